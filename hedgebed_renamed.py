@@ -146,7 +146,7 @@ _MODULES = {
             "summary_words=summary_parts"
         ),
         "vis.pictures": "arrows canvas frames meshes render scene sections stage tracks",
-        "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=pictures tumble_sweep=report",
+        "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=report tumble_sweep=report",
     },
 }
 """Package of before -> package of today -> its modules, `old=new` where the name is another, too."""

@@ -98,9 +98,9 @@ def test_the_set_down_has_a_scale_of_its_own(tmp_path, make_run):
     run = pictures.read_folder(folder)
     (folder / "frames/set_down-seed1.pvd").write_text((folder / "frames/driven-0.1-seed1.pvd").read_text())
     job, stills, _ = pictures._plan(run, (40, 30), None, [])
-    rest = next(view for view, still in zip(job["stills"], stills, strict=True) if "at rest" in still.title)
-    assert rest["top"] <= min(view["top"] for view in job["stills"] if view["by"] == "displacement")
-    tops = {view["top"] for view in job["stills"] if view["by"] == "displacement" and view is not rest}
+    rest = next(view for view, still in zip(job["views"], stills, strict=True) if "at rest" in still.title)
+    assert rest["top"] <= min(view["top"] for view in job["views"] if view["by"] == "displacement")
+    tops = {view["top"] for view in job["views"] if view["by"] == "displacement" and view is not rest}
     assert len(tops) == 1
 
 

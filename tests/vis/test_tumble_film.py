@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from vis.compare.report import _alike
-from vis.film.film import Sheet, run_film_job
+from vis.film.film import Sheet, film_times, moments, run_film_job
 from vis.film.reel import Reel
 from vis.pictures import arrows
 from vis.pictures.canvas import moved_since
@@ -16,7 +16,7 @@ from vis.pictures.frames import FrameWriter
 from vis.pictures.meshes import spike_mesh
 from vis.pictures.stage import Eye
 from vis.pictures.tracks import height_map
-from vis.tumble.pictures import _film_times, draw_tracks, moments
+from vis.tumble.report import draw_tracks
 
 LENGTH, SIZE = 0.04, (0.12, 0.03)
 
@@ -122,17 +122,19 @@ def test_two_runs_are_pictured_at_the_times_of_the_one_with_frames(folder, tmp_p
     for name in ("trajectory.csv", "result.json"):
         (law / name).write_bytes((folder / name).read_bytes())
     reels = [Reel.open(folder), Reel.open(law)]
-    for time in (*(moment[2] for moment in moments(reels)), *_film_times(reels)):
+    for time in (*(moment[2] for moment in moments(reels)), *film_times(reels)):
         assert reels[0].times[reels[0].nearest(time)] == pytest.approx(time, abs=1e-12)
         assert reels[1].times[reels[1].nearest(time)] == pytest.approx(time, abs=1.1e-3)
-    assert len(_film_times(reels)) == 11 and len(_film_times(reels[1:])) == 48
+    assert len(film_times(reels)) == 11 and len(film_times(reels[1:])) == 48
 
 
 def test_stills_film_and_tracks_are_drawn_without_opengl(folder):
     job = {
         "runs": [str(folder)], "labels": None, "by": "displacement",
-        "stills": [{"file": str(folder / "still.png"), "time": 1.0, "size": [640, 360]}],
-        "film": {"file": str(folder / "film.gif"), "times": [0.0, 0.5, 1.0], "size": [320, 180]},
+        "pictures": [
+            {"file": str(folder / "still.png"), "times": [1.0], "size": [640, 360]},
+            {"file": str(folder / "film.gif"), "times": [0.0, 0.5, 1.0], "size": [320, 180]},
+        ],
     }  # fmt: skip
     seen = []
     run_film_job(job, opengl=False, step=lambda: seen.append(1))

@@ -103,7 +103,7 @@ def _picture(report: Report) -> tuple[list[Block], str]:
         "cut": 0.5 * float(low[1] + high[1]), "radius": float(grains["radius"].mean()),
         "surface": float(result["bed"]["surface"]["value"]), "file": str(file), "size": [1600, 1200],
     }  # fmt: skip
-    job: PictureJob = {"folder": str(folder), "stills": [view], "animation": None}
+    job: PictureJob = {"folder": str(folder), "views": [view]}
     counter, flat = Counter([1.0], report.rest()), partial(run_job, job, opengl=False)
     stands_in = "a cross-section stands in for the picture"
     _, notes = carry_out(job, counter, flat, failed=stands_in, without=stands_in)

@@ -1,4 +1,4 @@
 """The report that sets two runs side by side.
 
-Imports `rigid`, `vis.film`, `vis.page`, `vis.pictures`, `vis.tumble`.
+Imports `rigid`, `vis.film`, `vis.page`, `vis.pictures`.
 """

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rigid.series import read_series
-from vis.film.film import ARROWS, draw_in_space, shown
-from vis.film.reel import NAME, Reel
+from vis.film.film import ARROWS, draw_runs, shown
+from vis.film.reel import NAME, AnyReel, Reel, SpaceReel
 from vis.page.folder import read_folder
 from vis.page.numbers import short
 from vis.page.page import (
@@ -32,7 +32,6 @@ from vis.page.plots import DASHED, Array, handle, legend_above, sheet
 from vis.page.states import LINES, States, draw_bands, legend_of_runs
 from vis.page.style import BED, GREY, INK, MODEL, as_it_lies
 from vis.pictures.frames import frame_names
-from vis.tumble.pictures import draw_tumbles, moments
 
 __all__ = ["write_compare_report"]
 
@@ -65,9 +64,9 @@ def write_compare_report(report: Report) -> Path:
 
 def _tumbles(report: Report, labels: Labels) -> list[Section]:
     """Figures and pictures of two tumbles."""
-    result, in_space = report.result, report.result["kind"] == "tumble spatial"
+    result = report.result
     path, states, *ground, energy = _figures(report, labels)
-    seen = (_seen_in_space if in_space else _seen)(report, labels) if result["pictures"] else []
+    seen = _seen(report, labels) if result["pictures"] else []
     return [
         Section("", [listing(result["departures"]["sentences"]), path]),
         *([Section("Seen side by side", seen)] if seen else []),
@@ -82,27 +81,18 @@ def _folders(report: Report) -> list[Path]:
 
 
 def _seen(report: Report, labels: Labels) -> list[Block]:
-    """Stills of both at the same moments, and the film."""
-    reels = _alike([Reel.open(folder) for folder in _folders(report)])
-    stills = [
-        (report.figures / f"seen-{name}.png", f"Both {words}", time,
-         "; ".join(f"{one}: {reel.line(reel.nearest(time))}" for one, reel in zip(labels, reels, strict=True)) + ".")
-        for name, words, time in moments(reels)
-    ]  # fmt: skip
-    film, by = report.folder / "film.gif", report.result["colour"]
-    drawn = draw_tumbles(reels, stills, film, by=by, labels=labels, progress=report.rest())
-    return [*shown(drawn, first=1), *(text(note, small=True) for note in drawn.notes)]
-
-
-def _seen_in_space(report: Report, labels: Labels) -> list[Block]:
-    """The same in space; where both have frames."""
+    """Stills of both at the same moments, and the film; in space where both have frames."""
     folders = _folders(report)
-    without = [label for label, folder in zip(labels, folders, strict=True) if NAME not in frame_names(folder)]
-    if without:
+    if report.result["kind"] != "tumble spatial":
+        reels: Sequence[AnyReel] = _alike([Reel.open(folder) for folder in folders])
+    elif without := [label for label, home in zip(labels, folders, strict=True) if NAME not in frame_names(home)]:
         return [text(f"There are no pictures: {' and '.join(without)} kept no frames (frame_count = 0).", small=True)]
-    by = report.result["colour"]
-    drawn = draw_in_space(folders, report.folder, stem="seen", by=by, film=True, labels=labels, progress=report.rest())
-    return [*shown(drawn), *(text(note, small=True) for note in (ARROWS, *drawn.notes))]
+    else:
+        reels = [SpaceReel(folder) for folder in folders]
+    by, in_plane = report.result["colour"], isinstance(reels[0], Reel)
+    drawn = draw_runs(reels, report.folder, "seen", by=by, labels=labels, progress=report.rest())
+    notes = drawn.notes if in_plane else [ARROWS, *drawn.notes]
+    return [*shown(drawn, first=int(in_plane)), *(text(note, small=True) for note in notes)]
 
 
 def _alike(reels: Sequence[Reel]) -> list[Reel]:

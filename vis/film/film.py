@@ -7,7 +7,6 @@ states over time with a cursor. `python -m vis.film.film <job.json>` draws a job
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 from vis.film.cameras import layout
 from vis.film.reel import AnyReel, Reel, SpaceReel
-from vis.page.page import Block, Progress, figure
+from vis.page.page import Block, Progress, capital, figure
 from vis.page.plots import Array
 from vis.page.sentences import Sentences
 from vis.page.states import state_strip
@@ -30,40 +29,34 @@ from vis.pictures.arrows import draw_force, draw_measure
 from vis.pictures.canvas import COLOURS, blank_page, colour_bar, colour_values, colourmap, pixels
 from vis.pictures.frames import Frame
 from vis.pictures.pictures import Counter, Picture, Pictures, carry_out
-from vis.pictures.render import replace_file, write_gif, write_png
+from vis.pictures.render import main, write_pictures
 from vis.pictures.stage import Stage
 
-__all__ = ["ARROWS", "MOST_FRAMES", "Sheet", "Stills", "draw_in_space", "draw_reels", "run_film_job", "shown"]
+__all__ = ["ARROWS", "MOST_FRAMES", "Sheet", "draw_runs", "film_times", "moments", "run_film_job", "shown"]
 
 say = Sentences(__package__)
 ARROWS = say("arrows")
 MOST_FRAMES = 48
-Stills = Sequence[tuple[Path, str, float, str]]
-"""Of each still: file, title, time [s], caption."""
+_WORDS = {"start": "when the torque begins", "half": "half way round", "end": "at the end"}
 
 
-class _Still(TypedDict):
-    file: str
-    time: float
-    size: Sequence[int]
+class _Picture(TypedDict):
+    """A still at one time [s], or a film at several, of a size [pixels]."""
 
-
-class _Film(TypedDict):
     file: str
     times: list[float]
     size: Sequence[int]
 
 
 class FilmJob(TypedDict):
-    """What a process of its own draws: runs by their folders, at times [s], in sizes [pixels]."""
+    """What a process of its own draws of runs, which are given by their folders."""
 
     runs: list[str]
     labels: list[str] | None
     by: str
-    stills: list[_Still]
-    film: _Film | None
+    pictures: list[_Picture]
     in_space: NotRequired[bool]
-    spikes: NotRequired[list[list[float]]]
+    spikes: NotRequired[list[tuple[float, float]]]
     """Of runs in the plane: diameter of a spike, its length out of the hull [m]."""
 
 
@@ -155,76 +148,92 @@ class Sheet:
         return np.asarray(self.map(self.norm(colour_values(frame.grains, self.by))))
 
 
-def draw_reels(
+def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> list[tuple[str, str, float, str]]:
+    """Name, title, time [s] and caption of the stills: the start, the middle of the way, the end.
+
+    Times at which the run with the fewest pictures has one, so that two runs, called `labels`, are shown at the same.
+    """
+    coarse, first = min(reels, key=len), reels[0]
+    if isinstance(first, SpaceReel):
+        end = min(float(reel.times[-1]) for reel in reels)
+        wanted = dict.fromkeys(float(coarse.times[coarse.nearest(time)]) for time in (0.0, 0.5 * end, end))
+        names = ("start", "middle", "end") if len(wanted) == 3 else ("start", "end")
+        seen = "Both platforms" if len(reels) == 2 else "The whole platform"
+        return [
+            (name, f"At the {name}", time, f"{seen}, seen along y from above, at {time:.4g} s.")
+            for name, time in zip(names, wanted, strict=False)
+        ]
+    end = min(float(reel.series["t_s"][-1]) for reel in reels)
+    turned = np.abs(first.series["theta_rad"] - first.series["theta_rad"][0])
+    half = float(first.series["t_s"][int(np.argmax(turned >= 0.5 * turned.max()))])
+    found = []
+    for (name, words), time in zip(_WORDS.items(), (0.0, min(half, end), end), strict=True):
+        at = float(coarse.times[coarse.nearest(time)])
+        lines = [reel.line(reel.nearest(at)) for reel in reels]
+        said = [f"{label}: {line}" for label, line in zip(labels, lines, strict=True)] if labels else lines
+        found.append((name, f"Both {words}" if labels else capital(words), at, "; ".join(said) + "."))
+    return found
+
+
+def film_times(reels: Sequence[AnyReel]) -> Array:
+    """When a film has a picture [s]: evenly over the longest run, and where the grains of the finest run have one."""
+    finest = max((reel for reel in reels if reel.frames is not None), key=len, default=None)
+    if isinstance(reels[0], SpaceReel):
+        assert finest is not None
+        chosen = np.unique(np.linspace(0, len(finest) - 1, min(MOST_FRAMES, len(finest))).round().astype(int))
+        later = {float(time) for reel in reels for time in reel.times if time > finest.times[-1]}  # of the longer run
+        return np.array([*finest.times[chosen], *sorted(later)])
+    end = max(float(reel.times[-1]) for reel in reels)
+    times = np.linspace(0.0, end, min(MOST_FRAMES, len(finest or max(reels, key=len))))
+    if finest is None:
+        return times
+    # The finest run's own times, so that a law beside it is drawn when the grains are; a longer law goes on alone.
+    own = [float(finest.times[finest.nearest(time)]) if time <= finest.times[-1] else float(time) for time in times]
+    return np.unique(own)
+
+
+def draw_runs(
     reels: Sequence[AnyReel],
-    stills: Stills,
-    film: Path | None,
-    times: Sequence[float],
+    home: Path,
+    stem: str,
     *,
     by: str,
-    about: str = "",
+    film: bool = True,
     labels: Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> Pictures:
-    """Stills and film of one or two runs, by OpenGL in a child process or flat.
+    """Draw figures/STEM-*.png and film.gif of one run or two of one kind, by OpenGL in a child process or flat.
 
-    ``film``: Its file; None: none is made. ``times``: Of its pictures [s]. ``about``: What its caption says after their
-    number.
+    ``home``: The folder that the pictures go to. ``stem``: How the stills' names begin. ``by``: What grains are
+    coloured by, a key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make the film. ``labels``: What to call
+    two runs. ``progress``: Called with the share that is done, 0 to 1.
     """
-    kind = reels[0]
+    kind, in_space = reels[0], isinstance(reels[0], SpaceReel)
+    told = moments(reels, labels)
+    stills = [Picture(home / "figures" / f"{stem}-{name}.png", title, said) for name, title, _, said in told]
+    pictures: list[_Picture] = [
+        {"file": str(still.file), "times": [time], "size": kind.still}
+        for still, (_, _, time, _) in zip(stills, told, strict=True)
+    ]
+    moving = None
+    if film:
+        times = film_times(reels).tolist()
+        pictures.append({"file": str(home / "film.gif"), "times": times, "size": kind.film})
+        about = "" if in_space else f" of {times[-1]:.3g} s"
+        caption = f"{len(times)} pictures{about}; the camera follows, the colours keep their scale."
+        moving = Picture(home / "film.gif", "The film", caption)
     job: FilmJob = {
         "runs": [str(reel.folder) for reel in reels],
         "labels": list(labels) if labels else None,
         "by": by,
-        "stills": [{"file": str(file), "time": time, "size": kind.still} for file, _, time, _ in stills],
-        "film": {"file": str(film), "times": list(times), "size": kind.film} if film else None,
-        "in_space": isinstance(kind, SpaceReel),
+        "pictures": pictures,
+        "in_space": in_space,
+        "spikes": [reel.spikes for reel in reels if isinstance(reel, Reel)],
     }
-    job["spikes"] = [list(reel.spikes) for reel in reels if isinstance(reel, Reel)]
-    moving = None
-    if film:
-        caption = f"{len(times)} pictures{about}; the camera follows, the colours keep their scale."
-        moving = Picture(film, "The film", caption)
-    counter = Counter([1.0] * (len(stills) + (len(times) if film else 0)), progress)
+    counter = Counter([1.0] * sum(len(picture["times"]) for picture in pictures), progress)
     flat = partial(run_film_job, job, opengl=False, step=counter.step)
     method, note = carry_out(job, counter, flat, module="vis.film.film", failed=kind.failed, without=kind.without)
-    return Pictures([Picture(file, title, said) for file, title, _, said in stills], moving, method, note)
-
-
-def draw_in_space(
-    folders: Sequence[Path],
-    home: Path,
-    *,
-    stem: str,
-    by: str,
-    film: bool,
-    progress: Progress,
-    labels: Sequence[str] | None = None,
-) -> Pictures:
-    """Draw figures/STEM-start.png, -middle, -end and film.gif in `home`, by OpenGL in a child process or flat.
-
-    ``folders``: One run folder or two, all with frames. ``home``: Where the pictures go. ``stem``: How the stills'
-    names begin. ``by``: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make
-    the film. ``progress``: Called with the share that is done, 0 to 1. ``labels``: What to call two runs.
-    """
-    reels = [SpaceReel(folder) for folder in folders]
-    coarse, fine = (of(reels, key=len).times for of in (min, max))
-    end = min(float(reel.times[-1]) for reel in reels)
-    # Moments at which the run with the fewest frames has one, so that two are shown at the same.
-    moments = dict.fromkeys(float(coarse[np.argmin(np.abs(coarse - time))]) for time in (0.0, 0.5 * end, end))
-    names = ("start", "middle", "end") if len(moments) == 3 else ("start", "end")
-    seen = "Both platforms" if len(folders) == 2 else "The whole platform"
-    stills = [
-        (home / "figures" / f"{stem}-{name}.png", f"At the {name}", time,
-         f"{seen}, seen along y from above, at {time:.4g} s.")
-        for name, time in zip(names, moments, strict=False)
-    ]  # fmt: skip
-    chosen = np.unique(np.linspace(0, len(fine) - 1, min(MOST_FRAMES, len(fine))).round().astype(int))
-    later = sorted({float(time) for reel in reels for time in reel.times if time > fine[-1]})  # of the longer run
-    times = [*fine[chosen].tolist(), *later]
-    return draw_reels(
-        reels, stills, home / "film.gif" if film else None, times, by=by, labels=labels, progress=progress
-    )
+    return Pictures(stills, moving, method, note)
 
 
 def shown(drawn: Pictures, *, first: int = 0) -> list[Block]:
@@ -247,7 +256,7 @@ def run_film_job(job: FilmJob, *, opengl: bool, step: Callable[[], None] = lambd
             for folder, like in zip(job["runs"], spikes, strict=True)
         ]
     )
-    sheets: dict[tuple[int, int], Sheet] = {}
+    sheets: dict[tuple[int, ...], Sheet] = {}
 
     def draw(size: Sequence[int], time: float) -> NDArray[np.uint8]:
         key = (int(size[0]), int(size[1]))
@@ -256,27 +265,13 @@ def run_film_job(job: FilmJob, *, opengl: bool, step: Callable[[], None] = lambd
         return sheets[key].draw(time)
 
     try:
-        for still in job["stills"]:
-            replace_file(Path(still["file"]), partial(write_png, draw(still["size"], still["time"])))
-            step()
-        if film := job.get("film"):
-            images = []
-            for time in film["times"]:
-                images.append(draw(film["size"], time))
-                step()
-            replace_file(Path(film["file"]), partial(write_gif, images=images, frame_ms=100))
+        for picture in job["pictures"]:
+            images = (draw(picture["size"], time) for time in picture["times"])
+            write_pictures(Path(picture["file"]), images, step, frame_ms=100)
     finally:
         for each in sheets.values():
             each.close()
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Carry out the job in the file that is named; exit status 0."""
-    (name,) = sys.argv[1:] if arguments is None else arguments
-    job: FilmJob = json.loads(Path(name).read_text(encoding="utf-8"))
-    run_film_job(job, opengl=True, step=lambda: print("done", flush=True))
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(run_film_job))

@@ -10,11 +10,10 @@ from __future__ import annotations
 import functools
 import json
 import os
-import queue
+import select
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -107,13 +106,13 @@ def make_pictures(
     run = read_folder(folder)
     notes: list[str] = []
     job, stills, animation = _plan(run, size, animation_size if animate else None, notes)
-    if not job["stills"]:
+    if not stills:
         return Pictures(method="none", notes=[*notes, "There are no frames to draw pictures of."])
-    moving = len(job["animation"]["frames"]) if job["animation"] else 0
-    counter = Counter([_STILL_COSTS] * len(job["stills"]) + [1.0] * moving, progress)
+    costs = [1.0 if view["file"].endswith(".gif") else _STILL_COSTS for view in job["views"] for _ in view["frames"]]
+    counter = Counter(costs, progress)
 
     def flat() -> None:
-        for view in filter(None, [*job["stills"], job["animation"]]):
+        for view in job["views"]:
             view["note"] = view["note"].replace(_CUT, _SLAB)
         run_job(job, opengl=False, step=counter.step)
 
@@ -173,42 +172,30 @@ def render_apart(
     with tempfile.TemporaryDirectory() as scratch:
         file, log = Path(scratch) / "job.json", Path(scratch) / "errors.txt"
         file.write_text(json.dumps(job), encoding="utf-8")
-        with log.open("w") as errors:
-            child = subprocess.Popen(
-                [sys.executable, "-m", module, str(file)],
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                env=environment,
-                text=True,
-            )
-            lines: queue.SimpleQueue[str] = queue.SimpleQueue()
-            reader = threading.Thread(target=_pass_on, args=(child, lines), daemon=True)
-            reader.start()
+        command = [sys.executable, "-m", module, str(file)]
+        with (
+            log.open("w") as errors,
+            subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment) as child,
+        ):
+            assert child.stdout is not None
+            pipe = child.stdout.fileno()
             try:
-                while line := lines.get(timeout=stall):
-                    if line.strip() == "done":
+                while ready := select.select([pipe], [], [], stall)[0]:
+                    if not (said := os.read(pipe, 65536)):
+                        break
+                    for _ in range(said.split().count(b"done")):
                         step()
+                if not ready:
+                    return f"no picture within {stall:g} s"
                 child.wait(timeout=stall)
-            except (queue.Empty, subprocess.TimeoutExpired):
+            except subprocess.TimeoutExpired:
                 return f"no picture within {stall:g} s"
             finally:
-                if child.poll() is None:
-                    child.kill()
-                    child.wait()
-                reader.join(timeout=5.0)
-                if child.stdout is not None:
-                    child.stdout.close()
+                child.kill()
         if child.returncode == 0:
             return None
-        said = log.read_text(errors="replace").strip().splitlines()
-        return f"exit status {child.returncode}" + (f", {said[-1][:200]}" if said else "")
-
-
-def _pass_on(child: subprocess.Popen[str], lines: queue.SimpleQueue[str]) -> None:
-    assert child.stdout is not None
-    for line in child.stdout:
-        lines.put(line)
-    lines.put("")
+        lines = log.read_text(errors="replace").strip().splitlines()
+        return f"exit status {child.returncode}" + (f", {lines[-1][:200]}" if lines else "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,7 +293,7 @@ def _plan(
             continue
         if story is not None:
             stories.append(story)
-    job: PictureJob = {"folder": str(run.path), "stills": [], "animation": None}
+    job: PictureJob = {"folder": str(run.path), "views": []}
     chosen = _choose(stories)
     if not chosen:
         return job, [], None
@@ -320,7 +307,7 @@ def _plan(
         if len(stills) >= _STILLS:
             return
         file = figures / f"bed-{story.name}-{moment}.png"
-        job["stills"].append(_view(run, story, [index], by, upper, file, size))
+        job["views"].append(_view(run, story, [index], by, upper, file, size))
         said = f"{story.line(index)}.".replace("\n", ", ").replace("bed ", "Bed ", 1)
         stills.append(Picture(file, f"{story.title}: {words}", said))
 
@@ -347,7 +334,7 @@ def _plan(
     if animation_size is not None and len(main.frames) > 1:
         frames = np.unique(np.linspace(0, last, min(len(main.frames), _ANIMATED)).round().astype(int)).tolist()
         file = run.path / "animation.gif"
-        job["animation"] = _view(run, main, frames, "displacement", top, file, animation_size)
+        job["views"].append(_view(run, main, frames, "displacement", top, file, animation_size))
         animation = Picture(file, f"{main.title}: from the first frame to the last", f"{len(frames)} frames.")
     return job, stills, animation
 

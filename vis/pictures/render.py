@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from vis.pictures.frames import read_frames
 from vis.pictures.scene import Scene
 from vis.pictures.sections import Section
 
-__all__ = ["PictureJob", "View", "main", "replace_file", "run_job", "write_gif", "write_png"]
+__all__ = ["PictureJob", "View", "main", "run_job", "write_gif", "write_pictures"]
 
 
 class View(TypedDict):
@@ -51,8 +50,7 @@ class PictureJob(TypedDict):
     """Pictures of the frames in a run folder."""
 
     folder: str
-    stills: list[View]
-    animation: View | None
+    views: list[View]
 
 
 _GIF_LIMIT = 5_500_000  # bytes
@@ -68,17 +66,24 @@ def run_job(job: PictureJob, *, opengl: bool, step: Callable[[], None] = lambda:
     ``job``: Its views, with lengths in m and sizes in pixels. ``opengl``: With `vis.pictures.scene`, else with
     `vis.pictures.sections`. ``step``: Called after each frame.
     """
-    folder = Path(job["folder"])
-    for view in job["stills"]:
-        for image in _images(folder, view, opengl):
-            replace_file(Path(view["file"]), partial(write_png, image))
-            step()
-    if moving := job.get("animation"):
-        images = []
-        for image in _images(folder, moving, opengl):
-            images.append(image)
-            step()
-        replace_file(Path(moving["file"]), partial(write_gif, images=images))
+    for view in job["views"]:
+        write_pictures(Path(view["file"]), _images(Path(job["folder"]), view, opengl), step)
+
+
+def write_pictures(file: Path, images: Iterable[NDArray[np.uint8]], step: Callable[[], None], **options: Any) -> None:
+    """Write a picture as PNG, or several as a GIF with the options of `write_gif`; `step` is called after each."""
+    drawn = []
+    for image in images:
+        drawn.append(image)
+        step()
+    moving = file.suffix == ".gif"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    temporary = file.with_name(file.name + ".part")
+    if moving:
+        write_gif(temporary, drawn, **options)
+    else:
+        Image.fromarray(drawn[0]).save(temporary, "PNG")
+    temporary.replace(file)
 
 
 def _images(folder: Path, view: View, opengl: bool) -> Iterator[NDArray[np.uint8]]:
@@ -152,23 +157,12 @@ def _with_scale(image: Image.Image) -> Image.Image:
     return Image.fromarray(np.concatenate([np.asarray(image), strip], axis=1))
 
 
-def write_png(image: NDArray[np.uint8], path: Path) -> None:
-    Image.fromarray(image).save(path, "PNG")
-
-
-def replace_file(path: Path, write: Callable[[Path], None]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    write(temporary)
-    temporary.replace(path)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Carry out the job in the file that is named; exit status 0."""
-    (name,) = sys.argv[1:] if arguments is None else arguments
-    run_job(json.loads(Path(name).read_text(encoding="utf-8")), opengl=True, step=lambda: print("done", flush=True))
+def main(run: Callable[..., None]) -> int:
+    """Carry out the job in the file that the command line names, with OpenGL; exit status 0."""
+    (name,) = sys.argv[1:]
+    run(json.loads(Path(name).read_text(encoding="utf-8")), opengl=True, step=lambda: print("done", flush=True))
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(run_job))

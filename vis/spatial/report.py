@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vis.film.film import ARROWS, draw_in_space, shown
-from vis.film.reel import NAME
+from vis.film.film import ARROWS, draw_runs, shown
+from vis.film.reel import NAME, SpaceReel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity
 from vis.page.page import Block, Report, Result, Section, Tile, again, given, listing, report_of, text
@@ -50,7 +50,7 @@ def write_spatial_report(
         drawn.append(report.draw(key, drawing))
     seen = []
     if pictures and NAME in frame_names(home):
-        made = draw_in_space([home], home, stem="space", by=colour, film=film, progress=report.rest())
+        made = draw_runs([SpaceReel(home)], home, "space", by=colour, film=film, progress=report.rest())
         seen = [Section("Seen", [*shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)])]
     told = result.get("transitions")  # an older folder has none
     sections = [

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
-from vis.film.film import shown
+from vis.film.film import draw_runs, shown
+from vis.film.reel import Reel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity, short
 from vis.page.page import (
@@ -35,14 +37,17 @@ from vis.page.plots import DASHED, DOTTED, Array, handle, legend_above, sheet
 from vis.page.sentences import Sentences
 from vis.page.states import States, by_state, draw_states, legend_of_states, panels, passages
 from vis.page.style import BED, GREY, INK, MODEL, STATES
+from vis.pictures.canvas import COLOURS, nice_above
+from vis.pictures.pictures import Picture
 from vis.tumble.beside import HEAD
 from vis.tumble.grains import grains_section
-from vis.tumble.pictures import make_tumble_pictures
 
-__all__ = ["write_tumble_report"]
+__all__ = ["draw_tracks", "write_tumble_report"]
 
 say = Sentences(__package__)
 Columns = Mapping[str, Array]
+_LONGEST_MAP = 40.0
+"""Length over width of a map that is drawn to scale."""
 _FOLLOWED = 1.2
 """How far from its start the animation follows the centre [m]."""
 _JOULES = (("mJ", 1.0), ("µJ", 1e3), ("nJ", 1e6), ("pJ", 1e9), ("fJ", 1e12))
@@ -88,9 +93,7 @@ def write_tumble_report(
     if "grains" in result:
         sections.insert(1, grains_section(report))
     if pictures if pictures is not None else "grains" in result and (home / "frames" / "tumble.pvd").exists():
-        seen = make_tumble_pictures(home, by=colour, film=film, progress=report.rest())
-        notes = [text(say("camera"), small=True), *(text(note) for note in seen.notes)]
-        sections.insert(1, Section("Seen from near", [*shown(seen), *notes]))
+        sections.insert(1, _seen(report, colour, film))
     lead = ["tumble", f"{result['duration']:g} s", f"{len(numbers['t_s'])} rows"]
     return report.write(sections, lead=lead, tiles=_tiles(result))
 
@@ -105,6 +108,18 @@ def _settled(result: Result) -> Block:
         f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}. "
         f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}.",
     )
+
+
+def _seen(report: Report, colour: str, film: bool) -> Section:
+    """The platform on its ground, which is a block where there are no frames; the tracks that it leaves in a bed."""
+    if colour not in COLOURS:
+        raise ValueError(f"colour is {colour!r}; it must be one of {', '.join(COLOURS)}")
+    reel = Reel.open(report.folder)
+    drawn = draw_runs([reel], report.folder, "tumble", by=colour, film=film, progress=report.rest())
+    if reel.frames is not None and "surface" in reel.frame(len(reel) - 1).maps:
+        drawn.stills.append(draw_tracks(reel, report.figures / "tracks.png"))
+    notes = [text(say("camera"), small=True), *(text(note) for note in drawn.notes)]
+    return Section("Seen from near", [*shown(drawn), *notes])
 
 
 def _tiles(result: Result) -> list[Tile]:
@@ -239,6 +254,45 @@ def _animate(path: Path, result: Result, numbers: Columns, states: States) -> Pa
     pause = int(round(1000 * time[-1] / max(1, len(rows) - 1) / 10) * 10)
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=max(20, pause), loop=0, optimize=False)
     return path
+
+
+def draw_tracks(reel: Reel, file: Path) -> Picture:
+    """What the platform has left in the bed: the change of its surface at the end, from above, and along the spikes."""
+    assert reel.frames is not None
+    last = reel.frame(len(reel) - 1)
+    grid = last.maps["surface"]
+    change = 1e3 * np.asarray(grid.fields["change"], dtype=float)
+    x = 1e3 * (grid.origin[0] + grid.spacing[0] * np.arange(change.shape[1]) - reel.origin[0])
+    y = 1e3 * (grid.origin[1] + grid.spacing[1] * np.arange(change.shape[0]) - reel.cut)
+    # Single grains that roll count less than what a spike's width of them did.
+    most = nice_above(float(np.percentile(np.abs(change), 99.5)))
+    drawing, ((above,), (along,)) = sheet(2, 1, 4.6, sharex=True, height_ratios=(1.0, 1.3))
+    picture = above.pcolormesh(x, y, change, norm=TwoSlopeNorm(0.0, -most, most), cmap="RdBu", rasterized=True)
+    if np.ptp(x) <= _LONGEST_MAP * np.ptp(y):
+        above.set(aspect="equal", ylabel="across [mm]")
+    else:  # in its true shape it would be a thread
+        above.set_ylabel("across [mm], stretched")
+    above.grid(False)
+    bar = drawing.colorbar(picture, ax=[above, along], shrink=0.6, extend="both")
+    bar.set_label("change of the surface's height [mm]")
+    wide = max(reel.spikes[0], 2.0 * float(grid.spacing[1]))  # of the strip [m]: two columns of the map at least
+    strip = np.abs(y) <= 0.5e3 * wide
+    ages = colormaps["viridis_r"]
+    for index in np.unique(np.linspace(1, len(reel) - 1, 4).round().astype(int)):
+        now = reel.frame(int(index))
+        mean = 1e3 * np.asarray(now.maps["surface"].fields["change"], dtype=float)[strip].mean(axis=0)
+        colour = ages(0.15 + 0.8 * (index / (len(reel) - 1)))
+        along.plot(x, mean, lw=1.2, label=f"{reel.times[index]:.2f} s", color=colour)
+    along.axhline(0.0, color=INK, lw=0.8, ls=(0, (5, 4)))
+    along.set(xlabel="x from the start of the platform's centre [mm]", ylabel="mean under the spikes [mm]")
+    legend_above(drawing, along.lines[:-1], 4)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    drawing.savefig(file, dpi=130)
+    caption = (
+        "Above: by how much the top of the grains has risen or fallen since the torque began, from above, at the end. "
+        f"Below: the same, mean over {1e3 * wide:.3g} mm across the spikes' way, at four times."
+    )
+    return Picture(file, "The tracks", caption)
 
 
 # A sweep: figure and table of sweep.csv ------------------------------------------------------------------------------
