@@ -145,7 +145,7 @@ _MODULES = {
             "amended=report plot_drag plot_drops plot_parts plots=report summary summary_tables=summary_parts "
             "summary_words=summary_parts"
         ),
-        "vis.pictures": "arrows canvas frames meshes render scene sections stage tracks",
+        "vis.pictures": "arrows canvas frames meshes render scene sections stage=scene tracks",
         "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=report tumble_sweep=report",
     },
 }

@@ -14,7 +14,7 @@ from vis.pictures import arrows
 from vis.pictures.canvas import moved_since
 from vis.pictures.frames import FrameWriter
 from vis.pictures.meshes import spike_mesh
-from vis.pictures.stage import Eye
+from vis.pictures.scene import Eye
 from vis.pictures.tracks import height_map
 from vis.tumble.report import draw_tracks
 
@@ -70,7 +70,7 @@ def test_a_length_is_the_same_all_over_the_picture():
 
 
 def test_the_camera_follows_and_the_scale_stays_put(folder):
-    reel = Reel.open(folder)
+    reel = Reel(folder)
     assert reel.surface == pytest.approx(0.01, abs=1e-6) and reel.cut == pytest.approx(0.015, abs=1e-6)
     sheet = Sheet([reel], (320, 180), by="displacement", opengl=False)
     whole, near = sheet.ways
@@ -105,7 +105,7 @@ def test_spikes_and_hull_are_drawn_as_thick_and_long_as_the_run_has_them(folder,
     law = tmp_path_factory.mktemp("law")
     (law / "trajectory.csv").write_bytes((folder / "trajectory.csv").read_bytes())
     (law / "result.json").write_text(json.dumps({key: value for key, value in told.items() if key != "grains"}))
-    grains, alone = Reel.open(folder), Reel.open(law)
+    grains, alone = Reel(folder), Reel(law)
     beside = _alike([grains, alone])[1]
     assert grains.spikes == beside.spikes == (8e-3, 0.015)
     assert alone.spikes == pytest.approx((0.0024, 0.008))
@@ -121,7 +121,7 @@ def test_two_runs_are_pictured_at_the_times_of_the_one_with_frames(folder, tmp_p
     law = tmp_path_factory.mktemp("law")
     for name in ("trajectory.csv", "result.json"):
         (law / name).write_bytes((folder / name).read_bytes())
-    reels = [Reel.open(folder), Reel.open(law)]
+    reels = [Reel(folder), Reel(law)]
     for time in (*(moment[2] for moment in moments(reels)), *film_times(reels)):
         assert reels[0].times[reels[0].nearest(time)] == pytest.approx(time, abs=1e-12)
         assert reels[1].times[reels[1].nearest(time)] == pytest.approx(time, abs=1.1e-3)
@@ -130,7 +130,7 @@ def test_two_runs_are_pictured_at_the_times_of_the_one_with_frames(folder, tmp_p
 
 def test_stills_film_and_tracks_are_drawn_without_opengl(folder):
     job = {
-        "runs": [str(folder)], "labels": None, "by": "displacement",
+        "runs": [(str(folder), Reel(folder).spikes)], "labels": None, "by": "displacement",
         "pictures": [
             {"file": str(folder / "still.png"), "times": [1.0], "size": [640, 360]},
             {"file": str(folder / "film.gif"), "times": [0.0, 0.5, 1.0], "size": [320, 180]},
@@ -145,7 +145,7 @@ def test_stills_film_and_tracks_are_drawn_without_opengl(folder):
     assert red[:, 280:580].sum() > 60
     with Image.open(folder / "film.gif") as film:
         assert film.n_frames == 3
-    tracks = draw_tracks(Reel.open(folder), folder / "tracks.png")
+    tracks = draw_tracks(Reel(folder), folder / "tracks.png")
     assert tracks.file.stat().st_size > 5000
 
 
@@ -172,7 +172,7 @@ def with_force(monkeypatch, x, force):
 @pytest.mark.parametrize("aside", [0.0, 6.0])
 def test_the_arrow_of_four_weights_is_cut_at_the_edge_and_says_its_number(folder, monkeypatch, aside):
     """Its head would lie outside the picture: longer than that of one weight, up to the edge, with `8.00 N`."""
-    sheet = Sheet([Reel.open(folder)], (640, 360), by="displacement", opengl=False)
+    sheet = Sheet([Reel(folder)], (640, 360), by="displacement", opengl=False)
     said, x = [], sheet.ways[1][0, 0]
     monkeypatch.setattr(arrows, "_say", lambda axis, end, words: said.append((*end, words)))
     reds = []

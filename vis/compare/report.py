@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,7 +83,7 @@ def _seen(report: Report, labels: Labels) -> list[Block]:
     """Stills of both at the same moments, and the film; in space where both have frames."""
     folders = _folders(report)
     if report.result["kind"] != "tumble spatial":
-        reels: Sequence[AnyReel] = _alike([Reel.open(folder) for folder in folders])
+        reels: Sequence[AnyReel] = _alike([Reel(folder) for folder in folders])
     elif without := [label for label, home in zip(labels, folders, strict=True) if NAME not in frame_names(home)]:
         return [text(f"There are no pictures: {' and '.join(without)} kept no frames (frame_count = 0).", small=True)]
     else:
@@ -99,7 +98,7 @@ def _alike(reels: Sequence[Reel]) -> list[Reel]:
     """A law knows points only: beside a run on grains of spikes as long its platform is drawn with that one's."""
     known = [reel for reel in reels if reel.frames is not None]
     return [
-        replace(reel, like=known[0].spikes)
+        Reel(reel.folder, like=known[0].spikes)
         if reel.frames is None and known and known[0].number("spike_length") == reel.number("spike_length")
         else reel
         for reel in reels

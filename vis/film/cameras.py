@@ -14,7 +14,8 @@ from vis.page.plots import Array
 from vis.page.style import INK
 from vis.pictures.arrows import HALO
 from vis.pictures.frames import Frame
-from vis.pictures.stage import Eye, FlatStage, Stage
+from vis.pictures.scene import Eye, Stage
+from vis.pictures.sections import FlatStage
 
 __all__ = ["Camera", "Panel", "layout"]
 

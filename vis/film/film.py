@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NotRequired, TypedDict
+from typing import TypedDict
 
 import numpy as np
 from matplotlib.colors import Normalize
@@ -30,7 +30,6 @@ from vis.pictures.canvas import COLOURS, blank_page, colour_bar, colour_values, 
 from vis.pictures.frames import Frame
 from vis.pictures.pictures import Counter, Picture, Pictures, carry_out
 from vis.pictures.render import main, write_pictures
-from vis.pictures.stage import Stage
 
 __all__ = ["ARROWS", "MOST_FRAMES", "Sheet", "draw_runs", "film_times", "moments", "run_film_job", "shown"]
 
@@ -49,15 +48,13 @@ class _Picture(TypedDict):
 
 
 class FilmJob(TypedDict):
-    """What a process of its own draws of runs, which are given by their folders."""
+    """What a process of its own draws."""
 
-    runs: list[str]
+    runs: list[tuple[str, tuple[float, float] | None]]
+    """Folder, and in the plane the diameter of a spike and its length out of the hull [m]; None: a run in space."""
     labels: list[str] | None
     by: str
     pictures: list[_Picture]
-    in_space: NotRequired[bool]
-    spikes: NotRequired[list[tuple[float, float]]]
-    """Of runs in the plane: diameter of a spike, its length out of the hull [m]."""
 
 
 class Sheet:
@@ -117,8 +114,7 @@ class Sheet:
     def close(self) -> None:
         """Free the windows."""
         for stage in self.stages:
-            if isinstance(stage, Stage):
-                stage.close()
+            stage.close()
 
     def _panel(self, sheet: Figure, number: int, time: float) -> None:
         """One picture: ground and platform, what its camera draws over them, forces."""
@@ -129,11 +125,7 @@ class Sheet:
         axis = sheet.add_axes(panel.place)
         axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), autoscale_on=False, xticks=[], yticks=[])
         axis.grid(False)
-        if isinstance(stage, Stage):
-            image = stage.render(frame, self._colours(frame), focus)
-            axis.imshow(image, extent=(0.0, 1.0, 0.0, 1.0), aspect="auto", interpolation="nearest")
-        else:
-            stage.draw(axis, frame, self._colours(frame), focus)
+        stage.draw(axis, frame, self._colours(frame), focus)
         camera.dress(axis, reel, stage, frame, focus)
         if camera.arrow:
             long = camera.arrow * stage.height / self.weight  # [m/N]
@@ -208,7 +200,7 @@ def draw_runs(
     coloured by, a key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make the film. ``labels``: What to call
     two runs. ``progress``: Called with the share that is done, 0 to 1.
     """
-    kind, in_space = reels[0], isinstance(reels[0], SpaceReel)
+    kind = reels[0]
     told = moments(reels, labels)
     stills = [Picture(home / "figures" / f"{stem}-{name}.png", title, said) for name, title, _, said in told]
     pictures: list[_Picture] = [
@@ -219,16 +211,14 @@ def draw_runs(
     if film:
         times = film_times(reels).tolist()
         pictures.append({"file": str(home / "film.gif"), "times": times, "size": kind.film})
-        about = "" if in_space else f" of {times[-1]:.3g} s"
+        about = "" if isinstance(kind, SpaceReel) else f" of {times[-1]:.3g} s"
         caption = f"{len(times)} pictures{about}; the camera follows, the colours keep their scale."
         moving = Picture(home / "film.gif", "The film", caption)
     job: FilmJob = {
-        "runs": [str(reel.folder) for reel in reels],
+        "runs": [(str(reel.folder), reel.spikes if isinstance(reel, Reel) else None) for reel in reels],
         "labels": list(labels) if labels else None,
         "by": by,
         "pictures": pictures,
-        "in_space": in_space,
-        "spikes": [reel.spikes for reel in reels if isinstance(reel, Reel)],
     }
     counter = Counter([1.0] * sum(len(picture["times"]) for picture in pictures), progress)
     flat = partial(run_film_job, job, opengl=False, step=counter.step)
@@ -247,21 +237,16 @@ def shown(drawn: Pictures, *, first: int = 0) -> list[Block]:
 
 def run_film_job(job: FilmJob, *, opengl: bool, step: Callable[[], None] = lambda: None) -> None:
     """Draw every picture of a job; `step` is called after each."""
-    spikes: Sequence[Any] = job.get("spikes") or [None] * len(job["runs"])
-    reels: list[AnyReel] = (
-        [SpaceReel(folder) for folder in job["runs"]]
-        if job.get("in_space")
-        else [
-            Reel.open(folder, like=None if like is None else (float(like[0]), float(like[1])))
-            for folder, like in zip(job["runs"], spikes, strict=True)
-        ]
-    )
+    reels: list[AnyReel] = [
+        SpaceReel(folder) if spikes is None else Reel(folder, like=(spikes[0], spikes[1]))
+        for folder, spikes in job["runs"]
+    ]
     sheets: dict[tuple[int, ...], Sheet] = {}
 
     def draw(size: Sequence[int], time: float) -> NDArray[np.uint8]:
         key = (int(size[0]), int(size[1]))
         if key not in sheets:
-            sheets[key] = Sheet(reels, key, by=job["by"], opengl=opengl, labels=job.get("labels"))
+            sheets[key] = Sheet(reels, key, by=job["by"], opengl=opengl, labels=job["labels"])
         return sheets[key].draw(time)
 
     try:

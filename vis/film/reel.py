@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -42,12 +41,6 @@ class _Filmed:
     ``frames``: Its frames; None: the ground is a law that has none.
     """
 
-    folder: Path
-    result: Result
-    series: Mapping[str, Array]
-    states: NDArray[np.str_]
-    times: Array
-    frames: Frames | None
     still: ClassVar[tuple[int, int]]
     """Size of its still pictures [pixels]."""
     film: ClassVar[tuple[int, int]]
@@ -58,6 +51,13 @@ class _Filmed:
     failed: ClassVar[str]
     without: ClassVar[str]
     """What to say where OpenGL failed, and where there is none."""
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self.result: Result = json.loads((self.folder / "result.json").read_text(encoding="utf-8"))
+        self.series, self.states = read_columns(self.folder / "trajectory.csv")
+        self.frames = read_frames(self.folder, NAME) if NAME in frame_names(self.folder) else None
+        self.times: Array = np.zeros(0) if self.frames is None else np.asarray(self.frames.times)
 
     def __len__(self) -> int:
         return len(self.times)
@@ -111,13 +111,6 @@ class SpaceReel(_Filmed):
     failed, without = "flat pictures stand in", "flat ones stand in for them"
     frames: Frames
 
-    def __init__(self, folder: str | Path) -> None:
-        self.folder = Path(folder)
-        self.result = json.loads((self.folder / "result.json").read_text(encoding="utf-8"))
-        self.series, self.states = read_columns(self.folder / "trajectory.csv")
-        self.frames = read_frames(self.folder, NAME)
-        self.times = np.asarray(self.frames.times)
-
     @property
     def called(self) -> str:
         """Its title."""
@@ -154,37 +147,21 @@ class SpaceReel(_Filmed):
         return replace(found, grains=self.grains(found))
 
 
-@dataclass(frozen=True)
 class Reel(_Filmed):
-    """A run in the plane to be pictured; on a law without frames.
+    """A run in the plane to be pictured; on a law without frames, with `count` pictures to choose from.
 
-    `like` is what `spikes` is where the folder does not say, as on a law: of the run that it stands beside.
+    `like` is what `spikes` is where the folder does not say, as on a law: of the run that it stands beside. Raises
+    FileNotFoundError: there is no trajectory.csv or result.json.
     """
 
     still, film, bar, least = (1920, 1080), (1280, 720), (0.925, 0.27, 0.012, 0.5), 1.0
     failed, without = "cross-sections stand in for the pictures", "cross-sections stand in for them"
-    folder: Path
-    result: Result
-    series: Mapping[str, Array]
-    states: NDArray[np.str_]
-    times: Array
-    frames: Frames | None
-    like: tuple[float, float] | None = None
 
-    @classmethod
-    def open(cls, folder: str | Path, *, count: int = 500, like: tuple[float, float] | None = None) -> Reel:
-        """Of the tumble in a run folder; on a law with `count` pictures to choose from.
-
-        Raises FileNotFoundError: there is no trajectory.csv or result.json.
-        """
-        home = Path(folder)
-        result = json.loads((home / "result.json").read_text(encoding="utf-8"))
-        series, states = read_columns(home / "trajectory.csv")
-        if NAME in frame_names(home):
-            frames = read_frames(home, NAME)
-            return cls(home, result, series, states, np.asarray(frames.times), frames, like)
-        end = float(series["t_s"][-1])
-        return cls(home, result, series, states, np.linspace(0.0, end, max(2, count)), None, like)
+    def __init__(self, folder: str | Path, *, count: int = 500, like: tuple[float, float] | None = None) -> None:
+        super().__init__(folder)
+        self.like = like
+        if self.frames is None:
+            self.times = np.linspace(0.0, float(self.series["t_s"][-1]), max(2, count))
 
     def line(self, index: int) -> str:
         """Time, angle, state, as a picture says it."""

@@ -8,7 +8,6 @@ the page from its lower left corner.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,13 +17,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from vis.page.style import INK, styled
 
 __all__ = [
-    "COLOURS", "Caption", "ColourScale", "Page", "blank_page", "colour_bar", "colour_values", "colourmap",
-    "moved_since", "nice_above", "pixels",
+    "COLOURS", "Page", "blank_page", "colour_bar", "colour_values", "colourmap", "moved_since", "nice_above", "pixels",
 ]  # fmt: skip
 
 #: What grains are coloured by: name -> (label with unit, factor from SI).
@@ -35,29 +33,6 @@ COLOURS: dict[str, tuple[str, float]] = {
     "coordination": ("contacts of the grain [1]", 1.0),
 }
 Place = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-
-
-@dataclass(frozen=True)
-class ColourScale:
-    """A colour scale that stays the same over the pictures it is used for.
-
-    ``by``: A key of `COLOURS`. ``top``: Upper end of the scale, in the unit of its label; the lower end is 0.
-    """
-
-    by: str
-    top: float
-
-    @property
-    def label(self) -> str:
-        return COLOURS[self.by][0]
-
-
-@dataclass(frozen=True)
-class Caption:
-    """The words on a picture: a title and a few short lines of numbers below it."""
-
-    title: str
-    lines: str
 
 
 def colourmap() -> Colormap:
@@ -104,53 +79,48 @@ def nice_above(value: float) -> float:
 
 
 class Page:
-    """A page of 4:3 for pictures that share a colour scale.
+    """A page of 4:3 for pictures that share a colour scale, which begins at 0.
 
-    ``size``: Width and height [pixels]. ``scale``: The colour scale.
+    ``size``: Width and height [pixels]. ``by``: What grains are coloured by, a key of `COLOURS`. ``top``: Upper end of
+    the scale, in the unit of its label.
     """
 
-    def __init__(self, size: tuple[int, int], scale: ColourScale) -> None:
-        self.size = size
-        self.scale = scale
-        self.norm = Normalize(0.0, scale.top)
-        self.map = colourmap()
+    def __init__(self, size: tuple[int, int], by: str, top: float) -> None:
+        self.size, self.by, self.norm, self.map = size, by, Normalize(0.0, top), colourmap()
 
-    def colours(self, values: ArrayLike) -> NDArray[np.float64]:
-        """Colours of these values, shape (n, 4)."""
-        return np.asarray(self.map(self.norm(np.asarray(values, dtype=np.float64))))
+    def colours(self, grains: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
+        """Colours of the grains of a frame, shape (n, 4)."""
+        return np.asarray(self.map(self.norm(colour_values(grains, self.by))))
 
     def compose(
         self,
-        caption: Caption,
+        title: str,
+        lines: str,
+        draw: Callable[[Any], None],
         *,
-        image: NDArray[np.uint8] | None = None,
-        draw: Callable[[Any], None] | None = None,
         place: Place,
         section: tuple[float, float, float, float, float],
         note: str = "",
     ) -> NDArray[np.uint8]:
         """The finished picture, shape (height, width, 3).
 
-        ``caption``: Its words. ``image``: The rendered scene, shape (height, width, 3); or ``draw``: a function that
-        draws on an axes that fills the page, in the page's fractions. ``place``: Where a point of the bed lies on the
-        page. ``section``: Of the plane of the cut: x of its left and right end, its y, z of the floor and of the
-        undisturbed surface [m]. ``note``: Small print at the foot.
+        ``title``, ``lines``: Its words, a few short lines of numbers below the title. ``draw``: Draws the scene on an
+        axes that fills the page, in the page's fractions. ``place``: Where a point of the bed lies on the page.
+        ``section``: Of the plane of the cut: x of its left and right end, its y, z of the floor and of the undisturbed
+        surface [m]. ``note``: Small print at the foot.
         """
         with styled():
             figure = blank_page(self.size, 8.0)
             axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
             axis.set_axis_off()
-            if image is not None:
-                axis.imshow(image, extent=(0.0, 1.0, 0.0, 1.0), aspect="auto", interpolation="nearest")
             axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), autoscale_on=False)
-            if draw is not None:
-                draw(axis)
+            draw(axis)
             self._rulers(axis, place, section)
-            figure.text(0.03, 0.965, caption.title, fontsize=16, fontweight="bold", va="top")
-            figure.text(0.03, 0.905, caption.lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35)
+            figure.text(0.03, 0.965, title, fontsize=16, fontweight="bold", va="top")
+            figure.text(0.03, 0.905, lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35)
             if note:
                 figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
-            bar = colour_bar(figure, (0.885, 0.2, 0.018, 0.5), self.norm, self.map, self.scale.label, 11.5)
+            bar = colour_bar(figure, (0.885, 0.2, 0.018, 0.5), self.norm, self.map, COLOURS[self.by][0], 11.5)
             bar.ax.tick_params(labelsize=11)
             return pixels(figure)
 

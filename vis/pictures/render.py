@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -18,7 +20,7 @@ from PIL import Image, ImageColor
 
 from vis.page.style import STATES
 from vis.pictures.arrows import FORCE
-from vis.pictures.canvas import Caption, ColourScale, Page, colour_values, colourmap
+from vis.pictures.canvas import Page, colourmap
 from vis.pictures.frames import read_frames
 from vis.pictures.scene import Scene
 from vis.pictures.sections import Section
@@ -89,20 +91,13 @@ def write_pictures(file: Path, images: Iterable[NDArray[np.uint8]], step: Callab
 def _images(folder: Path, view: View, opengl: bool) -> Iterator[NDArray[np.uint8]]:
     size = (int(view["size"][0]), int(view["size"][1]))
     low, high = np.array(view["low"]), np.array(view["high"])
-    page = Page(size, ColourScale(view["by"], view["top"]))
-    frames = read_frames(folder, view["name"])
+    page, frames = Page(size, view["by"], view["top"]), read_frames(folder, view["name"])
     section = (low[0], high[0], view["cut"], low[2], view["surface"])
     drawer = (Scene if opengl else Section)(size, low, high, cut=view["cut"], radius=view["radius"])
-    try:
+    with closing(drawer):
         for index, line in zip(view["frames"], view["lines"], strict=True):
-            frame, words = frames[index], Caption(view["title"], line)
-            colours = page.colours(colour_values(frame.grains, view["by"]))
-            image = drawer.render(frame, colours) if isinstance(drawer, Scene) else None
-            draw = drawer.draw(frame, colours) if isinstance(drawer, Section) else None
-            yield page.compose(words, image=image, draw=draw, place=drawer.place, section=section, note=view["note"])
-    finally:
-        if isinstance(drawer, Scene):
-            drawer.close()
+            draw = partial(drawer.draw, frame=frames[index], colours=page.colours(frames[index].grains))
+            yield page.compose(view["title"], line, draw, place=drawer.place, section=section, note=view["note"])
 
 
 def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80, limit: int = _GIF_LIMIT) -> None:

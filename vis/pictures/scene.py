@@ -1,14 +1,16 @@
 """Scenes rendered off screen with VTK. Needs OpenGL: use them only in a process that may die.
 
 Grains are exact spheres by ray casting in the shader (a quad per grain, not a mesh): software OpenGL draws 20,000 of
-them in about a second. `Scene` is the bed cut open in front of a camera that stands still; `vis.pictures.stage` has the
-one that follows a platform.
+them in about a second. `Scene` is the bed cut open in front of a camera that stands still; `Stage` is a platform on its
+ground through a camera that can be moved. The latter's projection is parallel, so that a length is the same all over
+the picture: the view goes along +y, from a little above, onto the plane of the cut. `place` says where points lie on
+the picture, for what is drawn over it.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,17 +20,22 @@ from PIL import Image
 from vis.page.plots import Array
 from vis.pictures.frames import Frame
 
-__all__ = ["FLOOR", "METAL", "Rendered", "Scene"]
+__all__ = ["FLOOR", "GROUND", "METAL", "PARTS", "Eye", "Rendered", "Scene", "Stage"]
 
 _OVERSAMPLE = 1.5  # rendered larger and shrunk: smooth edges at a third of the cost of multi-sampling
 _LIGHTS = (((-1.0, -1.6, 1.9), 0.72), ((1.6, -1.4, 0.5), 0.26), ((0.1, 1.0, 1.4), 0.22))
 _RIM = (0.30, 0.32, 0.35)
 FLOOR = (0.55, 0.55, 0.57)
 METAL = (0.74, 0.76, 0.79)
+GROUND = (0.86, 0.80, 0.70)
+PARTS = {"hull": (0.80, 0.82, 0.85), "spikes": (0.52, 0.55, 0.60)}
+"""Colours of the parts of a platform."""
 
 
 class Rendered:
     """A white picture of a size [pixels] with lights about `centre`, far away for what reaches so far [m]."""
+
+    render: Callable[..., NDArray[np.uint8]]
 
     def __init__(self, size: tuple[int, int], *, centre: Array, reach: float) -> None:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
@@ -50,6 +57,10 @@ class Rendered:
     ) -> None:
         """A box, its corners in VTK's order [m], that stays: ground or floor."""
         self._plotter.add_mesh(self._pyvista.Box(corners), color=colour, ambient=ambient, diffuse=diffuse)
+
+    def draw(self, axis: Any, *frame: Any, **more: Any) -> None:
+        """Show the picture of a frame on an axes whose limits are 0 to 1; arguments as those of `render`."""
+        axis.imshow(self.render(*frame, **more), extent=(0.0, 1.0, 0.0, 1.0), aspect="auto", interpolation="nearest")
 
     def close(self) -> None:
         """Free the window."""
@@ -169,3 +180,79 @@ class Scene(Rendered):
         low, high = (edge(self.place(points), axis=0) for edge in (np.min, np.max))
         shift = 0.5 * (low + high) - 0.5 * np.array([left + right, foot + head])
         camera.SetWindowCenter(*(2.0 * shift))
+
+
+class Eye:
+    """Where a point lies on a picture of `width` [m] across whose middle is at the focus.
+
+    ``size``: Of the picture [pixels]. ``width``: What it shows across [m]. ``cut``: y of the plane that is looked at
+    [m]. ``pitch``: How far the view goes downwards [radians].
+    """
+
+    def __init__(self, size: tuple[int, int], *, width: float, cut: float, pitch: float = 0.0) -> None:
+        self.size, self.width, self.cut = size, width, cut
+        self.height = width * size[1] / size[0]
+        self.pitch = pitch
+
+    def place(self, points: Array, focus: tuple[float, float]) -> Array:
+        """Fractions of the picture from its lower left corner, shape (n, 2), of points [m], shape (n, 3)."""
+        at = np.asarray(points, dtype=float).reshape(-1, 3)
+        up = (at[:, 2] - focus[1]) * np.cos(self.pitch) + (at[:, 1] - self.cut) * np.sin(self.pitch)
+        return np.column_stack([0.5 + (at[:, 0] - focus[0]) / self.width, 0.5 + up / self.height])
+
+    def _near(self, position: Array, focus: tuple[float, float]) -> NDArray[np.bool_]:
+        """Which grains the picture may show."""
+        return np.abs(position[:, 0] - focus[0]) < 0.6 * self.width
+
+
+class Stage(Eye, Rendered):
+    """Renders frames with VTK. Needs OpenGL: use it only in a process that may die.
+
+    ``low``, ``high``: Corners of the bed [m]; without grains, of a block of ground. ``radius``: Typical radius of a
+    grain [m], for the shading of gaps; None: a block of ground in place of grains. (the others as `Eye`)
+    """
+
+    def __init__(
+        self,
+        size: tuple[int, int],
+        *,
+        width: float,
+        cut: float,
+        low: Array,
+        high: Array,
+        radius: float | None,
+        pitch: float = 0.24,
+    ) -> None:
+        Eye.__init__(self, size, width=width, cut=cut, pitch=pitch)
+        Rendered.__init__(self, size, centre=np.zeros(3), reach=1.0)
+        thick = 0.03 * float(high[2] - low[2])
+        if radius is None:
+            self.add_block((low[0], high[0], cut, high[1], low[2], high[2]), GROUND, 0.4, 0.7)
+        else:
+            self.add_block((low[0], high[0], cut, high[1], low[2] - thick, low[2] - 1e-6), FLOOR, 0.25, 0.8)
+            if radius / width * size[0] > 4.0:  # on smaller grains the shading of gaps does not show
+                self._plotter.enable_ssao(radius=3.0 * radius, bias=0.3 * radius, kernel_size=32, blur=True)
+        self._plotter.enable_parallel_projection()
+        self.reach = 0.5 * width + 2.0 * float(high[1] - low[1])
+
+    def render(self, frame: Frame, colours: Array, focus: tuple[float, float]) -> NDArray[np.uint8]:
+        """Image of a frame with `focus` (x, z) [m] in its middle, shape (height, width, 3)."""
+        self._clear()
+        position = frame.grains["position"]
+        shown = self._near(position, focus) & (position[:, 1] >= self.cut)
+        if shown.any():
+            self._add_spheres(position[shown], frame.grains["radius"][shown], colours[shown])
+        for name, body in frame.bodies.items():
+            colour = PARTS.get(name, METAL)
+            self._add_body(self._mesh(*body), rim=40.0, smooth=35.0, line=2.0, specular=0.4, colour=colour)
+        camera = self._plotter.camera
+        far = 1.05 * self.reach
+        middle = np.array([focus[0], self.cut, focus[1]])
+        camera.focal_point = tuple(middle)
+        camera.position = tuple(middle + far * np.array([0.0, -np.cos(self.pitch), np.sin(self.pitch)]))
+        camera.up = (0.0, 0.0, 1.0)
+        camera.parallel_scale = 0.5 * self.height
+        # As near as it can be: the shading of gaps reads distances from the camera off half-precision numbers (a part
+        # in 2048), and coarse ones stripe what is flat.
+        camera.clipping_range = (far - self.reach, far + self.reach)
+        return self._image()

@@ -114,7 +114,7 @@ def _seen(report: Report, colour: str, film: bool) -> Section:
     """The platform on its ground, which is a block where there are no frames; the tracks that it leaves in a bed."""
     if colour not in COLOURS:
         raise ValueError(f"colour is {colour!r}; it must be one of {', '.join(COLOURS)}")
-    reel = Reel.open(report.folder)
+    reel = Reel(report.folder)
     drawn = draw_runs([reel], report.folder, "tumble", by=colour, film=film, progress=report.rest())
     if reel.frames is not None and "surface" in reel.frame(len(reel) - 1).maps:
         drawn.stills.append(draw_tracks(reel, report.figures / "tracks.png"))
