@@ -142,8 +142,8 @@ _MODULES = {
         "vis.page": "columns=page folder numbers palette=plots state_figures=states style tumble_series=states",
         "vis.paper": "hop paper_assumed=figures paper_measures=figures paper_paths=figures paper_run=figures",
         "vis.penetrate": (
-            "amended=report plot_drag plot_drops plot_parts plots=report summary summary_tables=summary_parts "
-            "summary_words=summary_parts"
+            "amended=report plot_drag plot_drops plot_parts=plot_drag plots=report summary "
+            "summary_tables=summary_parts summary_words=summary_parts"
         ),
         "vis.pictures": "arrows canvas frames meshes render scene sections stage=scene tracks",
         "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=report tumble_sweep=report",
@@ -283,8 +283,8 @@ _NAMES = {
     "vis.paper.figures": {
         "vis.page.plots": "WIDTH new_figure",
     },
-    "vis.penetrate.plot_parts": {
-        "vis.page.plots": "WIDTH legend_above new_panels shades",
+    "vis.penetrate.plot_drag": {
+        "vis.page.plots": "WIDTH shades",
     },
     "vis.pictures": {
         "vis.pictures.pictures": "Picture Pictures make_pictures opengl_available render_apart",

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from vis.page.folder import read_folder
-from vis.page.page import Progress
+from vis.page.report import Progress
 from vis.penetrate.report import write_penetration_report
 
 __all__ = ["write_report"]

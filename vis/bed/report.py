@@ -6,8 +6,9 @@ from functools import partial
 from pathlib import Path
 
 from vis.page.numbers import short
-from vis.page.page import Block, Report, Section, Tile, again, figure, listing, report_of, tables
+from vis.page.page import Block, Section, Tile, figure, listing
 from vis.page.plots import DASHED, handle, legend_above, new_panels, shades
+from vis.page.report import Report, again, report_of, tables
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import grains_box, read_frames
 from vis.pictures.pictures import Counter, carry_out

@@ -14,8 +14,9 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from vis.page.numbers import quote
-from vis.page.page import Block, Report, Result, Section, Tile, again, report_of, tables, text
+from vis.page.page import Block, Section, Tile, text
 from vis.page.plots import Array, handle, legend_above, new_panels, shades, smooth_ratio
+from vis.page.report import Report, Result, again, report_of, tables
 from vis.page.sentences import Sentences
 from vis.page.style import BED, MODEL
 from vis.pictures.frames import read_frames

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 
 from vis.page.folder import read_columns
 from vis.page.numbers import short
-from vis.page.page import Report, Result, Section, Tile, again, report_of, table, text
+from vis.page.page import Section, Tile, table, text
 from vis.page.plots import legend_above, line_handles, line_styles, sheet
+from vis.page.report import Report, Result, again, report_of
 
 __all__ = ["write_campaign_report"]
 

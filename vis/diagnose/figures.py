@@ -16,8 +16,8 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from rigid.series import read_series
-from vis.page.page import Result
 from vis.page.plots import DASHED, Array, handle, legend_above, sheet
+from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
 from vis.page.style import BED, GREY, INK, MODEL, STATES

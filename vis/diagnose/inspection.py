@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from vis.page.page import Report, Result, Section, Tile, again, capital, listing, report_of, table, text
+from vis.page.page import Section, Tile, listing, table, text
 from vis.page.plots import RED, Array, handle, legend_above, line_handles, line_styles, sheet
+from vis.page.report import Report, Result, again, capital, report_of
 from vis.page.style import BED, GREY, MODEL
 
 __all__ = ["write_inspection_report"]

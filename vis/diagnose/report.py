@@ -8,20 +8,8 @@ from pathlib import Path
 
 from vis.diagnose.figures import draw_evidence, draw_latent, draw_phases, draw_trajectories, read_channel, worst
 from vis.page.numbers import plain, short
-from vis.page.page import (
-    Block,
-    Report,
-    Result,
-    Section,
-    Tile,
-    again,
-    listing,
-    report_of,
-    table,
-    table_of,
-    text,
-    unit_text,
-)
+from vis.page.page import Block, Section, Tile, listing, table, table_of, text
+from vis.page.report import Report, Result, again, report_of, unit_text
 from vis.page.sentences import Sentences
 
 __all__ = ["write_diagnosis_report"]

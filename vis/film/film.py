@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from vis.film.cameras import layout
 from vis.film.reel import AnyReel, Reel, SpaceReel
-from vis.page.page import Block, Progress, capital, figure
+from vis.page.page import Block, figure
 from vis.page.plots import Array
+from vis.page.report import Progress, capital
 from vis.page.sentences import Sentences
 from vis.page.states import state_strip
 from vis.page.style import styled

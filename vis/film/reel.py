@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vis.page.folder import read_columns
-from vis.page.page import Result
 from vis.page.plots import Array
+from vis.page.report import Result
 from vis.pictures.canvas import colour_values, moved_since, nice_above
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
 from vis.pictures.meshes import in_place, spike_mesh

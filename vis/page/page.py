@@ -1,40 +1,27 @@
 """A report as a page: title, tiles, warnings, and sections of text, figures and tables, in one file without a network.
 
-`Report` is what a report is made with: it reads the run folder, draws the figures and writes the page. How it looks is
-that of every report.
+What the page says is its author's business (`vis.page.report` and those who use it); how it looks is that of every
+report.
 """
 
 from __future__ import annotations
 
 import base64
-import functools
 import io
-import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
-from matplotlib.figure import Figure
 from PIL import Image
 
-from vis.page.folder import read_columns
-from vis.page.plots import Array
-from vis.page.sentences import Sentences
-from vis.page.style import styled
-
 __all__ = [
-    "Block", "Columns", "Page", "Progress", "Report", "Result", "Section", "Tile", "again", "capital", "code",
-    "columns", "figure", "given", "listing", "number_text", "report_of", "table", "table_of", "tables", "template",
-    "text", "unit_text", "write_page", "write_template",
+    "Block", "Columns", "Page", "Section", "Tile", "code", "columns", "figure", "listing", "table", "table_of",
+    "template", "text", "write_page", "write_template",
 ]  # fmt: skip
 
-Progress = Callable[[float], None]
-"""Called with the share that is done, 0 to 1."""
-Result = Mapping[str, Any]
-"""What result.json holds, or an object within it (docs/architecture.md)."""
 _KINDS = {".png": "png", ".gif": "gif", ".jpg": "jpeg"}
 
 
@@ -84,140 +71,6 @@ class Page:
     tiles: Sequence[Tile] = ()
     warnings: Sequence[str] = ()
     missing: Sequence[str] = ()
-
-
-class Report:
-    """The report of one run folder; its `figures/` is made with it.
-
-    ``folder``: The run folder. ``progress``: Called with the share that is done, 0 to 1. ``package``: Whose
-    figures.toml has the titles and captions. ``dpi``: Of its figures; the style's own if not given. Raises
-    FileNotFoundError where the folder has no result.json, and where a series is missing that is drawn.
-    """
-
-    def __init__(
-        self, folder: str | Path, progress: Progress | None = None, *, package: str = "", dpi: int | None = None
-    ) -> None:
-        self.folder, self.dpi, self.captions = Path(folder), dpi, Sentences(package, "figures.toml")
-        self.done, self.progress = 0.0, progress
-        self.result: Result = json.loads((self.folder / "result.json").read_text(encoding="utf-8"))
-        self.figures = self.folder / "figures"
-        self.figures.mkdir(exist_ok=True)
-
-    def columns(self, name: str) -> dict[str, Array]:
-        """The columns of a CSV file of the folder that are numbers."""
-        return read_columns(self.folder / name)[0]
-
-    def draw(self, key: str, drawing: Figure, *, name: str = "", **values: Any) -> Block:
-        """Write a figure to figures/`name`.png, or figures/`key`.png, and return what shows it in the report.
-
-        Title and caption are those of `key` in figures.toml, their placeholders filled with `values`.
-        """
-        path = self.figures / f"{name or key}.png"
-        drawing.savefig(path, dpi=self.dpi)
-        self.tell(self.done + 0.2 * (1.0 - self.done))
-        title, caption = (self.captions(f"{key}.{part}", **values) for part in ("title", "caption"))
-        return figure(path, title=title, caption=caption)
-
-    def tell(self, done: float) -> None:
-        """Report the share that is done, 0 to 1."""
-        self.done = done
-        if self.progress is not None:
-            self.progress(done)
-
-    def rest(self) -> Progress:
-        """What tells the progress of a part that takes nearly all of the time that is left."""
-        start = self.done
-        return lambda done: self.tell(start + (0.95 - start) * done)
-
-    def numbers(self, *, std: bool = False, beside: Result | None = None) -> Section:
-        """Every number of the result with its note, its spread if `std`, and that of the spring-damper `beside` it."""
-        digits, none = 5 if std else 6, "null" if not std and beside is None else "\N{EN DASH}"
-        rows = []
-        for name, entry in self.result["quantities"].items():
-            cells = [number_text(entry["value"], digits, none=none)]
-            cells += [number_text(entry["std"], 2)] if std else []
-            cells += [number_text((beside.get(name) or {}).get("value"))] if beside else []
-            rows.append((name, *cells, unit_text(entry["unit"]), entry.get("note", "")))
-        more = [*(["std"] if std else []), *(["spring-damper"] if beside else [])]
-        blocks = [table(("quantity", "value", *more, "unit", "note"), rows, words=True)]
-        return Section("Every number of the result", blocks)
-
-    def write(
-        self,
-        sections: Sequence[Section],
-        *,
-        lead: Sequence[str],
-        version: bool = True,
-        tiles: Sequence[Tile] = (),
-        title: str | None = None,
-        warnings: Sequence[str] | None = None,
-        missing: Sequence[str] = (),
-    ) -> Path:
-        """Write report.html and return it; title and warnings are the result's where they are not given.
-
-        `lead` stands under the title, after the version of hedgebed where `version` is asked for.
-        """
-        result = self.result
-        warned = [capital(str(warning)) for warning in result["warnings"]] if warnings is None else warnings
-        top = [f"hedgebed {result['version']}", *lead] if version else lead
-        page = Page(str(result["title"]) if title is None else title, top, sections, tiles, warned, missing)
-        report = write_page(self.folder / "report.html", page)
-        self.tell(1.0)
-        return report
-
-
-def report_of(dpi: int | None = None) -> Callable[[Callable[..., Path]], Callable[..., Path]]:
-    """Make of a function of a `Report` one of its folder: `write(folder, *, progress=None, **options)`.
-
-    It draws in the house's style, `dpi` dots an inch, and takes titles and captions from figures.toml of its package.
-    Raises FileNotFoundError where the folder has no result.json, or lacks a file that is drawn.
-    """
-
-    def decorate(write: Callable[..., Path]) -> Callable[..., Path]:
-        @functools.wraps(write)
-        def of_folder(folder: str | Path, *, progress: Progress | None = None, **options: Any) -> Path:
-            with styled():
-                package = write.__module__.rpartition(".")[0]
-                return write(Report(folder, progress, package=package, dpi=dpi), **options)
-
-        return of_folder
-
-    return decorate
-
-
-def again(command: str, before: str = "In this folder:", after: str = "") -> Section:
-    """How to do the run again; an empty `before` or `after` is left out."""
-    blocks = [text(before)] if before else []
-    return Section("To do this again", [*blocks, code(command), *([text(after, small=True)] if after else [])])
-
-
-def given(entries: Mapping[str, Result]) -> Block:
-    """The numbers of a trial and where each is from."""
-    rows = [(name, number_text(e["value"]), unit_text(e["unit"]), e["origin"]) for name, e in entries.items()]
-    return table(("number", "value", "unit", "where from"), rows, words=True)
-
-
-def tables(result: Result) -> list[Block]:
-    """The tables that a result has made."""
-    return [table(t["head"], t["rows"], title=t["title"], words=t.get("words", False)) for t in result["tables"]]
-
-
-def number_text(value: float | None, digits: int = 6, *, none: str = "\N{EN DASH}") -> str:
-    """A number of a table with so many digits."""
-    return none if value is None else f"{value:.{digits}g}"
-
-
-def unit_text(unit: str) -> str:
-    """A unit, as a table has it."""
-    return "" if unit == "1" else unit
-
-
-def capital(words: str) -> str:
-    """With a capital at the start."""
-    return words[:1].upper() + words[1:]
-
-
-# Blocks, and the page that they stand on ------------------------------------------------------------------------------
 
 
 def text(words: str, *, small: bool = False) -> Block:

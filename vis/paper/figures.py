@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from vis.page.folder import read_columns
-from vis.page.page import Block, Report, Result
+from vis.page.page import Block
 from vis.page.plots import Array, handle, legend_above, sheet
+from vis.page.report import Report, Result
 from vis.page.states import States, state_runs
 from vis.page.style import GREY, INK, STATES
 

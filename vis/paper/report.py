@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from vis.page.page import Block, Report, Result, Section, Tile, again, report_of, table, text
+from vis.page.page import Block, Section, Tile, table, text
+from vis.page.report import Report, Result, again, report_of
 from vis.page.sentences import Sentences
 from vis.paper.figures import FIGURES, PaperRun, in_order
 

@@ -1,34 +1,103 @@
-"""Plots of driven spikes: drag against depth, where the spring-damper departs from it, work in and out."""
+"""Plots of driven spikes: drag against depth, where the spring-damper departs from it, work in and out.
+
+And what these plots share with those of drops: handles of bed and law, parts of a series, means by speed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import plain, quote, short
 from vis.page.plots import DASHED, Array, handle, legend_above, new_panels, sheet
 from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.penetrate.plot_parts import (
-    Plot,
-    above_surface,
-    by_speed,
-    has_model,
-    pair_of_handles,
-    speed_words,
-    spread_words,
-)
 from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
-__all__ = ["drag_plot", "gap_plot", "work_plot"]
+__all__ = [
+    "Plot", "above_surface", "by_speed", "drag_plot", "gap_plot", "has_model", "pair_of_handles", "spread_words",
+    "work_plot",
+]  # fmt: skip
 
 say = Sentences(__package__)
+captions = Sentences(__package__, "figures.toml")
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure with the name of its file (without ending), a title and a caption."""
+
+    name: str
+    title: str
+    caption: str
+    figure: Figure
+
+    @classmethod
+    def said(cls, key: str, figure: Figure, **values: Any) -> Plot:
+        """A figure called as its key, with its title and caption from the table `key` of figures.toml."""
+        return cls(key, captions(f"{key}.title", **values), captions(f"{key}.caption", **values).strip(), figure)
+
+    def save(self, folder: Path) -> Path:
+        """Write `<folder>/<name>.png`."""
+        path = folder / f"{self.name}.png"
+        self.figure.savefig(path)
+        return path
+
+
+def pair_of_handles(*, markers: bool = False, bars: bool = False) -> list[Any]:
+    """What stands for the bed and for the spring-damper in a legend: lines, lines with marks, or bars."""
+    if bars:
+        return [
+            Patch(facecolor=BED, edgecolor="white", label="bed"),
+            Patch(facecolor=MODEL, edgecolor="white", hatch="///", label="spring-damper"),
+        ]
+    marks = ("o", "D") if markers else ("", "")
+    return [handle("bed", BED, marker=marks[0]), handle("spring-damper", MODEL, ls=DASHED, marker=marks[1])]
+
+
+def above_surface(series: Series | None) -> Series | None:
+    """The way in before depth 0 from where grains are first felt; None where none are."""
+    if series is None:
+        return None
+    touched = np.flatnonzero((series.depth < 0.0) & (series.force > 0.0) & (series.velocity > 0.0))
+    if not len(touched):
+        return None
+    keep = (series.depth < 0.0) & (series.velocity > 0.0)
+    keep[: touched[0]] = False
+    return series.where(keep)
+
+
+def has_model(runs: Iterable[Run]) -> bool:
+    """Whether the spring-damper did any of these runs."""
+    return any(r.model is not None for r in runs)
+
+
+def by_speed(runs: list[Run], speeds: list[float], key: str, scale: float) -> tuple[Array, Array]:
+    """Mean and standard deviation between seeds of a quantity at each speed; NaN where unknown."""
+    mean, spread = np.full(len(speeds), np.nan), np.full(len(speeds), np.nan)
+    for i, speed in enumerate(speeds):
+        numbers = [n for r in runs if r.speed == speed and (n := value_of(r.quantities, key)) is not None]
+        if numbers:
+            mean[i] = scale * float(np.mean(numbers))
+        if len(numbers) > 1:
+            spread[i] = scale * float(np.std(numbers, ddof=1))
+    return mean, spread
+
+
+def spread_words(runs: list[Run]) -> str:
+    """What the bars are, where several runs have one speed."""
+    speeds = [r.speed for r in runs]
+    return " Bars: standard deviation between beds, where there are several." if len(set(speeds)) < len(speeds) else ""
 
 
 @styled()
@@ -43,12 +112,10 @@ def drag_plot(run: RunFolder) -> Plot | None:
     for axis, speed in zip(axes, speeds, strict=True):
         here = [r for r in driven if r.speed == speed]
         seeds = len(here)
-        axis.set_title(f"{speed_words(speed)}   ({seeds} bed{'s' if seeds > 1 else ''})")
+        axis.set_title(f"{speed:.3g} m/s   ({seeds} bed{'s' if seeds > 1 else ''})")
         for way, shade in (("in", 1.0), ("out", 0.45)):
-            parts = [_way(r.bed, way) for r in here]
-            _band(axis, parts, BED, alpha=shade, solid=way == "in")
-            models = [_way(r.model, way) for r in here if r.model is not None]
-            if models:
+            _band(axis, _parts([r.bed for r in here], way), BED, alpha=shade, solid=way == "in")
+            if models := _parts([r.model for r in here], way):
                 grid, mean, _ = _mean_by_depth(models)
                 style = DASHED if way == "in" else (0, (1, 1.5))
                 axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
@@ -63,7 +130,7 @@ def drag_plot(run: RunFolder) -> Plot | None:
         axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     _label(axes, "depth of the tip [mm]", "force on the spike [N]")
     handles = [handle("bed, way in", BED, lw=2.2)]
-    out = any(len(_way(r.bed, "out") or ()) for r in driven)
+    out = any(((r.bed.phase == "out") & (r.bed.depth >= 0.0)).any() for r in driven if r.bed is not None)
     handles += [handle("bed, way out", BED, lw=2.2, alpha=0.45)] if out else []
     handles += [handle("bed, as recorded", BED, lw=0.7, alpha=0.55)]
     law = has_model(driven)
@@ -71,9 +138,11 @@ def drag_plot(run: RunFolder) -> Plot | None:
     handles += [handle("spring-damper, out", MODEL, ls=(0, (1, 1.5)))] if law and out else []
     legend_above(figure, handles)
     many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
-    width = _bin_width([_way(r.bed, "in") for r in driven])
+    # The slices of depth that `_mean_by_depth` averages over, where they are the same at all speeds.
+    slices = {part.depth.max() / _bins([part]) for part in _parts([r.bed for r in driven], "in")}
+    widths = {quote(float(width), None, "m", significant=2) for width in slices}
     sentences = [
-        say("drag_thick", width=width or "slices"),
+        say("drag_thick", width=widths.pop() if len(widths) == 1 else "slices"),
         say("drag_beds") if many else say("drag_bed"),
         say("drag_left") if above else "",
         say("drag_law") + say("drag_law_out" if out else "drag_law_in") if law else "",
@@ -114,7 +183,7 @@ def gap_plot(run: RunFolder) -> Plot | None:
         number = row.difference
         text = f"{'+' if number > 0 else ''}{quote(number, row.bed_std, 'N', significant=2)}"
         if row.share is not None:
-            text += f"   ({_signed(100.0 * row.share, 2)} %)"
+            text += f"   ({'+' if row.share > 0 else ''}{plain(100.0 * row.share, 2)} %)"
         if row.known:
             text += f"\n{row.known}"
         dark = number < -0.45 * bound or number > 0.6 * bound  # of the map, purple is the darker end
@@ -149,7 +218,10 @@ def work_plot(run: RunFolder) -> Plot | None:
                 axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
             for x, y, s in zip(where, mean, np.nan_to_num(spread), strict=True):
                 if np.isfinite(y):
-                    _above(axis, x, max(y, 0.0) + s, plain(y, 2 if abs(y) < 0.1 else 3))
+                    axis.annotate(
+                        plain(y, 2 if abs(y) < 0.1 else 3), (x, max(y, 0.0) + s), xytext=(0, 3), fontsize=7.5,
+                        textcoords="offset points", ha="center", color=INK,
+                    )  # fmt: skip
         axis.set_title(f"Work {title}")
         axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
         axis.grid(False, axis="x")
@@ -169,8 +241,7 @@ def _label(axes: list[Axes], x: str, y: str) -> None:
             axis.set_ylabel(y)
 
 
-def _band(axis: Axes, parts: Iterable[Series | None], colour: str, *, alpha: float, solid: bool) -> None:
-    there = [part for part in parts if part is not None and len(part) > 1]
+def _band(axis: Axes, there: Sequence[Series], colour: str, *, alpha: float, solid: bool) -> None:
     if not there:
         return
     grid, mean, spread = _mean_by_depth(there)
@@ -183,20 +254,18 @@ def _band(axis: Axes, parts: Iterable[Series | None], colour: str, *, alpha: flo
     axis.plot(1e3 * grid, mean, color=colour, alpha=alpha, lw=2.2 if solid else 1.8)
 
 
-def _way(series: Series | None, way: str) -> Series | None:
-    """The rows on the way in or out, in the ground."""
-    if series is None:
-        return None
-    part = series.part(way)
-    return part.where(part.depth >= 0.0)
+def _parts(runs: Iterable[Series | None], way: str) -> list[Series]:
+    """The rows on the way in or out, in the ground, of those runs that have more than one."""
+    parts = (series.part(way) for series in runs if series is not None)
+    return [inside for part in parts if len(inside := part.where(part.depth >= 0.0)) > 1]
 
 
-def _mean_by_depth(parts: Iterable[Series | None], bins: int = 40) -> tuple[Array, Array, Array]:
+def _mean_by_depth(parts: Sequence[Series], bins: int = 40) -> tuple[Array, Array, Array]:
     """Depth [m], mean force [N] and its standard deviation between the parts [N], shape (bins,).
 
     Each part is averaged within a bin first, so that noise within one bed is not taken for spread between beds.
     """
-    there = [part for part in parts if part is not None and len(part) > 1]
+    there = [part for part in parts if len(part) > 1]
     if not there:
         return np.zeros(0), np.zeros(0), np.zeros(0)
     deepest = max(float(part.depth.max()) for part in there)
@@ -210,7 +279,8 @@ def _mean_by_depth(parts: Iterable[Series | None], bins: int = 40) -> tuple[Arra
         row[count > 0] = np.bincount(which, part.force, bins)[count > 0] / count[count > 0]
     filled = np.isfinite(rows).any(axis=0)
     rows = rows[:, filled]
-    spread = np.nanstd(rows, axis=0, ddof=0) * np.sqrt(_bessel(np.isfinite(rows).sum(axis=0)))
+    many = np.isfinite(rows).sum(axis=0)
+    spread = np.nanstd(rows, axis=0, ddof=0) * np.sqrt(np.where(many > 1, many / np.maximum(many - 1, 1), 0.0))
     return (0.5 * (edges[1:] + edges[:-1]))[filled], np.nanmean(rows, axis=0), spread
 
 
@@ -218,20 +288,13 @@ def _bins(parts: list[Series], most: int = 40) -> int:
     return int(np.clip(min(len(part) for part in parts) // 3, 4, most))
 
 
-def _bessel(count: NDArray[np.int64]) -> Array:
-    return np.where(count > 1, count / np.maximum(count - 1, 1), 0.0)
-
-
 def _departures_of_series(run: RunFolder) -> list[Departure]:
     """The table of departures made from the driven series, where none is written."""
     rows = []
     for speed in run.speeds("driven"):
         here = [r for r in run.of_kind("driven") if r.speed == speed and r.bed is not None and r.model is not None]
-        beds, models = [_way(r.bed, "in") for r in here], [_way(r.model, "in") for r in here]
-        if not here:
-            continue
-        grid, bed, _ = _mean_by_depth(beds, bins=5)
-        grid2, model, _ = _mean_by_depth(models, bins=5)
+        grid, bed, _ = _mean_by_depth(_parts([r.bed for r in here], "in"), bins=5)
+        grid2, model, _ = _mean_by_depth(_parts([r.model for r in here], "in"), bins=5)
         if len(grid) == len(grid2) > 1:
             half = 0.5 * (grid[1] - grid[0])
             rows += [
@@ -239,21 +302,6 @@ def _departures_of_series(run: RunFolder) -> list[Departure]:
                 for d, b, m in zip(grid.tolist(), bed.tolist(), model.tolist(), strict=True)
             ]
     return rows
-
-
-def _bin_width(parts: Iterable[Series | None]) -> str:
-    """The slices of depth that `_mean_by_depth` averages over, in words; "" where they differ between speeds."""
-    there = [part for part in parts if part is not None and len(part) > 1]
-    widths = {quote(float(part.depth.max()) / _bins([part]), None, "m", significant=2) for part in there}
-    return widths.pop() if len(widths) == 1 else ""
-
-
-def _above(axis: Axes, x: float, y: float, text: str) -> None:
-    axis.annotate(text, (x, y), xytext=(0, 3), textcoords="offset points", ha="center", fontsize=7.5, color=INK)
-
-
-def _signed(number: float, significant: int = 3) -> str:
-    return ("+" if number > 0 else "") + plain(number, significant)
 
 
 def _returned_words(runs: list[Run]) -> str:

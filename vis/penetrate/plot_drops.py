@@ -7,19 +7,11 @@ from matplotlib.lines import Line2D
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import quote
-from vis.page.page import capital
 from vis.page.plots import DASHED, Array, handle, legend_above, new_panels, sheet
+from vis.page.report import capital
 from vis.page.sentences import Sentences
 from vis.page.style import BED, GREY, INK, MODEL, styled
-from vis.penetrate.plot_parts import (
-    Plot,
-    above_surface,
-    by_speed,
-    has_model,
-    pair_of_handles,
-    speed_words,
-    spread_words,
-)
+from vis.penetrate.plot_drag import Plot, above_surface, by_speed, has_model, pair_of_handles, spread_words
 from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
 
 __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
@@ -64,7 +56,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
                     1e3 * (series.time[peak] - start), series.force[peak], "o" if colour == BED else "D",
                     color=colour, ms=5, mec="white", mew=0.8, zorder=5,
                 )  # fmt: skip
-        above.set_title(f"dropped at {speed_words(speed)}")
+        above.set_title(f"dropped at {speed:.3g} m/s")
         above.axhline(0.0, color=GREY, lw=0.8)
         if early:
             for axis in (above, below):

@@ -15,25 +15,12 @@ from matplotlib.figure import Figure
 
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
 from vis.page.numbers import quote
-from vis.page.page import (
-    Block,
-    Progress,
-    Report,
-    Result,
-    Section,
-    Tile,
-    again,
-    figure,
-    report_of,
-    table,
-    text,
-    write_template,
-)
+from vis.page.page import Block, Section, Tile, figure, table, text, write_template
 from vis.page.plots import DASHED, handle, legend_above, sheet
+from vis.page.report import Progress, Report, Result, again, report_of
 from vis.page.style import BED, GREY, MODEL, styled
-from vis.penetrate.plot_drag import drag_plot, gap_plot, work_plot
+from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
-from vis.penetrate.plot_parts import Plot
 from vis.penetrate.summary import summarise
 from vis.pictures.pictures import Picture, Pictures, make_pictures
 

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from vis.page.folder import Run, RunFolder, read_folder
 from vis.page.numbers import quote
-from vis.page.page import Progress
 from vis.page.plots import Array
+from vis.page.report import Progress
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
 from vis.pictures.render import PictureJob, View, run_job

@@ -13,8 +13,9 @@ from vis.film.film import ARROWS, draw_runs, shown
 from vis.film.reel import NAME, SpaceReel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity
-from vis.page.page import Block, Report, Result, Section, Tile, again, given, listing, report_of, text
+from vis.page.page import Block, Section, Tile, listing, text
 from vis.page.plots import DASHED, DOTTED, Array, legend_above, mean_over, sheet
+from vis.page.report import Report, Result, again, given, report_of
 from vis.page.states import States, draw_bands, draw_states, passages
 from vis.page.style import BED, GREY, INK, MODEL
 from vis.pictures.canvas import COLOURS

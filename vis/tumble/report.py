@@ -18,22 +18,9 @@ from vis.film.film import draw_runs, shown
 from vis.film.reel import Reel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity, short
-from vis.page.page import (
-    Block,
-    Report,
-    Result,
-    Section,
-    Tile,
-    again,
-    figure,
-    given,
-    listing,
-    report_of,
-    table,
-    tables,
-    text,
-)
+from vis.page.page import Block, Section, Tile, figure, listing, table, text
 from vis.page.plots import DASHED, DOTTED, Array, handle, legend_above, sheet
+from vis.page.report import Report, Result, again, given, report_of, tables
 from vis.page.sentences import Sentences
 from vis.page.states import States, by_state, draw_states, legend_of_states, panels, passages
 from vis.page.style import BED, GREY, INK, MODEL, STATES

@@ -559,7 +559,7 @@ def test_tips_that_come_down_over_more_than_one_copy_are_said_to_meet_the_same_s
 
 def _check_report(folder, result):
     """The section of the report has its figures and both columns, and where the energy went."""
-    from vis.page.page import Report
+    from vis.page.report import Report
     from vis.tumble.grains import grains_section
 
     section = grains_section(Report(folder, package="vis.tumble"))
