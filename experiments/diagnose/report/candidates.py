@@ -1,5 +1,6 @@
-"""The candidates as a person wants to see them: a line a set of names, and why one that looks better has no name."""
+"""The candidates in a table: a row for each set of effects, and why one that scores better is not named."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,25 +10,25 @@ __all__ = ["candidate_rows", "no_better", "say", "unnamed_sentence"]
 
 say = Sentences(__package__)
 
-_MORE = 0.05  # nats by which a set of names must beat each of its parts to be listed
-_SETS = 4  # sets of names that are listed beside the one that is told
-_WORTH_SAYING = 1.0  # nats by which a candidate must beat what is told to be spoken of
+_MORE = 0.05  # nats by which a set of effects must beat each of its parts to be listed
+_SETS = 4  # sets of effects that are listed beside the one that is named
+_WORTH_SAYING = 1.0  # nats by which a candidate must beat what is named to be mentioned
 
 Row = Mapping[str, Any]
 
 
 def candidate_rows(said: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """``candidates`` of diagnosis.json: the best form of each name, of what is told, and of the sets of names that beat
-    all of their parts; the likeliest first, those no better than the base model last."""
+    """``candidates`` of diagnosis.json: the best form of each effect, of what is named, and of the sets of effects that
+    beat all of their parts; the likeliest first, those no better than the base model last."""
     best: dict[frozenset[str], Row] = {}
-    tried: dict[frozenset[str], int] = {}
+    tried = Counter(frozenset(row["effects"]) for row in said.get("evidence", []))
     for row in said.get("evidence", []):
         names = frozenset(row["effects"])
-        tried[names] = tried.get(names, 0) + 1
         if names not in best or row["score"] > best[names]["score"]:
             best[names] = row
     alone = {name: row["score"] for names, row in best.items() for name in names if len(names) == 1}
-    told = frozenset(_told(said))
+    order = _told(said)
+    told = frozenset(order)
     sets = [names for names, row in best.items()
             if len(names) > 1 and all(row["score"] > alone.get(name, 0.0) + _MORE for name in names)]  # fmt: skip
     sets.sort(key=lambda names: -best[names]["score"])
@@ -40,7 +41,7 @@ def candidate_rows(said: Mapping[str, Any]) -> list[dict[str, Any]]:
         return min(row["left"], base) if "left" in row and base is not None else row.get("left")
 
     return [
-        {"candidate": _written(best[names], alone, _told(said)), "effects": _ordered(names, alone, _told(said)),
+        {"candidate": _written(best[names], alone, order), "effects": _ordered(names, alone, order),
          "score": best[names]["score"], "left": left(best[names]), "closes": best[names].get("closes"),
          "tried": tried[names], "better": best[names]["score"] > 0, "note": _note(said, names, best, told)}
         for names in shown
@@ -48,16 +49,15 @@ def candidate_rows(said: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def no_better(rows: Sequence[Row]) -> str:
-    """The names that are no better than the base model, as a clause; empty where all are."""
+    """The effects that are no better than the base model, as a clause; empty where all are."""
     names = [" + ".join(row["effects"]) for row in rows if not row["better"]]
     return f"no better than the base model with its parameters fitted: {', '.join(names)}" if names else ""
 
 
 def unnamed_sentence(said: Mapping[str, Any]) -> list[str]:
-    """Of a candidate that is likelier than what is told: which, and why it is not told."""
+    """A candidate that is likelier than what is named: which, and why it is not named."""
     rows = candidate_rows(said)
-    told = frozenset(_told(said))
-    own = next((row for row in rows if frozenset(row["effects"]) == told), None)
+    own = next((row for row in rows if {*row["effects"]} == {*_told(said)}), None)
     ahead = [row for row in rows if own is not None and row["score"] > own["score"] + _WORTH_SAYING and row["note"]]
     if own is None or not ahead:
         return []
@@ -68,20 +68,20 @@ def unnamed_sentence(said: Mapping[str, Any]) -> list[str]:
 
 
 def _told(said: Mapping[str, Any]) -> tuple[str, ...]:
-    """The names that are told, or of an unknown the best model's, in order."""
+    """The effects that are named, or of an unknown the best model's, in order."""
     names = tuple(effect["id"] for effect in said.get("effects", ()))
     leading = tuple(said.get("leading", {}).get("effects", ()))
     return leading if said["verdict"] == "unknown" and leading else names
 
 
 def _ordered(names: frozenset[str], alone: Mapping[str, float], told: Sequence[str]) -> list[str]:
-    """What is told first, then those that explain most alone."""
+    """What is named first, then those that explain most alone."""
     place = {name: k for k, name in enumerate(told)}
     return sorted(names, key=lambda name: (place.get(name, len(place)), -alone.get(name, -1e300), name))
 
 
 def _written(row: Row, alone: Mapping[str, float], told: Sequence[str]) -> str:
-    """``a:one + two + b:three``: names in order, each once, with its forms."""
+    """``a:one + two + b:three``: effects in order, each once, with its forms."""
     forms: dict[str, list[str]] = {}
     for part in row.get("candidate", " + ".join(row["effects"])).split(" + "):
         effect, _, form = part.partition(":")
@@ -93,12 +93,12 @@ def _written(row: Row, alone: Mapping[str, float], told: Sequence[str]) -> str:
 def _note(
     said: Mapping[str, Any], names: frozenset[str], best: Mapping[frozenset[str], Row], told: frozenset[str]
 ) -> str:
-    """What a candidate is to the one that is told; of one that is likelier, why it is not."""
+    """How a candidate relates to the one that is named; of one that is likelier, why it is not named."""
     if names == told:
         return {"named": "told", "ambiguous": "told, or another"}.get(said["verdict"], "leads")
     if not told or told not in best:
         return ""
-    if said["verdict"] == "ambiguous" and _is_alternative(said, names, told):
+    if said["verdict"] == "ambiguous" and any(names == {other, *_told(said)[1:]} for other in said["alternatives"]):
         return "cannot be told from it"
     own, row = best[told], best[names]
     more = row["score"] - own["score"]
@@ -119,8 +119,3 @@ def _note(
     if other is not None and (other.get("left_out_behind") or 0.0) > 0:
         return f"predicts conditions that were left out worse, by {other['left_out_behind']:.0f} nats"
     return "does not stand when noise and names are looked at together"
-
-
-def _is_alternative(said: Mapping[str, Any], names: frozenset[str], told: frozenset[str]) -> bool:
-    first = next(iter(_told(said)))
-    return any(names == (told - {first}) | {other} for other in said["alternatives"])

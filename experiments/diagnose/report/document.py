@@ -9,6 +9,7 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 ```
 """
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,12 @@ from experiments.diagnose.core.scatter_gap import scatter_std
 from experiments.diagnose.core.sizes import effect_sizes
 from experiments.diagnose.fit.evidence import excess, inflation
 from experiments.diagnose.fit.fitting import Fit
-from experiments.diagnose.fit.gaps import Gaps
-from experiments.diagnose.fit.localise import Place, phases_of
-from experiments.diagnose.fit.problem import Form
+from experiments.diagnose.fit.localise import phases_of
 from experiments.diagnose.noise.spectrum import line_rows
 from experiments.runs.folder import write_json, write_series, write_text
 
 from .candidates import candidate_rows
-from .telling import PhaseTable, valid_residuals
+from .gaps import Gaps
 
 __all__ = ["document", "write_diagnosis"]
 
@@ -41,12 +40,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "verdict": found.verdict,
         "effects": effects,
         "alternatives": list(found.alternatives) if found.verdict == "ambiguous" else [],
-        "where": [{**_place(p), "settings": settings[p.trial]} for p in found.where],
-        "gap": {
-            "before": {"fit": found.before.fit, "held_out": found.before.held_out},
-            "after": {"fit": found.after.fit, "held_out": found.after.held_out},
-            "held_out_trials": list(found.held_out),
-        },
+        "where": [{**asdict(p), "settings": settings[p.trial]} for p in found.where],
+        "gap": {"before": asdict(found.before), "after": asdict(found.after), "held_out_trials": list(found.held_out)},
     }  # fmt: skip
     if (weighed := found.gap_with_scatter) is not None:
         stages = {"before": weighed.before, "after": weighed.after, "after_std": weighed.after_std}
@@ -55,58 +50,35 @@ def document(found: Diagnosis) -> dict[str, Any]:
         } | {"freedom": weighed.freedom}
     if found.verdict == "unknown":
         said["leading"] = _leading(found)
-        said["left"] = [_place(p) for p in found.left]
+        said["left"] = [asdict(p) for p in found.left]
         words, shares = found.dependence
         said["latent"] = {"file": "latent.csv", "depends_on": words, "explained": shares,
                           "lines": line_rows(found.lines)}  # fmt: skip
     said["base"] = _base_values(found)
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
-    said["gate"] = {
-        stage: {"passed": gate.passed, "score": gate.score, "threshold": gate.threshold}
-        for stage, gate in gates.items()
-        if gate is not None
-    }
-    said["at_bounds"] = {
-        stage: [{"parameter": b.parameter, "value": b.value, "unit": b.unit, "sigmas": b.sigmas, "at_bound": b.at_bound}
-                for b in bounds]
-        for stage, bounds in (("before", found.bounds_before), ("after", found.bounds_after))
-    }  # fmt: skip
+    said["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
+    bounds = {"before": found.bounds_before, "after": found.bounds_after}
+    said["at_bounds"] = {stage: [asdict(bound) for bound in met] for stage, met in bounds.items()}
     said["evidence"] = _evidence(found)
     said["evidence_base"] = _evidence_base(found)
     said["sizes"] = effect_sizes(found)
     said["remarks"] = list(found.remarks)
-    said["equations"] = _equations(found)
+    said["equations"] = equations_of(
+        found.problem.kind, found.forms,
+        lambda form: {name: unit for name, (_, unit) in found.problem.reported(found.best_values, form).items()},
+    )  # fmt: skip
     said["symbols"] = SYMBOLS if found.problem.kind == "penetration" and found.forms else ""
     said["equivalence"] = _equivalence(found)
     said["candidates"] = candidate_rows(said)
     said["noise"] = _noise(found)
     said["model_std"] = dict(found.model_std)
-    said["findings"] = [
-        {"trial": f.trial, "what": f.what, "channel": f.channel, "from_s": f.from_s, "to_s": f.to_s,
-         "set_aside": f.set_aside, "doubt": f.doubt}
-        for f in found.findings
-    ]  # fmt: skip
+    said["findings"] = [asdict(finding) for finding in found.findings]
     said["next_experiment"] = found.next_experiment
     return said
 
 
-def _place(p: Place) -> dict[str, str | float]:
-    return {"trial": p.trial, "channel": p.channel, "phase": p.phase, "from_s": p.from_s, "to_s": p.to_s,
-            "excess": p.excess}  # fmt: skip
-
-
-def _equations(found: Diagnosis) -> list[dict[str, Any]]:
-    """The laws of the best model's effects, and the units of their parameters."""
-    problem, values = found.problem, found.best_values
-
-    def units(form: Form) -> dict[str, str]:
-        return {name: unit for name, (_, unit) in problem.reported(values, form).items()}
-
-    return equations_of(problem.kind, found.forms, units)
-
-
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
-    """The first effect against the nearest other names: what the evidence, the design and prediction say."""
+    """The first effect against the nearest others: evidence, signatures and cross-validation."""
     if not found.equivalence:
         return []
     first = found.best.model.forms[0]
@@ -132,45 +104,37 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
         write_series(folder / "latent.csv", found.latent())
     path = folder / "model.toml"
     problem.write_model(str(path), found.best_values, found.forms)
-    commented = with_comments(path.read_text(encoding="utf-8"), said["equations"], problem.kind)
-    write_text(path, commented)
-    rows = _evidence(found)
-    if rows:
+    write_text(path, with_comments(path.read_text(encoding="utf-8"), said["equations"], problem.kind))
+    if rows := said["evidence"]:
         write_series(folder / "evidence.csv", {
-            "candidate": np.array([r["candidate"] for r in rows]),
-            "effects": np.array([" + ".join(r["effects"]) for r in rows]),
-            "score": np.array([r["score"] for r in rows]),
-            "excess_per_sample": np.array([r["left"] for r in rows]),
+            "candidate": [r["candidate"] for r in rows], "effects": [" + ".join(r["effects"]) for r in rows],
+            "score": [r["score"] for r in rows], "excess_per_sample": [r["left"] for r in rows],
         })  # fmt: skip
-    phase_table, gaps = PhaseTable(), Gaps()
+    gaps = Gaps()
     for trial in problem.trials:
         before = problem.compare(found.base_values, (), trial.id)
         after = problem.compare(found.best_values, found.forms, trial.id)
         samples = problem.samples(trial.id)
         phases = phases_of(problem, found.base_values, (), trial.id)
         wide = scatter_std(problem, found.model_std, found.best_values, found.forms, trial.id)
-        noises = [problem.sensor_std(found.base_values, (), trial.id),
-                  problem.sensor_std(found.best_values, found.forms, trial.id)]  # fmt: skip
+        std = problem.sensor_std(found.base_values, (), trial.id)
+        std_after = problem.sensor_std(found.best_values, found.forms, trial.id)
         for channel, columns in before.items():
             if not len(columns["t_s"]):  # a sensor that recorded nothing
                 continue
-            rows_here = samples.channel == channel
+            own = samples.channel == channel
             columns = {"t_s": columns["t_s"], "measured": columns["measured"], "before": columns["model"],
                        "after": after[channel]["model"]}  # fmt: skip
-            if len(columns["t_s"]) == int(rows_here.sum()):
-                first, last = (noise[channel] for noise in noises)
-                columns |= {"std": first, "std_after": last, "phase": phases[rows_here]}
+            if len(columns["t_s"]) == int(own.sum()):
+                columns |= {"std": std[channel], "std_after": std_after[channel], "phase": phases[own]}
                 if found.model_std:
                     columns["scatter"] = wide[channel]
-                rest = [columns["measured"] - columns[stage] for stage in ("before", "after")]
-                held = trial.id in found.held_out
-                phase_table.add(channel, phases[rows_here], valid_residuals(rest[0], first),
-                                valid_residuals(rest[1], last), held_out=held)  # fmt: skip
-                gaps.add(trial.id, channel, columns["t_s"], rest[0], rest[1], first, last, settings=trial.settings,
-                         held_out=held)  # fmt: skip
+                rest, rest_after = (columns["measured"] - columns[stage] for stage in ("before", "after"))
+                gaps.add(trial.id, channel, columns["t_s"], rest, rest_after, std[channel], std_after[channel],
+                         phases=phases[own], settings=trial.settings, held_out=trial.id in found.held_out)  # fmt: skip
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
-    said["by_phase"] = phase_table.rows
-    said["by_channel"], said["by_condition"], said["parted"] = gaps.by_channel, gaps.by_condition, gaps.parted
+    said["by_phase"], said["by_channel"] = gaps.by_phase, gaps.by_channel
+    said["by_condition"], said["parted"] = gaps.by_condition, gaps.parted
     write_json(folder / "diagnosis.json", said)
     return said
 
@@ -204,12 +168,11 @@ def _evidence(found: Diagnosis) -> list[dict[str, Any]]:
         return []
     zero, whole = found.choice.base.score, _beyond_noise(found.choice.base.fit)
     seen: dict[tuple[str, ...], dict[str, Any]] = {}
-    for hypothesis in found.choice.table:
-        ids = [form.id for form in hypothesis.forms]
+    for one in found.choice.table:
+        ids, left = [form.id for form in one.forms], _beyond_noise(one.fit)
         key = tuple(sorted(ids))  # in whatever order they were added
-        row = {"candidate": " + ".join(ids), "effects": list(hypothesis.effects), "score": hypothesis.score - zero,
-               "left": _beyond_noise(hypothesis.fit),
-               "closes": 1 - _beyond_noise(hypothesis.fit) / whole if whole > 0 else None}  # fmt: skip
+        row = {"candidate": " + ".join(ids), "effects": list(one.effects), "score": one.score - zero, "left": left,
+               "closes": 1 - left / whole if whole > 0 else None}  # fmt: skip
         if key not in seen or row["score"] > seen[key]["score"]:
             seen[key] = row
     return sorted(seen.values(), key=lambda row: -row["score"])
@@ -221,7 +184,7 @@ def _beyond_noise(fit: Fit) -> float:
 
 
 def _evidence_base(found: Diagnosis) -> dict[str, Any]:
-    """What the base model leaves in the same units; were candidates weighed against what replicates differ by?"""
+    """What the base model leaves in the same units, and whether the wander of replicates counted as noise."""
     if found.choice is None:
         return {}
     base = found.choice.base.fit
@@ -229,7 +192,7 @@ def _evidence_base(found: Diagnosis) -> dict[str, Any]:
 
 
 def _leading(found: Diagnosis) -> dict[str, Any]:
-    """The candidate that explains most where something has no name: what it closes, and how sure it is."""
+    """The candidate that explains most of something unknown: what it closes, and how sure it is."""
     if found.choice is None or not found.choice.best.effects:
         return {"effects": [], "certain": [], "nearest": None}
     rivals = found.choice.rivals

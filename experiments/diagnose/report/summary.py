@@ -14,10 +14,15 @@ from .telling import remark_sentences, shares_words, size_sentences, small_names
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
-_WORTH_SAYING = 0.5
-"""Share of what is beyond the noise that a candidate without the best evidence must close to be called likeliest."""
-_AS_LIKELY = 1.0  # nats within which another name is said beside the likeliest
-_NAMES = 3  # candidates that are said where none is certain
+_WORTH_SAYING = 0.5  # share of the excess that a candidate without the best evidence closes to be called likeliest
+_AS_LIKELY = 1.0  # nats within which another effect is reported beside the likeliest
+_SHOWN = 3  # candidates that are reported where none is certain
+_LOST = 100.0  # a standard error over the value itself past which it is none: the curvature there is round-off
+
+
+def _strained(said: Mapping[str, Any], stage: str) -> list[Mapping[str, Any]]:
+    """Parameters far from the stated value."""
+    return [bound for bound in said["at_bounds"][stage] if bound["sigmas"] is not None]
 
 
 def _only_stated_wrong(said: Mapping[str, Any]) -> str:
@@ -25,7 +30,7 @@ def _only_stated_wrong(said: Mapping[str, Any]) -> str:
     if said["verdict"] != "unknown":
         return ""
     gaps = [gap for gap in said["gap"]["before"].values() if gap is not None]
-    far = [bound["parameter"] for bound in said["at_bounds"]["before"] if bound["sigmas"] is not None]
+    far = [bound["parameter"] for bound in _strained(said, "before")]
     return " and ".join(far) if far and max(gaps) <= SMALL else ""
 
 
@@ -51,31 +56,25 @@ def title_words(said: Mapping[str, Any]) -> str:
 
 def summary_sentences(said: Mapping[str, Any]) -> list[str]:
     """What stands first in the report and on the terminal."""
-    wrong = _only_stated_wrong(said)
+    ask = said["next_experiment"]
     if said["verdict"] == "none":
         gap = said["gap"]["after"]
         out = "" if gap["held_out"] is None else f" and {numeral(gap['held_out'])} of those held out"
         first = [
             f"The base model leaves {numeral(gap['fit'])} a sample of the trials that were fitted{out} (1 is noise)."
         ]
-    elif wrong:
-        said_so = "; ".join(
-            f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in said["at_bounds"]["before"]
-            if bound["sigmas"] is not None
-        )  # fmt: skip
-        first = [say("stated_wrong", said_so=said_so, wrong=wrong)]
+    elif wrong := _only_stated_wrong(said):
+        off = [f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in _strained(said, "before")]
+        first, ask = [say("stated_wrong", said_so="; ".join(off), wrong=wrong)], say("check_units", wrong=wrong)
     elif said["verdict"] == "unknown":
         first = [*_candidates(said), *_left(said), *worse_sentences(said)]
     else:
         first = [*sure_sentences(said), *worse_sentences(said)]
-    ask = said["next_experiment"]
-    if wrong:
-        ask = say("check_units", wrong=wrong)
     return [*_doubts(said), *first, *scatter_sentence(said), f"Next experiment: {ask}"]
 
 
 def _doubts(said: Mapping[str, Any]) -> list[str]:
-    """What in the recordings may be all that stands behind a name."""
+    """Faults of the recordings that may be all there is behind an effect."""
     found = [finding["what"] for finding in said.get("findings", []) if finding.get("doubt")]
     if not found or (said["verdict"] == "none" and said["gap"]["after"]["fit"] <= SMALL):
         return []
@@ -88,39 +87,30 @@ def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
     weighed = said.get("gap_with_scatter")
     if weighed is None:
         return []
-    key = "weighed_none" if said["verdict"] == "none" else "weighed_both"
-    before, after = _both(weighed["before"]), _both(weighed["after"], weighed)
-    return [say(key, scatter=_scatter(said), before=before, after=after, rests_on=_rests_on(weighed))]
+    kinds = [f"{kind.replace('_', ' ')} {size_words(kind, std)}" for kind, std in said.get("model_std", {}).items()]
+    freedom = weighed.get("freedom")
+    s = "" if freedom == 1 else "s"
+    return [say(
+        "weighed_none" if said["verdict"] == "none" else "weighed_both",
+        scatter=f" ({', '.join(kinds)})" if kinds else "", before=_both(weighed["before"], {}),
+        after=_both(weighed["after"], weighed.get("after_std", {})),
+        rests_on=f"; what replicates differ by rests on {freedom} degree{s} of freedom" if freedom else "",
+    )]  # fmt: skip
 
 
-def _scatter(said: Mapping[str, Any]) -> str:
-    """By how much replicates differ, in parentheses: a channel in its unit, a trial's own factor in per cent."""
-    parts = [f"{kind.replace('_', ' ')} {size_words(kind, std)}" for kind, std in said.get("model_std", {}).items()]
-    return f" ({', '.join(parts)})" if parts else ""
+def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -> str:
+    """A gap, fitted and held out, with its standard errors."""
 
-
-def _both(gap: Mapping[str, float | None], weighed: Mapping[str, Any] | None = None) -> str:
-    """`weighed`: `gap_with_scatter`, for the standard errors of its `after`."""
-    errors = {} if weighed is None else weighed.get("after_std", {})
-
-    def told(key: str) -> str:
+    def written(key: str) -> str:
         error = errors.get(key)
         return numeral(gap[key] or 0.0) if error is None else f"{gap[key]:.2f} +- {error:.1g}"
 
-    out = "" if gap["held_out"] is None else f" ({told('held_out')} held out)"
-    return f"{told('fit')} fitted{out}"
-
-
-def _rests_on(weighed: Mapping[str, Any]) -> str:
-    """How well it is known what replicates differ by."""
-    freedom = weighed.get("freedom")
-    if not freedom:
-        return ""
-    return f"; what replicates differ by rests on {freedom} degree{'s' if freedom > 1 else ''} of freedom"
+    out = "" if gap["held_out"] is None else f" ({written('held_out')} held out)"
+    return f"{written('fit')} fitted{out}"
 
 
 def _likeliest(said: Mapping[str, Any]) -> str:
-    """The names of the best model, or of the candidate that closes most; empty where it is little."""
+    """The effects of the best model, or the candidate that closes most; empty where it is little."""
     leading = said.get("leading", {})
     names, near = leading.get("effects", []), leading.get("nearest")
     if names:
@@ -131,13 +121,13 @@ def _likeliest(said: Mapping[str, Any]) -> str:
 
 
 def _candidates(said: Mapping[str, Any]) -> list[str]:
-    """Which names lead, how far each closes the gap, and how sure it is."""
+    """Which effects lead, how far each closes the gap, and how sure it is."""
     leading = said.get("leading", {"effects": [], "certain": [], "nearest": None})
     if not leading["effects"]:
         rows = _singles(said)
         if not rows:
             return ["No effect of the library could be tried."]
-        listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_NAMES])
+        listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_SHOWN])
         return [f"No effect of the library explains it: of what the base model leaves beyond the noise, {listed}."]
     certain = leading["certain"]
     others = [name for name in leading["effects"] if name not in certain]
@@ -154,17 +144,14 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
         first += say("nearest", near=near, apart=apart)
     sentences.append(f"{first}.")
     sentences += [*_numbers(leading), *size_sentences(said), *remark_sentences(said), *unnamed_sentence(said)]
-    rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _NAMES - 1]
+    rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _SHOWN - 1]
     if rest and not certain:
         sentences.append(f"Of what the base model leaves beyond the noise{_weighed(said)}, {_closing(rest)}.")
     return [*sentences, *_why_unknown(said)]
 
 
-_LOST = 100.0  # A standard error over the value itself [1] past which it is none: the curvature there is round-off
-
-
 def _numbers(leading: Mapping[str, Any]) -> list[str]:
-    """The parameters of names that are not certain, which stand in no table."""
+    """The parameters of effects that are not certain, which are in no table."""
     parts = []
     for effect, parameters in leading.get("parameters", {}).items():
         for name, told in parameters.items() if effect not in leading["certain"] else ():
@@ -178,24 +165,24 @@ def _numbers(leading: Mapping[str, Any]) -> list[str]:
 def _why_unknown(said: Mapping[str, Any]) -> list[str]:
     """What keeps the leading candidate from being the verdict."""
     gate = said["gate"]
-    strained = [bound for bound in said["at_bounds"]["after"] if bound["sigmas"] is not None]
-    reasons = [
+    failed = [
         f"{numeral(score['score'])} on {which} (a right model: {score['threshold']:.3g} at most)"
         for which, score in (("the fitted trials", gate["after"]), ("those held out", gate.get("held_out")))
         if score is not None and not score["passed"]
     ]
-    said_so = [f"the gate stands at {' and at '.join(reasons)}"] if reasons else []
-    said_so += [f"it needs {bound['parameter']} {bound['sigmas']:+.1f} sigma off what was stated" for bound in strained]
-    return [f"It is not the whole answer: {'; '.join(said_so)}."] if said_so else []
+    reasons = [f"the gate stands at {' and at '.join(failed)}"] if failed else []
+    reasons += [f"it needs {bound['parameter']} {bound['sigmas']:+.1f} sigma off what was stated"
+                for bound in _strained(said, "after")]  # fmt: skip
+    return [f"It is not the whole answer: {'; '.join(reasons)}."] if reasons else []
 
 
 def _weighed(said: Mapping[str, Any]) -> str:
-    """Against what candidates were weighed, where it is not the sensors alone."""
+    """A clause where candidates were compared against more than the sensors' noise."""
     return ", weighed against what replicates differ by" if said.get("evidence_base", {}).get("with_scatter") else ""
 
 
 def _singles(said: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The best form of every single name, the likeliest first."""
+    """The best form of every single effect, the likeliest first."""
     best: dict[str, Mapping[str, Any]] = {}
     for row in said["evidence"]:
         if len(row["effects"]) == 1:
@@ -228,15 +215,12 @@ def _closes(gap: Mapping[str, Any]) -> str:
 
 
 def _left(said: Mapping[str, Any]) -> list[str]:
-    """Where the best model still fails, and what the missing force goes with."""
+    """Where the best model still fails, and what the missing force correlates with."""
     sentences = []
-    places = said.get("left", [])
-    if places:
-        total = sum(place["excess"] for place in places)
-        phase, channel = (shares_words(places, key, total) for key in ("phase", "channel"))
-        first = places[0]
+    if places := said.get("left", []):
         beyond = ", beyond what replicates differ by," if "gap_with_scatter" in said else ""
-        sentences.append(say("left", beyond=beyond, phase=phase, channel=channel, first=first))
+        phase, channel = (shares_words(places, key) for key in ("phase", "channel"))
+        sentences.append(say("left", beyond=beyond, phase=phase, channel=channel, first=places[0]))
     if "latent" in said:
         sentences.append(f"The force that is missing goes with {said['latent']['depends_on']}.")
         sentences += [line_sentence(row) for row in said["latent"].get("lines", [])]

@@ -10,30 +10,34 @@ from golden import golden
 
 from experiments.diagnose.core.effect_texts import confirmation
 from experiments.diagnose.core.next_steps import _follow
-from experiments.diagnose.fit.gaps import Gaps, numeral
+from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.localise import Place
 from experiments.diagnose.noise.colour import Colour, together
 from experiments.diagnose.report.candidates import candidate_rows, unnamed_sentence
+from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
 from experiments.diagnose.report.telling import (
-    PhaseTable,
     remark_sentences,
     size_sentences,
     sure_sentences,
     told_tables,
-    valid_residuals,
     where_sentences,
     worse_sentences,
 )
 
 
 def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():
-    table = PhaseTable()
-    phases = np.array(["in", "in", "out"])
-    table.add("force", phases, np.array([1.0, 3.0, 2.0]), np.array([1.0, 1.0, 0.0]), held_out=False)
-    table.add("force", phases[:1], np.array([2.0]), np.array([1.0]), held_out=False)
-    table.add("force", phases[2:], np.array([4.0]), np.array([0.5]), held_out=True)
-    rows = {(row["phase"], row["held_out"]): row for row in table.rows}
+    gaps, phases = Gaps(), np.array(["in", "in", "out"])
+
+    def add(phases, before, after, *, held_out):
+        time, noise = np.arange(float(len(phases))), np.ones(len(phases))
+        gaps.add("a", "force", time, np.array(before), np.array(after), noise, noise, phases=phases, settings={},
+                 held_out=held_out)  # fmt: skip
+
+    add(phases, [1.0, 3.0, 2.0], [1.0, 1.0, 0.0], held_out=False)
+    add(phases[:1], [2.0], [1.0], held_out=False)
+    add(phases[2:], [4.0], [0.5], held_out=True)
+    rows = {(row["phase"], row["held_out"]): row for row in gaps.by_phase}
     assert rows["in", False] | {"before": 0} == {
         "phase": "in", "channel": "force", "held_out": False, "samples": 3, "before": 0, "after": 1.0,
     }  # fmt: skip
@@ -42,12 +46,13 @@ def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():
 
 
 def test_a_reading_at_a_switch_of_the_contact_counts_in_no_table_as_in_the_gap():
-    table, gaps, rest = PhaseTable(), Gaps(), np.array([2.0, 50.0, 2.0])
+    gaps, rest = Gaps(), np.array([2.0, 50.0, 2.0])
     noise, quiet = np.array([1.0, np.inf, 1.0]), np.ones(3)
-    table.add("ax", np.array(["hop"] * 3), valid_residuals(rest, noise), valid_residuals(rest, quiet), held_out=False)
-    (row,) = table.rows
+    phases = np.array(["hop"] * 3)
+    gaps.add("a", "ax", np.arange(3.0), rest, rest, noise, quiet, phases=phases, settings={}, held_out=False)
+    (row,) = gaps.by_phase
     assert (row["samples"], row["before"], row["after"]) == (2, 4.0, pytest.approx((4 + 2500 + 4) / 3))
-    gaps.add("a", "ax", np.arange(3.0), rest, rest, noise, noise, settings={}, held_out=False)
+    assert gaps.by_condition[0]["after"] == row["after"]
     assert gaps.by_condition[0]["before"] == 4.0 and gaps.by_channel[0]["rms_before"] == 2.0
 
 
@@ -157,7 +162,8 @@ def test_the_gap_is_told_in_millimetres_by_condition_and_from_when_on():
     for trial, torque in (("a", 0.1), ("b", 0.2)):
         before = rest if trial == "a" else 0 * rest
         noise = np.full(101, 5e-4)
-        gaps.add(trial, "x", time, before, 0 * rest, noise, noise, settings={"torque_N_m": torque}, held_out=False)
+        gaps.add(trial, "x", time, before, 0 * rest, noise, noise, phases=np.full(101, "hop"),
+                 settings={"torque_N_m": torque}, held_out=False)  # fmt: skip
     (row,) = gaps.by_channel
     assert (row["unit"], row["rms_after"]) == ("mm", 0.0)
     assert row["rms_before"] == pytest.approx(3 * np.sqrt(51 / 202))
@@ -165,7 +171,8 @@ def test_the_gap_is_told_in_millimetres_by_condition_and_from_when_on():
         (["a"], pytest.approx(36 * 51 / 101)), (["b"], 0.0)]  # fmt: skip
     offset = np.where(np.linspace(-0.2, 1.0, 121) < 0.295, 2e-3, 5e-3)  # the zero alone is no parting
     time, noise = np.linspace(-0.2, 1.0, 121), np.full(121, 5e-4)
-    gaps.add("c", "y", time, offset, 0 * offset, noise, noise, settings={}, held_out=False)
+    still = np.full(121, "stand")
+    gaps.add("c", "y", time, offset, 0 * offset, noise, noise, phases=still, settings={}, held_out=False)
     parted, later = gaps.parted
     assert later["trial"] == "c" and later["at_s"] == pytest.approx(0.3, abs=0.03)
     assert parted["trial"] == "a" and parted["at_s"] == pytest.approx(0.5, abs=0.03)
