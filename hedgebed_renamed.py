@@ -83,7 +83,7 @@ _MODULES = {
         "experiments.validate": "validate_settings=settings",
     },
     "experiments.diagnose": {
-        "experiments.check": "lags unit_factors=words",
+        "experiments.check": "lags=tumbles unit_factors=words",
         "experiments.diagnose.core": (
             "deciding diagnosis effect_equations=effect_texts effect_words=effect_texts equivalence=rivals next_steps "
             "outcome own_ways=deciding pairs prediction=rivals renoised scatter_gap search sizes "
@@ -107,7 +107,9 @@ _MODULES = {
         ),
     },
     "experiments.plausible": {
-        "experiments.check": "findings force_units penetration tumble turning words zeros",
+        "experiments.check": (
+            "findings force_units=pushes penetration=pushes tumble=tumbles turning=tumbles words zeros=pushes"
+        ),
     },
     "experiments.validate": {
         "experiments.validate.base": "case cloud drops energy kept=parts parts peers spheres",

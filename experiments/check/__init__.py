@@ -2,7 +2,7 @@
 
 A column in degrees under a heading in radians, a force that points down, an accelerometer's reading where the second
 derivative of the depth was asked for: each fits no effect of any library and would be diagnosed as one. Nothing is set
-aside for it; a person has to say what is right. `hedgebed campaign check` and `hedgebed diagnose` both say it.
+aside for it; a person has to state what is right. `hedgebed campaign check` and `hedgebed diagnose` both report it.
 
 Imports `experiments.campaign`, `rigid`, `vis.page`.
 """

@@ -1,5 +1,6 @@
-"""Replicates in a campaign, looked at without a model: which trials are alike, and is one at odds with the others?"""
+"""Replicates in a campaign, without a model: which trials are alike, and whether one is at odds with the others."""
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -7,17 +8,16 @@ import numpy as np
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign
 from experiments.campaign.tables import PenetrationTrial, TumbleTrial
 
-from .words import Array, Finding, factor_words, say
+from .pushes import down
+from .words import Array, Finding, factor_words, say, std_of
 
 __all__ = ["Condition", "condition_of", "condition_words", "odd_replicates"]
 
 Condition = tuple[object, ...]
 
-_AT_ODDS = 20.0
-"""How many times as far from its replicates as they are from one another, in mean square, a trial is at odds."""
-_NOISE = 4.0  # and how many times farther, in mean square, than the sensors' noise would put it
-_SIZEABLE = 0.1
-"""And by which share of what the channel does (its standard deviation) it must differ: beds differ by some percent."""
+_AT_ODDS = 20.0  # times as far from its replicates as these from one another, in mean square, a trial is at odds
+_NOISE = 4.0  # and times farther, in mean square, than the sensors' noise would put it
+_SIZEABLE = 0.1  # and share of the channel's standard deviation by which it differs: beds differ by some percent
 _POINTS = 80  # places at which replicates are compared
 
 
@@ -53,6 +53,8 @@ def odd_replicates(campaign: Campaign) -> list[Finding]:
     own size.
     """
     tables = campaign.tables
+    std = tables.uncertainty.gravity_sim if isinstance(tables, TumbleCampaign) else 0.0
+    also = say("own_gravity", percent=100 * std) if std else ""  # each trial's gravity may be behind it
     groups: dict[Condition, list[Any]] = {}
     for trial in tables.trial:
         groups.setdefault(condition_of(tables, trial), []).append(trial)
@@ -63,73 +65,56 @@ def odd_replicates(campaign: Campaign) -> list[Finding]:
         worst: dict[str, tuple[float, str]] = {}
         units: dict[str, str] = {}
         for sensor in trials[0].files:
-            own = [campaign.recording(trial.id, sensor) for trial in trials]
-            here = [(trial, recording) for trial, recording in zip(trials, own, strict=True) if recording is not None]
+            own = {trial.id: campaign.recording(trial.id, sensor) for trial in trials}
+            here = {id: recording for id, recording in own.items() if recording is not None}
             if len(here) < 3:
                 continue
-            for channel, std, curves in _curves(tables, sensor, here):
-                for name, ratio in _at_odds([trial.id for trial, _ in here], curves, std):
-                    worst[name] = max(worst.get(name, (0.0, "")), (ratio, channel))
-                    units[name] = units.get(name) or factor_words(
-                        channel, *_parted([trial.id for trial, _ in here], curves, name)
-                    )
+            for channel, std, curves in _curves(tables, sensor, trials[0], list(here.values())):
+                for place, ratio in _at_odds(curves, std):
+                    id = list(here)[place]
+                    worst[id] = max(worst.get(id, (0.0, "")), (ratio, channel))
+                    others = [curve for k, curve in enumerate(curves) if k != place]
+                    units[id] = units.get(id) or factor_words(channel, curves[place], others)
         if 2 * len(worst) < len(trials):  # where half of them are odd, none is
             found += [
                 Finding(
                     trial=id, channel=channel,
-                    what=say("at_odds", id=id, others=len(trials) - 1, channel=channel, ratio=ratio) + units[id]
-                    + _own_gravity(tables),
+                    what=say("at_odds", id=id, others=len(trials) - 1, channel=channel, ratio=ratio) + units[id] + also,
                 )
                 for id, (ratio, channel) in worst.items()
             ]  # fmt: skip
     return found
 
 
-def _parted(ids: list[str], curves: list[Array], name: str) -> tuple[Array, list[Array]]:
-    """The curve of one trial, and those of the others."""
-    return curves[ids.index(name)], [curve for id, curve in zip(ids, curves, strict=True) if id != name]
-
-
-def _own_gravity(tables: TumbleCampaign | PenetrationCampaign) -> str:
-    """What may be behind it where every trial has a gravity of its own."""
-    std = tables.uncertainty.gravity_sim if isinstance(tables, TumbleCampaign) else 0.0
-    if not std:
-        return ""
-    return say("own_gravity", percent=100 * std)
-
-
 def _curves(
-    tables: TumbleCampaign | PenetrationCampaign, sensor: str, here: list[tuple[Any, Recording]]
+    tables: TumbleCampaign | PenetrationCampaign, sensor: str, trial: Any, here: list[Recording]
 ) -> list[tuple[str, float, list[Array]]]:
-    """(channel, its noise, a curve of each trial at common places)."""
+    """(channel, its noise, a curve of each recording at common places); `trial`: one of them."""
     if isinstance(tables, PenetrationCampaign):
         sensors = tables.sensors
-        if here[0][0].mode == "driven":
-            std = sensors.force.std[0] if sensors.force else 0.0
-            return [("force", std, _resampled([_way_in(recording) for _, recording in here]))]
+        if trial.mode == "driven":
+            return [("force", std_of(sensors.force), _resampled([_by_depth(recording) for recording in here]))]
         names = {"depth_m": ("depth", sensors.depth), "accel_m_s2": ("accel", sensors.accel)}
         return [
-            (name, table.std[0] if table else 0.0, _resampled([(r.time, r[column]) for _, r in here]))
+            (name, std_of(table), _resampled([(r.time, r[column]) for r in here]))
             for column, (name, table) in names.items()
         ]
     stds = getattr(tables.sensors, sensor).std
     return [
         (column.rsplit("_", 1)[0] if sensor == "pose" else column, std,
-         _resampled([(r.time, _from_start(r[column]) if sensor == "pose" else r[column]) for _, r in here]))
-        for column, std in zip(list(here[0][1].columns)[1:], stds, strict=True)
+         _resampled([(r.time, _from_start(r[column]) if sensor == "pose" else r[column]) for r in here]))
+        for column, std in zip(list(here[0].columns)[1:], stds, strict=True)
     ]  # fmt: skip
 
 
-def _way_in(recording: Recording) -> tuple[Array, Array]:
+def _by_depth(recording: Recording) -> tuple[Array, Array]:
     """Depth and force down to the deepest point, by depth."""
-    depth, force = recording["depth_m"], recording["force_N"]
-    known = np.isfinite(depth) & np.isfinite(force)
-    depth, force = depth[known], force[known]
-    if not len(depth):
-        return depth, force
-    last = int(np.argmax(depth))
-    order = np.argsort(depth[: last + 1], kind="stable")
-    return depth[: last + 1][order], force[: last + 1][order]
+    pushed = down(recording)
+    if pushed is None:
+        return np.zeros(0), np.zeros(0)
+    _, depth, force = pushed
+    order = np.argsort(depth, kind="stable")
+    return depth[order], force[order]
 
 
 def _from_start(values: Array) -> Array:
@@ -156,22 +141,19 @@ def _resampled(pairs: list[tuple[Array, Array]]) -> list[Array]:
     return curves
 
 
-def _at_odds(ids: list[str], curves: list[Array], std: float) -> list[tuple[str, float]]:
-    """(trial, how many times as far from its nearest replicate as the others are from one another)."""
-    if not curves:
-        return []
-    count = len(ids)
+def _at_odds(curves: list[Array], std: float) -> list[tuple[int, float]]:
+    """(place of a curve, times as far from its nearest replicate as the others are from one another)."""
+    count = len(curves)
     far = np.zeros((count, count))
-    for a in range(count):
-        for b in range(a + 1, count):
-            difference = curves[a] - curves[b]
-            far[a, b] = far[b, a] = float(np.nanmean(difference**2)) / 2 if np.isfinite(difference).any() else 0.0
+    for a, b in combinations(range(count), 2):
+        difference = curves[a] - curves[b]
+        far[a, b] = far[b, a] = float(np.nanmean(difference**2)) / 2 if np.isfinite(difference).any() else 0.0
     found = []
     for k in range(count):
         others = [j for j in range(count) if j != k]
         mine = min(far[k, j] for j in others)
-        theirs = float(np.median([far[a, b] for a in others for b in others if a < b]))
+        theirs = float(np.median([far[pair] for pair in combinations(others, 2)]))
         size = float(np.median([np.nanvar(curves[j]) if np.isfinite(curves[j]).any() else 0.0 for j in others]))
         if mine > max(_AT_ODDS * theirs, _NOISE * std**2, _SIZEABLE**2 * size):
-            found.append((ids[k], mine / max(theirs, 1e-300)))
+            found.append((k, mine / max(theirs, 1e-300)))
     return found

@@ -1,4 +1,4 @@
-"""What is said of an odd recording: a finding, a channel and a sentence, and what a ratio of two units means."""
+"""The findings of odd recordings: a channel and a sentence, and what a ratio of two units means."""
 
 import math
 from collections.abc import Sequence
@@ -12,20 +12,8 @@ from experiments.campaign.tables import DepthSensor
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.sentences import Sentences
 
-__all__ = [
-    "OFF",
-    "ZERO",
-    "Array",
-    "Finding",
-    "Odd",
-    "factor_words",
-    "said",
-    "say",
-    "std_of",
-    "oddity",
-    "times",
-    "unit_words",
-]
+__all__ = ["OFF", "ZERO", "Array", "Finding", "Odd", "factor_words", "oddity", "row_noise", "say", "std_of", "times",
+           "unit_words"]  # fmt: skip
 
 Array = NDArray[np.float64]
 say = Sentences(__package__)
@@ -55,8 +43,7 @@ _READ_IN: dict[str, dict[float, str]] = {
 _READ_IN |= {"ax": _READ_IN["accel"], "ay": _READ_IN["accel"]}
 """Channel -> how many times too large a reading is that was taken in another unit."""
 _NEXT_TO = 0.02  # relative distance from such a factor; between 9.807 and 30/pi lie 2.7 %
-_SHAPE = 0.1
-"""Share of its size by which it may differ from its replicates times that factor: what is left is noise and beds."""
+_SHAPE = 0.1  # share of its size by which a curve may differ from its replicates times such a factor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,15 +61,10 @@ class Finding:
 
 
 class Odd(NamedTuple):
-    """One thing that cannot be."""
+    """One implausible thing."""
 
     channel: str
     what: str
-
-
-def said(channel: str, *parts: str) -> Odd:
-    """The parts as one sentence."""
-    return Odd(channel, "".join(parts))
 
 
 def oddity(channel: str, key: str, /, **values: object) -> Odd:
@@ -98,6 +80,11 @@ def unit_words(ratio: float) -> str | None:
 def times(ratio: float) -> str:
     """24 times, 2.5 times."""
     return f"{ratio:.0f} times" if ratio >= 10 else f"{ratio:.2g} times"
+
+
+def row_noise(values: Array) -> float:
+    """Noise of neighbouring readings, by the median of their fourth differences; `values`: without gaps, shape [n]."""
+    return float(np.median(np.abs(np.diff(values, 4)))) / 0.6745 / math.sqrt(70)
 
 
 def std_of(sensor: DepthSensor | None) -> float:

@@ -1,12 +1,12 @@
 """Readings that are stuck, or clip: a sensor that says the same number over and over where it otherwise never does."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.check.words import row_noise
 from experiments.grains.spells import spells
 
 __all__ = ["Clipped", "clipped", "clipped_wheel", "cut_rows", "stuck_rows"]
@@ -74,8 +74,7 @@ def clipped_wheel(values: NDArray[np.float64], std: float) -> list[Clipped]:
     below = below[np.isfinite(below)]
     if len(below) < 3 * _AT_THE_END:
         return []
-    noise = float(np.median(np.abs(np.diff(below, 4)))) / 0.6745 / math.sqrt(70)
-    return found if noise > _NOISY * std else []
+    return found if row_noise(below) > _NOISY * std else []
 
 
 def cut_rows(recordings: Sequence[NDArray[np.float64]], std: float) -> list[NDArray[np.int64]]:

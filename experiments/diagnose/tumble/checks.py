@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from experiments.check.lags import find_lag, pieces
+from experiments.check.tumbles import find_lag, pieces
 from experiments.diagnose.fit.problem import Finding
 from experiments.diagnose.noise.stuck import clipped, clipped_wheel, stuck_rows
 

@@ -11,7 +11,7 @@ from penetration_campaigns import DAMPING, FORCE_STD, STIFFNESS, campaign_of, dr
 from experiments.campaign import Campaign, Recording, read_campaign
 from experiments.campaign.templates import TEMPLATES
 from experiments.check import find_implausible
-from experiments.check.force_units import force_units
+from experiments.check.pushes import force_units
 from experiments.diagnose.inspection import find_faults
 from experiments.diagnose.noise.stuck import clipped_wheel, cut_rows
 from experiments.diagnose.push.data import prepare
