@@ -17,14 +17,6 @@ def make_advance(parts: SimpleNamespace) -> Any:
     """The kernel `advance(numbers, poses, times, time_step, steps, end, launch, summary, series)`."""
     import taichi as ti
 
-    vertical, applied, torque_factor, inner = parts.vertical, parts.applied, parts.torque_factor, parts.inner
-    MEMORY, HOLDS, INNER, HALF, BETA = parts.MEMORY, parts.HOLDS, parts.INNER, parts.HALF, parts.BETA
-    DIAGONAL, NAN, LAW, LAW_SIZE, count = parts.DIAGONAL, parts.NAN, parts.LAW, parts.LAW_SIZE, parts.count
-    load_parameters, state_of, trial_state = parts.load_parameters, parts.state_of, parts.trial_state
-    trial_numbers, set_mass = parts.trial_numbers, parts.set_mass
-    Motion, Forces, Modes, Event, Spikes, Tally = (
-        parts.Motion, parts.Forces, parts.Modes, parts.Event, parts.Spikes, parts.Tally,
-    )  # fmt: skip
     start_inner, advance_inner = make_inner(parts)
     push_spikes, hold = make_contacts(parts), make_hold(parts)
     find_events, switch = make_events(parts)
@@ -44,30 +36,32 @@ def make_advance(parts: SimpleNamespace) -> Any:
     ):
         ti.loop_config(block_dim=4)
         for i in range(numbers.shape[0]):
-            s = trial_state(numbers, i)
-            p = load_parameters(numbers, i)
-            q = ti.Vector([numbers[i, LAW + k] for k in ti.static(range(LAW_SIZE))])
-            s.up_x, s.up_y = vertical(p)
-            c = trial_numbers(numbers, i, s, p)
-            top = ti.Vector([0.0 for _ in ti.static(range(count if MEMORY else 1))])
-            held = ti.Vector([0.0 for _ in ti.static(range(count if HOLDS else 1))])
+            s = parts.trial_state(numbers, i)
+            p = parts.load_parameters(numbers, i)
+            q = ti.Vector([numbers[i, parts.LAW + k] for k in ti.static(range(parts.LAW_SIZE))])
+            s.up_x, s.up_y = parts.vertical(p)
+            c = parts.trial_numbers(numbers, i, s, p)
+            top = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.MEMORY else 1))])
+            held = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.HOLDS else 1))])
             y_start = poses[i, 0]
-            now = Motion(y=y_start, theta=poses[i, 1], wheel=numbers[i, 11])
-            then = Motion(y=y_start)
-            last = Forces(own_holds=1.0)  # of the step before
-            f = Forces(own_holds=1.0)
-            spikes = Spikes()
-            e = Event()
-            both = 1 | (1 << (count - 1))
-            m = Modes(touch=both, stick=both)
-            t = Tally(best_angle=NAN, stand=NAN, pivot=NAN, slip=NAN, hop=NAN, longest=NAN)
+            now = parts.Motion(y=y_start, theta=poses[i, 1], wheel=numbers[i, 11])
+            then = parts.Motion(y=y_start)
+            last = parts.Forces(own_holds=1.0)  # of the step before
+            f = parts.Forces(own_holds=1.0)
+            spikes = parts.Spikes()
+            e = parts.Event()
+            both = 1 | (1 << (parts.count - 1))
+            m = parts.Modes(touch=both, stick=both)
+            t = parts.Tally(
+                best_angle=parts.NAN, stand=parts.NAN, pivot=parts.NAN, slip=parts.NAN, hop=parts.NAN, longest=parts.NAN
+            )
             if c.nominal == 0.0 or c.until <= 0.0:
                 m.over = 1
-            if ti.static(MEMORY):
-                for n in ti.static((0, count - 1)):
-                    angle = now.theta + HALF + n * BETA
+            if ti.static(parts.MEMORY):
+                for n in ti.static((0, parts.count - 1)):
+                    angle = now.theta + parts.HALF + n * parts.BETA
                     top[n] = ti.max((s.length - c.radius) * ti.cos(angle) + c.radius - now.y, 0.0)
-                    if ti.static(HOLDS):
+                    if ti.static(parts.HOLDS):
                         held[n] = top[n]
             time = 0.0
             pull = 0.0  # the torque at the step's start
@@ -87,7 +81,7 @@ def make_advance(parts: SimpleNamespace) -> Any:
             going = not ti.math.isnan(now.theta)
             if not going:
                 status = 3
-            if ti.static(INNER):
+            if ti.static(parts.INNER):
                 start_inner(s, p, now, last, t)
                 if time_step > t.longest:
                     status = 4
@@ -109,15 +103,15 @@ def make_advance(parts: SimpleNamespace) -> Any:
                 s.wheel_speed = now.wheel + dt * c.spin_up * pull
                 s.torque = 0.0
                 if driving:
-                    s.torque = c.nominal * torque_factor(p, s)
-                f = Forces(own_holds=1.0)
-                if ti.static(INNER):
+                    s.torque = c.nominal * parts.torque_factor(p, s)
+                f = parts.Forces(own_holds=1.0)
+                if ti.static(parts.INNER):
                     advance_inner(s, p, now, then, f, dt)
-                f.fx, f.fy, f.ft = applied(p, s)
-                if ti.static(not DIAGONAL):
-                    set_mass(c, p, s)
-                e = Event(ahead=1.0)
-                spikes = Spikes()
+                f.fx, f.fy, f.ft = parts.applied(p, s)
+                if ti.static(not parts.DIAGONAL):
+                    parts.set_mass(c, p, s)
+                e = parts.Event(ahead=1.0)
+                spikes = parts.Spikes()
                 status = push_spikes(s, p, q, c, then, dt, f, m, e, spikes, top, held, status)
                 hold(s, p, c, then, f, m, hx, hy, ht, dt)
                 find_events(s, c, now, then, f, last, m, e, spikes, dt, driving, pull)
@@ -142,15 +136,15 @@ def make_advance(parts: SimpleNamespace) -> Any:
                 if dt > 0.0:
                     while sample < samples and times[row, ti.min(sample, samples - 1)] <= time + dt:
                         share = (times[row, sample] - time) / dt
-                        record(series, i, sample, share, dt, now, then, state_of(m.touch, m.stick))
+                        record(series, i, sample, share, dt, now, then, parts.state_of(m.touch, m.stick))
                         sample += 1
                     follow(t, now, then, y_start, launch)
-                    if ti.static(MEMORY):
+                    if ti.static(parts.MEMORY):
                         for j in ti.static(range(3)):
-                            n = (m.lowest + j - 1 + count) % count
+                            n = (m.lowest + j - 1 + parts.count) % parts.count
                             if (m.touch & (1 << n)) != 0:
                                 top[n] = ti.max(top[n], spikes.depth[j])
-                                if ti.static(HOLDS):
+                                if ti.static(parts.HOLDS):
                                     held[n] = ti.max(held[n], spikes.depth[j])
                             elif spikes.depth[j] < 0.0:
                                 top[n] = 0.0  # forgotten above the surface
@@ -171,7 +165,7 @@ def make_advance(parts: SimpleNamespace) -> Any:
                     again = True
                 # -- the next stretch --
                 if not again or splits >= MOST_SPLITS + 8:
-                    enter(t, state_of(m.touch, m.stick), now.theta)
+                    enter(t, parts.state_of(m.touch, m.stick), now.theta)
                 if again and splits < MOST_SPLITS + 8:
                     dt = 0.0
                     settle_only = True
@@ -194,7 +188,7 @@ def make_advance(parts: SimpleNamespace) -> Any:
                     going = False
             # -- the end --
             while sample < samples and times[row, ti.min(sample, samples - 1)] <= end * (1.0 + 1e-12):
-                record(series, i, sample, 0.0, 0.0, now, now, state_of(m.touch, m.stick))
+                record(series, i, sample, 0.0, 0.0, now, now, parts.state_of(m.touch, m.stick))
                 sample += 1
             t.status, t.splits = status, total_splits
             summarise(summary, i, t, now)
@@ -210,22 +204,20 @@ def make_inner(parts: SimpleNamespace) -> Any:
     """
     import taichi as ti
 
-    inner_start, inner = parts.inner_start, parts.inner
-
     @ti.func
     def start_inner(s: ti.template(), p: ti.template(), now: ti.template(), last: ti.template(), t: ti.template()):
         s.x = now.x
         s.y = now.y
         s.theta = now.theta
-        now.own = inner_start(p, s)
+        now.own = parts.inner_start(p, s)
         s.inner = now.own
-        mass, at_rest, last.own_holds = inner(p, s)
+        mass, at_rest, last.own_holds = parts.inner(p, s)
         if mass > 0.0:  # as `step_bound` has it for the ground
             s.inner = now.own + 1e-6 * s.length
-            mass, by_place, last.own_holds = inner(p, s)
+            mass, by_place, last.own_holds = parts.inner(p, s)
             s.inner = now.own
             s.inner_speed = 1e-3
-            mass, by_speed, last.own_holds = inner(p, s)
+            mass, by_speed, last.own_holds = parts.inner(p, s)
             lightest = 1.0 / mass + 1.0 / s.mass
             t.longest = 0.2 / ti.sqrt(ti.max((at_rest - by_place) / (1e-6 * s.length) * lightest, 1e-12))
             t.longest = ti.min(t.longest, 1.0 / ti.max((at_rest - by_speed) / 1e-3 * lightest, 1e-12))
@@ -237,7 +229,7 @@ def make_inner(parts: SimpleNamespace) -> Any:
         s.inner = now.own + dt * (now.own_v + 0.5 * dt * now.own_a)
         s.inner_speed = now.own_v + dt * now.own_a
         then.own = s.inner
-        mass, force, f.own_holds = inner(p, s)
+        mass, force, f.own_holds = parts.inner(p, s)
         then.own_a = 0.0
         if mass > 0.0:
             then.own_a = force / mass

@@ -13,11 +13,6 @@ def make_contacts(parts: SimpleNamespace) -> Any:
     """
     import taichi as ti
 
-    contact, arms, count = parts.contact, parts.arms, parts.count
-    MEMORY, HOLDS, BETA, HALF = parts.MEMORY, parts.HOLDS, parts.BETA, parts.HALF
-    TURN_COS, TURN_SIN, TWICE_COS, TWICE_SIN = parts.TURN_COS, parts.TURN_SIN, parts.TWICE_COS, parts.TWICE_SIN
-    small_sine, small_cosine = parts.small_sine, parts.small_cosine
-
     @ti.func
     def push_spikes(
         s: ti.template(), p: ti.template(), q: ti.template(), c: ti.template(), then: ti.template(), dt,
@@ -25,33 +20,33 @@ def make_contacts(parts: SimpleNamespace) -> Any:
         held: ti.template(), given,
     ):  # fmt: skip
         status = given
-        turned = then.theta + HALF
-        k = ti.floor(turned / BETA + 0.5)
-        low = turned - k * BETA
-        m.lowest = (ti.cast(-k, ti.i32) % count + count) % count
-        low_cos = small_cosine(low)
-        low_sin = small_sine(low)
+        turned = then.theta + parts.HALF
+        k = ti.floor(turned / parts.BETA + 0.5)
+        low = turned - k * parts.BETA
+        m.lowest = (ti.cast(-k, ti.i32) % parts.count + parts.count) % parts.count
+        low_cos = parts.small_cosine(low)
+        low_sin = parts.small_sine(low)
         near = 0
         for j in ti.static(range(3)):
-            n = (m.lowest + j - 1 + count) % count
+            n = (m.lowest + j - 1 + parts.count) % parts.count
             bit = 1 << n
             near |= bit
-            cosine = low_cos * TURN_COS[j] - low_sin * TURN_SIN[j]
-            sine = low_sin * TURN_COS[j] + low_cos * TURN_SIN[j]
-            h, d = arms(cosine, sine, s.length, c.radius)
+            cosine = low_cos * parts.TURN_COS[j] - low_sin * parts.TURN_SIN[j]
+            sine = low_sin * parts.TURN_COS[j] + low_cos * parts.TURN_SIN[j]
+            h, d = parts.arms(cosine, sine, s.length, c.radius)
             depth = h - then.y
             spikes.depth[j] = depth
             deepest = depth
-            if ti.static(MEMORY):
+            if ti.static(parts.MEMORY):
                 deepest = ti.max(top[n], depth)
             since = deepest
-            if ti.static(HOLDS):
+            if ti.static(parts.HOLDS):
                 since = ti.max(held[n], depth)
             if (m.touch & bit) != 0:
                 rate = -(then.vy + then.omega * d)
                 slip = then.vx - then.omega * h
                 at = ti.max(depth, c.crater * deepest * (1.0 + 1e-15) + 1e-300)
-                elastic, lost, stored, side, factor_s, factor_d, grip = contact(
+                elastic, lost, stored, side, factor_s, factor_d, grip = parts.contact(
                     p, s, q, at, rate, slip, ti.max(deepest, at), ti.max(since, at)
                 )
                 normal = elastic + lost
@@ -86,8 +81,9 @@ def make_contacts(parts: SimpleNamespace) -> Any:
                         e.ahead, e.kind, e.which = share, 1, n
         m.touch &= near
         m.stick &= m.touch
-        if ti.static(count > 3):  # the fourth lowest tip
-            if then.y < (s.length - c.radius) * (low_cos * TWICE_COS + ti.abs(low_sin) * TWICE_SIN) + c.radius:
+        if ti.static(parts.count > 3):  # the fourth lowest tip
+            fourth = low_cos * parts.TWICE_COS + ti.abs(low_sin) * parts.TWICE_SIN
+            if then.y < (s.length - c.radius) * fourth + c.radius:
                 status = 1
         return status
 

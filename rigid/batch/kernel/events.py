@@ -18,9 +18,6 @@ def make_events(parts: SimpleNamespace) -> Any:
     """
     import taichi as ti
 
-    MEMORY, SHEDS, HOLDS, BETA, HALF = parts.MEMORY, parts.SHEDS, parts.HOLDS, parts.BETA, parts.HALF
-    DRY, INNER, NEAR, count = parts.DRY, parts.INNER, parts.NEAR, parts.count
-
     @ti.func
     def earlier(e: ti.template(), share, kind):
         if share < e.ahead or e.kind == 0:
@@ -40,7 +37,7 @@ def make_events(parts: SimpleNamespace) -> Any:
         last: ti.template(), m: ti.template(), e: ti.template(), spikes: ti.template(), dt, driving, pull,
     ):  # fmt: skip
         for j in ti.static(range(3)):
-            n = (m.lowest + j - 1 + count) % count
+            n = (m.lowest + j - 1 + parts.count) % parts.count
             bit = 1 << n
             if dt > 0.0 and (m.touch & bit) != 0 and (m.stick & bit) == 0:
                 slip = then.vx - then.omega * spikes.h[j]
@@ -57,7 +54,7 @@ def make_events(parts: SimpleNamespace) -> Any:
         f.margin = f.bound - ti.abs(f.hold)
         if m.stick != 0 and f.margin < 0.0:
             share = used_up(last.margin, f.margin)
-            if dt == 0.0 and f.margin > -NEAR * f.bound:
+            if dt == 0.0 and f.margin > -parts.NEAR * f.bound:
                 share = 2.0
             if share < e.ahead or (e.kind == 0 and share <= 1.0):
                 e.ahead, e.kind = share, 4
@@ -66,12 +63,11 @@ def make_events(parts: SimpleNamespace) -> Any:
             then.wheel = now.wheel + 0.5 * dt * c.spin_up * (pull + s.torque)
             if c.braking != 0.0 and then.wheel < 0.0 and dt > 0.0:
                 earlier(e, now.wheel / (now.wheel - then.wheel), 5)
-        if ti.static(INNER):
+        if ti.static(parts.INNER):
             if dt > 0.0 and f.own_holds < 0.0:
                 earlier(e, used_up(last.own_holds, f.own_holds), 10)
-        f.margin_v = f.bound_v - ti.abs(f.hold_v)
-        f.margin_r = f.bound_r - ti.abs(f.hold_r)
-        if ti.static(DRY):
+        f.dry_margin = f.dry_bound - ti.abs(f.dry_hold)
+        if ti.static(parts.DRY):
             find_dry_events(s, then, f, last, m, e, dt)
 
     @ti.func
@@ -79,23 +75,17 @@ def make_events(parts: SimpleNamespace) -> Any:
         s: ti.template(), then: ti.template(), f: ti.template(), last: ti.template(), m: ti.template(),
         e: ti.template(), dt,
     ):  # fmt: skip
-        if m.slide_v != 0 and dt > 0.0:
-            speed = (s.up_x * then.vx + s.up_y * then.vy) * m.slide_v
-            change = (s.up_x * then.ax + s.up_y * then.ay) * m.slide_v
-            if speed < 0.0:
+        speed = parts.dry_along(s, then.vx, then.vy, then.omega) * m.slide
+        change = parts.dry_along(s, then.ax, then.ay, then.alpha) * m.slide
+        for k in ti.static(range(2)):
+            if m.slide[k] != 0 and dt > 0.0 and speed[k] < 0.0:
                 share = 0.0
-                if change < 0.0:
-                    share = 1.0 - ti.min(speed / (change * dt), 1.0)
-                earlier(e, share, 6)
-        if m.slide_r != 0 and dt > 0.0 and then.omega * m.slide_r < 0.0:
-            share = 0.0
-            if then.alpha * m.slide_r < 0.0:
-                share = 1.0 - ti.min(then.omega / (then.alpha * dt), 1.0)
-            earlier(e, share, 7)
-        if m.slide_v == 0 and f.bound_v > 0.0 and f.margin_v < -NEAR * f.bound_v:
-            earlier(e, used_up(last.margin_v, f.margin_v), 8)
-        if m.slide_r == 0 and f.bound_r > 0.0 and f.margin_r < -NEAR * f.bound_r:
-            earlier(e, used_up(last.margin_r, f.margin_r), 9)
+                if change[k] < 0.0:
+                    share = 1.0 - ti.min(speed[k] / (change[k] * dt), 1.0)
+                earlier(e, share, 6 + k)
+        for k in ti.static(range(2)):
+            if m.slide[k] == 0 and f.dry_bound[k] > 0.0 and f.dry_margin[k] < -parts.NEAR * f.dry_bound[k]:
+                earlier(e, used_up(last.dry_margin[k], f.dry_margin[k]), 8 + k)
 
     @ti.func
     def switch(
@@ -107,9 +97,9 @@ def make_events(parts: SimpleNamespace) -> Any:
         m.fresh = 0
         if kind == 1:
             m.touch |= bit
-            if ti.static(HOLDS):
+            if ti.static(parts.HOLDS):
                 held[which] = 0.0
-            reach = (s.length - c.radius) * ti.cos(now.theta + HALF + which * BETA) + c.radius
+            reach = (s.length - c.radius) * ti.cos(now.theta + parts.HALF + which * parts.BETA) + c.radius
             slip = now.vx - now.omega * reach
             m.stick &= ~bit
             if slip > 0.0:
@@ -119,7 +109,7 @@ def make_events(parts: SimpleNamespace) -> Any:
         elif kind == 2:
             m.touch &= ~bit
             m.stick &= ~bit
-            if ti.static(MEMORY and not SHEDS):
+            if ti.static(parts.MEMORY and not parts.SHEDS):
                 top[which] = 0.0
         elif kind == 3:
             m.stick |= bit
@@ -130,7 +120,7 @@ def make_events(parts: SimpleNamespace) -> Any:
                 leaving = newcomers
             m.stick &= ~leaving
             for j in ti.static(range(3)):
-                one = 1 << ((m.lowest + j - 1 + count) % count)
+                one = 1 << ((m.lowest + j - 1 + parts.count) % parts.count)
                 if (leaving & one) != 0:
                     sign = -f.hold
                     slip = now.vx - now.omega * spikes.h[j]  # what the constraint leaves: not its excess before
@@ -143,19 +133,14 @@ def make_events(parts: SimpleNamespace) -> Any:
         elif kind == 5:
             now.wheel = 0.0
             m.over = 1
-        elif kind == 6:
-            m.slide_v = 0
-        elif kind == 7:
-            m.slide_r = 0
-        elif kind == 8:
-            m.slide_v = 1
-            if f.hold_v > 0.0:
-                m.slide_v = -1
-        elif kind == 9:
-            m.slide_r = 1
-            if f.hold_r > 0.0:
-                m.slide_r = -1
         elif kind == 10:
             s.inner_mode = 1.0 - s.inner_mode
+        for k in ti.static(range(2)):
+            if kind == 6 + k:
+                m.slide[k] = 0
+            elif kind == 8 + k:
+                m.slide[k] = 1
+                if f.dry_hold[k] > 0.0:
+                    m.slide[k] = -1
 
     return find_events, switch

@@ -13,16 +13,14 @@ def make_hold(parts: SimpleNamespace) -> Any:
     """
     import taichi as ti
 
-    divide, dry_friction, DIAGONAL, DRY = parts.divide, parts.dry_friction, parts.DIAGONAL, parts.DRY
-
     @ti.func
     def hold(
         s: ti.template(), p: ti.template(), c: ti.template(), then: ti.template(), f: ti.template(), m: ti.template(),
         hx, hy, ht, dt,
     ):  # fmt: skip
         then.ax, then.ay, then.alpha = f.fx * c.inverse_x, f.fy * c.inverse_y, f.ft * c.inverse_t
-        if ti.static(not DIAGONAL):
-            then.ax, then.ay, then.alpha = divide(c, f.fx, f.fy, f.ft)
+        if ti.static(not parts.DIAGONAL):
+            then.ax, then.ay, then.alpha = parts.divide(c, f.fx, f.fy, f.ft)
         holds = m.stick != 0
         if f.load > 0.0:
             f.mean_h /= f.load
@@ -31,14 +29,14 @@ def make_hold(parts: SimpleNamespace) -> Any:
             f.mean_h = f.plain_h
         tx, ty, tt = 0.0, 0.0, 0.0
         if holds:
-            if ti.static(DIAGONAL):
+            if ti.static(parts.DIAGONAL):
                 tx, tt = c.inverse_x, -f.mean_h * c.inverse_t
             else:
-                tx, ty, tt = divide(c, 1.0, 0.0, -f.mean_h)
+                tx, ty, tt = parts.divide(c, 1.0, 0.0, -f.mean_h)
         plain = True
-        if ti.static(DRY):
-            f.bound_v, f.bound_r = dry_friction(p, s)
-            plain = f.bound_v + f.bound_r == 0.0
+        if ti.static(parts.DRY):
+            f.dry_bound[0], f.dry_bound[1] = parts.dry_friction(p, s)
+            plain = f.dry_bound[0] + f.dry_bound[1] == 0.0
             if not plain:
                 hold_dry(s, c, then, f, m, tx, ty, tt, hx, hy, ht, dt)
         if plain:
@@ -62,26 +60,21 @@ def make_hold(parts: SimpleNamespace) -> Any:
         s: ti.template(), c: ti.template(), then: ti.template(), f: ti.template(), m: ti.template(), tx, ty, tt,
         hx, hy, ht, dt,
     ):  # fmt: skip
-        if m.slide_v != 0:
-            part = f.bound_v * m.slide_v
-            bx, by, bt = divide(c, -part * s.up_x, -part * s.up_y, 0.0)
-            then.ax += bx
-            then.ay += by
-            then.alpha += bt
-        if m.slide_r != 0:
-            bx, by, bt = divide(c, 0.0, 0.0, -f.bound_r * m.slide_r)
-            then.ax += bx
-            then.ay += by
-            then.alpha += bt
-        wx, wy, wt = divide(c, s.up_x, s.up_y, 0.0)
-        rx, ry, rt = divide(c, 0.0, 0.0, 1.0)
+        x, y, turn = ti.Vector([s.up_x, 0.0]), ti.Vector([s.up_y, 0.0]), ti.Vector([0.0, 1.0])
         on = ti.Vector([0.0, 0.0, 0.0])
         if m.stick != 0:
             on[0] = 1.0
-        if m.slide_v == 0 and f.bound_v > 0.0:
-            on[1] = 1.0
-        if m.slide_r == 0 and f.bound_r > 0.0:
-            on[2] = 1.0
+        for k in ti.static(range(2)):
+            if m.slide[k] != 0:
+                part = -f.dry_bound[k] * m.slide[k]
+                bx, by, bt = parts.divide(c, part * x[k], part * y[k], part * turn[k])
+                then.ax += bx
+                then.ay += by
+                then.alpha += bt
+            elif f.dry_bound[k] > 0.0:
+                on[1 + k] = 1.0
+        wx, wy, wt = parts.divide(c, s.up_x, s.up_y, 0.0)
+        rx, ry, rt = parts.divide(c, 0.0, 0.0, 1.0)
         g = ti.Matrix(
             [
                 [tx - f.mean_h * tt, wx - f.mean_h * wt, rx - f.mean_h * rt],
@@ -97,10 +90,10 @@ def make_hold(parts: SimpleNamespace) -> Any:
                 g[a, b] *= on[a] * on[b]
             g[a, a] += 1.0 - on[a]
         push = g.inverse() @ right
-        f.hold, f.hold_v, f.hold_r = push[0], push[1], push[2]
-        then.ax += f.hold * tx + f.hold_v * wx + f.hold_r * rx
-        then.ay += f.hold * ty + f.hold_v * wy + f.hold_r * ry
-        then.alpha += f.hold * tt + f.hold_v * wt + f.hold_r * rt
+        f.hold, f.dry_hold[0], f.dry_hold[1] = push[0], push[1], push[2]
+        then.ax += f.hold * tx + f.dry_hold[0] * wx + f.dry_hold[1] * rx
+        then.ay += f.hold * ty + f.dry_hold[0] * wy + f.dry_hold[1] * ry
+        then.alpha += f.hold * tt + f.dry_hold[0] * wt + f.dry_hold[1] * rt
         # Speeds that the held directions do not allow.
         ux1 = hx + 0.5 * dt * then.ax
         uy1 = hy + 0.5 * dt * then.ay

@@ -27,14 +27,13 @@ CHANNELS = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "wheel_speed", "
 _MOTION = ("x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel", "own", "own_v", "own_a")
 """The motion at one time; `own` is the coordinate that a term has of its own, with its speed and acceleration."""
 _FORCES = (
-    "fx", "fy", "ft", "load", "bound", "mean_h", "bias", "plain_h", "hold", "hold_v", "hold_r", "bound_v", "bound_r",
-    "margin", "margin_v", "margin_r", "own_holds",
+    "fx", "fy", "ft", "load", "bound", "mean_h", "bias", "plain_h", "hold", "margin", "own_holds",
 )  # fmt: skip
-"""Applied force and torque; load, bound and mean arm of the spikes that stick; what holds them, the pulleys (v) and the
-bearing (r), their bounds and what is left of these."""
-_MODES = ("touch", "stick", "backwards", "fresh", "slide_v", "slide_r", "over", "lowest")
-"""Bits of the spikes that touch, stick, slide towards -x, may stick from now; directions in which the pulleys and the
-bearing slide; whether the torque is over; the lowest spike."""
+"""Applied force and torque; load, bound and mean arm of the spikes that stick; what holds them and what is left of it.
+Pairs of the same of the dry frictions, pulleys and bearing, are `dry_hold`, `dry_bound` and `dry_margin`."""
+_MODES = ("touch", "stick", "backwards", "fresh", "over", "lowest")
+"""Bits of the spikes that touch, stick, slide towards -x, may stick from now; whether the torque is over; the lowest
+spike. `slide`: directions in which pulleys and bearing slide."""
 _NUMBERS = (
     "nominal", "until", "spin_up", "braking", "mu_s", "mu_d", "radius", "crater", "mxx", "mxy", "myy", "mxt", "myt",
     "mtt", "inverse_x", "inverse_y", "inverse_t",
@@ -61,10 +60,12 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     inertia, applied, dry_friction = model.inertia, model.applied, model.dry_friction
     inner_start, inner, crater_of = model.inner_start, model.inner, model.crater
     contact, arms, divide_mass = model.contact, model.contact_arms, model.divide_mass
-    Motion, Forces, Tally, Numbers = (
-        ti.types.struct(**dict.fromkeys(fields, ti.f64)) for fields in (_MOTION, _FORCES, _TALLY, _NUMBERS)
+    Motion, Tally, Numbers = (
+        ti.types.struct(**dict.fromkeys(fields, ti.f64)) for fields in (_MOTION, _TALLY, _NUMBERS)
     )
-    Modes = ti.types.struct(**dict.fromkeys(_MODES, ti.i32))
+    pair = dict.fromkeys(("dry_hold", "dry_bound", "dry_margin"), ti.types.vector(2, ti.f64))
+    Forces = ti.types.struct(**dict.fromkeys(_FORCES, ti.f64), **pair)
+    Modes = ti.types.struct(**dict.fromkeys(_MODES, ti.i32), slide=ti.types.vector(2, ti.i32))
     Event = ti.types.struct(ahead=ti.f64, kind=ti.i32, which=ti.i32)  # at this share of the step; 0: none (`events`)
     Spikes = ti.types.struct(**dict.fromkeys(("h", "d", "depth"), ti.types.vector(3, ti.f64)))
     MEMORY = model.has_memory
@@ -98,6 +99,11 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
         for k in ti.static(range(7, -1, -1)):
             value = value * b + COSINE[k]
         return value
+
+    @ti.func
+    def dry_along(s: ti.template(), x, y, turn):
+        """Parts of a vector along the directions of the dry frictions: the vertical, the rotation."""
+        return ti.Vector([s.up_x * x + s.up_y * y, turn])
 
     @ti.func
     def state_of(touch, stick):

@@ -10,19 +10,15 @@ def make_stand(parts: SimpleNamespace) -> Any:
     """The kernel `stand(numbers, poses)`: y and theta at rest; theta NaN where a platform cannot stand."""
     import taichi as ti
 
-    vertical, tip_radius, applied, inner_start = parts.vertical, parts.tip_radius, parts.applied, parts.inner_start
-    contact, arms, INNER, HALF, NAN, LAW = parts.contact, parts.arms, parts.INNER, parts.HALF, parts.NAN, parts.LAW
-    LAW_SIZE, load_parameters, trial_state = parts.LAW_SIZE, parts.load_parameters, parts.trial_state
-
     @ti.kernel
     def stand(numbers: ti.types.ndarray(dtype=ti.f64, ndim=2), poses: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         ti.loop_config(block_dim=4)
         for i in range(numbers.shape[0]):
-            s = trial_state(numbers, i)
-            p = load_parameters(numbers, i)
-            q = ti.Vector([numbers[i, LAW + k] for k in ti.static(range(LAW_SIZE))])
-            s.up_x, s.up_y = vertical(p)
-            radius = tip_radius(p)
+            s = parts.trial_state(numbers, i)
+            p = parts.load_parameters(numbers, i)
+            q = ti.Vector([numbers[i, parts.LAW + k] for k in ti.static(range(parts.LAW_SIZE))])
+            s.up_x, s.up_y = parts.vertical(p)
+            radius = parts.tip_radius(p)
             s.cosine = 1.0
             share = 0.5 * s.weight * s.up_y
             low, high = 0.0, s.length
@@ -30,14 +26,14 @@ def make_stand(parts: SimpleNamespace) -> Any:
                 middle = 0.5 * (low + high)
                 if not low < middle < high:
                     break  # nothing lies between them
-                elastic, lost, stored, side, factor_s, factor_d, grip = contact(
+                elastic, lost, stored, side, factor_s, factor_d, grip = parts.contact(
                     p, s, q, middle, 0.0, 0.0, middle, middle
                 )
                 if elastic < share:
                     low = middle
                 else:
                     high = middle
-            y = (s.length - radius) * ti.cos(HALF) + radius - high
+            y = (s.length - radius) * ti.cos(parts.HALF) + radius - high
             theta = 0.0
             depth = high
             error = 1e300
@@ -62,16 +58,16 @@ def make_stand(parts: SimpleNamespace) -> Any:
                     s.theta = at_theta
                     s.cosine = ti.cos(at_theta)
                     s.sine = ti.sin(at_theta)
-                    if ti.static(INNER):
-                        s.inner = inner_start(p, s)
-                    fx, fy, ft = applied(p, s)
+                    if ti.static(parts.INNER):
+                        s.inner = parts.inner_start(p, s)
+                    fx, fy, ft = parts.applied(p, s)
                     load, mean_h, mu_load = 0.0, 0.0, 0.0
                     for side_of in range(2):
-                        angle = at_theta + HALF * (1.0 - 2.0 * side_of)
-                        h, d = arms(ti.cos(angle), ti.sin(angle), s.length, radius)
+                        angle = at_theta + parts.HALF * (1.0 - 2.0 * side_of)
+                        h, d = parts.arms(ti.cos(angle), ti.sin(angle), s.length, radius)
                         z = h - at_y
                         in_z = ti.max(z, 1e-300)
-                        elastic, lost, stored, side, factor_s, factor_d, grip = contact(
+                        elastic, lost, stored, side, factor_s, factor_d, grip = parts.contact(
                             p, s, q, in_z, 0.0, 0.0, in_z, in_z
                         )
                         press = ti.max(elastic + grip, 0.0)
@@ -112,6 +108,6 @@ def make_stand(parts: SimpleNamespace) -> Any:
             poses[i, 0] = best_y
             poses[i, 1] = best_theta
             if not sound or best > 1e-9:
-                poses[i, 1] = NAN
+                poses[i, 1] = parts.NAN
 
     return stand
