@@ -124,14 +124,14 @@ _MODULES = {
         "rigid.ground": "grounds law_functions laws reaction rft",
         "rigid.model": "mechanics trial",
         "rigid.planar": (
-            "dormand_prince dynamics implicit modes planar_events=events planar_located=located "
-            "planar_paper=paper rest statics trajectory"
+            "dormand_prince=methods dynamics implicit=methods modes=events planar_events=events planar_located=located "
+            "planar_paper=paper rest=statics statics trajectory"
         ),
         "rigid.platform": "actuation inertia platform_files=files rig solids spike",
         "rigid.spatial": "quaternions spatial_motion=motion spatial_steps=steps",
     },
     "rigid.batch_kernel": {
-        "rigid.batch.kernel": "advance changes=events columns=parts dry=contacts parts samples stand",
+        "rigid.batch.kernel": "advance changes=events columns=parts dry=forces parts samples stand",
     },
     "rigid.terms": {
         "rigid.terms.body": "wires=wire_compliance",

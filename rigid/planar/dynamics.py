@@ -136,7 +136,7 @@ class System:
         self.dry_forces: Sequence[float] = (0.0, 0.0)  # Of the dry frictions that hold
         self.dry_bounds: Sequence[float] = (0.0, 0.0)
         self.inner_holds = 1.0
-        self.implicit: Any = None  # Makes implicit steps, where the ground asks for them (`rigid.planar.implicit`)
+        self.implicit: Any = None  # Makes implicit steps, where the ground asks for them (`rigid.planar.methods`)
         self.acceleration = (0.0, 0.0, 0.0)
 
     def _remembers(self) -> bool:

@@ -12,13 +12,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from .dormand_prince import Interpolant, Step, attempt, interpolant
 from .dynamics import LOST, THETA, WHEEL, Modes, System
-from .events import KINKS, Monitor, Watch, cubic, monitors, precision, triggered
-from .implicit import Implicit
-from .modes import let_go, resolve
-from .rest import at_rest, comes_to_rest, resting
-from .statics import standing, stiffness_at_rest
+from .events import KINKS, Monitor, Watch, cubic, let_go, monitors, precision, resolve, triggered
+from .methods import Implicit, Interpolant, Step, attempt, interpolant
+from .statics import at_rest, comes_to_rest, resting, standing, stiffness_at_rest
 
 __all__ = ["Progress", "integrate"]
 

@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable
 
 from .dynamics import INNER, INNER_SPEED, LOST, OMEGA, THETA, VX, VY, WHEEL, WORK, Modes, System, X, Y
-from .modes import resolve
-from .rest import at_rest
+from .events import resolve
+from .statics import at_rest
 
 __all__ = ["integrate_fixed"]
 

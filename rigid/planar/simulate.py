@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from rigid.checks import check_above_zero, sample_times
 from rigid.model.trial import Trial
 
-from .dormand_prince import Interpolant
 from .dynamics import LOST, OMEGA, VX, VY, WORK, Modes, System, X, Y
 from .located import integrate
+from .methods import Interpolant
 from .paper import integrate_fixed
 from .statics import inner_slopes, standing, stiffness_at_rest
 from .trajectory import LAUNCH_DISTANCE, STATES, Tally, Trajectory

@@ -3,9 +3,8 @@
 from types import SimpleNamespace
 from typing import Any
 
-from .contacts import make_contacts
 from .events import make_events
-from .holds import make_hold
+from .forces import make_contacts, make_hold
 from .samples import make_records
 
 __all__ = ["make_advance"]

@@ -8,10 +8,9 @@ from rigid_trials import LENGTH, effect, in_rig
 
 from rigid import simulate
 from rigid.planar.dynamics import OMEGA, THETA, VX, VY, System, Y
+from rigid.planar.events import resolve
 from rigid.planar.located import _scale
-from rigid.planar.modes import resolve
-from rigid.planar.rest import comes_to_rest
-from rigid.planar.statics import standing
+from rigid.planar.statics import comes_to_rest, standing
 
 
 def test_a_platform_that_its_torque_does_not_tip_comes_to_rest_where_statics_says():
