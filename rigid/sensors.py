@@ -17,6 +17,7 @@ motion sampled at `sensor_times` needs no acceleration at all, unless the window
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -223,7 +224,8 @@ def _imu_times(sensors: SensorSet, duration: float) -> Array:
     return at[sensors.true_times(at) + 0.5 * sensors.imu_window <= duration + 1e-9]
 
 
-def _with_lead(motion: Motion, sensors: SensorSet) -> Motion:
+def _with_lead(motion: Motion, sensors: SensorSet) -> SimpleNamespace:
+    """`motion` with the rest before it, from as early as the sensors record."""
     before = (
         sensors.lead / (1.0 - abs(sensors.clock_drift))
         + 2.0 * abs(sensors.clock_offset)
@@ -237,17 +239,12 @@ def _with_lead(motion: Motion, sensors: SensorSet) -> Motion:
         for name, values in vars(motion).items()
         if values is not None
     }
-    return _Extended(**whole)
+    return SimpleNamespace(**vars(motion) | whole)
 
 
-class _Extended(Motion):
-    """A motion that begins before t = 0."""
-
-    def __post_init__(self) -> None:
-        """Its parts have been checked."""
-
-
-def _specific_force(moving: Motion, at: ArrayLike, window: float, gravity: tuple[float, float]) -> tuple[Array, Array]:
+def _specific_force(
+    moving: SimpleNamespace, at: ArrayLike, window: float, gravity: tuple[float, float]
+) -> tuple[Array, Array]:
     """Specific force in body axes [m/s2], (ax, ay) of shape [row_count] each, averaged over `window` [s] about `at`."""
     at = np.asarray(at, dtype=float)
     time = moving.time

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "Parameter", "check_above_zero", "check_friction", "check_not_negative", "check_parameters", "is_number",
-    "sample_times",
+    "check_rig", "sample_times",
 ]  # fmt: skip
 
 
@@ -84,6 +84,23 @@ def check_friction(mu_s: float, mu_d: float | None, *, endless: bool = False) ->
         check_not_negative(mu_s=mu_s)
     if mu_d is not None and not 0 <= mu_d <= mu_s:
         raise ValueError(f"mu_d = {mu_d} must be from 0 to mu_s = {mu_s}")
+
+
+def check_rig(mass: float, counterweight: float, *, gravity: float, **simulated: float) -> None:
+    """Raise ValueError for a counterweight that lifts the platform, or a simulated gravity not below the local one.
+
+    `simulated`: one gravity [m/s2] by its name. Without a counterweight there is nothing to check but that.
+    """
+    if counterweight >= mass:
+        raise ValueError(
+            f"counterweight = {counterweight:g} kg must be below mass = {mass:g} kg: a heavier one would lift the "
+            f"platform off the ground"
+        )
+    for key, value in simulated.items():
+        if counterweight > 0 and value >= gravity:
+            raise ValueError(
+                f"{key} = {value:g} m/s2 must be below gravity = {gravity:g} m/s2: a rig can only take weight away"
+            )
 
 
 def sample_times(duration: float, interval: float, times: ArrayLike | None) -> NDArray[np.float64]:

@@ -113,14 +113,6 @@ class _LawGround:
         """In the surface after the steps made so far [J]."""
         return {"springs": self.stored(self._depth[0]) if self._depth[0] > 0 else 0.0}
 
-    def checkpoint(self) -> State:
-        """What `rollback` brings back."""
-        return self.state()
-
-    def rollback(self, kept: State) -> None:
-        """Go back to what `checkpoint` gave."""
-        self.restore(kept)
-
     def state(self) -> State:
         """The deepest depth, where the law remembers it; otherwise nothing."""
         return {"deepest": np.array(self._deepest[0])} if self._law.has_memory else {}
@@ -128,6 +120,8 @@ class _LawGround:
     def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
         self._deepest[0] = float(state["deepest"]) if self._law.has_memory else 0.0
+
+    checkpoint, rollback = state, restore  # It is all that a macro step changes
 
     def _mean(self, start: float, end: float, rate: float) -> float:
         """Mean force on the way from depth `start` to `end` [m] at `rate` [m/s]."""

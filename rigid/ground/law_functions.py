@@ -113,9 +113,7 @@ def no_rate_force(depth, rate, p):
     return 0.0 * depth
 
 
-def no_rate_work(depth, rate, p):
-    """0."""
-    return 0.0 * depth
+no_rate_work = no_rate_force
 
 
 def rft_loading(depth, p):

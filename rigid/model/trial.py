@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from rigid.checks import check_above_zero, check_friction, check_not_negative
+from rigid.checks import check_above_zero, check_friction, check_not_negative, check_rig
 from rigid.ground.laws import SurfaceLaw, find_law
 from rigid.terms import Term, find_effect, load_effect
 
@@ -120,10 +120,8 @@ class Trial:
         for key in positive + others:
             object.__setattr__(self, key, float(getattr(self, key)))
         check_friction(self.mu_s, self.mu_d)
-        if isinstance(self.spike_count, bool) or not isinstance(self.spike_count, int) or self.spike_count < 3:
-            raise ValueError(f"spike_count = {self.spike_count!r} must be a whole number of 3 or more")
-        if self.spike_count > 30:
-            raise ValueError(f"spike_count = {self.spike_count} must be at most 30")
+        if type(self.spike_count) is not int or not 3 <= self.spike_count <= 30:
+            raise ValueError(f"spike_count = {self.spike_count!r} must be a whole number from 3 to 30")
         most = self.mass * self.spike_length**2
         if self.inertia > most:
             raise ValueError(
@@ -140,16 +138,7 @@ class Trial:
                 f"inertia = {self.inertia:g} kg m2 must exceed wheel_inertia = {self.wheel_inertia:g} kg m2: it leaves "
                 f"this wheel's spin out, but holds the two wheels across it, J_w / 2 each at least, and all the rest"
             )
-        if self.counterweight >= self.mass:
-            raise ValueError(
-                f"counterweight = {self.counterweight:g} kg must be below mass = {self.mass:g} kg: a heavier one would "
-                f"lift the platform off the ground"
-            )
-        if self.counterweight > 0 and self.gravity_sim >= self.gravity:
-            raise ValueError(
-                f"gravity_sim = {self.gravity_sim:g} m/s2 must be below gravity = {self.gravity:g} m/s2: a rig can "
-                f"only take weight away"
-            )
+        check_rig(self.mass, self.counterweight, gravity=self.gravity, gravity_sim=self.gravity_sim)
         if self.actuator not in ("motor", "brake"):
             raise ValueError(f"actuator = {self.actuator!r} must be 'motor' or 'brake'")
         if math.isnan(self.torque_until) or self.torque_until < 0:

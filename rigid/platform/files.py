@@ -1,6 +1,7 @@
 """Platforms from TOML files, those that ship and a user's own."""
 
 import tomllib
+from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -47,6 +48,14 @@ class _Body(_Table):
         return self
 
 
+_HULLS: dict[str, tuple[Callable[..., np.ndarray], tuple[str, ...]]] = {
+    "rhombicuboctahedron": (rhombicuboctahedron_vertices, ("edge",)),
+    "box": (box_vertices, ("size",)),
+    "prism": (prism_vertices, ("sides", "diameter", "height")),
+}
+"""Shapes of a hull: what makes its corners, and from which keys."""
+
+
 class _Hull(_Table):
     shape: Literal["rhombicuboctahedron", "box", "prism"]
     edge: Positive | None = None
@@ -57,10 +66,7 @@ class _Hull(_Table):
 
     @model_validator(mode="after")
     def _fits_shape(self) -> "_Hull":
-        wanted = {"rhombicuboctahedron": {"edge"}, "box": {"size"}, "prism": {"sides", "diameter", "height"}}[
-            self.shape
-        ]
-        given = {key for key in ("edge", "size", "sides", "diameter", "height") if getattr(self, key) is not None}
+        wanted, given = set(_HULLS[self.shape][1]), self.model_fields_set - {"shape"}
         if given != wanted:
             raise ValueError(
                 f"a {self.shape} has {', '.join(sorted(wanted))}, not {', '.join(sorted(given)) or 'nothing'}"
@@ -68,11 +74,8 @@ class _Hull(_Table):
         return self
 
     def vertices(self) -> np.ndarray:
-        if self.shape == "rhombicuboctahedron":
-            return rhombicuboctahedron_vertices(float(self.edge or 0))
-        if self.shape == "box":
-            return box_vertices(self.size or ())
-        return prism_vertices(int(self.sides or 0), float(self.diameter or 0), float(self.height or 0))
+        make, keys = _HULLS[self.shape]
+        return make(*(getattr(self, key) for key in keys))
 
 
 class _Spikes(_Table):

@@ -13,7 +13,7 @@ The two are almost a factor of two apart.
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from rigid.checks import check_above_zero
+from rigid.checks import check_above_zero, check_rig
 
 __all__ = ["STANDARD_GRAVITY", "Reading", "Rig", "counterweight_for"]
 
@@ -35,11 +35,7 @@ def counterweight_for(
         raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
     check_above_zero("kg", mass=mass)
     check_above_zero("m/s2", gravity=gravity, gravity_stated=gravity_stated)
-    if gravity_stated >= gravity:
-        raise ValueError(
-            f"gravity_stated = {gravity_stated:g} m/s2 is not below the local gravity, {gravity:g} m/s2: a rig can "
-            f"only take weight away, so less would do, or no rig"
-        )
+    check_rig(mass, 0.5 * mass, gravity=gravity, gravity_stated=gravity_stated)
     if reading == "pair":
         return mass * (gravity - gravity_stated) / (gravity + gravity_stated)
     return mass * (1 - gravity_stated / gravity)
@@ -65,16 +61,7 @@ class Rig:
         check_above_zero("m/s2", gravity=self.gravity, gravity_sim=self.gravity_sim)
         if self.wire_length is not None:
             check_above_zero("m", wire_length=self.wire_length)
-        if self.counterweight >= self.mass:
-            raise ValueError(
-                f"counterweight = {self.counterweight:g} kg is not below the platform's mass = {self.mass:g} kg: "
-                f"the rig would lift the platform off the ground; less would do"
-            )
-        if self.gravity_sim >= self.gravity:
-            raise ValueError(
-                f"gravity_sim = {self.gravity_sim:g} m/s2 is not below the local gravity, {self.gravity:g} m/s2: less "
-                f"would do, or no rig"
-            )
+        check_rig(self.mass, self.counterweight, gravity=self.gravity, gravity_sim=self.gravity_sim)
 
     @classmethod
     def offloading(

@@ -90,6 +90,10 @@ class Motion:
         self.found: list[Tip] = []
         self.spin = np.zeros(3)  # Angular velocity [rad/s], world axes, as last evaluated
 
+    def tip(self, index: int) -> Tip:
+        """The touching tip of this index, as last evaluated."""
+        return next(tip for tip in self.found if tip.index == index)
+
     def turning(self, z: Array) -> tuple[Array, Array]:
         """Rotation matrix and angular velocity in world axes [rad/s]."""
         turn = to_matrix(z[Q])

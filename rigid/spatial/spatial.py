@@ -224,7 +224,8 @@ def simulate(
     if time_step is not None:
         check_above_zero("s", time_step=time_step)
     samples = sample_times(duration, sample_interval, times)
-    z, motion = _start(trial, position, quaternion, velocity, angular_velocity), trial.motion()
+    motion = trial.motion()
+    z = _start(trial, motion, position, quaternion, velocity, angular_velocity)
     run = Integration(motion, trial.histories, trial.torque_in_flight, z, tolerance=tolerance, time_step=time_step)
     rows, counts, energies = np.empty((len(samples), STATE_COUNT)), [], []
     reach = trial.platform.reach
@@ -260,8 +261,9 @@ def simulate(
 
 
 def _start(
-    trial: SpatialTrial, position: Numbers | None, quaternion: Numbers | None, velocity: Numbers, spin: Numbers
-) -> Array:
+    trial: SpatialTrial, motion: Motion, position: Numbers | None, quaternion: Numbers | None, velocity: Numbers,
+    spin: Numbers,
+) -> Array:  # fmt: skip
     z = np.zeros(STATE_COUNT)
     z[Q] = (1.0, 0.0, 0.0, 0.0)
     if position is None:
@@ -275,11 +277,9 @@ def _start(
             if not abs(size - 1) < 1e-6:
                 raise ValueError(f"quaternion has length {size}: it must be 1")
             z[Q] = np.asarray(quaternion, dtype=float) / size
-    masses = np.array([1.0, 1.0, 1.0]) * trial.platform.mass + (0.0, 0.0, trial.counterweight)
     turn = to_matrix(z[Q])
-    z[P] = masses * velocity
-    inertia = turn @ trial.platform.inertia @ turn.T
-    z[L] = inertia @ np.asarray(spin, dtype=float)
+    z[P] = motion.masses * velocity
+    z[L] = turn @ trial.platform.inertia @ turn.T @ np.asarray(spin, dtype=float)
     for k, history in enumerate(trial.histories):
         if history is not None:
             z[H.start + k] = history.spin

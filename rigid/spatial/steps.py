@@ -60,9 +60,9 @@ class Integration:
         depths = motion.depths(z)
         for k in np.flatnonzero(depths > 0):
             self._touch(int(k))
-        self._resolve([k for k in self.modes.touching if self._slip_size(k) < STILL * self.speed])
+        self._resolve([k for k in self.modes.touching if self._stands_still(k, STILL)])
         self.stored_0 = motion.energy(self.z, self.modes)[2]
-        self._tell()
+        self._note_change()
         self.scale = self._scale()
 
     def advance(self, until: float) -> None:
@@ -71,7 +71,7 @@ class Integration:
         room = ends - self.time
         if self._rests():
             self.time = ends
-            self._at_time(ends)
+            self._change_torques()
             return
         longest = LONGEST_TOUCHING if self.modes.touching else LONGEST
         h = min(self.fixed if self.fixed else min(self.step, longest), room)
@@ -113,7 +113,7 @@ class Integration:
         else:
             self._keep_still(stalled=h < STALL and h < room and not self.fixed)
         if self.time == ends:
-            self._at_time(ends)
+            self._change_torques()
         self.step = grown if not found else min(max(grown, 1e-4), 1e-3)
 
     def _attempt(self, first: Array, h: float) -> tuple[Array, float]:
@@ -243,8 +243,7 @@ class Integration:
         if kind == "stop":
             return value < 1e-12 * self.speed
         if kind == "loose":
-            load = next(tip.load for tip in self.motion.found if tip.index == k)
-            return value < 1e-9 * self.motion.mu_s * load
+            return value < 1e-9 * self.motion.mu_s * self.motion.tip(k).load
         return False
 
     def _switch(self, found: Sequence[tuple[str, int]]) -> None:
@@ -253,12 +252,12 @@ class Integration:
         for kind, k in found:
             if kind == "touch" and k not in self.modes.touching:
                 self._touch(k)
-                if self._slip_size(k) < STILL * self.speed:
+                if self._stands_still(k, STILL):
                     may_stick.append(k)
             elif kind == "lift":
                 self._lift(k)
             elif kind == "stop" and k in self.modes.direction:
-                slip = next(tip.slip for tip in self.motion.found if tip.index == k)
+                slip = self.motion.tip(k).slip
                 size = float(np.linalg.norm(slip))
                 if size < (SLOW if k in self.modes.frozen else 1e-6) * self.speed:
                     may_stick.append(k)
@@ -267,8 +266,7 @@ class Integration:
             elif kind == "loose":
                 loose.append(k)
             elif kind in ("turn", "deeper"):
-                depth = next(tip.depth for tip in self.motion.found if tip.index == k)
-                self.modes.top[k] = max(depth, 0.0) if kind == "turn" else -1.0
+                self.modes.top[k] = max(self.motion.tip(k).depth, 0.0) if kind == "turn" else -1.0
             elif kind == "wheel":
                 self.spent[k] = True
                 history = self.histories[k]
@@ -282,16 +280,14 @@ class Integration:
                     self._let_go(k, frictions[k])
         self._resolve(may_stick)
 
-    def _at_time(self, now: float) -> None:
-        if now in self.changes:
+    def _change_torques(self) -> None:
+        if self.time in self.changes:
             self._resolve([])
 
     def _touch(self, k: int) -> None:
         self.modes.touching = sorted([*self.modes.touching, k])
         self.modes.top.setdefault(k, -1.0)
-        slip = self._slip(k)
-        size = float(np.linalg.norm(slip))
-        self.modes.direction[k] = slip / size if size > 0 else np.array([1.0, 0.0])
+        self.modes.direction[k] = _unit(self._slip(k))
 
     def _lift(self, k: int) -> None:
         self.modes.direction.pop(k, None)
@@ -320,16 +316,16 @@ class Integration:
         """From sticking to sliding against the force that held it."""
         self.modes.sticking = [n for n in self.modes.sticking if n != k]
         self.modes.weight.pop(k, None)
-        size = float(np.linalg.norm(friction))
-        self.modes.direction[k] = -friction / size if size > 0 else np.array([1.0, 0.0])
+        self.modes.direction[k] = _unit(-friction)
         self.modes.frozen.add(k)
 
     def _slip(self, k: int) -> Array:
         turn, spin = self.motion.turning(self.z)
         return (self.z[P] / self.motion.masses + np.cross(spin, turn @ self.motion.tips[k]))[:2]
 
-    def _slip_size(self, k: int) -> float:
-        return float(np.linalg.norm(self._slip(k)))
+    def _stands_still(self, k: int, share: float) -> bool:
+        """Whether the slip of a tip is below this share of sqrt(g reach)."""
+        return float(np.linalg.norm(self._slip(k))) < share * self.speed
 
     def _resolve(self, may_stick: Sequence[int]) -> None:
         """Let those stick that may and can; set the torques; take out of the speeds what sticking forbids."""
@@ -360,7 +356,7 @@ class Integration:
         self._weigh()
         motion.rates(self.z, modes)
         motion.hold_still(self.z, modes)
-        self._tell()
+        self._note_change()
 
     def _weigh(self) -> None:
         """Shares of the sticking tips in the load they carry, at this moment."""
@@ -377,11 +373,11 @@ class Integration:
 
     def _set_torques(self) -> None:
         driving = bool(self.modes.touching) or self.in_flight
-        torque = [0.0, 0.0, 0.0]
-        for k, history in enumerate(self.histories):
-            if history is not None and driving and not self.spent[k]:
-                torque[k] = history.torque(self.time, float(self.z[H.start + k]) / history.wheel.inertia)
-        self.modes.torque = (torque[0], torque[1], torque[2])
+        self.modes.torque = tuple(
+            history.torque(self.time, float(self.z[H.start + k]) / history.wheel.inertia)
+            if history is not None and driving and not self.spent[k] else 0.0
+            for k, history in enumerate(self.histories)
+        )  # fmt: skip
 
     def _keep_still(self, *, stalled: bool) -> None:
         """After a step without events: new weights and directions; the speeds that sticking forbids taken out."""
@@ -421,9 +417,16 @@ class Integration:
             size = float(np.linalg.norm(slip))
             if size > 0:
                 self.modes.direction[k] = slip / size
-        self._resolve([k for k in self.modes.direction if self._slip_size(k) < 1e-6 * self.speed])
+        self._resolve([k for k in self.modes.direction if self._stands_still(k, 1e-6)])
 
-    def _tell(self) -> None:
+    def _note_change(self) -> None:
+        """Add to the transitions how many touch and stick now, where that has changed."""
         now = (len(self.modes.touching), len(self.modes.sticking))
         if not self.transitions or self.transitions[-1][1:] != now:
             self.transitions.append((self.time, *now))
+
+
+def _unit(vector: Array) -> Array:
+    """The vector over its length, shape (2,); (1, 0) where it has none."""
+    size = float(np.linalg.norm(vector))
+    return vector / size if size > 0 else np.array([1.0, 0.0])
