@@ -216,28 +216,22 @@ class _Contact:
             turn, _, force = self.rates(y, torque, mode)
             return [-y[1], turn, force / self.t.mass]
 
-        def lift(_: float, y: np.ndarray) -> float:
-            return self.rates(y, torque, mode)[1]
-
-        def down(_: float, y: np.ndarray) -> float:
-            return y[0] + self.t.lean  # the next tips are at the ground
-
-        def back(_: float, y: np.ndarray) -> float:
-            return self.t.lean * (1 + 1e-9) - y[0]  # it has fallen back onto those behind
-
         def change(_: float, y: np.ndarray) -> float:
             if mode:
                 return mode * self.slip(y) - least
             _, normal, force = self.rates(y, torque, 0)
             return abs(force) - self.t.mu_s * normal
 
-        events: dict[Callable[..., float], int] = {lift: -1, down: -1, back: -1}
-        if mode or math.isfinite(self.t.mu_s):
-            events[change] = 1
-        for event, direction in events.items():
-            vars(event).update(terminal=True, direction=direction)  # as scipy has it
+        events: list[Callable[[float, np.ndarray], float]] = [
+            lambda _, y: self.rates(y, torque, mode)[1],  # nothing holds it down
+            lambda _, y: y[0] + self.t.lean,  # the next tips are at the ground
+            lambda _, y: self.t.lean * (1 + 1e-9) - y[0],  # it has fallen back onto those behind
+            *([change] if mode or math.isfinite(self.t.mu_s) else []),
+        ]
+        for event in events:
+            vars(event).update(terminal=True, direction=1 if event is change else -1)  # as scipy has it
         stop = end if math.isfinite(end) else start + self._long(torque)
-        solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=list(events), rtol=1e-10, atol=1e-13)
+        solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=events, rtol=1e-10, atol=1e-13)
         at, y = float(solved.t[-1]), solved.y[:, -1]
         if mode == 0:
             y[2] = self.t.spike_length * math.cos(y[0]) * y[1]

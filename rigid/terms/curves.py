@@ -5,7 +5,7 @@ from math import exp
 from .candidate import Bend, bent, shape
 from .term import Parameter
 
-__all__ = ["STRIBECK", "mobilised", "stribeck", "stribeck_bends", "stribeck_parameters"]
+__all__ = ["STRIBECK", "mobilised", "over_linear", "raised", "stribeck", "stribeck_bends", "stribeck_parameters"]
 
 STRIBECK = (
     "more near rest by Stribeck's curve (as Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30:1083, "
@@ -19,6 +19,22 @@ def mobilised(share, sharpness):
     if sharpness > 0.0:
         part = share / (1.0 + max(share, 1e-12) ** sharpness) ** (1.0 / sharpness)
     return part
+
+
+def over_linear(value, power):
+    """x^(power - 1) of a `value` x of 0 or more: what makes of a linear law one of that power; 1 where it is 1."""
+    factor = 1.0 + 0.0 * value
+    if power != 1.0:
+        factor = max(value, 1e-12) ** (power - 1.0)
+    return factor
+
+
+def raised(value, power):
+    """`value` of 0 or more to the power `power`, to the bit where that is 1."""
+    out = value
+    if power != 1.0:
+        out = max(value, 1e-12) ** power
+    return out
 
 
 def stribeck(level, excess, share):

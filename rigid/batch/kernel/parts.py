@@ -118,16 +118,10 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
 
     @ti.func
     def trial_state(numbers: ti.template(), i):
-        s = State(time=0.0)
-        s.inner_mode = 1.0
-        s.mass = numbers[i, 0]
-        s.inertia = numbers[i, 1]
-        s.length = numbers[i, 2]
-        s.stance = numbers[i, 3]
-        s.counterweight = numbers[i, 4]
-        s.gravity = numbers[i, 5]
-        s.weight = numbers[i, 6]
-        return s
+        return State(
+            inner_mode=1.0, mass=numbers[i, 0], inertia=numbers[i, 1], length=numbers[i, 2], stance=numbers[i, 3],
+            counterweight=numbers[i, 4], gravity=numbers[i, 5], weight=numbers[i, 6],
+        )  # fmt: skip
 
     @ti.func
     def trial_numbers(numbers: ti.template(), i, s: ti.template(), p: ti.template()):

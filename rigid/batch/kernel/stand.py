@@ -45,15 +45,8 @@ def make_stand(parts: SimpleNamespace) -> Any:
                 e = 1e-4 * ti.max(depth, 1e-9)
                 least = 1e300
                 for m in range(5):
-                    at_y, at_theta = y, theta
-                    if m == 1:
-                        at_y = y + e
-                    if m == 2:
-                        at_y = y - e
-                    if m == 3:
-                        at_theta = theta + e / s.length
-                    if m == 4:
-                        at_theta = theta - e / s.length
+                    at_y = y + e * (ti.cast(m == 1, ti.i32) - ti.cast(m == 2, ti.i32))
+                    at_theta = theta + e / s.length * (ti.cast(m == 3, ti.i32) - ti.cast(m == 4, ti.i32))
                     s.y = at_y
                     s.theta = at_theta
                     s.cosine = ti.cos(at_theta)

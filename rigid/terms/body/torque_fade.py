@@ -1,18 +1,13 @@
 """The torque falls with speed or time."""
 
 from rigid.terms.candidate import Candidate, Form, Tumble, bent, free, shape
+from rigid.terms.curves import raised
 from rigid.terms.term import Parameter, Term
 
 
 def torque_fade_factor(s, speed_loss, time_loss, speed_power, time_power):
     """1 - (a w)^p - (b t)^q, w the wheel's speed, never below zero; p = q = 1 are straight lines."""
-    lost = speed_loss * abs(s.wheel_speed)
-    if speed_power != 1.0:
-        lost = max(lost, 1e-12) ** speed_power
-    faded = time_loss * s.time
-    if time_power != 1.0:
-        faded = max(faded, 1e-12) ** time_power
-    return max(0.0, 1.0 - lost - faded)
+    return max(0.0, 1.0 - raised(speed_loss * abs(s.wheel_speed), speed_power) - raised(time_loss * s.time, time_power))
 
 
 TERM = Term(

@@ -1,6 +1,7 @@
 """The cable pulls or drags on the rotation."""
 
 from rigid.terms.candidate import Candidate, Form, Tumble, Typical, bent, free, shape
+from rigid.terms.curves import over_linear
 from rigid.terms.term import Parameter, Term
 
 
@@ -16,21 +17,13 @@ def umbilical_potential(s, stiffness, spring_power, rest):
 def umbilical_force(s, stiffness, drag, spring_power, drag_power, rest):
     """-k (theta - theta_0) |theta - theta_0|^(n - 1) - c omega |omega|^(m - 1)."""
     turned = s.theta - rest
-    spring = stiffness * turned
-    if spring_power != 1.0:
-        spring = spring * max(abs(turned), 1e-12) ** (spring_power - 1.0)
-    resisted = drag * s.omega
-    if drag_power != 1.0:
-        resisted = resisted * max(abs(s.omega), 1e-12) ** (drag_power - 1.0)
-    return 0.0, 0.0, -spring - resisted
+    spring = stiffness * turned * over_linear(abs(turned), spring_power)
+    return 0.0, 0.0, -spring - drag * s.omega * over_linear(abs(s.omega), drag_power)
 
 
 def umbilical_loss(s, drag, drag_power):
     """c |omega|^(m + 1)."""
-    power = drag * s.omega * s.omega
-    if drag_power != 1.0:
-        power = power * max(abs(s.omega), 1e-12) ** (drag_power - 1.0)
-    return power
+    return drag * s.omega * s.omega * over_linear(abs(s.omega), drag_power)
 
 
 TERM = Term(

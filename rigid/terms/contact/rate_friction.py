@@ -1,17 +1,14 @@
 """Friction depends on the sliding speed."""
 
 from rigid.terms.candidate import Candidate, Form, Tumble, bent, free, logarithm, shape
+from rigid.terms.curves import raised
 from rigid.terms.term import Parameter, Term
 
 
 def rate_friction_factor(s, slip, change, speed, power):
     """mu_d (1 + c |u|^p / (|u|^p + u_0^p)): grows (c > 0) or falls (c < 0) and saturates."""
-    u = abs(slip)
-    half = speed
-    if power != 1.0:
-        u = max(u, 1e-12) ** power
-        half = speed**power
-    return 1.0, 1.0 + change * u / (u + half)
+    u = raised(abs(slip), power)
+    return 1.0, 1.0 + change * u / (u + raised(speed, power))
 
 
 TERM = Term(
