@@ -112,10 +112,10 @@ _MODULES = {
         ),
     },
     "experiments.validate": {
-        "experiments.validate.base": "case cloud drops energy kept=parts parts peers spheres",
+        "experiments.validate.base": "case cloud drops energy kept=drops parts=drops peers spheres",
         "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
         "experiments.validate.contacts": (
-            "books cohesion collisions integrator large_body laws microslip oblique one_grain restitution sliding "
+            "books cohesion collisions integrator large_body laws=other_codes microslip oblique one_grain restitution sliding=other_codes "
             "spinning"
         ),
     },

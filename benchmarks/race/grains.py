@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from dem import Bed, Material
+from experiments.validate.base.peers import box_of, data_file, spheres
 
 __all__ = [
     "BENCH", "DIAMETER", "SPREAD", "Grains", "coordination", "packing", "prepare_grains", "wrapped", "write_data",
@@ -104,14 +105,9 @@ def write_data(path: Path, grains: Grains) -> None:
     A row is id, type, diameter [m], density [kg/m3], x, y, z [m].
     """
     top = float((grains.positions[:, 2] + grains.radii).max()) + 2 * DIAMETER
-    lines = ["settled bed of hedgebed\n", f"{grains.count} atoms", "1 atom types\n"]
-    lines += [f"0 {x:.12g} {axis}lo {axis}hi" for axis, x in zip("xyz", (*grains.period, top), strict=True)]
-    lines += ["\nAtoms\n"]
-    lines += [
-        f"{k} 1 {2 * radius:.12g} {BENCH.density:.12g} {x:.12g} {y:.12g} {z:.12g}"
-        for k, (radius, (x, y, z)) in enumerate(zip(grains.radii, grains.positions, strict=True), start=1)
-    ]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    box = box_of(*grains.period, top, figures=12)
+    text = data_file(box, spheres(grains.radii, grains.positions, BENCH.density, figures=12))
+    path.write_text(text, encoding="ascii")
 
 
 def coordination(grains: Grains) -> float:

@@ -7,8 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dem import Bed
-from experiments.validate.base.drops import BEADS, drop
-from experiments.validate.base.parts import part
+from experiments.validate.base.drops import BEADS, drop, part
 from experiments.validate.beds.impact import energy, fit_law, published
 from experiments.validate.beds.intrusion import cone_coefficient, plate_law
 from experiments.validate.beds.low_gravity import collapsed, power_of

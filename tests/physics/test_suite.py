@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.validate.base.case import Case, Comparison, Outcome, compared
+from experiments.validate.base.drops import first_touch
 from experiments.validate.base.peers import PEERS
 from experiments.validate.beds import dosta, silo
 from experiments.validate.experiment import run_case
@@ -98,7 +99,7 @@ def test_dostas_grains_fill_their_box_and_the_ball_starts_on_the_first():
         low, high = dosta.WALLS[2 * axis : 2 * axis + 2]
         assert low < (positions - radii[:, None])[:, axis].min() + 1e-5
         assert (positions + radii[:, None])[:, axis].max() < high + 1e-5
-    height = dosta.first_touch(positions, radii)
+    height = first_touch(positions, radii, dosta.BALL_RADIUS)
     gap = np.linalg.norm(positions - [0, 0, height], axis=1) - radii - dosta.BALL_RADIUS
     assert abs(gap.min()) < 1e-12
 

@@ -14,12 +14,13 @@ import numpy as np
 
 from dem import Ball, Bed, Facing, Material
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
-from experiments.validate.base.peers import PEERS, data_file, digits, run_peer
+from experiments.validate.base.drops import first_touch
+from experiments.validate.base.peers import PEERS, data_file, deck_of, digits, run_peer
 from experiments.validate.base.spheres import mass_of, upright_walls
 
 from .words import say
 
-__all__ = ["CASES", "Setup", "first_touch", "grains"]
+__all__ = ["CASES", "Setup", "grains"]
 
 DATA = Path(__file__).parents[1] / "dosta_data" / "25KParticles.txt.gz"
 STUFF = Material("dosta", 2500.0, 1e9, 0.2, 0.3, 0.5)
@@ -52,18 +53,10 @@ def grains() -> tuple[np.ndarray, np.ndarray]:
     return found[:, 1:], found[:, 0]
 
 
-def first_touch(positions: np.ndarray, radii: np.ndarray) -> float:
-    """Height of a ball that comes down the axis when it touches the first grain [m]."""
-    across = np.hypot(positions[:, 0], positions[:, 1])
-    reach = BALL_RADIUS + radii
-    under = across < reach
-    return float((positions[under, 2] + np.sqrt(reach[under] ** 2 - across[under] ** 2)).max())
-
-
 def setup() -> Setup:
     """The case when the ball arrives."""
     positions, radii = grains()
-    height = first_touch(positions, radii) + 1e-6
+    height = first_touch(positions, radii, BALL_RADIUS) + 1e-6
     speed = math.sqrt(SPEED**2 + 2 * GRAVITY * (THROWN_FROM - height))
     return Setup(positions, radii, np.array([0.0, 0.0, height]), speed)
 
@@ -117,25 +110,23 @@ def _data(case: Setup) -> str:
 
 
 def _deck() -> str:
-    e, mu = STUFF.restitution, STUFF.friction
     law = "hertz tangential history"
     planes = zip(("xplane",) * 2 + ("yplane",) * 2 + ("zplane",), (*WALLS, FLOOR), strict=True)
-    pairs = "peratomtypepair 2"
+
+    def pairs(of_grains: float, of_ball: float) -> str:
+        return f"peratomtypepair 2 {of_grains:g} {of_ball:g} {of_ball:g} {of_ball:g}"
+
     lines = [
-        "hard_particles yes", "units si", "atom_style granular", "atom_modify map array", "communicate single vel yes",
-        "boundary f f f",
-        "newton off", "read_data grains.data", "neighbor 8e-4 bin", "neigh_modify delay 0 every 1 check yes",
         f"fix young all property/global youngsModulus peratomtype {STUFF.young:g} {BALL_YOUNG:g}",
         f"fix poisson all property/global poissonsRatio peratomtype {STUFF.poisson:g} {BALL_POISSON:g}",
-        f"fix rebound all property/global coefficientRestitution {pairs} {e:g} {BALL_RESTITUTION:g} "
-        f"{BALL_RESTITUTION:g} {BALL_RESTITUTION:g}",
-        f"fix friction all property/global coefficientFriction {pairs} {mu:g} {BALL_FRICTION:g} {BALL_FRICTION:g} "
-        f"{BALL_FRICTION:g}",
-        f"pair_style gran model {law}", "pair_coeff * *",
-    ]  # fmt: skip
-    for k, (kind, where) in enumerate(planes):
-        lines.append(f"fix wall{k} all wall/gran model {law} primitive type 1 {kind} {where:.7f}")
-    lines += [
+        f"fix rebound all property/global coefficientRestitution {pairs(STUFF.restitution, BALL_RESTITUTION)}",
+        f"fix friction all property/global coefficientFriction {pairs(STUFF.friction, BALL_FRICTION)}",
+        f"pair_style gran model {law}",
+        "pair_coeff * *",
+        *(
+            f"fix wall{k} all wall/gran model {law} primitive type 1 {kind} {where:.7f}"
+            for k, (kind, where) in enumerate(planes)
+        ),
         f"fix weight all gravity {GRAVITY:g} vector 0.0 0.0 -1.0",
         "fix motion all nve/sphere",
         "group ball type 2",
@@ -145,7 +136,7 @@ def _deck() -> str:
         "thermo 1000",
         f"run {round(TIME / STEP)}",
     ]
-    return "\n".join(lines) + "\n"
+    return "hard_particles yes\n" + deck_of("liggghts", lines, boundary="f f f", skin="8e-4")
 
 
 def _compute(tell: Tell) -> Outcome:

@@ -35,7 +35,7 @@ from dem.grains.sizes import Uniform
 from dem.measure.element import ElementShear, shear_element
 from experiments.calibrate.tests import mohr_circle, summary_of, triaxial_angle
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
-from experiments.validate.base.peers import PEERS, box_of, data_file, lammps_restitution, run_peer, spheres
+from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, lammps_restitution, run_peer, spheres
 
 from .words import say
 
@@ -167,9 +167,7 @@ def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[st
     mass = stuff.density * math.pi / 6 * GRAIN**3
     squeezing = round(30 * unit / step)
     deck = [
-        "units si", "atom_style sphere", "comm_modify vel yes", "boundary p p p", "newton off", "read_data grains.data",
-        "neighbor 4e-4 bin", "neigh_modify delay 0 every 1 check yes", "pair_style granular",
-        f"pair_coeff * * {lammps_law(stuff, young, GRAIN)}",
+        "pair_style granular", f"pair_coeff * * {lammps_law(stuff, young, GRAIN)}",
         f"timestep {step:.17g}", "fix motion all nve/sphere", f"fix calm all viscous {mass / unit:.17g}",
         f"fix squeeze all deform 1 y final 0 {solid / (packing * width * depth):.17g} remap x", "thermo 10000",
         f"run {squeezing}", "unfix squeeze", "unfix calm", "compute stress all pressure NULL virial",
@@ -177,7 +175,8 @@ def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[st
         f"fix mean all ave/time 1 {_EVERY} {_EVERY} {' '.join(f'c_stress[{i}]' for i in range(1, 7))} file stress.txt",
         f"run {round(STRAIN / rate / step / _EVERY) * _EVERY}",
     ]  # fmt: skip
-    return data_file(box, spheres(radii, places, stuff.density)), "\n".join(deck) + "\n"
+    data = data_file(box, spheres(radii, places, stuff.density))
+    return data, deck_of("lammps", deck, boundary="p p p", skin="4e-4")
 
 
 def _smooth(strain: np.ndarray, ratio: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ smaller that D + d is the experiment's, its mass is kept. What is left of the gr
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -19,12 +18,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told
-from experiments.validate.base.drops import BEADS, drop, prepared
-from experiments.validate.base.parts import part
+from experiments.validate.base.drops import BEADS, Drop
 
 from .words import say
 
-__all__ = ["BALL", "CASES", "Fall", "K_OVER_M", "MASS", "energy", "fit_law"]
+__all__ = ["BALL", "CASES", "K_OVER_M", "MASS", "energy", "fit_law"]
 
 BALL, BEAD, MASS, GRAVITY = 0.0254, 0.0003, 0.0692, 9.81  # diameters [m], [kg], [m/s2]
 D1, K_OVER_M = 0.087, 1040.0  # published [m], [1/s2]
@@ -36,36 +34,17 @@ COARSE = ("5", 6, ((1, PLACES),))
 FINE = ("7", 8, ((2, PLACES), (3, PLACES)))
 """Grains across the ball; D + d over d; seeds of the beds, and places in each."""
 D1_BAND, K_BAND, TIME_BAND = 0.15, 0.25, 0.15
-STRUCK = 0.08  # overlap over diameter that is let pass where the ball strikes; the bed itself stays below 0.05
 LONGEST = 0.4  # [s]
 POINTS = 50
 
 
-@dataclass(frozen=True)
-class Fall:
-    """One drop, ``across`` D + d over d; the rest as `drop` has it."""
-
-    across: int
-    seed: int
-    at: tuple[float, float]
-    speed: float
-
-    def run(self) -> dict[str, np.ndarray]:
-        """What `drop` gives, kept."""
-        grain = CLEAR / self.across
-        radius = 0.5 * (CLEAR - grain)
-        size = tuple(share * CLEAR for share in BOX)
-
-        def compute() -> dict[str, np.ndarray]:
-            bed = prepared(grain=grain, size=size, gravity=GRAVITY, seed=self.seed)
-            bed.overlap_limit = STRUCK
-            found = drop(
-                bed, radius=radius, density=MASS / (4 / 3 * math.pi * radius**3), speed=self.speed,
-                at=(self.at[0] * size[0], self.at[1] * size[1]), longest=LONGEST,
-            )  # fmt: skip
-            return found | {"packing": np.array(bed.packing_fraction), "count": np.array(bed.grain_count)}
-
-        return part("impact", vars(self) | {"size": size, "mass": MASS, "longest": LONGEST}, compute)
+def fall(across: int, seed: int, at: tuple[float, float], speed: float) -> Drop:
+    """One drop; ``across``: D + d over d."""
+    grain = CLEAR / across
+    radius = 0.5 * (CLEAR - grain)
+    density = MASS / (4 / 3 * math.pi * radius**3)
+    size = tuple(share * CLEAR for share in BOX)
+    return Drop(grain, 2 * radius, density, size, GRAVITY, seed, at, speed, LONGEST)  # type: ignore[arg-type]
 
 
 def energy(depth: np.ndarray, *, start: float, d1: float, k_over_m: float, gravity: float = GRAVITY) -> np.ndarray:
@@ -110,7 +89,7 @@ def _scatter(falls: Sequence[dict[str, np.ndarray]]) -> tuple[float, float]:
 
 def _drops(fineness: tuple[str, int, Any], tell: Tell) -> Outcome:
     name, across, beds = fineness
-    falls = [Fall(across, seed, at, speed) for seed, places in beds for at in places for speed in SPEEDS]
+    falls = [fall(across, seed, at, speed) for seed, places in beds for at in places for speed in SPEEDS]
     found = [fall.run() for fall in told(falls, tell)]
     d1, k_over_m = fit_law(found)
     errors = _scatter(found)

@@ -26,8 +26,7 @@ from dem import Cone, Cylinder
 from dem.measure.element import shear_element
 from experiments.calibrate.tests import summary_of
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
-from experiments.validate.base.drops import BEADS, SPREAD, drive_down, prepared
-from experiments.validate.base.parts import part
+from experiments.validate.base.drops import BEADS, SPREAD, drive_down, part, prepared
 from rigid.ground.laws import find_law
 from rigid.ground.rft import flat_plate, stress_gradient, tractions
 

@@ -9,17 +9,15 @@ show here.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
-from experiments.validate.base.drops import BEADS, drop, prepared
-from experiments.validate.base.parts import part
+from experiments.validate.base.drops import BEADS, Drop
 
 from .words import say
 
-__all__ = ["CASES", "Setting", "collapsed", "power_of"]
+__all__ = ["CASES", "collapsed", "power_of"]
 
 GRAIN, BALL = 0.02, 0.1  # diameters [m]: five grains across the ball
 BOX = (2.5, 2.5, 1.75)  # of the bed, over D + d
@@ -31,37 +29,17 @@ LARGER, LARGER_AT = 1.4, (0.1, 7)  # another ball over the first; its bed grows 
 MURDOCH_GRAVITIES = ((1.0, 3), (0.2, 4))
 MURDOCH_SPEEDS = (0.05, 0.1, 0.2, 0.4)
 BAND = 0.1
-STRUCK = 0.08  # overlap over diameter that is let pass where the ball strikes; the bed itself stays below 0.05
 LONGEST = 8.0  # over sqrt(D / g); one that still creeps then has come as far as it is taken to
 MOSTLY = 0.9  # of its depth, for the time it takes
 
 
-@dataclass(frozen=True)
-class Setting:
+def setting(
+    gravity: float, seed: int, at: tuple[float, float], density: float, speed: float, ball: float = BALL
+) -> Drop:
     """One drop: SI units, ``at`` over the bed's sides."""
-
-    gravity: float
-    seed: int
-    at: tuple[float, float]
-    density: float
-    speed: float
-    ball: float = BALL
-    stiffer: float = 1.0  # than the bed would choose by itself
-
-    def run(self, tell: Tell = lambda share: None) -> dict[str, np.ndarray]:
-        """What `drop` gives, kept."""
-
-        def compute() -> dict[str, np.ndarray]:
-            size = tuple(share * (self.ball + GRAIN) for share in BOX)
-            bed = prepared(grain=GRAIN, size=size, gravity=self.gravity, seed=self.seed, stiffer=self.stiffer)
-            bed.overlap_limit = STRUCK
-            return drop(
-                bed, radius=self.ball / 2, density=self.density, speed=self.speed,
-                at=(self.at[0] * size[0], self.at[1] * size[1]), longest=LONGEST * math.sqrt(self.ball / self.gravity),
-                tell=tell,
-            )  # fmt: skip
-
-        return part("drop", vars(self) | {"grain": GRAIN, "box": BOX, "longest": LONGEST}, compute)
+    size = tuple(share * (ball + GRAIN) for share in BOX)
+    longest = LONGEST * math.sqrt(ball / gravity)
+    return Drop(GRAIN, ball, density, size, gravity, seed, at, speed, longest)  # type: ignore[arg-type]
 
 
 def power_of(x: Sequence[float], y: Sequence[float]) -> float:
@@ -99,8 +77,8 @@ def _about() -> str:
     return say("beads", beads=BEADS, across=across, grain=BALL / GRAIN)
 
 
-def _sweep(speed_over: float) -> list[Setting]:
-    return [Setting(g, seed, at, STEEL, speed_over * math.sqrt(g * BALL)) for g, seed in SWEEP for at in PLACES]
+def _sweep(speed_over: float) -> list[Drop]:
+    return [setting(g, seed, at, STEEL, speed_over * math.sqrt(g * BALL)) for g, seed in SWEEP for at in PLACES]
 
 
 def _means(values: Sequence[float]) -> list[float]:
@@ -135,7 +113,7 @@ def _sink(tell: Tell) -> Outcome:
     return Outcome(rows, [plot], [remark])
 
 
-def _one_froude(tell: Tell, others: Sequence[Setting] = (), names: Sequence[str] = ()) -> Outcome:
+def _one_froude(tell: Tell, others: Sequence[Drop] = (), names: Sequence[str] = ()) -> Outcome:
     """The sweep at one Froude number and beside it other beds; held to the mean curve of the sweep are the others, or
     its own beds where there are none."""
     settings = [*_sweep(FROUDE), *others]
@@ -168,7 +146,7 @@ def _size(tell: Tell) -> Outcome:
     large = LARGER * (BALL + GRAIN) - GRAIN
     density = STEEL * (LARGER * BALL / large) ** 3
     speed = FROUDE * math.sqrt(LARGER_AT[0] * LARGER * BALL)
-    others = [Setting(*LARGER_AT, at, density, speed, ball=large) for at in PLACES]
+    others = [setting(*LARGER_AT, at, density, speed, ball=large) for at in PLACES]
     found = _one_froude(tell, others, [f"{LARGER_AT[0]:g} m/s2, ball {LARGER:g} times larger"])
     remark = say("larger_ball", larger=LARGER)
     return Outcome(found.comparisons, found.plots, [*found.remarks, remark])
@@ -176,7 +154,7 @@ def _size(tell: Tell) -> Outcome:
 
 def _murdoch(tell: Tell) -> Outcome:
     settings = [
-        Setting(g, seed, at, ALUMINIUM, speed) for g, seed in MURDOCH_GRAVITIES for speed in MURDOCH_SPEEDS
+        setting(g, seed, at, ALUMINIUM, speed) for g, seed in MURDOCH_GRAVITIES for speed in MURDOCH_SPEEDS
         for at in PLACES
     ]  # fmt: skip
     runs = [one.run() for one in told(settings, tell)]

@@ -19,7 +19,7 @@ from dem.grains.materials import SAND, Material
 from dem.measure.repose import measure_flanks, thickness_profile
 from experiments.bed.tests import stiff_enough
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
-from experiments.validate.base.peers import PEERS, box_of, data_file, run_peer, spheres
+from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, run_peer, spheres
 
 from .friction_angle import lammps_law
 from .words import say
@@ -111,15 +111,15 @@ def in_lammps(stuff: Material, block: tuple[Any, ...]) -> Heap:
     steps, high = _steps(bed), 3 * BLOCK[2] * GRAIN
     data = data_file(box_of(*bed.size[:2], high), spheres(radii, places, stuff.density))
     law, floor = lammps_law(stuff, young, GRAIN), lammps_law(stuff, young, GRAIN, friction=ROUGH)
-    deck = [
-        "units si", "atom_style sphere", "comm_modify vel yes", "boundary p p f", "newton off", "read_data grains.data",
-        "neighbor 4e-4 bin", "neigh_modify delay 0 every 1 check yes", "pair_style granular", f"pair_coeff * * {law}",
-        f"timestep {bed.time_step:.17g}", f"fix floor all wall/gran granular {floor} zplane 0.0 NULL",
+    lines = [
+        "pair_style granular", f"pair_coeff * * {law}", f"timestep {bed.time_step:.17g}",
+        f"fix floor all wall/gran granular {floor} zplane 0.0 NULL",
         f"fix weight all gravity {GRAVITY:.17g} vector 0.0 0.0 -1.0", "fix motion all nve/sphere", "thermo 10000",
         f"dump last all custom {steps} dump.txt id x y z vx vy vz",
         "dump_modify last sort id first no format float %.17g", f"run {steps}",
     ]  # fmt: skip
-    text = run_peer("lammps", data, "\n".join(deck) + "\n", "dump.txt", limit=LIMIT)
+    deck = deck_of("lammps", lines, boundary="p p f", skin="4e-4")
+    text = run_peer("lammps", data, deck, "dump.txt", limit=LIMIT)
     rows = np.array([line.split()[1:] for line in text.split("ITEM: ATOMS")[-1].splitlines()[1:]], dtype=float)
     mass = stuff.density * 4 / 3 * math.pi * radii**3
     energy = 0.5 * float(mass @ (rows[:, 3:] ** 2).sum(axis=1)) / float(mass.sum()) / (GRAVITY * GRAIN)
