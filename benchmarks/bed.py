@@ -21,9 +21,8 @@ from typing import Any, Self
 from benchmarks.race import table
 from benchmarks.race.entrants import GRAVITY, TIME_STEP, WARM_STEPS, Entrant, Heat, Ours, Theirs
 from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
-from benchmarks.race.machine import busy, describe_machine, head, wide_console
+from benchmarks.race.machine import begin_timing, environment_numbers, wide_console
 from benchmarks.race.peers import LAMMPS, LIGGGHTS, Peer, find_mpirun
-from experiments.runs.memory import cores_there
 from experiments.runs.types import Json
 
 __all__ = ["Lane", "Settings", "pick_best", "run"]
@@ -51,24 +50,17 @@ class Settings:
 
         Raises ValueError for one that is no positive whole number (several for the sizes; 0 or 1 for the last).
         """
-        sizes, rounds, steps = _numbers("SIZES"), _numbers("ROUNDS", most=1), _numbers("STEPS", most=1)
+        sizes = environment_numbers("SIZES", cls.sizes, most=100)
+        (rounds,) = environment_numbers("ROUNDS", (cls.rounds,))
+        steps = environment_numbers("STEPS", ())
         shown = os.environ.get("HEDGEBED_BENCH_SHOWN", "1")
         if shown not in ("0", "1"):
             raise ValueError(f"HEDGEBED_BENCH_SHOWN = {shown!r} must be 0 or 1")
-        return cls(sizes or cls.sizes, *(rounds or (cls.rounds,)), *(steps or (None,)), shown == "1")
+        return cls(sizes, rounds, steps[0] if steps else None, shown == "1")
 
     def steps_for(self, count: int) -> int:
         """Timed steps of a bed of ``count`` grains."""
         return self.steps or (2000 if count <= 50_000 else 1000)
-
-
-def _numbers(name: str, *, most: int | None = None) -> tuple[int, ...]:
-    key = f"HEDGEBED_BENCH_{name}"
-    words = os.environ.get(key, "").replace(",", " ").split()
-    if not all(word.isdigit() and int(word) > 0 for word in words) or len(words) > (most or len(words)):
-        wanted = "one positive whole number" if most == 1 else "positive whole numbers"
-        raise ValueError(f"{key} = {os.environ[key]!r} must be {wanted}")
-    return tuple(int(word) for word in words)
 
 
 @dataclass
@@ -121,16 +113,16 @@ def run(out: Path, *, progress: Any) -> Json:
     RuntimeError where our own bed failed.
     """
     settings = Settings.from_environment()
-    cores, load = cores_there(), os.getloadavg()[0]
+    bench, busy = begin_timing("bed")
+    cores = bench["machine"]["cores"]
     peers, remarks = _find_peers()
-    remarks += busy(cores, load)
+    remarks += busy
     for remark in remarks:
         progress.message(remark)
     progress.plan(dict(_plan(settings, with_peers=bool(peers))))
     said = [f"{key}={value!r}" for key, value in sorted(os.environ.items()) if key.startswith("HEDGEBED_BENCH_")]
-    bench = head("bed") | {
+    bench |= {
         "command": " ".join([*said, "hedgebed bench bed"]),
-        "machine": describe_machine(cores, load),
         "peers": {peer.name: None for peer in (LIGGGHTS, LAMMPS)},
         "unit": "grain steps per second",
         "rounds": settings.rounds,
@@ -159,8 +151,10 @@ def run(out: Path, *, progress: Any) -> Json:
 def _find_peers() -> tuple[list[Peer], list[str]]:
     """The peers that can race, and what is to be said of the others."""
     peers = [peer for peer in (LIGGGHTS, LAMMPS) if peer.find()]
-    missing = [peer for peer in (LIGGGHTS, LAMMPS) if peer not in peers]
-    remarks = [f"{peer.name} is not installed and is left out (apt install {peer.package})" for peer in missing]
+    remarks = [
+        f"{peer.name} is not installed and is left out (apt install {peer.package})"
+        for peer in (LIGGGHTS, LAMMPS) if peer not in peers
+    ]  # fmt: skip
     if peers and not find_mpirun():
         names = " and ".join(peer.name for peer in peers)
         remarks.append(f"mpirun is not installed, so {names} cannot use all cores: left out (apt install openmpi-bin)")
@@ -174,8 +168,8 @@ def _plan(settings: Settings, *, with_peers: bool) -> Iterator[tuple[str, float]
         heat = count * (WARM_STEPS + settings.steps_for(count)) / _EXPECTED_SPEED
         yield f"{count:,} grains: bed", count * _SETTLING_STEPS / _EXPECTED_SPEED
         for k in range(1, settings.rounds + 1):
-            first = 6 + 4 * settings.shown
-            yield f"{count:,} grains: round {k}", heat * (1 + with_peers * (first if k == 1 else 3))
+            lanes = 6 + 4 * settings.shown if k == 1 else 3
+            yield f"{count:,} grains: round {k}", heat * (1 + with_peers * lanes)
         if settings.shown:
             yield f"{count:,} grains: float32, one thread", 3 * heat
 
@@ -198,10 +192,8 @@ def _race(count: int, settings: Settings, peers: list[Peer], cores: int, progres
         write_data(folder / "bed.data", grains)
         theirs = [Lane(entrant) for peer in peers for entrant in _theirs(peer, grains, folder, cores)]
         racing = [lane for lane in theirs if lane.entrant.counted]
-        rolling, shown = [], []
-        if settings.shown:
-            rolling = [Lane(Ours(grains, threads=cores, rolling=True))]
-            shown = [lane for lane in theirs if not lane.entrant.counted]
+        rolling = [Lane(Ours(grains, threads=cores, rolling=True))] if settings.shown else []
+        shown = [lane for lane in theirs if not lane.entrant.counted and settings.shown]
         staying = [ours, *racing, *rolling, *shown]
         for k in range(1, settings.rounds + 1):
             _heats(f"{of}round {k}", staying, steps, progress)
@@ -256,21 +248,18 @@ def _theirs(peer: Peer, grains: Grains, folder: Path, ranks: int) -> Iterator[Th
 
 def _leaders(racing: list[Lane]) -> list[Lane]:
     """Of each peer the fastest skin, and those close to it."""
-    leaders = []
-    for name in dict.fromkeys(lane.entrant.name for lane in racing):
-        fit = [(lane.speed, lane) for lane in racing if lane.entrant.name == name and lane.speed is not None]
-        fastest = max((speed for speed, _ in fit), default=0.0)
-        leaders += [lane for speed, lane in fit if speed >= _CLOSE * fastest]
-    return leaders
+    fastest: dict[str, float] = {}
+    for lane in racing:
+        fastest[lane.entrant.name] = max(fastest.get(lane.entrant.name, 0.0), lane.speed or 0.0)
+    return [lane for lane in racing if lane.speed is not None and lane.speed >= _CLOSE * fastest[lane.entrant.name]]
 
 
 def _check_work(ours: Lane, lanes: list[Lane]) -> None:
     """Say of each lane whether its bed ended up in another state than ours."""
-    for lane in lanes:
-        if ours.failure or lane.failure:
+    for lane in lanes if not ours.failure else ():
+        if lane.failure:
             continue
-        last, reference = lane.heats[-1], ours.heats[-1]
-        found = []
+        last, reference, found = lane.heats[-1], ours.heats[-1], []
         for what, bound in (("coordination", COORDINATION_BOUND), ("packing", PACKING_BOUND)):
             gap = getattr(last, what) / getattr(reference, what) - 1
             # Written so that a NaN counts as other work.

@@ -7,7 +7,6 @@ HEDGEBED_BENCH_TRIALS (timed ones), HEDGEBED_BENCH_ROUNDS, HEDGEBED_BENCH_COMPAR
 third as many with all terms on). What agreement means is in ``benchmarks/planar_trials/agreement.py``.
 """
 
-import os
 import statistics
 import time
 from pathlib import Path
@@ -16,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.planar_trials.agreement import CHANNELS, SHARE_WITHIN, TOLERANCE, compare, random_trial
-from benchmarks.race.machine import busy, column_table, describe_machine, head, wide_console
-from experiments.runs.memory import cores_there
+from benchmarks.race.machine import begin_timing, column_table, environment_numbers, wide_console
 from experiments.runs.types import Json
 from rigid import EFFECTS, Effect, Trial, simulate_batch
 
@@ -38,19 +36,9 @@ class Settings:
     """Numbers of trials and rounds. Raises ValueError where the environment holds no positive whole number."""
 
     def __init__(self) -> None:
-        self.trials, self.rounds, self.compared = (
-            _number("TRIALS", 20_000),
-            _number("ROUNDS", 5),
-            _number("COMPARED", 1000),
-        )
-
-
-def _number(name: str, default: int) -> int:
-    key = f"HEDGEBED_BENCH_{name}"
-    value = os.environ.get(key, str(default))
-    if not (value.isdigit() and int(value) > 0):
-        raise ValueError(f"{key} = {value!r} must be a positive whole number")
-    return int(value)
+        (self.trials,) = environment_numbers("TRIALS", (20_000,))
+        (self.rounds,) = environment_numbers("ROUNDS", (5,))
+        (self.compared,) = environment_numbers("COMPARED", (1000,))
 
 
 def drawn_trials(count: int, *, seed: int, all_terms: bool) -> tuple[Trial, dict[str, np.ndarray]]:
@@ -99,11 +87,10 @@ def run(out: Path, *, progress: Any) -> Json:
     RuntimeError where the batch failed.
     """
     settings = Settings()
-    cores, load = cores_there(), os.getloadavg()[0]
-    for remark in busy(cores, load):
+    bench, remarks = begin_timing("planar")
+    for remark in remarks:
         progress.message(remark)
-    bench = head("planar") | {
-        "machine": describe_machine(cores, load),
+    bench |= {
         "unit": "trials of 1 s at 1 ms a second",
         "trials": settings.trials,
         "rounds": settings.rounds,
@@ -124,7 +111,7 @@ def run(out: Path, *, progress: Any) -> Json:
             "trials_per_s": statistics.median(speeds),
             "rounds": speeds,
             "processor_s_per_trial": processor,
-            "trials_per_s_idle_cores": cores / processor,
+            "trials_per_s_idle_cores": bench["machine"]["cores"] / processor,
             "first_call_s": compiling,
             "effects": [effect.id for effect in base.effects],
             "agreement": compare(trials).summary(),

@@ -13,7 +13,7 @@ import numpy as np
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.runs.types import Json
 
-__all__ = ["EFFECTS", "OUTSIDE", "Hidden", "correlated", "draw_hidden", "draw_kind", "make_hidden"]
+__all__ = ["EFFECTS", "OUTSIDE", "Hidden", "correlated", "draw_hidden", "draw_kind", "make_hidden", "tables_of"]
 
 Random = np.random.Generator
 Names = Sequence[str]
@@ -79,9 +79,8 @@ class _Law:
         s, force = self.s, self.k * z
         if "hardening" in s:
             x = z / s["depth"]
-            force *= (1.0 + s["hardening"] * x * x / (0.3 + x)) if s["hardening_kind"] < 0.5 else (
-                math.sinh(s["hardening"] * x + 1e-9) / (s["hardening"] * x + 1e-9)
-            )  # fmt: skip
+            steep = s["hardening"] * x + 1e-9
+            force *= 1.0 + s["hardening"] * x * x / (0.3 + x) if s["hardening_kind"] < 0.5 else math.sinh(steep) / steep
         if "layer" in s:
             z1, w = s["layer_depth"], s["layer_width"]
             if s["layer_kind"] < 0.5:  # another stiffness below
@@ -109,16 +108,15 @@ def make_hidden(
     )  # fmt: skip
     coloured = random.random() < 0.3
     clean = [_trial(plan, k, {}) for k in range(len(plan["trials"]))]
-    amplitude, made = 1.0, clean
-    measure = 0.0
+    made, measure = clean, 0.0
     settings: dict[str, float] = {}
     if kind != "null":
         shape = _shape(random, plan, effects, outside)
         low, high = math.log(1e-4), math.log(30.0)
+        few = list(range(0, len(clean), max(1, len(clean) // 4)))
         for _ in range(9):  # amplitude by halving: the signature grows with it
             amplitude = math.exp(0.5 * (low + high))
             settings = shape(amplitude)
-            few = list(range(0, len(clean), max(1, len(clean) // 4)))
             measure = _signature(plan, [clean[k] for k in few], [_trial(plan, k, settings) for k in few], few)
             low, high = (math.log(amplitude), high) if measure < strength else (low, math.log(amplitude))
         made = [_trial(plan, k, settings) for k in range(len(clean))]
@@ -240,16 +238,15 @@ def _driven(plan: Json, this: Json, law: _Law, s: dict[str, float]) -> _Columns:
     depth, speed = plan["depth"], this["speed"]
     going = depth / speed
     total = going * (1.9 if plan["returns"] else 1.0)
-    rate = max(plan["rate"], 300 / total)
-    rate = min(rate, 900 / total)
-    time = np.arange(0, total, 1 / rate)
+    time = np.arange(0, total, 1 / min(max(plan["rate"], 300 / total), 900 / total))
     ease = 0.05 * going  # it turns smoothly
-    velocity = np.where(time < going - ease, speed, np.clip(-(time - going) / ease, -1, 1) * speed)
-    if not plan["returns"]:
-        velocity = np.full(len(time), speed)
-    fine = np.linspace(0, total, 4000)
-    moving = np.where(fine < going - ease, speed, np.clip(-(fine - going) / ease, -1, 1) * speed)
-    moving = moving if plan["returns"] else np.full(len(fine), speed)
+
+    def moves(at: np.ndarray) -> np.ndarray:
+        there = at < going - ease if plan["returns"] else np.full(len(at), True)
+        return np.where(there, speed, np.clip(-(at - going) / ease, -1, 1) * speed)
+
+    velocity, fine = moves(time), np.linspace(0, total, 4000)
+    moving = moves(fine)
     path = np.concatenate([[0], np.cumsum(0.5 * (moving[1:] + moving[:-1]) * np.diff(fine))])
     z = np.interp(time, fine, path)
     rows = zip(z.tolist(), velocity.tolist(), time.tolist(), strict=True)
@@ -303,15 +300,12 @@ def _signature(plan: Json, clean: list[_Columns], made: list[_Columns], which: l
     change, slope = [], []
     for one, other, index in zip(clean, made, which, strict=True):
         nudged = _trial({**plan, "k": plan["k"] * 1.01}, index, {})
-        driven = plan["trials"][index]["driven"]
-        if driven:
-            noise = math.hypot(plan["noise_force"], plan["k"] * plan["noise_depth"] * 0.1)
-            change.append((other["other"] - one["other"]) / noise)
-            slope.append((nudged["other"] - one["other"]) / noise)
-        else:
-            for name, noise in (("depth", plan["noise_depth"]), ("other", plan["noise_accel"])):
-                change.append((other[name] - one[name]) / noise)
-                slope.append((nudged[name] - one[name]) / noise)
+        noises = {"depth": plan["noise_depth"], "other": plan["noise_accel"]}
+        if plan["trials"][index]["driven"]:
+            noises = {"other": math.hypot(plan["noise_force"], plan["k"] * plan["noise_depth"] * 0.1)}
+        for name, noise in noises.items():
+            change.append((other[name] - one[name]) / noise)
+            slope.append((nudged[name] - one[name]) / noise)
     d, k = np.concatenate(change), np.concatenate(slope)
     d = d - k * (k @ d) / max(float(k @ k), 1e-12)
     return float(np.sqrt(np.mean(d**2)))
@@ -329,24 +323,29 @@ def _record(random: Random, plan: Json, made: list[_Columns], coloured: bool, de
     persistence = float(random.uniform(0.3, 0.8)) if coloured else 0.0
     trials, recordings = [], {}
     for index, (this, data) in enumerate(zip(plan["trials"], made, strict=True)):
-        name = f"{index + 1:03d}"
-        mode = "driven" if this["driven"] else "drop"
+        name, mode, n = f"{index + 1:03d}", "driven" if this["driven"] else "drop", len(data["time"])
         kept = {key: this[key] for key in ("gravity", "speed", "diameter")}
         trials.append({"id": name, "mode": mode, "data": f"{name}.csv", **kept})
-        n = len(data["time"])
         column, std = ("force_N", plan["noise_force"]) if this["driven"] else ("accel_m_s2", plan["noise_accel"])
         recordings[(name, "data")] = Recording({
             "t_s": data["time"],
             "depth_m": data["depth"] + plan["noise_depth"] * correlated(random.standard_normal(n), depth_persistence),
             column: data["other"] + std * correlated(random.standard_normal(n), persistence),
         })  # fmt: skip
-    tables = PenetrationCampaign.model_validate({
-        "format": "hedgehog-campaign/1", "kind": "penetration", "name": "made up",
-        "spike": {"mass": plan["mass"], "diameter": 0.012, "tip": "sphere"},
-        "surface": {"kind": "sand", "stiffness": plan["believed_k"], "damping": plan["believed_c"]},
-        "uncertainty": {"stiffness": plan["doubt_k"], "damping": plan["doubt_c"]},
-        "sensors": {"depth": {"std": (plan["noise_depth"],)}, "force": {"std": (plan["noise_force"],)},
-                    "accel": {"std": (plan["noise_accel"],)}},
-        "trial": tuple(trials),
+    spike = {"mass": plan["mass"], "diameter": 0.012, "tip": "sphere"}
+    noise = {name: plan[f"noise_{name}"] for name in ("depth", "force", "accel")}
+    believed, doubt = ((plan[f"{of}_k"], plan[f"{of}_c"]) for of in ("believed", "doubt"))
+    return Campaign(tables_of("made up", spike, believed, doubt, noise, trials), recordings)
+
+
+def tables_of(
+    name: str, spike: Json, believed: Sequence[float], doubt: Sequence[float], noise: dict[str, float],
+    trials: Sequence[Json],
+) -> PenetrationCampaign:  # fmt: skip
+    """The tables of a campaign in sand; ``believed``, ``doubt``: of stiffness and damping."""
+    return PenetrationCampaign.model_validate({
+        "format": "hedgehog-campaign/1", "kind": "penetration", "name": name, "spike": spike,
+        "surface": {"kind": "sand", "stiffness": believed[0], "damping": believed[1]},
+        "uncertainty": {"stiffness": doubt[0], "damping": doubt[1]},
+        "sensors": {sensor: {"std": (std,)} for sensor, std in noise.items()}, "trial": tuple(trials),
     })  # fmt: skip
-    return Campaign(tables, recordings)

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.campaign import Campaign, PenetrationCampaign, Recording
+from experiments.campaign import Campaign, Recording
 
-from .penetration import EFFECTS, Hidden, correlated, draw_kind
+from .penetration import EFFECTS, Hidden, correlated, draw_kind, tables_of
 from .rig_bed import LAWS, Bed, Law, draw_law, drop, push
 from .rig_plan import NUISANCES, SIZES, Rig, Trial, draw_rig
 
@@ -63,9 +63,10 @@ def make_rig(
     if outside == "wrong-mass":
         rig = replace(rig, true_mass=rig.mass * (1.0 + float(random.choice([-1, 1])) * _WRONG_MASS))
         made = [_moved(rig, trial) for trial in rig.trials]
-        measure = _signature([_change(rig, *three) for three in zip(rig.trials, clean, made, strict=True)])
     elif laws:
-        amplitude, made = _amplified(rig, laws, clean, strength)
+        amplitude = _amplitude(rig, laws, clean, strength)
+        made = [_moved(rig, trial, laws, amplitude) for trial in rig.trials]
+    if made is not clean:
         measure = _signature([_change(rig, *three) for three in zip(rig.trials, clean, made, strict=True)])
     campaign, left = _record(random, rig, made)
     parameters = {f"{own.name}.{key}": value for own in laws for key, value in own.numbers.items()}
@@ -94,9 +95,7 @@ def _moved(rig: Rig, trial: Trial, laws: Sequence[Law] = (), amplitude: float = 
                 rate=trial.rate)  # fmt: skip
 
 
-def _amplified(
-    rig: Rig, laws: Sequence[Law], clean: Sequence[_Columns], strength: float
-) -> tuple[float, list[_Columns]]:
+def _amplitude(rig: Rig, laws: Sequence[Law], clean: Sequence[_Columns], strength: float) -> float:
     """The amplitude with the signature aimed at, by halving its logarithm: one trial of each condition is looked at."""
     first: dict[tuple[bool, float, float], int] = {}
     for index, trial in enumerate(rig.trials):
@@ -111,8 +110,7 @@ def _amplified(
             for (trial, one), slopes in zip(few, uncertain, strict=True)
         ]
         low, high = (middle, high) if _signature(changes) < strength else (low, middle)
-    amplitude = math.exp(0.5 * (low + high))
-    return amplitude, [_moved(rig, trial, laws, amplitude) for trial in rig.trials]
+    return math.exp(0.5 * (low + high))
 
 
 def _noise(rig: Rig, trial: Trial) -> dict[str, float]:
@@ -132,19 +130,15 @@ def _over_noise(rig: Rig, trial: Trial, columns: _Columns) -> Array:
 
 def _slopes(rig: Rig, trial: Trial, clean: _Columns) -> dict[str, Array]:
     """What one standard deviation of all that is uncertain changes, over the noise; a * is this trial's own."""
-    if trial.path is not None:
-        inside = clean["depth"] > 0
-        k = rig.k * (trial.size / SIZES[1]) ** rig.power
-        damper = np.maximum(trial.path.speed, 0.0) * inside
-        damper *= rig.c * (trial.size / SIZES[1]) ** rig.power * trial.factor_c
-        of_k, of_c = clean["other"] - damper, damper
     raw: dict[str, _Columns] = {}
-    for what in ("k", "c"):
-        if trial.path is not None:
-            raw[what] = {"other": of_k if what == "k" else of_c}
-        else:
-            nudged = _moved(replace(rig, true_mass=rig.mass), trial, **{what: 1.01})
-            raw[what] = {name: (nudged[name] - clean[name]) / 0.01 for name in ("depth", "other")}
+    if trial.path is not None:
+        inside, grown = clean["depth"] > 0, (trial.size / SIZES[1]) ** rig.power
+        damper = np.maximum(trial.path.speed, 0.0) * inside
+        damper *= rig.c * grown * trial.factor_c
+        raw = {"k": {"other": clean["other"] - damper}, "c": {"other": damper}}
+    for what in ("k", "c") if trial.path is None else ():
+        nudged = _moved(replace(rig, true_mass=rig.mass), trial, **{what: 1.01})
+        raw[what] = {name: (nudged[name] - clean[name]) / 0.01 for name in ("depth", "other")}
     wandering, found = rig.wandering, {}
     for (what, columns), doubt in zip(raw.items(), rig.doubt, strict=True):
         slope = _over_noise(rig, trial, columns)
@@ -152,7 +146,7 @@ def _slopes(rig: Rig, trial: Trial, clean: _Columns) -> dict[str, Array]:
         found[f"{what} *"] = wandering["bed"] * (what == "k" or trial.factor_c != 1.0) * slope
     if trial.path is not None:
         force = {"other": np.full(len(inside), wandering["force-zero"] * rig.noise["force"])}
-        depth = {"other": inside * k * wandering["depth-zero"] * rig.noise["depth"]}
+        depth = {"other": inside * (rig.k * grown) * wandering["depth-zero"] * rig.noise["depth"]}
         found |= {"force *": _over_noise(rig, trial, force), "depth *": _over_noise(rig, trial, depth)}
     return {name: slope for name, slope in found.items() if slope.any()}
 
@@ -194,15 +188,8 @@ def _record(
         recordings[name, "data"] = _read_off(random, rig, trial, data, gaps=rig.gaps and number % 2 == 0)
         left.append(_left(rig, trial, data, recordings[name, "data"]))
     shape = str(random.choice(["sphere", "flat", "cone"]))
-    tables = PenetrationCampaign.model_validate({
-        "format": "hedgehog-campaign/1", "kind": "penetration", "name": "a rig",
-        "spike": {"mass": rig.mass, "diameter": SIZES[1], "tip": shape}
-        | ({"cone_angle": 60.0} if shape == "cone" else {}),
-        "surface": {"kind": "sand", "stiffness": rig.believed[0], "damping": rig.believed[1]},
-        "uncertainty": {"stiffness": rig.doubt[0], "damping": rig.doubt[1]},
-        "sensors": {name: {"std": (std,)} for name, std in rig.noise.items()}, "trial": tuple(trials),
-    })  # fmt: skip
-    return Campaign(tables, recordings), left
+    spike = {"mass": rig.mass, "diameter": SIZES[1], "tip": shape} | ({"cone_angle": 60.0} if shape == "cone" else {})
+    return Campaign(tables_of("a rig", spike, rig.believed, rig.doubt, rig.noise, trials), recordings), left
 
 
 def _left(rig: Rig, trial: Trial, data: _Columns, read: Recording) -> tuple[float, int]:
@@ -210,16 +197,16 @@ def _left(rig: Rig, trial: Trial, data: _Columns, read: Recording) -> tuple[floa
     stand beside them, with the stated noise, and how many they are."""
     time = read["t_ms"] / 1e3 if rig.small_units else read["t_s"]
     total, count = 0.0, 0
-    for name, column, small, factor, usual in (
-        ("depth", "depth", "depth_mm", 1e-3, "depth_m"),
-        ("force", "other", "force_mN", 1e-3, "force_N"),
-        ("accel", "other", "accel_g", 9.80665, "accel_m_s2"),
+    for name, usual, small, factor in (
+        ("depth", "depth_m", "depth_mm", 1e-3),
+        ("force", "force_N", "force_mN", 1e-3),
+        ("accel", "accel_m_s2", "accel_g", 9.80665),
     ):
         label = small if rig.small_units else usual
         if label not in read.columns or (name == "depth" and trial.driven):
             continue
-        value = read[label] * (factor if rig.small_units else 1.0)
-        off = (value - np.interp(time, data["time"], data[column]))[time >= 0.0] / rig.noise[name]
+        value, column = read[label] * (factor if rig.small_units else 1.0), data.get(name, data["other"])
+        off = (value - np.interp(time, data["time"], column))[time >= 0.0] / rig.noise[name]
         off = off[np.isfinite(off)]
         total, count = total + float(off @ off), count + len(off)
     return total, count
@@ -237,14 +224,10 @@ def _read_off(random: np.random.Generator, rig: Rig, trial: Trial, data: _Column
         time = np.concatenate([flight, time])
         depth = np.concatenate([trial.speed * flight + 0.5 * rig.gravity * flight**2, depth])
         other = np.concatenate([np.full(len(flight), rig.gravity), other])
-    zeros = {"depth": trial.depth_zero, what: trial.force_zero}
     read = {}
-    for name, true in (("depth", depth), (what, other)):
-        value = true + zeros[name]
-        value = value + rig.noise[name] * rig.louder[name] * correlated(
-            random.standard_normal(len(true)), rig.persistence[name]
-        )
-        step = rig.steps[name]
+    for name, true, zero in (("depth", depth, trial.depth_zero), (what, other, trial.force_zero)):
+        noise = correlated(random.standard_normal(len(true)), rig.persistence[name])
+        value, step = true + zero + rig.noise[name] * rig.louder[name] * noise, rig.steps[name]
         read[name] = np.round(value / step) * step if step else value
     if gaps:
         first = int(0.35 * len(time))

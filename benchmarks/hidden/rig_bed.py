@@ -128,9 +128,7 @@ class Bed:
 
     def force(self, z: float, v: float, t: float, h: float, way: float) -> float:
         """At depth z, speed v, time t, after a step of h; `way` is the direction for friction without a reach."""
-        total = 0.0
-        for acts in self.fields:
-            total += acts(z, t)
+        total = sum(acts(z, t) for acts in self.fields)
         if z <= 0.0:
             self.top = self.gripped = self.strained = 0.0
             return total
@@ -140,14 +138,13 @@ class Bed:
             total += spring + self.c * max(v, 0.0)
         for acts in self.pushes:
             total += acts(z, v, h)
-        if self.bound is not None:
-            bound = self.bound(z, abs(v))
-            if self.reach:
-                self.gripped = min(max(self.gripped + bound / self.reach * v * h, -bound), bound)
-                total += self.gripped
-            else:
-                total += bound * way
-        return total
+        if self.bound is None:
+            return total
+        bound = self.bound(z, abs(v))
+        if not self.reach:
+            return total + bound * way
+        self.gripped = min(max(self.gripped + bound / self.reach * v * h, -bound), bound)
+        return total + self.gripped
 
     def curve(self, z: float) -> float:
         """Loading curve."""
@@ -160,9 +157,9 @@ class Bed:
         return abs(weight - self.force(z, 0.0, t, 0.0, 0.0)) <= self.bound(z, 0.0)
 
     def _add(self, law: Law, a: float, full: float, size: float) -> None:
-        n, depth, k = law.numbers, law.numbers["depth"], self.k
+        n, depth, k, most = law.numbers, law.numbers["depth"], self.k, a * full
         if law.name == "inertial-drag":
-            self.pushes.append(_drag(law, a * full * size**2))
+            self.pushes.append(_drag(law, most * size**2))
         elif law.name == "depth-hardening":
             self.curves.append(_hardening(law, a, k))
         elif law.name == "layering":
@@ -170,31 +167,26 @@ class Bed:
         elif law.name == "plastic-sinkage":
             self.crater = self._unloading(1.0 + a, 1.0 + (n["bend"] - 1.0) * a / (1.0 + a) * (law.kind == "bent"))
         elif law.name == "adhesion":
-            self.pushes.append(self._pull(law, a * full * size**2))
+            self.pushes.append(self._pull(law, most * size**2))
         elif law.name == "shaft-friction":
-            self.bound = _friction(law, a * full * size)
+            self.bound = _friction(law, most * size)
             self.reach = n["reach"] if law.kind == "mobilised" else 0.0
         elif law.name == "relaxation":
             self.pushes.append(self._maxwell(a * k, n["time"]))
         elif law.name == "collapse":
-            top = a * full * size**2
+            top = most * size**2
             self.pushes.append(  # no bed pulls a spike in
                 lambda z, v, h: max(
                     top * ((z / n["period"]) % 1.0 - 0.5) * min(1.0, z / 2e-3) * (v > 0.0), -0.9 * k * z
                 )
             )
         elif law.name == "magnet":
-            pull = a * full
-            self.fields.append(lambda z, t: pull / (1.0 + max(n["at"] - z, 0.0) / n["scale"]) ** 2)
+            self.fields.append(lambda z, t: most / (1.0 + max(n["at"] - z, 0.0) / n["scale"]) ** 2)
         elif law.name == "cell-drift":
-            end = a * full
-            self.fields.append(lambda z, t: end * (1.0 - math.exp(-t / n["time"])))
+            self.fields.append(lambda z, t: most * (1.0 - math.exp(-t / n["time"])))
         elif law.name == "ringing":
-            struck = a * full
-            self.fields.append(
-                lambda z, t: struck * math.exp(-max(t - self.event, 0.0) / n["time"])
-                * math.sin(n["rate"] * max(t - self.event, 0.0))
-            )  # fmt: skip
+            since = lambda t: max(t - self.event, 0.0)  # noqa: E731
+            self.fields.append(lambda z, t: most * math.exp(-since(t) / n["time"]) * math.sin(n["rate"] * since(t)))
         elif law.name == "rate":
             self.pushes.append(lambda z, v, h: a * k * z * (max(v, 0.0) / n["speed"]) ** n["power"])
         else:
@@ -214,16 +206,16 @@ class Bed:
         n = law.numbers
 
         def pull(z: float, v: float, h: float) -> float:
-            back = self.top - z
+            back = (self.top - z) / n["reach"]
             if back <= 0.0:
                 return 0.0
             if law.kind == "short":
-                return -most * min(1.0, back / n["reach"])
+                return -most * min(1.0, back)
             if law.kind == "fading":
-                return -most * (1.0 - math.exp(-back / n["reach"])) * (1.0 - math.exp(-z / n["fade"]))
+                return -most * (1.0 - math.exp(-back)) * (1.0 - math.exp(-z / n["fade"]))
             if law.kind == "deepest":
-                return -most * self.top / n["depth"] * (1.0 - math.exp(-back / n["reach"]))
-            return -most * math.tanh(back / n["reach"])
+                return -most * self.top / n["depth"] * (1.0 - math.exp(-back))
+            return -most * math.tanh(back)
 
         return pull
 
@@ -240,10 +232,10 @@ class Bed:
 
 def _drag(law: Law, most: float) -> Callable[[float, float, float], float]:
     """`most` [N] at 0.1 m/s."""
-    power, onset = (1.8 if law.kind == "power" else 2.0), law.numbers["onset"]
-    if law.kind == "onset":
-        return lambda z, v, h: most * (max(v, 0.0) / 0.1) ** power * (1.0 - math.exp(-z / onset))
-    return lambda z, v, h: float(most * (max(v, 0.0) / 0.1) ** power)
+    power = 1.8 if law.kind == "power" else 2.0
+    onset = law.numbers["onset"] if law.kind == "onset" else 0.0
+    grown = (lambda z: 1.0 - math.exp(-z / onset)) if onset else (lambda z: 1.0)
+    return lambda z, v, h: most * (max(v, 0.0) / 0.1) ** power * grown(z)
 
 
 def _hardening(law: Law, a: float, k: float) -> Callable[[float], float]:
@@ -256,10 +248,8 @@ def _hardening(law: Law, a: float, k: float) -> Callable[[float], float]:
         locking = depth / (0.8 * math.tanh(a))
 
         def locked(z: float) -> float:
-            x, edge = z / locking, _STEEPEST
-            rest = max(x - edge, 0.0)
-            x = min(x, edge)
-            return float(k * locking * (x / (1.0 - x) + rest / (1.0 - edge) ** 2) - k * z)
+            x, rest = min(z / locking, _STEEPEST), max(z / locking - _STEEPEST, 0.0)
+            return float(k * locking * (x / (1.0 - x) + rest / (1.0 - _STEEPEST) ** 2) - k * z)
 
         return locked
     at, width = n["corner"], n["width"]

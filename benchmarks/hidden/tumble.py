@@ -31,6 +31,7 @@ _RIG = ("pendulum", "rig-friction", "pulley-inertia")
 _PRIORS = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 _GRAVITY = 9.80665
 _Numbers = Mapping[str, float]
+_Form = tuple[dict[str, float], dict[str, float], float, float]
 _CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
 _COARSE = 5e-5  # step while an amplitude is looked for [s]
 _TRIES = 9  # of amplitudes
@@ -142,14 +143,11 @@ def _plan(random: Random, *, rig: bool, count: int | None) -> _Plan:
     drawn = int(random.choice((6, 8, 8, 8, 12, 16, 24)))
     count = count or drawn
     until = float(random.choice((10.0, 10.0, 0.8)))
-    trials = []
-    for k in range(count):
-        g, torque, actuator, speed = conditions[k % len(conditions)]
-        m_b = round(stated["mass"] * (_GRAVITY - g) / (_GRAVITY + g), 4) if rig else 0.0
-        trials.append(
-            {"gravity_sim": g, "torque": torque, "actuator": actuator, "wheel_speed_0": speed, "torque_until": until,
-             "counterweight": m_b}
-        )  # fmt: skip
+    trials = [
+        {"gravity_sim": g, "torque": torque, "actuator": actuator, "wheel_speed_0": speed, "torque_until": until,
+         "counterweight": round(stated["mass"] * (_GRAVITY - g) / (_GRAVITY + g), 4) if rig else 0.0}
+        for g, torque, actuator, speed in (conditions[k % len(conditions)] for k in range(count))
+    ]  # fmt: skip
     noise = float(random.choice((0.7, 1.0, 1.5)))
     std = {"x": 5e-4, "y": 5e-4, "theta": 3e-3, "gyro": 0.01, "ax": 0.02, "ay": 0.02, "wheel": 0.5}
     return _Plan(
@@ -159,7 +157,7 @@ def _plan(random: Random, *, rig: bool, count: int | None) -> _Plan:
     )  # fmt: skip
 
 
-def _form(random: Random, name: str, plan: _Plan) -> tuple[dict[str, float], dict[str, float], float, float]:
+def _form(random: Random, name: str, plan: _Plan) -> _Form:
     """What grows with the amplitude (per unit), what does not, a typical amplitude, and the largest one."""
     weight = (plan.stated["mass"] + plan.trials[0]["counterweight"]) * plan.trials[0]["gravity_sim"]
     sinkage = 0.5 * weight / plan.stated["stiffness"]
@@ -170,25 +168,21 @@ def _form(random: Random, name: str, plan: _Plan) -> tuple[dict[str, float], dic
         speed = float(random.uniform(100, 300))
         return {"vibration_share": 1.0}, {"vibration_speed": speed, "vibration_power": 1.0 + pick % 2}, 0.1, 0.9
     if name == "torque-fade":
-        return (
-            {("fade_speed", "fade_speed_square", "fade_time")[pick]: 1.0},
-            {},
-            (2e-4, 5e-4, 0.05)[pick],
-            (0.01, 0.004, 2.0)[pick],
-        )
+        key, usual, most = (("fade_speed", 2e-4, 0.01), ("fade_speed_square", 5e-4, 0.004), ("fade_time", 0.05, 2.0))[
+            pick
+        ]
+        return {key: 1.0}, {}, usual, most
     if name == "inertial-drag":
         side = 0.3 if pick else 0.0
         return {"drag_normal": 1.0, "drag_side": side}, {"drag_power": 1.8}, 5.0, 400.0
     if name == "depth-hardening":
-        if pick == 2:
-            return {"harden_bend": -1.0 / sinkage}, {}, 0.1, 4.0
-        return {"harden_bend": 1.0 / sinkage}, {}, 0.1, 4.0
+        return {"harden_bend": (-1.0 if pick == 2 else 1.0) / sinkage}, {}, 0.1, 4.0
     if name == "rate-friction":
         return {"rate_change": sign}, {"rate_speed": float(random.uniform(0.03, 0.2))}, 0.2, 0.8 if sign < 0 else 2.0
     if name == "umbilical":
         key = ("cable_spring", "cable_cubic", "cable_drag")[pick]
         return {key: 1.0}, {}, 0.01 * weight, 0.3 * weight
-    table: dict[str, tuple[dict[str, float], dict[str, float], float, float]] = {
+    table: dict[str, _Form] = {
         "pendulum": ({"wire_curvature": 1.0}, {}, 0.3, 1.5),
         "com-offset": ({"offset_x": math.cos(turn), "offset_y": math.sin(turn)}, {}, 3e-4, 5e-3 if plan.rig else 0.02),
         "slope": ({"slope": sign}, {}, 3e-3, 0.1),
@@ -212,7 +206,7 @@ def _form(random: Random, name: str, plan: _Plan) -> tuple[dict[str, float], dic
     return table[name]
 
 
-def _merged(forms: Sequence[Any], amplitudes: Sequence[float]) -> dict[str, float]:
+def _merged(forms: Sequence[_Form], amplitudes: Sequence[float]) -> dict[str, float]:
     settings: dict[str, float] = {}
     for (grows, stays, _, _), amplitude in zip(forms, amplitudes, strict=True):
         settings |= {name: value * amplitude for name, value in grows.items()} | stays
@@ -300,24 +294,15 @@ def _measure(
     """What the sensors read without noise, one table a trial: by channel, with `<sensor>_t` for the times."""
     from .tumble_motion import COLUMNS, STEP, move  # loads Taichi
 
-    numbers = np.zeros((len(plan.trials), len(COLUMNS)))
-    for row, trial, factor in zip(numbers, plan.trials, gravity, strict=True):
+    rows, pulls = [], []
+    for trial, factor in zip(plan.trials, gravity, strict=True):
         g = trial["gravity_sim"] * float(factor)
-        given = dict(true) | {
-            "length": 0.2, "counterweight": trial["counterweight"], "gravity_sim": g,
-            "gravity_at_mass": _GRAVITY if plan.rig else g, "torque": trial["torque"],
-            "torque_until": trial["torque_until"], "wheel_inertia": 1.2e-3, "wheel_speed_0": trial["wheel_speed_0"],
-            "wheel_sign": 1.0 if trial["actuator"] == "motor" else -1.0,
-        }  # fmt: skip
-        given |= {name: value for name, value in settings.items() if name in COLUMNS}
-        for name, value in given.items():
-            row[COLUMNS.index(name)] = value
-    time, motions = move(numbers, plan.duration + 0.15, step=step or STEP)
-    found = []
-    for motion, trial, factor in zip(motions, plan.trials, gravity, strict=True):
-        pull = _GRAVITY if plan.rig else trial["gravity_sim"] * float(factor)
-        found.append(_read(plan, time, motion, pull, settings))
-    return found
+        pulls.append(_GRAVITY if plan.rig else g)
+        given = {**true, **trial, **settings, "length": 0.2, "gravity_sim": g, "gravity_at_mass": pulls[-1],
+                 "wheel_inertia": 1.2e-3, "wheel_sign": 1.0 if trial["actuator"] == "motor" else -1.0}  # fmt: skip
+        rows.append([given.get(name, 0.0) for name in COLUMNS])
+    time, motions = move(np.array(rows), plan.duration + 0.15, step=step or STEP)
+    return [_read(plan, time, motion, pull, settings) for motion, pull in zip(motions, pulls, strict=True)]
 
 
 def _read(plan: _Plan, time: np.ndarray, motion: np.ndarray, pull: float, settings: _Numbers) -> dict[str, np.ndarray]:
@@ -341,18 +326,15 @@ def _read(plan: _Plan, time: np.ndarray, motion: np.ndarray, pull: float, settin
     found = {"camera_t": camera, "imu_t": imu, "wheel_t": wheel}
     for name, value in (("ax", body_x), ("ay", body_y)):
         summed = np.concatenate([[0.0], np.cumsum(value) * dt])
-        found[name] = (
-            np.interp(true + window / 2, whole, summed) - np.interp(true - window / 2, whole, summed)
-        ) / window
+        late, early = (np.interp(true + half, whole, summed) for half in (window / 2, -window / 2))
+        found[name] = (late - early) / window
     seen_x, seen_y = np.interp(camera, time, x), np.interp(camera, time, y)
     away = (seen_x**2 + (seen_y - y[0]) ** 2) / _VIEW**2
     scale = 1 + settings.get("scale", 0.0) + settings.get("scale_bend", 0.0) * away
-    found["x"] = scale * seen_x
-    found["y"] = scale * seen_y
-    found["theta"] = np.interp(camera, time, theta)
-    found["gyro"] = np.interp(true, whole, np.concatenate([still, omega]))
-    found["wheel"] = np.abs(np.interp(wheel, time, spin))
-    return found
+    return found | {
+        "x": scale * seen_x, "y": scale * seen_y, "theta": np.interp(camera, time, theta),
+        "gyro": np.interp(true, whole, np.concatenate([still, omega])), "wheel": np.abs(np.interp(wheel, time, spin)),
+    }  # fmt: skip
 
 
 def _wires(random: Random, plan: _Plan, settings: _Numbers) -> float | None:
@@ -374,17 +356,17 @@ def _record(
         return value + std * correlated(random.standard_normal(len(value)), persistence)
 
     recordings = {}
+    sensors = {
+        "pose": ("camera_t", {"x_m": "x", "y_m": "y", "theta_rad": "theta"}),
+        "imu": ("imu_t", {"gyro_rad_s": "gyro", "ax_m_s2": "ax", "ay_m_s2": "ay"}),
+        "wheel": ("wheel_t", {"omega_rad_s": "wheel"}),
+    }
     for number, one in enumerate(readings, 1):
         zero = {channel: float(random.uniform(-2.5, 2.5)) * plan.std[channel] for channel in ("x", "y", "theta")}
         taken = {channel: noisy(one[channel] + zero.get(channel, 0.0), plan.std[channel]) for channel in _CHANNELS}
-        id = f"{number:03d}"
-        recordings[id, "pose"] = Recording(
-            {"t_s": one["camera_t"], "x_m": taken["x"], "y_m": taken["y"], "theta_rad": taken["theta"]}
-        )
-        recordings[id, "imu"] = Recording(
-            {"t_s": one["imu_t"], "gyro_rad_s": taken["gyro"], "ax_m_s2": taken["ax"], "ay_m_s2": taken["ay"]}
-        )
-        recordings[id, "wheel"] = Recording({"t_s": one["wheel_t"], "omega_rad_s": taken["wheel"]})
+        for sensor, (time, columns) in sensors.items():
+            read = {"t_s": one[time]} | {label: taken[channel] for label, channel in columns.items()}
+            recordings[f"{number:03d}", sensor] = Recording(read)
     return Campaign(_tables(plan, wires), recordings)
 
 

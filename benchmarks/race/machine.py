@@ -1,5 +1,6 @@
 """What a benchmark ran on, and the head of its bench.json."""
 
+import os
 import platform
 import sys
 from collections.abc import Sequence
@@ -11,10 +12,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from experiments.runs.memory import cores_there
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 
-__all__ = ["busy", "column_table", "describe_machine", "head", "now", "wide_console"]
+__all__ = ["begin_timing", "column_table", "describe_machine", "environment_numbers", "now", "wide_console"]
 
 _BUSY = 0.5  # load per core at the start from which the machine is called busy
 
@@ -24,15 +26,25 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def head(what: str) -> Json:
-    """What the bench.json of a timing begins with."""
-    return {"format": "hedgebed-bench/1", "what": what, "date": now(), "version": __version__}
-
-
-def busy(cores: int, load: float) -> list[str]:
-    """A remark that the machine was busy at the start; none where it was not."""
+def begin_timing(what: str) -> tuple[Json, list[str]]:
+    """What the bench.json of a timing begins with, and a remark where the machine is busy at the start."""
+    cores, load = cores_there(), os.getloadavg()[0]
     said = f"the machine was busy at the start (load {load:.1f} on {cores} cores): timings mean little"
-    return [said] if load > _BUSY * cores else []
+    bench = {"format": "hedgebed-bench/1", "what": what, "date": now(), "version": __version__}
+    return bench | {"machine": describe_machine(cores, load)}, [said] if load > _BUSY * cores else []
+
+
+def environment_numbers(name: str, default: tuple[int, ...], *, most: int = 1) -> tuple[int, ...]:
+    """The positive whole numbers, `most` at most, in the variable HEDGEBED_BENCH_<name> of the environment.
+
+    `default`: where it is empty or not set. Raises ValueError for anything else.
+    """
+    key = f"HEDGEBED_BENCH_{name}"
+    words = os.environ.get(key, "").replace(",", " ").split()
+    if not all(word.isdigit() and int(word) > 0 for word in words) or len(words) > most:
+        wanted = "one positive whole number" if most == 1 else "positive whole numbers"
+        raise ValueError(f"{key} = {os.environ[key]!r} must be {wanted}")
+    return tuple(int(word) for word in words) or default
 
 
 def column_table(columns: Sequence[str], *, left: Sequence[str] = (), **options: Any) -> Table:

@@ -303,7 +303,7 @@ def test_a_race_on_a_stack_finds_that_peers_do_the_same_work(tiny, tmp_path, mon
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr("tempfile.tempdir", None)
     if len(os.sched_getaffinity(0)) > 2:  # so few grains cannot be shared out among many
-        monkeypatch.setattr(race, "cores_there", lambda: 2)
+        monkeypatch.setattr("benchmarks.race.machine.cores_there", lambda: 2)
     bench = race.run(tmp_path / "b", progress=Progress())
     (bed,) = bench["beds"]
     assert [entrant["failure"] for entrant in bed["entrants"]] == ["", "", ""]
