@@ -10,24 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from dem import Bed, Material, Plane
+from dem import Bed, Grains, Material, Plane
 from dem.contact.law import effective_moduli
 from experiments.runs.types import Json
 
 __all__ = [
-    "ALUMINA",
-    "CAST_IRON",
-    "HERTZ_TIME",
-    "Meeting",
-    "RADIUS",
-    "SIXTEEN",
-    "hertz",
-    "mass_of",
-    "meet_floor",
-    "plane_modulus",
-    "row_of_grains",
-    "upright_walls",
-]
+    "ALUMINA", "CAST_IRON", "HERTZ_TIME", "RADIUS", "SIXTEEN", "contact_of", "hertz", "mass_of", "meet_floor",
+    "plane_modulus", "row_of_grains", "upright_walls",
+]  # fmt: skip
 
 HERTZ_TIME = 2.943275
 RADIUS = 0.0025
@@ -57,6 +47,16 @@ def plane_modulus(young: float, poisson: float) -> float:
     return effective_moduli(young, poisson, math.inf, poisson)[0]
 
 
+def contact_of(
+    stuff: Material, radius: float, speed: float, *, pair: bool = False
+) -> tuple[float, float, float, float]:
+    """`hertz` of a sphere [m] that meets a rigid plane, or one like it, at this speed of approach [m/s]."""
+    mass, young, poisson = mass_of(stuff.density, radius), stuff.young, stuff.poisson
+    if pair:
+        return hertz(mass / 2, radius / 2, effective_moduli(young, poisson, young, poisson)[0], speed)
+    return hertz(mass, radius, plane_modulus(young, poisson), speed)
+
+
 def upright_walls(width: float, depth: float, margin: float) -> Iterator[tuple[int, int, Plane, tuple[float, ...]]]:
     """Axis, side, shape and place of four plane walls that face one another, a margin inside the box [m]."""
     for axis, side in enumerate((width, depth)):
@@ -74,22 +74,6 @@ def row_of_grains(height: float = RADIUS, **options: Any) -> tuple[np.ndarray, n
     return positions, np.full(SIXTEEN, RADIUS), options
 
 
-class Meeting:
-    """What became of spheres that met the floor or one another, in the order they were given.
-
-    It does not hold the bed: an engine that is given back is used by the next bed, and not compiled anew.
-
-    Attributes:
-        position, velocity, spin: afterwards, shape [grain_count, 3] [m, m/s, rad/s].
-    """
-
-    def __init__(self, bed: Bed):
-        grains = bed.grains()
-        self.velocity: np.ndarray = grains.velocity
-        self.spin: np.ndarray = grains.spin
-        self.position: np.ndarray = grains.position
-
-
 def meet_floor(
     material: Material,
     velocities: np.ndarray,
@@ -99,8 +83,8 @@ def meet_floor(
     step: float,
     time: float,
     **options: Any,
-) -> Meeting:
-    """Grains of one radius that touch the floor at time 0 with these velocities, well apart.
+) -> Grains:
+    """What becomes of grains of one radius, well apart, that touch the floor at time 0 with these velocities.
 
     ``velocities``, ``spins``: shape [grain_count, 3] [m/s, rad/s]. ``radius``: [m]. ``step``: time step [s]. ``time``:
     after which they are looked at [s].
@@ -115,4 +99,4 @@ def meet_floor(
         size=(side * pitch, side * pitch, 10 * radius), height=32 * radius, gravity=0.0, time_step=step, **options,
     )  # fmt: skip
     bed.advance(round(time / step))
-    return Meeting(bed)
+    return bed.grains()

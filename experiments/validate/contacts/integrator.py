@@ -1,6 +1,7 @@
 """The order of the integrator: collisions against the equations of motion integrated by another method."""
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.integrate import solve_ivp
 from dem import Bed, Grains, Material
 from dem.contact.law import effective_moduli
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
-from experiments.validate.base.spheres import RADIUS, SIXTEEN, hertz, mass_of, row_of_grains
+from experiments.validate.base.spheres import RADIUS, SIXTEEN, contact_of, mass_of, row_of_grains
 
 from .words import say
 
@@ -17,83 +18,83 @@ __all__ = ["CASES", "errors_of_pair", "oblique_pair"]
 
 COUNTS = (50, 100, 200, 400)
 """Steps in seven tenths of a contact."""
-DENSITY, YOUNG, POISSON = 2600.0, 1e8, 0.25
+PAIR = Material("pair", 2600.0, 1e8, 0.25, 50.0, 1.0)
+MASS, INERTIA = mass_of(PAIR.density, RADIUS), 0.4 * mass_of(PAIR.density, RADIUS) * RADIUS * RADIUS
+STAR, SHEAR = effective_moduli(PAIR.young, PAIR.poisson, PAIR.young, PAIR.poisson)
+CONTACT = contact_of(PAIR, RADIUS, 1.0, pair=True)[2]
+END = 0.7 * CONTACT
 QUANTITIES = ("velocity", "position over contact time", "spin times radius")
 
 
-def _reference(y0: np.ndarray, time: float, m: float, r: float, star: float, shear: float) -> np.ndarray:
-    """Two like grains, elastic and with no slip: (x, v, w of both, u), shape [7, 3]; independent of the engine."""
-    radius = r / 2
+def _push(d: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force on the first of two like grains, elastic and with no slip, and torque on each: apart by d, the spring u."""
+    length = float(np.linalg.norm(d))
+    n, overlap = d / length, max(0.0, 2 * RADIUS - length)
+    a = math.sqrt(RADIUS / 2 * overlap)
+    f = 4 / 3 * STAR * a * overlap * n - 8 * SHEAR * a * u
+    return f, (RADIUS - overlap / 2) * np.cross(f, n)
+
+
+def _reference(y0: np.ndarray) -> np.ndarray:
+    """The two grains at ``END``: (x, v, w of both, u), shape [7, 3]; independent of the engine."""
 
     def rates(_, y):
         x1, v1, w1, x2, v2, w2, u = y.reshape(7, 3)
         d = x1 - x2
         length = float(np.linalg.norm(d))
-        n, overlap = d / length, max(0.0, 2 * r - length)
-        arm = r - overlap / 2
+        n, arm = d / length, RADIUS - max(0.0, 2 * RADIUS - length) / 2
         v = v1 - v2 - np.cross(arm * (w1 + w2), n)
         v_t = v - (v @ n) * n
         turn = ((v1 - v2) - ((v1 - v2) @ n) * n) / length
-        du = v_t - (u @ turn) * n
-        a = math.sqrt(radius * overlap)
-        f = 4 / 3 * star * a * overlap * n - 8 * shear * a * u
-        t = arm * np.cross(f, n)
-        return np.concatenate([v1, f / m, t / (0.4 * m * r * r), v2, -f / m, t / (0.4 * m * r * r), du])
+        f, t = _push(d, u)
+        return np.concatenate([v1, f / MASS, t / INERTIA, v2, -f / MASS, t / INERTIA, v_t - (u @ turn) * n])
 
-    found = solve_ivp(rates, (0, time), y0, t_eval=[time], method="DOP853", rtol=1e-11, atol=1e-14)
+    found = solve_ivp(rates, (0, END), y0, t_eval=[END], method="DOP853", rtol=1e-11, atol=1e-14)
     return found.y[:, -1].reshape(7, 3)
 
 
-def staggered_pair(y0: np.ndarray, time: float, steps: int, m: float, r: float, *, middle: bool) -> np.ndarray:
+def staggered_pair(y0: np.ndarray, steps: int, *, middle: bool) -> np.ndarray:
     """A leapfrog for ``_reference``'s two grains, in numpy: (x, v, w of both), shape [6, 3].
 
-    ``y0``: as ``_reference`` has it. ``time``: [s]. ``middle``: the slip of a step is that across the normal at its
-    middle, where the velocity is, as the bed has it (to second order in the step); else at its end.
+    ``y0``: as ``_reference`` has it. ``middle``: the slip of a step is that across the normal at its middle, where the
+    velocity is, as the bed has it (to second order in the step); else at its end.
     """
-    star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
-    radius, inertia, dt = r / 2, 0.4 * m * r * r, time / steps
+    dt = END / steps
     x1, v1, w1, x2, v2, w2, u = y0.reshape(7, 3).copy()
     f, t = np.zeros(3), np.zeros(3)
     for _ in range(steps):
         before = x1 - x2
-        v1, v2, w1, w2 = v1 + dt * f / m, v2 - dt * f / m, w1 + dt * t / inertia, w2 + dt * t / inertia
+        v1, v2, w1, w2 = v1 + dt * f / MASS, v2 - dt * f / MASS, w1 + dt * t / INERTIA, w2 + dt * t / INERTIA
         x1, x2 = x1 + dt * v1, x2 + dt * v2
         d = x1 - x2
-        length = float(np.linalg.norm(d))
-        n, overlap = d / length, max(0.0, 2 * r - length)
-        arm, across = r - overlap / 2, n
-        if middle:
-            across = (before + d) / np.linalg.norm(before + d)
-            arm = r - 0.5 * max(0.0, 2 * r - 0.5 * float(np.linalg.norm(before + d)))
+        n = d / float(np.linalg.norm(d))
+        at = before + d if middle else 2 * d  # twice the distance where the slip is taken
+        length = float(np.linalg.norm(at))
+        across, arm = at / length, RADIUS - 0.5 * max(0.0, 2 * RADIUS - 0.5 * length)
         v = v1 - v2 - np.cross(arm * (w1 + w2), across)
         u = u + dt * (v - (v @ across) * across)
         u = u - (u @ n) * n
-        a = math.sqrt(radius * overlap)
-        f = 4 / 3 * star * a * overlap * n - 8 * shear * a * u
-        t = (r - overlap / 2) * np.cross(f, n)
+        f, t = _push(d, u)
     half = 0.5 * dt
-    return np.array([x1, v1 + half * f / m, w1 + half * t / inertia, x2, v2 - half * f / m, w2 + half * t / inertia])
+    return np.array([
+        x1, v1 + half * f / MASS, w1 + half * t / INERTIA, x2, v2 - half * f / MASS, w2 + half * t / INERTIA,
+    ])  # fmt: skip
 
 
 def _orders_of_the_scheme() -> tuple[float, float]:
     """Order of the position's error over the two finest of ``COUNTS``, with the normal of the step's end and middle."""
-    m = mass_of(DENSITY, RADIUS)
-    star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
-    time = 0.7 * hertz(m / 2, RADIUS / 2, star, 1.0)[2]
-    start, _, _ = oblique_pair(time / COUNTS[0], steps=0)
-    y0 = _unknowns(start)
-    exact = _reference(y0, time, m, RADIUS, star, shear)
+    y0 = _unknowns(oblique_pair(END / COUNTS[0], steps=0)[0])
+    exact = _reference(y0)
 
     def off(steps: int, middle: bool) -> float:
-        found = staggered_pair(y0, time, steps, m, RADIUS, middle=middle)
-        return np.abs(found[[0, 3]] - exact[[0, 3]]).max()
+        return np.abs(staggered_pair(y0, steps, middle=middle)[[0, 3]] - exact[[0, 3]]).max()
 
     errors = np.array([[off(steps, at) for at in (False, True)] for steps in COUNTS[-2:]])
     end, middle = np.log2(errors[0] / errors[1])
     return float(end), float(middle)
 
 
-def oblique_pair(step: float, *, steps: int, friction: float = 50.0, along: bool = False) -> tuple[Grains, Grains, int]:
+def oblique_pair(step: float, *, steps: int, along: bool = False) -> tuple[Grains, Grains, int]:
     """Two grains meet obliquely, spinning, among others that are far away; before, after, and how many lists were made.
 
     ``step``: [s]. ``along``: without spins and slip.
@@ -108,8 +109,7 @@ def oblique_pair(step: float, *, steps: int, friction: float = 50.0, along: bool
         velocities[5] += 0.4 * np.array([-0.6, 0.48, 0.64])
         spins[0], spins[5] = (40.0, -30.0, 25.0), (-10.0, 60.0, 5.0)
     bed = Bed.from_grains(
-        Material("pair", DENSITY, YOUNG, POISSON, friction, 1.0), positions=positions, radii=radii,
-        velocities=velocities, spins=spins, time_step=step, **options,
+        PAIR, positions=positions, radii=radii, velocities=velocities, spins=spins, time_step=step, **options,
     )  # fmt: skip
     start = bed.grains()
     bed.advance(steps)
@@ -124,17 +124,14 @@ def _unknowns(grains: Grains) -> np.ndarray:
 
 def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
     """Errors of velocity, position over contact time, spin times radius [m/s] at each of ``COUNTS``; their orders."""
-    star, shear = effective_moduli(YOUNG, POISSON, YOUNG, POISSON)
-    m = mass_of(DENSITY, RADIUS)
-    contact = hertz(m / 2, RADIUS / 2, star, 1.0)[2]
     errors = []
     for count in COUNTS:
-        start, after, _ = oblique_pair(0.7 * contact / count, steps=count, along=along)
+        start, after, _ = oblique_pair(END / count, steps=count, along=along)
         if count == COUNTS[0]:
-            y = _reference(_unknowns(start), 0.7 * contact, m, RADIUS, star, shear)
+            y = _reference(_unknowns(start))
         off = after.velocity[[0, 5]] - y[[1, 4]], after.position[[0, 5]] - y[[0, 3]], after.spin[[0, 5]] - y[[2, 5]]
         velocity, position, spin = (np.abs(one).max() for one in off)
-        errors.append([velocity, position / contact, spin * RADIUS])
+        errors.append([velocity, position / CONTACT, spin * RADIUS])
     found = np.array(errors)[:, : 2 if along else 3]
     return found, -np.polyfit(np.log(COUNTS), np.log(found), 1)[0]
 
@@ -162,9 +159,8 @@ def _order(along: bool, tell: Tell) -> Outcome:
 
 def _bouncing(tell: Tell) -> Outcome:
     """An elastic grain in free flight and contact: the time of its second landing, from closed forms alone."""
-    speed = 1.0
-    star, _ = effective_moduli(YOUNG, POISSON, math.inf, POISSON)
-    _, _, time, _ = hertz(mass_of(DENSITY, RADIUS), RADIUS, star, speed)
+    speed, stuff = 1.0, replace(PAIR, friction=0.0)
+    time = contact_of(stuff, RADIUS, speed)[2]
     errors, counts = [], np.array([16, 32, 64, 128, 256])
     for count in told(counts, tell):
         positions, radii, options = row_of_grains()
@@ -172,8 +168,8 @@ def _bouncing(tell: Tell) -> Outcome:
         step = time / count
         positions[:, 2] += phase * step * speed
         bed = Bed.from_grains(
-            Material("bouncing", DENSITY, YOUNG, POISSON, 0.0, 1.0), positions=positions, radii=radii,
-            velocities=np.tile([0.0, 0.0, -speed], (SIXTEEN, 1)), time_step=step, max_overlap=0.2, **options,
+            stuff, positions=positions, radii=radii, velocities=np.tile([0.0, 0.0, -speed], (SIXTEEN, 1)),
+            time_step=step, max_overlap=0.2, **options,
         )  # fmt: skip
         bed.advance(round(1.5 * count))
         grains = bed.grains()

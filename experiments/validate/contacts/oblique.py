@@ -9,15 +9,15 @@ import math
 
 import numpy as np
 
-from dem import Material
+from dem import Grains, Material
 from dem.contact.law import damping_factor
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, told, worst
 
-from ..base.spheres import ALUMINA, HERTZ_TIME, RADIUS, Meeting, hertz, mass_of, meet_floor, plane_modulus
+from ..base.spheres import ALUMINA, HERTZ_TIME, RADIUS, contact_of, hertz, mass_of, meet_floor, plane_modulus
 from .microslip import tangential_restitution
 from .words import say
 
-__all__ = ["ANGLES", "CASES", "E_N", "MU", "STEP", "oblique", "plane_contact_time"]
+__all__ = ["ANGLES", "CASES", "E_N", "MU", "STEP", "oblique"]
 
 MU, E_N, SPEED = 0.092, 0.98, 3.9
 ANGLES = np.array([5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 70, 80, 85])
@@ -38,7 +38,7 @@ STEP = 2e-8
 SLIDES_FROM = 35  # [deg]: tan > 7/2 mu (1 + e), the contact slips to its end
 
 
-def oblique(step: float = STEP, angles: np.ndarray = ANGLES) -> Meeting:
+def oblique(step: float = STEP, angles: np.ndarray = ANGLES) -> Grains:
     """T4: alumina spheres that meet the floor at 3.9 m/s, at angles from its normal [deg]."""
     angle = np.radians(angles)
     velocities = SPEED * np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
@@ -167,28 +167,20 @@ T5_MU, T5_SPEED, T5_RADIUS = 0.3, 5.0, 1e-5
 T5_RATIOS = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.5, 10.0, 15.0, 20.0])  # tan / mu
 
 
-def plane_contact_time(density: float, young: float, poisson: float, radius: float, speed: float) -> float:
-    """Hertz's, of a sphere on a rigid plane [s]."""
-    return hertz(mass_of(density, radius), radius, plane_modulus(young, poisson), speed)[2]
-
-
 def _t5(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
     curves = [Curve("sliding throughout, 5", [7.0, 20.0], [5.0, 5.0], False)]
-    for name, (density, young, poisson) in told(T5.items(), tell):
-        time = plane_contact_time(density, young, poisson, T5_RADIUS, T5_SPEED)
+    for name, numbers in told(T5.items(), tell):
+        stuff = Material(name, *numbers, T5_MU, 1.0)
+        overlap, _, time, _ = contact_of(stuff, T5_RADIUS, T5_SPEED)
         along = T5_RATIOS * T5_MU * T5_SPEED
         velocities = np.column_stack([along, 0 * along, np.full(len(along), -T5_SPEED)])
-        after = meet_floor(
-            Material(name, density, young, poisson, T5_MU, 1.0), velocities, radius=T5_RADIUS, step=time / 300,
-            time=1.5 * time, max_overlap=0.2,
-        )  # fmt: skip
+        after = meet_floor(stuff, velocities, radius=T5_RADIUS, step=time / 300, time=1.5 * time, max_overlap=0.2)
         slides, unit = T5_RATIOS > 7, T5_MU * T5_SPEED
         scaled = after.spin[:, 1] * T5_RADIUS / unit
         labels = [f"tan / mu = {ratio:g}" for ratio in T5_RATIOS[slides]]
         lost, alike = (along - after.velocity[:, 0]) / unit, np.ones(slides.sum())
         rows += compared(f"{name}: loss of v_t over mu v_n", labels, 2 * alike, lost[slides], band=CLOSED_BAND)
-        overlap = hertz(mass_of(density, T5_RADIUS), T5_RADIUS, plane_modulus(young, poisson), T5_SPEED)[0]
         band = CLOSED_BAND + overlap / T5_RADIUS  # the arm is shorter by the overlap at most
         rows += compared(f"{name}: spin r over mu v_n", labels, 5 * alike, scaled[slides], band=band)
         e_n = worst(after.velocity[:, 2] / T5_SPEED, 1.0)

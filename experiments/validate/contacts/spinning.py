@@ -7,12 +7,12 @@ import math
 
 import numpy as np
 
-from dem import Bed, Material
+from dem import Bed, Grains, Material
 from dem.contact.law import damping_factor
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, near_zero, told
-from experiments.validate.base.spheres import ALUMINA, RADIUS, Meeting, hertz, mass_of, meet_floor, plane_modulus
+from experiments.validate.base.spheres import ALUMINA, RADIUS, contact_of, hertz, mass_of, meet_floor, plane_modulus
 
-from .oblique import E_N, MU, STEP, plane_contact_time
+from .oblique import E_N, MU, STEP
 from .words import say
 
 __all__ = ["CASES", "sliding_share", "spin_impact"]
@@ -28,11 +28,12 @@ E_BAND = 1e-3  # Thornton's fit of the damping
 def _t6(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
     curves = [Curve("mu (1 + e) v_n", SPINS[SLIDES], np.full(SLIDES.sum(), _KICK), False)]
-    for name, (density, young, poisson) in told(METALS.items(), tell):
-        time = plane_contact_time(density, young, poisson, SPIN_RADIUS, SPIN_SPEED)
+    for name, numbers in told(METALS.items(), tell):
+        stuff = Material(name, *numbers, SPIN_MU, SPIN_E)
+        time = contact_of(stuff, SPIN_RADIUS, SPIN_SPEED)[2]
         after = meet_floor(
-            Material(name, density, young, poisson, SPIN_MU, SPIN_E), np.tile([0.0, 0.0, -SPIN_SPEED], (len(SPINS), 1)),
-            spins=np.outer(SPINS, [0.0, 1.0, 0.0]), radius=SPIN_RADIUS, step=time / 500, time=4 * time,
+            stuff, np.tile([0.0, 0.0, -SPIN_SPEED], (len(SPINS), 1)), spins=np.outer(SPINS, [0.0, 1.0, 0.0]),
+            radius=SPIN_RADIUS, step=time / 500, time=4 * time,
         )  # fmt: skip
         rows += _spin_rows(name, after.velocity[:, 0], after.spin[:, 1], 1.0, SPIN_RADIUS)
         curves.append(Curve(name, SPINS, after.velocity[:, 0]))
@@ -51,7 +52,7 @@ def _spin_rows(name: str, along: np.ndarray, spin: np.ndarray, share: float, rad
     ]
 
 
-def _pair(name: str, radii: tuple[float, float], speeds: tuple[float, float], spins: tuple[float, float]) -> Meeting:
+def _pair(name: str, radii: tuple[float, float], speeds: tuple[float, float], spins: tuple[float, float]) -> Grains:
     """Two spheres of a metal that touch at time 0 and come together along x; spins about z."""
     density, young, poisson = METALS[name]
     (r, s), (m, k) = radii, (mass_of(density, r) for r in radii)
@@ -66,7 +67,7 @@ def _pair(name: str, radii: tuple[float, float], speeds: tuple[float, float], sp
         floor=False, time_step=step,
     )  # fmt: skip
     bed.advance(round(4 * time / step))
-    return Meeting(bed)
+    return bed.grains()
 
 
 ALIKE, TOGETHER = (SPIN_RADIUS, SPIN_RADIUS), (SPIN_SPEED, -SPIN_SPEED)
