@@ -115,8 +115,8 @@ _MODULES = {
         "experiments.validate.base": "case cloud drops energy kept=drops parts=drops peers spheres",
         "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
         "experiments.validate.contacts": (
-            "books cohesion collisions integrator large_body laws=other_codes microslip oblique one_grain restitution sliding=other_codes "
-            "spinning"
+            "books cohesion collisions integrator large_body laws=other_codes microslip=law_alone oblique=impacts "
+            "one_grain restitution sliding=other_codes spinning=impacts"
         ),
     },
     "rigid": {

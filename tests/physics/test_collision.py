@@ -6,10 +6,9 @@ The collisions themselves, Chung & Ooi's T1 to T8 and the order of the integrato
 import numpy as np
 
 from dem import Bed
+from experiments.validate.contacts.impacts import ANGLES, oblique
 from experiments.validate.contacts.integrator import oblique_pair
-from experiments.validate.contacts.oblique import ANGLES, oblique
-from experiments.validate.contacts.restitution import staggered_rebound
-from experiments.validate.contacts.spinning import sliding_share
+from experiments.validate.contacts.law_alone import sliding_share, staggered_rebound
 
 
 def test_each_sphere_of_t4_stays_in_its_plane():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from experiments.validate.contacts.microslip import _influence, _settled, tangential_restitution
+from experiments.validate.contacts.law_alone import _influence, _settled, tangential_restitution
 
 ALUMINA = {"friction": 0.092, "restitution": 0.98, "poisson": 0.23}
 
