@@ -116,7 +116,7 @@ _MODULES = {
         "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
         "experiments.validate.contacts": (
             "books cohesion collisions integrator large_body laws=other_codes microslip=law_alone oblique=impacts "
-            "one_grain restitution sliding=other_codes spinning=impacts"
+            "one_grain restitution=collisions sliding=other_codes spinning=impacts"
         ),
     },
     "rigid": {

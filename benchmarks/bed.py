@@ -19,10 +19,21 @@ from pathlib import Path
 from typing import Any, Self
 
 from benchmarks.race import table
-from benchmarks.race.entrants import GRAVITY, TIME_STEP, WARM_STEPS, Entrant, Heat, Ours, Theirs
+from benchmarks.race.entrants import (
+    GRAVITY,
+    LAMMPS,
+    LIGGGHTS,
+    TIME_STEP,
+    WARM_STEPS,
+    Entrant,
+    Heat,
+    Ours,
+    Peer,
+    Theirs,
+    find_mpirun,
+)  # fmt: skip
 from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
 from benchmarks.race.machine import begin_timing, environment_numbers, wide_console
-from benchmarks.race.peers import LAMMPS, LIGGGHTS, Peer, find_mpirun
 from experiments.runs.types import Json
 
 __all__ = ["Lane", "Settings", "pick_best", "run"]

@@ -40,8 +40,8 @@ _ROOT = Path(__file__).resolve().parent.parent
 _CODE = {
     "code": ("experiments/diagnose", "experiments/campaign", "rigid"),
     "suite": ("benchmarks/hidden/penetration.py", "benchmarks/hidden/tumble.py", "benchmarks/hidden/tumble_motion.py"),
-    "rig": ("benchmarks/hidden/rig.py", "benchmarks/hidden/rig_bed.py", "benchmarks/hidden/rig_plan.py"),
-    "baselines": ("benchmarks/baseline/methods.py", "benchmarks/baseline/rows.py", "benchmarks/baseline/motion.py"),
+    "rig": ("benchmarks/hidden/rig.py", "benchmarks/hidden/rig_bed.py"),
+    "baselines": ("benchmarks/baseline/methods.py", "benchmarks/baseline/residuals.py"),
 }
 _SEVERAL = {"both": ("penetration", "tumble"), "all": KINDS}
 

@@ -6,7 +6,7 @@
 Both get what diagnose got: the fitted base model, the same trials to learn from, the same held-out trials. Both say
 that something is missing where, over the trials left out in turn, what they learnt predicts the residuals better than
 zero does (Wilcoxon's signed ranks over quarters of trials, at 5 %). Then the discrepancy is added to the base model,
-which is run again on the held-out trials (`baseline_motion`). Neither knows names; `points_to` holds the effects whose
+which is run again on the held-out trials (`residuals`). Neither knows names; `points_to` holds the effects whose
 force would look like the term of the sparse law that moves most.
 
 They need ``pip install .[bench]``; `missing` says so where they are not there.
@@ -26,8 +26,7 @@ from scipy import stats
 from experiments.campaign import Campaign
 from experiments.diagnose.experiment import make_problem
 
-from .motion import held_out_gap
-from .rows import NAMES, STANDING, Array, Rows, make_rows
+from .residuals import NAMES, STANDING, Array, Rows, held_out_gap, make_rows
 
 __all__ = ["METHODS", "missing", "points_to", "try_all"]
 

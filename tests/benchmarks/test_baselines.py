@@ -7,8 +7,7 @@ import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, drop_trial
 
 from benchmarks.baseline import methods as baselines
-from benchmarks.baseline.motion import _TERM, _fall, _hooks, held_out_gap
-from benchmarks.baseline.rows import NAMES, Rows, make_rows, touching
+from benchmarks.baseline.residuals import _TERM, NAMES, Rows, _fall, _hooks, held_out_gap, make_rows, touching
 from experiments.diagnose.push.problem import make_problem
 from rigid import Effect, Trial, simulate
 from rigid.terms import load_effect

@@ -12,9 +12,8 @@ import pytest
 import benchmarks.bed as race
 from benchmarks.bed import Lane, Settings, pick_best
 from benchmarks.race import table
-from benchmarks.race.entrants import Entrant, Heat, Ours
+from benchmarks.race.entrants import LIGGGHTS, Entrant, Heat, Ours, PeerError, read_log, run_peer
 from benchmarks.race.grains import BENCH, DIAMETER, Grains, coordination, packing, prepare_grains, wrapped, write_data
-from benchmarks.race.peers import LIGGGHTS, PeerError, read_log, run_peer
 from experiments.cli.main import main
 from experiments.runs.progress import Progress
 
