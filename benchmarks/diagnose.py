@@ -39,7 +39,10 @@ Ask = Callable[[str], Json]
 _ROOT = Path(__file__).resolve().parent.parent
 _CODE = {
     "code": ("experiments/diagnose", "experiments/campaign", "rigid"),
-    "suite": ("benchmarks/hidden/penetration.py", "benchmarks/hidden/tumble.py", "benchmarks/hidden/tumble_motion.py"),
+    **dict.fromkeys(
+        ("penetration", "tumble"),
+        ("benchmarks/hidden/penetration.py", "benchmarks/hidden/tumble.py", "benchmarks/hidden/tumble_motion.py"),
+    ),
     "rig": ("benchmarks/hidden/rig.py", "benchmarks/hidden/rig_bed.py"),
     "baselines": ("benchmarks/baseline/methods.py", "benchmarks/baseline/residuals.py"),
 }
@@ -82,28 +85,29 @@ def run(
     progress.plan({f"diagnose {one}": float(count) for one in kinds})
     _mend(out / CASES_FILE)
     done = {
-        _key(case): case
+        _key(case["kind"], case["case"]): case
         for case in read_cases(out)
-        if case.get("code") == digest("code") and case.get("suite") == digest(_maker(case["kind"]))
+        if case.get("code") == digest("code") and case.get("suite") == digest(case["kind"])
     }
     with _asking(ask) as asked:
         for one, cases in plans.items():
-            left = [case for case in cases if not _finished(done.get(_key({"kind": one, "case": case})), wanted)]
+            left = [case for case in cases if not _finished(done.get(_key(one, case)), wanted)]
             progress.stage(f"diagnose {one}", total=max(len(left), 1))
             if len(left) < len(cases):
                 progress.message(f"{one}: {len(cases) - len(left)} of {len(cases)} campaigns were done before")
             for number, case in enumerate(left, 1):
-                record = _one(one, case, asked, done.get(_key({"kind": one, "case": case})), wanted)
-                done[_key(record)] = record
+                done[_key(one, case)] = record = _one(one, case, asked, done.get(_key(one, case)), wanted)
                 with (out / CASES_FILE).open("a", encoding="utf-8") as file:
                     file.write(json.dumps(record) + "\n")
                 progress.message(_line(record))
                 progress.update(number)
-    result: Json = {"format": "hedgebed-bench/1", "what": "diagnose", "seed": seed, "count": count}
-    made_by = " ".join(sorted({digest(_maker(one)) for one in kinds}))
-    result |= {"date": now(), "code": digest("code"), "suite": made_by, "baselines": missing or baselines}
+    result: Json = {
+        "format": "hedgebed-bench/1", "what": "diagnose", "seed": seed, "count": count, "date": now(),
+        "code": digest("code"), "suite": " ".join(sorted({digest(one) for one in kinds})),
+        "baselines": missing or baselines,
+    }  # fmt: skip
     for one, cases in plans.items():
-        result[one] = summarise([done[_key({"kind": one, "case": case})] for case in cases])
+        result[one] = summarise([done[_key(one, case)] for case in cases])
         show(one, result[one])
     return result
 
@@ -121,7 +125,7 @@ def _mend(path: Path) -> None:
 
 @cache
 def digest(what: str) -> str:
-    """Of the sources behind a record: "code" that diagnoses, "suite" or "rig" that make up, or "baselines".
+    """Of the sources behind a record: "code" that diagnoses, a kind of campaigns that are made up, or "baselines".
 
     What is said about the code (comments, docstrings, how its lines are broken) does not count.
     """
@@ -151,7 +155,7 @@ def _one(kind: str, case: Json, ask: Ask, before: Json | None, wanted: bool) -> 
         campaign = read_campaign(folder)  # in the format's units
     if record is None:
         record = {
-            "kind": kind, "case": case, "date": now(), "code": digest("code"), "suite": digest(_maker(kind)),
+            "kind": kind, "case": case, "date": now(), "code": digest("code"), "suite": digest(kind),
             "truth": list(hidden.effects), "outside": hidden.outside, "signature": float(hidden.signature),
             "true_parameters": hidden.parameters if kind == "tumble" else {}, "coloured": bool(hidden.coloured),
             "trials": len(campaign.tables.trial), **({"hidden": hidden.extra} if kind == "rig" else {}),
@@ -170,13 +174,8 @@ def _finished(record: Json | None, wanted: bool) -> bool:
     return tried or not wanted or "base_values" not in record
 
 
-def _maker(kind: str) -> str:
-    """What `digest` calls the sources that make campaigns of this kind up."""
-    return "rig" if kind == "rig" else "suite"
-
-
-def _key(record: Json) -> str:
-    return json.dumps([record["kind"], record["case"]], sort_keys=True)
+def _key(kind: str, case: Json) -> str:
+    return json.dumps([kind, case], sort_keys=True)
 
 
 def _line(record: Json) -> str:

@@ -100,12 +100,13 @@ def run(out: Path, *, progress: Any) -> Json:
         "sets": {},
     }
     progress.plan({"base": 1.0, "all terms": 3.0})
-    for name, all_terms in (("base", False), ("all terms", True)):
+    for name, on, count in (
+        ("base", (), settings.compared), ("all terms", tuple(AMPLITUDES), max(1, settings.compared // 3)),
+    ):  # fmt: skip
         progress.stage(name, total=1.0)
-        base, vary = drawn_trials(settings.trials, seed=1, all_terms=all_terms)
+        base, vary = drawn_trials(settings.trials, seed=1, all_terms=bool(on))
         speeds, compiling, processor = _timed(base, vary, settings.rounds)
-        rng, on = np.random.default_rng(2026), tuple(AMPLITUDES) if all_terms else ()
-        count = settings.compared if not all_terms else max(1, settings.compared // 3)
+        rng = np.random.default_rng(2026)
         trials = [random_trial(rng, on, AMPLITUDES) for _ in range(count)]
         bench["sets"][name] = {
             "trials_per_s": statistics.median(speeds),
@@ -138,22 +139,19 @@ def _show(bench: Json) -> None:
         title=f"random trials by agreement: {100 * SHARE_WITHIN:g} % or more are to be within the tolerance",
     )
     for name, part in bench["sets"].items():
+        agreement, speeds = part["agreement"], part["rounds"]
+        count = agreement["trials"]
         table.add_row(
-            name,
-            f"{part['trials_per_s']:,.0f}",
-            f"{min(part['rounds']):,.0f} - {max(part['rounds']):,.0f}",
-            f"{part['trials_per_s_idle_cores']:,.0f}",
-            f"{part['first_call_s']:.1f}",
-            f"{1e3 * part['agreement']['seconds_per_accurate_trial']:.0f}",
-        )
-        agreement = part["agreement"]
+            name, f"{part['trials_per_s']:,.0f}", f"{min(speeds):,.0f} - {max(speeds):,.0f}",
+            f"{part['trials_per_s_idle_cores']:,.0f}", f"{part['first_call_s']:.1f}",
+            f"{1e3 * agreement['seconds_per_accurate_trial']:.0f}",
+        )  # fmt: skip
         differences = agreement["differences"].values()
         apart = (f"{one['median']:.0e} {one['quantile_99']:.0e} {one['largest']:.0e}" for one in differences)
-        near.add_row(f"{name} ({agreement['trials']})", *apart)
-        shares = (f"{count} ({100 * count / agreement['trials']:.1f} %)" for count in agreement["counts"].values())
+        near.add_row(f"{name} ({count})", *apart)
+        shares = (f"{kind} ({100 * kind / count:.1f} %)" for kind in agreement["counts"].values())
         why.add_row(name, *shares, f"{agreement['largest_over_tolerance_no_branch']:.1f}")
     near.add_section()
     near.add_row("tolerance", *(f"{limit:.1e}" for limit in TOLERANCE.values()))
-    console = wide_console()
     for one in (table, near, why):
-        console.print(one)
+        wide_console().print(one)

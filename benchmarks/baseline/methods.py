@@ -15,10 +15,11 @@ They need ``pip install .[bench]``; `missing` says so where they are not there.
 import math
 import time
 import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from scipy import stats
@@ -42,15 +43,19 @@ _FULL = 500
 """Rows of a trial that the sparse regression looks at."""
 
 
-class Regressor(Protocol):
-    """Learns targets, in units of their noise, from states."""
+class Regressor(ABC):
+    """Learns targets of a kind of trial, in units of their noise, from states."""
 
-    terms: list[tuple[str, str, float]]
-    """(target, term, size over the noise of a row), the largest first; none where it has none."""
+    def __init__(self, kind: str) -> None:
+        self._kind = kind
+        self.terms: list[tuple[str, str, float]] = []
+        """(target, term, size over the noise of a row), the largest first; none where it has none."""
 
+    @abstractmethod
     def fit(self, rows: Sequence[Rows]) -> Self:
         """Learn, settings of its own and all."""
 
+    @abstractmethod
     def predict(self, state: Array) -> Array:
         """Targets in units of their noise, shape [row_count, target_count]."""
 
@@ -75,8 +80,7 @@ def try_all(
     told = {}
     for name, make in METHODS.items():
         began = time.monotonic()
-        told[name] = _try(problem, make, rows, values, held_out, before)
-        told[name]["seconds"] = time.monotonic() - began
+        told[name] = _try(problem, make, rows, values, held_out, before) | {"seconds": time.monotonic() - began}
     return told
 
 
@@ -104,13 +108,11 @@ def _try(
         told |= {"terms": [list(term) for term in learnt.terms[:8]] if alarm else [],
                  "points_to": sorted(points_to(learnt.terms)) if alarm else []}  # fmt: skip
     if alarm:
-        std = rows[0].std
-        lowest = np.min([learnt.predict(one.state).min(axis=0) for one in rows], axis=0)
-        highest = np.max([learnt.predict(one.state).max(axis=0) for one in rows], axis=0)
+        known = np.concatenate([learnt.predict(one.state) for one in rows])
 
         def force(state: Array) -> Array:
             """[row_count, target_count], never beyond what was learnt: neither knows what lies outside."""
-            return np.clip(learnt.predict(state), lowest, highest) * std
+            return np.clip(learnt.predict(state), known.min(axis=0), known.max(axis=0)) * rows[0].std
 
         told["after"] = {"fit": None, "held_out": held_out_gap(problem, values, held_out, force)}
     return told
@@ -129,18 +131,13 @@ def _better(gains: Array) -> bool:
     return bool(stats.wilcoxon(gains, alternative="greater").pvalue <= _LEVEL)
 
 
-class SparseLaw:
+class SparseLaw(Regressor):
     """STLSQ of pysindy on polynomials of degree 2 and the usual friction and drag terms, a threshold for each target.
 
     The threshold is that which predicts trials left out in turn best, no term at all among the choices.
     """
 
-    def __init__(self, kind: str) -> None:
-        self._kind = kind
-        self.terms: list[tuple[str, str, float]] = []
-
     def fit(self, rows: Sequence[Rows]) -> Self:
-        """See `Regressor`."""
         states = np.concatenate([_thinned(one.state, _FULL) for one in rows])
         self._scale = np.maximum(np.std(states, axis=0), 1e-12)
         self._weights = self._solve(*self._columns(rows), self._choose(rows))
@@ -154,7 +151,6 @@ class SparseLaw:
         return self
 
     def predict(self, state: Array) -> Array:
-        """See `Regressor`."""
         return np.clip(self._library(state) @ self._weights, *self._range)
 
     def _choose(self, rows: Sequence[Rows]) -> list[float]:
@@ -190,9 +186,9 @@ class SparseLaw:
         return weights
 
     def _library(self, state: Array) -> Array:
-        names = list(NAMES[self._kind])
-        powers, told = _polynomials(self._kind)
-        told = list(told)
+        names = NAMES[self._kind]
+        powers, terms = _polynomials(self._kind)
+        told = list(terms)
         scaled = state / self._scale
         flag = scaled[:, -1:] * self._scale[-1]
         smooth = scaled[:, :-1] if self._kind == "tumble" else scaled[:, :-1] * flag
@@ -203,13 +199,11 @@ class SparseLaw:
                 columns += [np.tanh(speed / 0.05), speed * np.abs(speed)]
                 told += [f"sign({name})", f"|{name}|{name}"]
         if self._kind == "tumble":
-            columns += [flag, flag * smooth]
-            told += ["touch", *(f"touch*{name}" for name in names[:-1])]
-            columns += [flag * np.tanh(smooth[:, 3:4] / 0.05)]
-            told += ["touch*sign(vx)"]
+            columns += [flag, flag * smooth, flag * np.tanh(smooth[:, 3:4] / 0.05)]
+            told += ["touch", *(f"touch*{name}" for name in names[:-1]), "touch*sign(vx)"]
         else:
-            columns += [(smooth[:, 2:3] > 0.02).astype(float)]
-            told += ["on the way back"]
+            columns.append((smooth[:, 2:3] > 0.02).astype(float))
+            told.append("on the way back")
         self._names = told
         library = np.concatenate(columns, axis=1)
         return library if self._kind == "tumble" else library * flag  # a bed pushes where the spike is in it
@@ -227,18 +221,13 @@ def _polynomials(kind: str) -> tuple[Array, tuple[str, ...]]:
     return powers, tuple(name.replace(" ", "*") for name in library.get_feature_names(names))
 
 
-class Process:
+class Process(Regressor):
     """A Gaussian process for each target: squared exponential with a length a state, plus white noise.
 
     Amplitude, lengths and noise maximise the marginal likelihood of at most `_MOST_ROWS` rows, taken evenly.
     """
 
-    def __init__(self, kind: str) -> None:
-        self.terms: list[tuple[str, str, float]] = []
-        self._laws: list[tuple[float, Array, Array]] = []
-
     def fit(self, rows: Sequence[Rows]) -> Self:
-        """See `Regressor`."""
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
@@ -247,6 +236,7 @@ class Process:
         targets = np.concatenate([_thinned(one.target / one.std, each) for one in rows])
         self._centre, self._scale = states.mean(axis=0), np.maximum(states.std(axis=0), 1e-9)
         self._rows = (states - self._centre) / self._scale
+        self._laws: list[tuple[float, Array, Array]] = []
         for j in range(targets.shape[1]):
             kernel = ConstantKernel(1.0, (1e-4, 1e5)) * RBF(np.full(states.shape[1], 2.0), (0.05, 1e3))
             kernel = kernel + WhiteKernel(1.0, (0.3, 1e4))
@@ -257,7 +247,6 @@ class Process:
         return self
 
     def predict(self, state: Array) -> Array:
-        """See `Regressor`."""
         here = (state - self._centre) / self._scale
         columns = []
         for size, lengths, weights in self._laws:

@@ -14,6 +14,7 @@ deepest point.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -86,11 +87,8 @@ def _tumble(problem: Any, values: Mapping[str, float], trial: str) -> Rows:
     if len(time) < 20:
         return Rows(trial, np.zeros((0, 8)), np.zeros((0, 3)), np.ones(3))
     target = np.stack([latent[name][kept] for name in ("latent_force_x_N", "latent_force_y_N", "latent_torque_N_m")], 1)
-    x, vx = _smooth(data, "x", time, 0.1)
-    y, vy = _smooth(data, "y", time, 0.1)
-    theta, _ = _smooth(data, "theta", time, 0.1)
-    omega, _ = _smooth(data, "gyro", time, 0.05)
-    wheel, _ = _smooth(data, "wheel", time, 0.05)
+    (x, vx), (y, vy), (theta, _) = (_smooth(data, name, time, 0.1) for name in ("x", "y", "theta"))
+    (omega, _), (wheel, _) = (_smooth(data, name, time, 0.05) for name in ("gyro", "wheel"))
     x, y, theta = x - _still(data, "x"), y - _still(data, "y"), theta - _still(data, "theta")
     state = np.stack([x, y, theta, vx, vy, omega, 0.01 * wheel, touching(y, theta, problem.data.tables)], axis=1)
     mass, inertia = (values.get(name, problem.forward.nominal[name]) for name in ("mass", "inertia"))
@@ -200,13 +198,13 @@ def _tumble_left(problem: Any, values: Mapping[str, float], trial: str, force: F
     tables = problem.data.tables
     term = load_effect(_TERM)
     effects = (Effect(id=term.id, file=_TERM),) if force is not None else ()
+    pull = data.local_gravity if data.local_gravity is not None else gravity
     made = Trial(
         mass=number["mass"], inertia=number["inertia"], spike_length=tables.platform.spike_length,
         stiffness=number["stiffness"], damping=number["damping"], mu_s=number["mu_s"],
         mu_d=min(number["mu_d"], number["mu_s"]), gravity_sim=gravity,
-        gravity=data.local_gravity if data.local_gravity is not None else gravity, counterweight=data.counterweight,
-        torque=data.torque, torque_until=data.torque_until, actuator=data.actuator,
-        wheel_inertia=tables.wheel.inertia, wheel_speed_0=data.wheel_speed_0, effects=effects,
+        gravity=pull, counterweight=data.counterweight, torque=data.torque, torque_until=data.torque_until,
+        actuator=data.actuator, wheel_inertia=tables.wheel.inertia, wheel_speed_0=data.wheel_speed_0, effects=effects,
     )  # fmt: skip
     window = problem.data.window
     imu = np.unique(data.time[data.of("ax") | data.of("ay")])
@@ -214,7 +212,7 @@ def _tumble_left(problem: Any, values: Mapping[str, float], trial: str, force: F
     end = float(max(edge.max(initial=0.0) for edge in edges)) + 1e-6
     times = np.unique(np.concatenate([[0.0, end], *(edge[edge > 0] for edge in edges)]))
     stand = made.spike_length * math.cos(math.pi / 8) - 0.5 * made.weight / made.stiffness
-    hooks = _hooks(load_effect(_TERM))
+    hooks = _hooks(term)
     if force is not None:
         hooks.append(lambda s: _acting(s, stand, tables, force))
     try:
@@ -222,7 +220,6 @@ def _tumble_left(problem: Any, values: Mapping[str, float], trial: str, force: F
     finally:
         if force is not None:
             hooks.pop()
-    pull = data.local_gravity if data.local_gravity is not None else gravity
     return _residual(data, motion, window, pull)
 
 
@@ -235,8 +232,8 @@ def _acting(s: Any, stand: float, tables: Any, force: Force) -> tuple[float, flo
     y = s.y - stand
     touch = float(touching(np.array([y]), np.array([s.theta]), tables)[0])
     state = np.array([[s.x, y, s.theta, s.vx, s.vy, s.omega, 0.01 * abs(s.wheel_speed), touch]])
-    x, up, turn = force(state)[0]
-    return float(x), float(up), float(turn)
+    x, up, turn = force(state)[0].tolist()
+    return x, up, turn
 
 
 def _residual(data: Any, motion: Any, window: float, pull: float) -> Array:
@@ -247,28 +244,28 @@ def _residual(data: Any, motion: Any, window: float, pull: float) -> Array:
         column = np.asarray(getattr(motion, name), dtype=float)
         return np.interp(when, time, column, left=before)
 
+    def specific_force(when: Array) -> tuple[Array, Array]:
+        if window > 0:
+            low, high = when - 0.5 * window, when + 0.5 * window
+            x, y = ((at(v, high, 0.0) - at(v, low, 0.0)) / window for v in ("vx", "vy"))
+        else:
+            x, y = at("ax", when, 0.0), at("ay", when, 0.0)
+        sine, cosine = np.sin(at("theta", when)), np.cos(at("theta", when))
+        return x * cosine - (y + pull) * sine, x * sine + (y + pull) * cosine
+
+    read = {
+        **{name: partial(at, name) for name in ("x", "y", "theta")},
+        "gyro": lambda when: at("omega", when, 0.0),
+        "ax": lambda when: specific_force(when)[0],
+        "ay": lambda when: specific_force(when)[1],
+        "wheel": lambda when: np.abs(at("wheel_speed", when)),
+    }
     parts = []
-    for channel in ("x", "y", "theta", "gyro", "ax", "ay", "wheel"):
+    for channel, value_at in read.items():
         mine = data.of(channel)
         if not mine.any():
             continue
-        when = data.time[mine]
-        if channel in ("ax", "ay"):
-            turn = at("theta", when)
-            if window > 0:
-                low, high = when - 0.5 * window, when + 0.5 * window
-                x, y = ((at(v, high, 0.0) - at(v, low, 0.0)) / window for v in ("vx", "vy"))
-            else:
-                x, y = at("ax", when, 0.0), at("ay", when, 0.0)
-            y = y + pull
-            sine, cosine = np.sin(turn), np.cos(turn)
-            value = x * cosine - y * sine if channel == "ax" else x * sine + y * cosine
-        elif channel == "gyro":
-            value = at("omega", when, 0.0)
-        elif channel == "wheel":
-            value = np.abs(at("wheel_speed", when))
-        else:
-            value = at(channel, when)
+        value = value_at(data.time[mine])
         rest = (data.value[mine] - value) / data.std[mine]
         if channel in ("x", "y", "theta"):
             rest = rest - np.clip(rest.mean(), -3.0, 3.0)

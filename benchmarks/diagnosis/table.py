@@ -52,8 +52,15 @@ def summarise(cases: Sequence[Case]) -> Json:
     seen = [c for c in single if c["signature"] >= 1]
     plain = [c for c in single if c["signature"] >= _PLAIN]
     named = [c for c in single if c["verdict"] in ("named", "ambiguous")]
-    ambiguous = [c for c in single if c["verdict"] == "ambiguous"]
     right = [c for c in named if _right(c)]
+    of_truth = [(_after(c), left) for c in right if (left := _by_truth(c)) is not None]
+
+    def unknown(case: Case) -> bool:
+        return case["verdict"] == "unknown"
+
+    def holds(case: Case) -> bool:
+        return case["truth"][0] in {*case["effects"], *case["alternatives"]}
+
     return {
         "cases": len(cases),
         "failed": sum(c["verdict"] == "failed" for c in cases),
@@ -61,20 +68,20 @@ def summarise(cases: Sequence[Case]) -> Json:
         "named_right_plain": _share(plain, _right),
         "named_right_when_visible": _share(seen, _right),
         "missed_when_visible": _share(seen, lambda c: c["verdict"] == "none"),
-        "called_unknown_when_plain": _share(plain, _unknown),
+        "called_unknown_when_plain": _share(plain, unknown),
         "top1_by_effect": _by_effect(single),
-        "sets_hold_truth": _share(named, _holds),
-        "ambiguous_sets_hold_truth": _share(ambiguous, _holds),
+        "sets_hold_truth": _share(named, holds),
+        "ambiguous_sets_hold_truth": _share([c for c in named if c["verdict"] == "ambiguous"], holds),
         "set_size": float(np.mean([1 + len(c["alternatives"]) for c in named])) if named else None,
         "pairs_both_named": _share(pairs, lambda c: set(c["truth"]) == set(c["effects"])),
         "pairs_one_named": _share(pairs, lambda c: bool(set(c["truth"]) & set(c["effects"]))),
         "pairs_something_false": _share(pairs, lambda c: bool(set(c["effects"]) - set(c["truth"]))),
-        "unknown_recall": _share(outside, _unknown),
-        "unknown_recall_when_visible": _share([c for c in outside if c["signature"] >= 1], _unknown),
+        "unknown_recall": _share(outside, unknown),
+        "unknown_recall_when_visible": _share([c for c in outside if c["signature"] >= 1], unknown),
         "parameters": _parameters(right),
         "held_out_at_most_1_2": _share(right, lambda c: _after(c) <= 1.2),
         "held_out_at_most_1_2_times_what_the_truth_leaves": _share(
-            [c for c in right if _by_truth(c) is not None], lambda c: _after(c) <= 1.2 * max(_by_truth(c) or 1.0, 1.0)
+            of_truth, lambda pair: pair[0] <= 1.2 * max(pair[1] or 1.0, 1.0)
         ),
         "median_held_out_after": _median([_after(c) for c in right]),
         "median_gap_closed": _median([_closed(c["before"], c["after"]) for c in right if _gap(c["before"]) > _GAP]),
@@ -86,14 +93,6 @@ def summarise(cases: Sequence[Case]) -> Json:
 def _right(case: Case) -> bool:
     """Whether the first name is the truth, and nothing else is called certain."""
     return case["verdict"] in ("named", "ambiguous") and case["effects"] == case["truth"]
-
-
-def _unknown(case: Case) -> bool:
-    return case["verdict"] == "unknown"
-
-
-def _holds(case: Case) -> bool:
-    return case["truth"][0] in {*case["effects"], *case["alternatives"]}
 
 
 def _by_truth(case: Case) -> float | None:
@@ -153,8 +152,8 @@ def _parameters(right: Sequence[Case]) -> Json:
 def _baselines(cases: Sequence[Case]) -> Json:
     """The same figures for those that ran beside, and ours on the very same cases."""
     tried = [c for c in cases if "baselines" in c]
-    names = sorted({name for c in tried for name in c["baselines"] if name != "code"})
-    return {name: _baseline(name, tried) for name in ("ours", *names)} if tried else {}
+    names = {name for c in tried for name in c["baselines"]} - {"code"}
+    return {name: _baseline(name, tried) for name in ("ours", *sorted(names))} if tried else {}
 
 
 def _baseline(name: str, tried: Sequence[Case]) -> Json:

@@ -172,10 +172,10 @@ def _plan(random: Random, *, retreat: bool, drops: bool, faster: bool, wanted: i
     diameters = [0.008, 0.016] if several else [0.012]
     trials = []
     for index in range(count):
-        driven = style == "driven" or (style == "both" and index % 2 == 0)
+        driven = bool(style == "driven" or (style == "both" and index % 2 == 0))
         options = speeds if driven else drops_at
         trials.append({
-            "driven": bool(driven), "speed": float(options[(index // 2 if style == "both" else index) % len(options)]),
+            "driven": driven, "speed": float(options[(index // 2 if style == "both" else index) % len(options)]),
             "gravity": float(gravities[index % len(gravities)]), "diameter": diameters[index // 2 % len(diameters)],
             "shock_time": float(np.random.default_rng(index).uniform(0.15, 0.8)),
         })  # fmt: skip
@@ -231,7 +231,7 @@ def _trial(plan: Json, index: int, s: dict[str, float]) -> _Columns:
     this = plan["trials"][index]
     size = this["diameter"] / 0.012
     law = _Law(plan["k"] * size, plan["c"] * size, size, s)
-    return _driven(plan, this, law, s) if this["driven"] else _drop(plan, this, law, s)
+    return (_driven if this["driven"] else _drop)(plan, this, law, s)
 
 
 def _driven(plan: Json, this: Json, law: _Law, s: dict[str, float]) -> _Columns:
@@ -258,23 +258,18 @@ def _driven(plan: Json, this: Json, law: _Law, s: dict[str, float]) -> _Columns:
 
 
 def _drop(plan: Json, this: Json, law: _Law, s: dict[str, float]) -> _Columns:
-    m, g, dt = plan["mass"], this["gravity"], _STEP
-    rate = plan["rate"] * 2
+    m, g, dt, rate = plan["mass"], this["gravity"], _STEP, plan["rate"] * 2
     time = np.arange(0, plan["drop_time"], 1 / rate)
     every = round(1 / rate / dt)
-    z, v, a, t = 0.0, this["speed"], g, 0.0
-    loose = s.get("loose", 0.0) * 0.3
-    inner, inner_v = 0.0, 0.0
-    depth, acceleration = np.empty(len(time)), np.empty(len(time))
-    stuck = False
+    z, v, a, t, stuck = 0.0, this["speed"], g, 0.0, False
+    loose, inner, inner_v = s.get("loose", 0.0) * 0.3, 0.0, 0.0
+    depth, acceleration = np.empty((2, len(time)))
     for row in range(len(time)):
         depth[row], acceleration[row] = z, a
         for _ in range(every):
             half = v + 0.5 * dt * a
-            way = math.copysign(1.0, half)
             new = z + dt * half if not stuck else z
-            force = law(new, half if not stuck else 0.0, t + dt, way)
-            total = m * g - force
+            total = m * g - law(new, half if not stuck else 0.0, t + dt, math.copysign(1.0, half))
             if "shock" in s:
                 late = (t / plan["drop_time"] - this["shock_time"]) / s["shock_width"]
                 total += s["shock"] * math.exp(-0.5 * late**2)
@@ -285,8 +280,7 @@ def _drop(plan: Json, this: Json, law: _Law, s: dict[str, float]) -> _Columns:
                 total += loose * m * s["loose_rate"] ** 2 * inner
             drift = s.get("drift", 0.0) / m * (t / plan["drop_time"]) ** 1.5
             if "shaft" in s and new > 0.0 and abs(half) < 2e-3:
-                down, up = m * g - law(new, 0.0, t, 1.0), m * g - law(new, 0.0, t, -1.0)
-                stuck = down <= 0.0 <= up
+                stuck = m * g - law(new, 0.0, t, 1.0) <= 0.0 <= m * g - law(new, 0.0, t, -1.0)
             z, a = new, 0.0 if stuck else total / m
             v = 0.0 if stuck else half + 0.5 * dt * a
             t += dt

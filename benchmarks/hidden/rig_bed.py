@@ -331,7 +331,7 @@ def drop(bed: Bed, *, mass: float, gravity: float, speed: float, duration: float
     h = 1.0 / (rate * every)
     rows = int(duration * rate)
     z, v, a, t, still = 0.0, speed, gravity, 0.0, False
-    depth, accel = np.empty(rows), np.empty(rows)
+    depth, accel = np.empty((2, rows))
     for row in range(rows):
         depth[row] = z
         inside = max(z, 1e-12) if row == 0 else z  # it has just touched

@@ -58,15 +58,11 @@ def suite(kind: str, count: int, *, seed: int = 1, only: str | None = None, tria
     cases = []
     for k in range(count):
         group = max(_SHARES, key=lambda name: _SHARES[name] * (k + 1) - taken[name])
-        hidden = order[group][taken[group] % len(order[group])]
+        hidden = only or order[group][taken[group] % len(order[group])]
         place = (first[group] + taken[group] * _GOLDEN) % 1.0
         taken[group] += 1
-        case: Json = {"seed": 1000 * seed + k, "kind": only or hidden}
-        if case["kind"] != "null":
-            case["strength"] = round(math.exp(low + place * (high - low)), 3)
-        if trials:
-            case["trials"] = trials
-        cases.append(case)
+        strength = {} if hidden == "null" else {"strength": round(math.exp(low + place * (high - low)), 3)}
+        cases.append({"seed": 1000 * seed + k, "kind": hidden} | strength | ({"trials": trials} if trials else {}))
     return cases
 
 

@@ -121,8 +121,6 @@ def compare(trials: Sequence[Trial], *, time_step: float = TIME_STEP) -> Agreeme
     nothing), at `time_step` [s]. Raises ValueError if none can stand.
     """
     quick, stands = _batched(trials, time_step)
-    kept: list[int] = []
-    found: list[Array] = []
     paths: dict[int, Array] = {}
     seconds = residual = 0.0
     strangers = 0
@@ -137,28 +135,24 @@ def compare(trials: Sequence[Trial], *, time_step: float = TIME_STEP) -> Agreeme
         if not stands[k]:
             strangers += 1
             continue
-        path = np.array([getattr(run, name) for name in CHANNELS]).T
-        kept.append(k)
-        found.append(np.abs(quick[k] - path).max(axis=0))
+        paths[k] = np.array([getattr(run, name) for name in CHANNELS]).T
         residual = max(residual, run.energy_residual)
-        if (found[-1] > _LIMITS).any():
-            paths[k] = path
-    if not kept:
+    if not paths:
         raise ValueError("none of the trials can stand")
-    differences = np.array(found)
-    late = list(paths)
-    finer = _batched([trials[k] for k in late], time_step / 4)[0] if late else np.zeros((0, len(TIMES), 6))
+    differences = np.array([np.abs(quick[k] - path).max(axis=0) for k, path in paths.items()])
+    late = [k for k, most in zip(paths, differences, strict=True) if (most > _LIMITS).any()]
+    finer = _batched([trials[k] for k in late], time_step / 4)[0]
     why = {
-        k: "branch" if _branches(trials[k], path)
-        else "step" if (np.abs(fine - path) <= _LIMITS).all()
+        k: "branch" if _branches(trials[k], paths[k])
+        else "step" if (np.abs(fine - paths[k]) <= _LIMITS).all()
         else "unexplained"
-        for (k, path), fine in zip(paths.items(), finer, strict=True)
+        for k, fine in zip(late, finer, strict=True)
     }  # fmt: skip
     return Agreement(
         differences=differences,
-        kinds=tuple(why.get(k, "within") for k in kept),
+        kinds=tuple(why.get(k, "within") for k in paths),
         ratios=(differences / _LIMITS).max(axis=1),
-        seconds=seconds / len(kept),
+        seconds=seconds / len(paths),
         energy_residual=residual,
         strangers=strangers,
     )
@@ -200,12 +194,10 @@ def _pushed(trial: Trial, size: float, rng: np.random.Generator) -> Array:
     """The accurate path from a start that is off by `size`, in units of the spike's length, radians and seconds."""
     system = System(trial)
     z, modes = standing(system)
-    length = trial.spike_length
-    units = (length, length, 1.0, length, length, 1.0)
     start = [float(value) for value in z]
-    for k, unit in enumerate(units):
+    for k, unit in enumerate(2 * (trial.spike_length, trial.spike_length, 1.0)):
         start[k] += size * unit * float(rng.normal())
-    path = np.full((len(TIMES), len(units)), np.nan)
+    path = np.full((len(TIMES), len(CHANNELS)), np.nan)
 
     def keep(begin: float, end: float, last: list[float], at: Any, modes: Any) -> None:
         for k in np.flatnonzero((begin <= TIMES) & (end >= TIMES)):

@@ -63,11 +63,5 @@ def draw(path: Path) -> str:
     return ", ".join(f"{name} {values.max():.1e}" for name, values in apart.items())
 
 
-def main() -> None:
-    """Draw the figure below the folder that is named."""
-    docs = Path(sys.argv[1] if len(sys.argv) > 1 else "docs")
-    print(draw(docs / "images" / "spatial-plane.png"))
-
-
 if __name__ == "__main__":
-    main()
+    print(draw(Path(sys.argv[1] if len(sys.argv) > 1 else "docs") / "images" / "spatial-plane.png"))

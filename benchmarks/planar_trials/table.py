@@ -7,7 +7,8 @@ docs/images/planar-*.png.
 
 import math
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 
 import matplotlib
@@ -23,6 +24,7 @@ from matplotlib import pyplot as plt
 GRAVITY, MASS = 9.80665, 5.3
 MARKS = "<!-- planar {0}: begin -->", "<!-- planar {0}: end -->"
 SURFACES = {"steel": 0.25, "brick": 0.5}
+TORQUES = (0.125, 0.22, 6.0)
 WHEEL_SPEED = 300.0  # of the brake trials [rad/s]: ours, the paper gives none
 DURATION = 2.0
 NAMES = ("x", "y", "theta", "vx", "vy", "omega")
@@ -38,8 +40,8 @@ def case(level: float, torque: float, mu_s: float) -> Trial:
     )  # fmt: skip
 
 
-def _three(values: Iterable[float | None], show: Callable[[float], str]) -> str:
-    return " / ".join("-" if value is None or math.isnan(value) else show(value) for value in values)
+def _each(values: Iterable[float | None], form: str, scale: float = 1.0) -> str:
+    return " / ".join("-" if value is None or math.isnan(value) else format(scale * value, form) for value in values)
 
 
 def table() -> str:
@@ -47,30 +49,21 @@ def table() -> str:
     columns = ("case", "trajectory angle [deg]", "largest speed [m/s]", "largest spin [rad/s]", "hop at [deg]",
                "energy residual")  # fmt: skip
     lines = [f"| {' | '.join(columns)} |", "|---|---|---|---|---|---|"]
-    for level in (0.0085, 0.015):
-        for surface, mu_s in SURFACES.items():
-            for torque in (0.125, 0.22, 6.0):
-                trial = case(level, torque, mu_s)
-                runs = [simulate(trial, duration=DURATION, method=method) for method in ("located", "paper")]
-                many = simulate_batch([trial], duration=DURATION)
-                angles = [*(run.trajectory_angle for run in runs), float(many.trajectory_angle[0])]
-                speeds = [*(run.max_speed for run in runs), float(many.max_speed[0])]
-                spins = [*(run.max_angular_velocity for run in runs), float(many.max_angular_velocity[0])]
-                hops = [*(run.transition_angle("hop") for run in runs), float(many.transition_angles["hop"][0])]
-                cells = (
-                    f"{level:g} g, {surface}, {torque:g} N m",
-                    _three(angles, _degrees),
-                    _three(speeds, lambda v: f"{v:.4f}"),
-                    _three(spins, lambda v: f"{v:.3f}"),
-                    _three(hops, _degrees),
-                    " / ".join(f"{run.energy_residual:.0e}" for run in runs),
-                )
-                lines.append(f"| {' | '.join(cells)} |")
+    for level, (surface, mu_s), torque in product((0.0085, 0.015), SURFACES.items(), TORQUES):
+        trial = case(level, torque, mu_s)
+        runs = [simulate(trial, duration=DURATION, method=method) for method in ("located", "paper")]
+        many = simulate_batch([trial], duration=DURATION)
+        angles = [*(run.trajectory_angle for run in runs), float(many.trajectory_angle[0])]
+        speeds = [*(run.max_speed for run in runs), float(many.max_speed[0])]
+        spins = [*(run.max_angular_velocity for run in runs), float(many.max_angular_velocity[0])]
+        hops = [*(run.transition_angle("hop") for run in runs), float(many.transition_angles["hop"][0])]
+        cells = (
+            f"{level:g} g, {surface}, {torque:g} N m", _each(angles, ".2f", 180 / math.pi), _each(speeds, ".4f"),
+            _each(spins, ".3f"), _each(hops, ".2f", 180 / math.pi),
+            " / ".join(f"{run.energy_residual:.0e}" for run in runs),
+        )  # fmt: skip
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
-
-
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.2f}"
 
 
 def effects() -> str:
@@ -83,12 +76,10 @@ def effects() -> str:
 
 
 def _final(trial: Trial, duration: float, longest: float, tolerance: float) -> np.ndarray:
-    last: dict[str, list[float]] = {}
-    integrate(
-        System(trial), duration=duration, tolerance=tolerance, longest=longest,
-        on_step=lambda t0, t1, z, at, modes: last.update(z=z),
-    )  # fmt: skip
-    return np.array(last["z"][:6])
+    ends: list[list[float]] = []
+    keep = lambda begin, end, z, at, modes: ends.append(z)  # noqa: E731
+    integrate(System(trial), duration=duration, tolerance=tolerance, longest=longest, on_step=keep)
+    return np.array(ends[-1][:6])
 
 
 def draw_orders(path: Path) -> None:
@@ -125,7 +116,7 @@ def draw_states(path: Path) -> None:
     figure, axes = plt.subplots(1, 2, figsize=(9, 2.6), sharey=True)
     order = {"pivot": 0, "slip": 1, "hop": 2, "stand": 0}
     for axis, (surface, mu_s) in zip(axes, SURFACES.items(), strict=True):
-        for torque in (0.125, 0.22, 6.0):
+        for torque in TORQUES:
             run = simulate(case(0.0085, torque, mu_s), duration=DURATION)
             axis.step(np.degrees(run.theta), [order[name] for name in run.state_names], label=f"{torque:g} N m")
         axis.set(title=f"{surface}, 0.0085 g", xlabel="theta [deg]", xlim=(0, 45), yticks=(0, 1, 2))

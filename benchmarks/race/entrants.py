@@ -82,7 +82,6 @@ _LOOP = re.compile(r"^Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+)
 _LISTS = re.compile(r"^Neighbor list builds = (\d+)", re.MULTILINE)
 _MISSED = re.compile(r"^Dangerous builds = (\d+)", re.MULTILINE)
 _VERSION = re.compile(r"^(?:LIGGGHTS \(Version ([^,)]+)|LAMMPS \(([^)]+)\))", re.MULTILINE)
-_COLUMNS = 7
 
 
 def read_log(text: str) -> Outcome:
@@ -99,13 +98,12 @@ def read_log(text: str) -> Outcome:
     after = text[loop.end() :]
     lists, missed, version = _LISTS.search(after), _MISSED.search(after), _VERSION.search(text)
     try:
-        numbers = [float(word) for word in row]
+        _, moving, turning, contacts, heights, lx, ly = (float(word) for word in row)
         time, steps, count = float(loop[1]), int(loop[2]), int(loop[3])
     except ValueError as problem:
-        raise PeerError(f"the log cannot be read: {problem}") from None
-    if len(numbers) != _COLUMNS or lists is None or time <= 0:
+        raise PeerError(f"the log cannot be read: its last numbers are {' '.join(row)!r} ({problem})") from None
+    if lists is None or time <= 0:
         raise PeerError(f"the log cannot be read: its last numbers are {' '.join(row)!r}")
-    _, moving, turning, contacts, heights, lx, ly = numbers
     return Outcome(
         version="unknown" if version is None else version[1] or version[2], time=time, steps=steps, grain_count=count,
         list_count=int(lists[1]), missed=0 if missed is None else int(missed[1]), kinetic_energy=moving + turning,
@@ -193,13 +191,8 @@ class Ours(Entrant):
         now = bed.grains()
         period = self._grains.period
         after = Grains(wrapped(now.position, period), now.radius, period)
-        return Heat(
-            speed=after.count * steps / wall,
-            list_count=bed.list_count - lists,
-            coordination=coordination(after),
-            packing=packing(self._grains.solid_volume, period, float(after.positions[:, 2].mean())),
-            kinetic_energy=bed.kinetic_energy,
-        )
+        share = packing(self._grains.solid_volume, period, float(after.positions[:, 2].mean()))
+        return Heat(after.count * steps / wall, bed.list_count - lists, coordination(after), share, bed.kinetic_energy)
 
     def _warmed(self) -> Bed:
         """The bed after its warm-up, with everything compiled."""
@@ -238,13 +231,8 @@ class Theirs(Entrant):
                 f"{self.name} ran {outcome.steps} steps of {outcome.grain_count} grains; "
                 f"{steps} of {self._grains.count} were wanted"
             )
+        share = packing(self._grains.solid_volume, outcome.period, outcome.mean_height)
         return Heat(
-            speed=outcome.grain_count * outcome.steps / outcome.time,
-            list_count=outcome.list_count,
-            coordination=outcome.coordination,
-            packing=packing(self._grains.solid_volume, outcome.period, outcome.mean_height),
-            kinetic_energy=outcome.kinetic_energy,
-            version=outcome.version,
-            command=" ".join(word or "''" for word in command),
-            missed=outcome.missed,
-        )
+            outcome.grain_count * outcome.steps / outcome.time, outcome.list_count, outcome.coordination, share,
+            outcome.kinetic_energy, outcome.version, " ".join(word or "''" for word in command), outcome.missed,
+        )  # fmt: skip

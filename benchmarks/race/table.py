@@ -82,22 +82,19 @@ def markdown(bench: Json) -> str:
     """The same in Markdown, with date, machine, versions and command."""
     machine = bench["machine"]
     peers = ", ".join(f"{name} {version}" for name, version in bench["peers"].items() if version)
+    rule = "|" + "|".join("---" if k in _LEFT else "---:" for k in range(len(HEADINGS))) + "|"
+
+    def line(cells: tuple[str, ...]) -> str:
+        return "| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |"
+
     lines = [
         f"{bench['date']}, {machine['processor']}, {machine['cores']} cores; hedgebed {bench['version']}, "
         f"Taichi {machine['taichi']}; {peers or 'no peers'}; `{bench['command']}`. Medians of {bench['rounds']} rounds."
     ]
     for bed in bench["beds"]:
-        lines += ["", f"**{_title(bed, bench)}**", "", _line(HEADINGS)]
-        lines += ["|" + "|".join("---" if k in _LEFT else "---:" for k in range(len(HEADINGS))) + "|"]
-        lines += [_line(row) for row in rows(bed)]
-    lines += ["", LEGEND]
-    if bench["remarks"]:
-        lines += ["", *(f"- {remark}" for remark in bench["remarks"])]
-    return "\n".join(lines) + "\n"
-
-
-def _line(cells: tuple[str, ...]) -> str:
-    return "| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |"
+        lines += ["", f"**{_title(bed, bench)}**", "", line(HEADINGS), rule, *(line(row) for row in rows(bed))]
+    remarks = [f"- {remark}" for remark in bench["remarks"]]
+    return "\n".join([*lines, "", LEGEND, *([""] if remarks else []), *remarks]) + "\n"
 
 
 def insert(text: str, table: str) -> str:

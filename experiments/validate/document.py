@@ -1,35 +1,24 @@
 """docs/validation.md from the result: one row a case, then what lies behind each row."""
 
 from collections.abc import Iterator, Mapping
+from itertools import groupby
 from typing import Any
 
-__all__ = ["band_of", "difference_of", "markdown", "number"]
+__all__ = ["markdown"]
 
-MARKS = {"pass": "pass", "fail": "**FAIL**", "skipped": "skipped", "not run": "not run", "not yet": "not yet"}
-
-
-def number(value: Any) -> str:
-    """To five digits; a dash where there is none."""
-    return "–" if value is None else f"{value:.5g}"
-
-
-def difference_of(row: Mapping[str, Any]) -> str:
-    """In the terms of the band: per cent of the reference, or the unit."""
-    if row["difference"] is None:
-        return "not a number"
-    if row["relative"]:
-        return f"{100 * row['difference'] / abs(row['reference']):+.2g} %"
-    return f"{row['difference']:+.2g}"
-
-
-def band_of(row: Mapping[str, Any]) -> str:
-    """As the difference."""
-    return f"±{100 * row['band']:.2g} %" if row["relative"] else f"±{row['band']:.2g}"
+MARKS = {"fail": "**FAIL**"}
 
 
 def _cells(row: Mapping[str, Any]) -> str:
+    """What was wanted, ours, difference and band: in per cent of the reference, or in the unit."""
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
-    return f"{number(row['reference'])}{unit} | {number(row['ours'])}{unit} | {difference_of(row)} | {band_of(row)}"
+    scale, sign = (100, " %") if row["relative"] else (1, "")
+    wanted, ours = ("–" if row[key] is None else f"{row[key]:.5g}{unit}" for key in ("reference", "ours"))
+    difference, band = "not a number", f"±{scale * row['band']:.2g}{sign}"
+    if row["difference"] is not None:
+        size = abs(row["reference"]) if row["relative"] else 1
+        difference = f"{scale * row['difference'] / size:+.2g}{sign}"
+    return f"{wanted} | {ours} | {difference} | {band}"
 
 
 def markdown(result: Mapping[str, Any], *, command: str) -> str:
@@ -54,22 +43,18 @@ def _lines(result: Mapping[str, Any], command: str) -> Iterator[str]:
     for row in result["cases"]:
         yield _overview(row)
     yield from _failing(result)
-    family = ""
-    for row in result["cases"]:
-        if row["status"] not in ("pass", "fail"):
-            continue
-        if row["family"] != family:
-            family = row["family"]
-            yield from ("", f"## {family}")
-        yield from _details(row)
+    ran = (row for row in result["cases"] if row["status"] in ("pass", "fail"))
+    for family, rows in groupby(ran, key=lambda row: row["family"]):
+        yield from ("", f"## {family}")
+        for row in rows:
+            yield from _details(row)
 
 
 def _overview(row: Mapping[str, Any]) -> str:
-    head = f"| {row['id']} | {row['title']} | {row['reference']} | {row['source']}"
-    if row.get("worst"):
-        return f"{head} | {_cells(row['worst'])} | {MARKS[row['status']]} |"
-    said = row.get("waits_for") or row.get("skipped") or ""
-    return f"{head} | – | – | – | – | {MARKS[row['status']]}{f': {said}' if said else ''} |"
+    cells = _cells(row["worst"]) if row.get("worst") else "– | – | – | –"
+    why = "" if row.get("worst") else row.get("waits_for") or row.get("skipped") or ""
+    mark = ": ".join(filter(None, (MARKS.get(row["status"], row["status"]), why)))
+    return f"| {row['id']} | {row['title']} | {row['reference']} | {row['source']} | {cells} | {mark} |"
 
 
 def _failing(result: Mapping[str, Any]) -> Iterator[str]:

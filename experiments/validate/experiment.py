@@ -68,21 +68,18 @@ def run_case(case: Case, tell: Any = None) -> tuple[Outcome, float]:
 
 def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress) -> Result:
     wanted = chosen(settings.only, quick=settings.quick)
-    records: dict[str, Json] = {}
     with folder.lock():
-        work = [case for case in wanted if case.compute is not None]
-        for case in work:
-            if folder.is_done(case.id) and folder.done_data(case.id)["code"] == fingerprint_of(case):
-                records[case.id] = folder.done_data(case.id)
-        left = [case for case in work if case.id not in records]
+        done = {case: folder.done_data(case.id) for case in wanted if case.compute and folder.is_done(case.id)}
+        records = {case.id: record for case, record in done.items() if record["code"] == fingerprint_of(case)}
+        left = [case for case in wanted if case.compute and case.id not in records]
         progress.plan({case.title: case.seconds for case in left})
         for case in left:
             progress.stage(case.title, total=1.0)
             record = _record(folder, case, progress)
-            progress.message(f"{record['status']:>7}  {case.id}{_said(record)}")
+            progress.message(": ".join(filter(None, (f"{record['status']:>7}  {case.id}", _line(record)))))
             records[case.id] = record
         entire = not settings.only and not settings.quick
-        result = _result([_row(case, records, wanted) for case in SUITE], entire)
+        result = _result([_row(case, records.get(case.id)) for case in SUITE], entire)
         folder.write_result(result)
         text = markdown(result, command=_command(settings))
         write_text(folder.path / "validation.md", text)
@@ -126,14 +123,11 @@ def _record(folder: RunFolder, case: Case, progress: Progress) -> Json:
     return record
 
 
-def _said(record: Json) -> str:
+def _line(record: Json) -> str:
     """What is worth a line while it runs."""
-    worst = worst_of(record["comparisons"])
-    if record["skipped"]:
-        return f": {record['skipped']}"
-    if worst is None:
-        return f": {record['remarks'][0]}" if record["remarks"] else ""
-    return f": {worst['quantity']} {worst['ours']:.5g}, wanted {worst['reference']:.5g}"
+    if worst := worst_of(record["comparisons"]):
+        return f"{worst['quantity']} {worst['ours']:.5g}, wanted {worst['reference']:.5g}"
+    return record["skipped"] or next(iter(record["remarks"]), "")
 
 
 def worst_of(comparisons: Sequence[Json]) -> Json | None:
@@ -141,15 +135,11 @@ def worst_of(comparisons: Sequence[Json]) -> Json | None:
     return max(comparisons, key=lambda one: math.inf if one["share"] is None else one["share"], default=None)
 
 
-def _row(case: Case, records: dict[str, Json], wanted: Sequence[Case]) -> Json:
-    head = dict(case.head())
-    if case.compute is None:
-        return head | {"status": "not yet", "waits_for": case.waits_for}
-    if case not in wanted:
-        return head | {"status": "not run"}
-    record = records[case.id]
+def _row(case: Case, record: Json | None) -> Json:
+    if record is None:
+        return case.head()
     reason = case.reason if record["status"] == "fail" else ""
-    return head | record | {"reason": reason, "worst": worst_of(record["comparisons"])}
+    return case.about() | record | {"reason": reason, "worst": worst_of(record["comparisons"])}
 
 
 STATUSES = ("pass", "fail", "skipped", "not run", "not yet")
@@ -175,10 +165,10 @@ def _result(rows: list[Json], entire: bool) -> Result:
 
 
 def _why(row: Json) -> str:
-    worst, said = row["worst"], "it ended with an error"
-    if worst:
-        said = f"{worst['quantity']} is {worst['ours']:.4g}, {worst['reference']:.4g} was wanted"
-    return f"{said} ({row['reason']})" if row["reason"] else said
+    what = "it ended with an error"
+    if worst := row["worst"]:
+        what = f"{worst['quantity']} is {worst['ours']:.4g}, {worst['reference']:.4g} was wanted"
+    return f"{what} ({row['reason']})" if row["reason"] else what
 
 
 def _is_checkout() -> bool:
@@ -211,11 +201,10 @@ def _merged(before: Iterable[Mapping[str, Any]], now: Iterable[Mapping[str, Any]
     old = {row["id"]: dict(row) for row in before if row["status"] in _RAN}
     rows = []
     for case in SUITE:
-        row = dict(case.head()) | (ran.get(case.id) or old.get(case.id) or {})
-        if row.get("status") == "fail":
+        known = ran.get(case.id) or old.get(case.id)
+        row = case.about() | known if known else case.head()
+        if row["status"] == "fail":
             row["reason"] = case.reason or row.get("reason", "")
-        if "status" not in row:
-            row |= {"status": "not run"} if case.compute else {"status": "not yet", "waits_for": case.waits_for}
         rows.append(row)
     return rows
 
@@ -224,9 +213,5 @@ _RAN = ("pass", "fail")
 
 
 def _command(settings: ValidateSettings) -> str:
-    words = ["hedgebed validate"]
-    if settings.only:
-        words += ["--only", *settings.only]
-    if settings.quick:
-        words.append("--quick")
-    return " ".join(words)
+    only = ["--only", *settings.only] if settings.only else []
+    return " ".join(["hedgebed validate", *only, *["--quick"] * settings.quick])

@@ -1,18 +1,15 @@
 """One grain under gravity: what the verification suite (test_suite.py) does not hold."""
 
-import math
-
 import numpy as np
 import pytest
 
 from dem import Ball
-from experiments.validate.contacts.one_grain import GRAVITY, advance_to, sixteen
+from experiments.validate.contacts.one_grain import GRAVITY, advance_to, downhill, sixteen
 
 
 @pytest.mark.parametrize("rolling", [0.05, 0.2])
 def test_every_grain_rolls_down_an_incline_alike(rolling):
-    angle = math.radians(20)
-    bed = sixteen(gravity=(GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle)), friction=0.5, rolling=rolling)
+    bed = sixteen(gravity=downhill(20), friction=0.5, rolling=rolling)
     speed = advance_to(bed, 0.02).velocity[:, 0]
     assert speed[0] > 0.01 and np.ptp(speed) < 1e-12
 

@@ -1,7 +1,7 @@
 """What a case of the verification suite is: what is known, what came out, and the band between them."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -10,7 +10,8 @@ import numpy as np
 from experiments.runs.types import Json
 
 __all__ = [
-    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "worst", "near_zero", "told",
+    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "near_zero", "told", "within",
+    "worst",
 ]  # fmt: skip
 Item = TypeVar("Item")
 
@@ -58,8 +59,7 @@ class Comparison:
 
     def as_dict(self) -> Json:
         """What result.json keeps."""
-        kept = {key: getattr(self, key) for key in ("quantity", "unit", "reference", "ours", "band", "relative")}
-        return kept | {"difference": self.difference, "share": self.share, "passes": self.passes}
+        return vars(self) | {"difference": self.difference, "share": self.share, "passes": self.passes}
 
 
 def compared(
@@ -125,6 +125,11 @@ def told(items: Iterable[Item], tell: Tell) -> Iterator[Item]:
         tell(done / len(rows))
 
 
+def within(tell: Tell, start: float, end: float) -> Tell:
+    """Takes how far a part of a case is; the part goes from one share of the whole to another."""
+    return lambda share: tell(start + share * (end - start))
+
+
 def worst(found: Any, wanted: float) -> float:
     """Of several numbers the one that is farthest off."""
     return float(np.ravel(found)[np.argmax(np.abs(found - wanted))])
@@ -167,6 +172,11 @@ class Case:
         if (self.compute is None) != bool(self.waits_for):
             raise ValueError(f"case {self.id!r} needs either compute or waits_for")
 
-    def head(self) -> Mapping[str, Any]:
-        """What result.json says of it before it has run."""
+    def about(self) -> Json:
+        """What result.json says of it whatever comes out."""
         return {key: getattr(self, key) for key in ("id", "family", "title", "reference", "source", "slow")}
+
+    def head(self) -> Json:
+        """What result.json says of it before it has run."""
+        status = {"status": "not run"} if self.compute else {"status": "not yet", "waits_for": self.waits_for}
+        return self.about() | status

@@ -110,36 +110,8 @@ class _Dashpot:
         return self.force
 
 
-@dataclass(frozen=True)
-class _Forces:
-    """The contact forces of one moment, and the power that each kind has at given velocities."""
-
-    i: Array
-    j: Array
-    normals: Array
-    arm: Array
-    overlap: Array
-    dashpot: Array
-    normal: Array
-    f_t: Array
-    torque: Array
-
-    def losses(self, v: Array, w: Array) -> Array:
-        """What the normal dashpots, the tangential forces and the torques take [W], shape [3]."""
-        speed = v[self.i] - v[self.j] - np.cross(self.arm[:, None] * (w[self.i] + w[self.j]), self.normals)
-        taken = (self.dashpot @ (speed * self.normals).sum(axis=1), (self.f_t * speed).sum())
-        return -np.array([*taken, (self.torque * (w[self.i] - w[self.j])).sum()])
-
-    def total(self, weight: Array, count: int) -> Array:
-        """On each grain [N], shape [count, 3]."""
-        total = np.tile(weight, (count, 1))
-        np.add.at(total, self.i, self.normal[:, None] * self.normals + self.f_t)
-        np.add.at(total, self.j, -self.normal[:, None] * self.normals - self.f_t)
-        return total
-
-
 class _Contacts:
-    """The law of docs/bed.md between like grains, and what its springs hold."""
+    """The law of docs/bed.md between like grains: the contact forces of one moment, and what its springs hold."""
 
     def __init__(self, bed: Bed, r: float, m: float, *, tensile: bool):
         stuff = bed.material
@@ -152,14 +124,14 @@ class _Contacts:
         self.slide, self.roll, self.twist = (_Springs(len(self.i)) for _ in range(3))
         self.dashpot = _Dashpot(len(self.i), self.mass, tensile=tensile)
 
-    def load(self, x: Array, v: Array, w: Array, took: float) -> _Forces:
+    def load(self, x: Array, v: Array, w: Array, took: float) -> None:
         """A step of ``took`` [s] on: the forces at places ``x``, the velocities those of half a step before."""
         i, j, mu, factor = self.i, self.j, self.mu, self.factor
         d = x[i] - x[j]
         d[:, :2] -= self.period * np.round(d[:, :2] / self.period)
         length = np.linalg.norm(d, axis=1)
-        overlap, normals = np.maximum(0.0, 2 * self.r - length), d / length[:, None]
-        touching = overlap > 0
+        self.overlap, self.normals = np.maximum(0.0, 2 * self.r - length), d / length[:, None]
+        overlap, normals, touching = self.overlap, self.normals, self.overlap > 0
         arm, a = self.r - overlap / 2, np.sqrt(self.radius * overlap)
         s_n, k_t = 2 * self.star * a, 8 * self.shear * a
         root = np.sqrt(self.mass * s_n)
@@ -167,7 +139,8 @@ class _Contacts:
         v_n = (path * normals).sum(axis=1)
         elastic = 2 / 3 * s_n * overlap
         f_n = self.dashpot.load(elastic, factor * root, v_n, overlap, took)
-        f_t, torque = np.zeros_like(normals), np.zeros_like(normals)
+        self.arm, self.normal, self.damped = arm, f_n, f_n - elastic
+        self.f_t, self.torque = np.zeros((2, *normals.shape))
         # Half a step ago, where the velocities are, the normal was this and the arm longer by what it has lost since.
         middle = normals - 0.5 * took * (path - v_n[:, None] * normals) / length[:, None]
         if mu > 0:
@@ -176,7 +149,7 @@ class _Contacts:
             v_t = np.where(touching[:, None], v_t, 0.0)
             damping = factor * math.sqrt(4 * self.shear / self.star) * root
             self.slide.stretch = flat(self.slide.stretch, normals)
-            f_t = self.slide.load(k_t, damping, v_t, mu * np.abs(f_n), took)
+            self.f_t = self.slide.load(k_t, damping, v_t, mu * np.abs(f_n), took)
         if self.mu_r > 0:
             spin = np.where(touching[:, None], w[i] - w[j], 0.0)
             along = (spin * normals).sum(axis=1)[:, None] * normals
@@ -187,14 +160,27 @@ class _Contacts:
             self.twist.stretch = (angle * normals).sum(axis=1)[:, None] * normals
             self.roll.stretch = angle - self.twist.stretch
             bound = self.mu_r * self.radius * np.abs(f_n)
-            torque = self.roll.load(k_r, share * np.sqrt(k_r), spin - along, bound, took)
+            self.torque = self.roll.load(k_r, share * np.sqrt(k_r), spin - along, bound, took)
             bound = 3 * math.pi / 16 * mu * a * np.abs(f_n)
-            torque += self.twist.load(k_w, share * np.sqrt(k_w), along, bound, took)
-        return _Forces(i, j, normals, arm, overlap, f_n - elastic, f_n, f_t, torque)
+            self.torque += self.twist.load(k_w, share * np.sqrt(k_w), along, bound, took)
 
-    def stored(self, overlap: Array) -> tuple[float, float, float]:
+    def losses(self, v: Array, w: Array) -> Array:
+        """What the normal dashpots, the tangential forces and the torques take at these velocities [W], shape [3]."""
+        i, j = self.i, self.j
+        speed = v[i] - v[j] - np.cross(self.arm[:, None] * (w[i] + w[j]), self.normals)
+        taken = (self.damped @ (speed * self.normals).sum(axis=1), (self.f_t * speed).sum())
+        return -np.array([*taken, (self.torque * (w[i] - w[j])).sum()])
+
+    def total(self, weight: Array, count: int) -> Array:
+        """On each grain [N], shape [count, 3]."""
+        total = np.tile(weight, (count, 1))
+        np.add.at(total, self.i, self.normal[:, None] * self.normals + self.f_t)
+        np.add.at(total, self.j, -self.normal[:, None] * self.normals - self.f_t)
+        return total
+
+    def stored(self) -> tuple[float, float, float]:
         """In normal, tangential and turning springs [J]."""
-        normal = 0.4 * float((4 / 3 * self.star * math.sqrt(self.radius) * overlap**2.5).sum())
+        normal = 0.4 * float((4 / 3 * self.star * math.sqrt(self.radius) * self.overlap**2.5).sum())
         return normal, self.slide.stored, self.roll.stored + self.twist.stored
 
 
@@ -208,8 +194,7 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -
     r, m = float(start.radius[0]), float(start.mass[0])
     contacts = _Contacts(bed, r, m, tensile=tensile)
     inertia, weight = 0.4 * m * r * r, m * np.array(bed.gravity)
-    lost, half_w = np.zeros(3), start.spin
-    before: tuple[_Forces, Array, Array] | None = None
+    lost, v, w, half_w = np.zeros(3), start.velocity, start.spin, start.spin
     worst = largest = 0.0
     rows: list[list[float]] = []
     for step in range(steps + 1):
@@ -217,23 +202,21 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -
             bed.advance(1)
         g = bed.grains()
         # The bed's own velocities, half a step behind; ``grains`` has brought them to the time of the positions.
-        v, w = g.velocity - 0.5 * dt / m * g.force, half_w
+        old_v, old_w, v, w = v, w, g.velocity - 0.5 * dt / m * g.force, half_w
         half_w = 2 * g.spin - half_w
-        if before is not None:
-            forces, old_v, old_w = before
-            lost += dt * forces.losses(0.5 * (old_v + v), 0.5 * (old_w + w))
-        forces = contacts.load(g.position, v, w, dt if step else 0.0)
+        if step:
+            lost += dt * contacts.losses(0.5 * (old_v + v), 0.5 * (old_w + w))
+        contacts.load(g.position, v, w, dt if step else 0.0)
         largest = max(largest, float(np.abs(g.force).max()))
-        worst = max(worst, float(np.abs(g.force - forces.total(weight, bed.grain_count)).max()))
+        worst = max(worst, float(np.abs(g.force - contacts.total(weight, bed.grain_count)).max()))
         if step % every == 0:
             # The velocities of now hold half a step of the forces of now.
-            so_far = lost + 0.5 * dt * forces.losses(0.5 * (v + g.velocity), 0.5 * (w + g.spin))
+            so_far = lost + 0.5 * dt * contacts.losses(0.5 * (v + g.velocity), 0.5 * (w + g.spin))
             kinetic = 0.5 * m * float((g.velocity**2).sum()) + 0.5 * inertia * float((g.spin**2).sum())
-            stored, held, turned = contacts.stored(forces.overlap)
+            stored, held, turned = contacts.stored()
             fallen = -float(weight @ (g.position - start.position).sum(axis=0))
             losses = [so_far[0], so_far[1] - held, so_far[2] - turned]
             rows.append([step * dt, kinetic, stored, held, turned, *losses, fallen])
-        before = (forces, v, w)
     names = ("kinetic", "normal", "tangential", "turning", "damped", "rubbed", "turned", "potential")
     columns = np.array(rows).T
     parts = dict(zip(names, columns[1:], strict=True))

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dem import Ball, Bed, Facing, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told, within
 from experiments.validate.base.drops import first_touch
 from experiments.validate.base.peers import PEERS, data_file, deck_of, digits, run_peer
 from experiments.validate.base.spheres import mass_of, upright_walls
@@ -49,7 +49,7 @@ def grains() -> tuple[np.ndarray, np.ndarray]:
     """Centres, shape [25000, 3], and radii [m] of the data."""
     with gzip.open(DATA, "rt", encoding="ascii") as file:
         rows = [line.split() for line in file.readlines()[1:]]
-    found = np.array([[float(v) for v in row] for row in rows if len(row) == 4])
+    found = np.array([row for row in rows if len(row) == 4], dtype=float)
     return found[:, 1:], found[:, 0]
 
 
@@ -82,7 +82,7 @@ def ours(case: Setup, tell: Tell) -> np.ndarray:
     velocity, spin = np.array([0.0, 0.0, -case.speed]), np.zeros(3)
     dt = TOGETHER * STEP
     found = [[case.ball[2], velocity[2]]]
-    for look in range(round(TIME / STEP) // EVERY):
+    for _ in told(range(round(TIME / STEP) // EVERY), tell):
         for _ in range(EVERY // TOGETHER):
             bed.move_body(ball, velocity=velocity.tolist(), spin=spin.tolist())
             bed.advance(TOGETHER)
@@ -90,14 +90,13 @@ def ours(case: Setup, tell: Tell) -> np.ndarray:
             velocity = velocity + dt * (force / mass + [0.0, 0.0, -GRAVITY])
             spin = spin + dt * torque / inertia
         found.append([bed.body_position(ball)[2] + FLOOR, velocity[2]])
-        tell((look + 1) * EVERY * STEP / TIME)
     return np.array(found)
 
 
 def theirs(case: Setup) -> np.ndarray:
     """The same by LIGGGHTS, in one process. Raises RuntimeError with its last lines where it fails."""
     blocks = run_peer("liggghts", _data(case), _deck(), "ball.txt", limit=LIMIT).split("ITEM: ATOMS z vz")[1:]
-    return np.array([[float(v) for v in block.splitlines()[1].split()] for block in blocks])
+    return np.array([block.splitlines()[1].split() for block in blocks], dtype=float)
 
 
 def _data(case: Setup) -> str:
@@ -145,18 +144,16 @@ def _compute(tell: Tell) -> Outcome:
     case = setup()
     there = theirs(case)
     tell(0.5)
-    here = ours(case, lambda done: tell(0.5 + 0.5 * done))
+    here = ours(case, within(tell, 0.5, 1.0))
     depth, found = case.ball[2] - there[:, 0], case.ball[2] - here[:, 0]
-    time = 1e3 * STEP * EVERY * np.arange(len(there))
-    slower = -0.8 * case.speed
+    time, half = 1e3 * STEP * EVERY * np.arange(len(there)), len(there) // 2
+    slowed = (_time_to(time, one[:, 1], -0.8 * case.speed) for one in (there, here))
     rows = [
         Comparison(f"depth {time[-1]:g} ms after the first touch", "mm", 1e3 * depth[-1], 1e3 * found[-1], 0.05),
         near_zero("height, largest difference over that depth", np.abs(found - depth).max() / depth[-1], 0.05),
-        Comparison("time to 0.8 of the speed", "ms", _time_to(time, there[:, 1], slower),
-                   _time_to(time, here[:, 1], slower), 0.05),
-        Comparison(f"speed after {time[len(time) // 2]:g} ms", "m/s", -there[len(time) // 2, 1],
-                   -here[len(time) // 2, 1], 0.05),
-    ]  # fmt: skip
+        Comparison("time to 0.8 of the speed", "ms", *slowed, 0.05),
+        Comparison(f"speed after {time[half]:g} ms", "m/s", -there[half, 1], -here[half, 1], 0.05),
+    ]
     curves = [
         Curve("LIGGGHTS", time, 1e3 * (there[:, 0] - case.ball[2]), False),
         Curve("bed", time, 1e3 * (here[:, 0] - case.ball[2])),

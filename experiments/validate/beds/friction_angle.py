@@ -34,7 +34,7 @@ from dem.grains.packing import draw_radii
 from dem.grains.sizes import Uniform
 from dem.measure.element import ElementShear, shear_element
 from experiments.calibrate.tests import mohr_circle, summary_of, triaxial_angle
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, within
 from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, lammps_restitution, run_peer, spheres
 
 from .words import say
@@ -101,16 +101,20 @@ def mohr_angle(tensor: np.ndarray) -> float:
     return math.degrees(math.asin(radius / centre))
 
 
-def _over_mean(shear: float, tensor: np.ndarray) -> float:
-    return 3 * abs(float(shear)) / float(np.trace(tensor))
-
-
 def _stuff(rolling: float, friction: float = 0.5) -> Material:
     return replace(SAND, name="sheared", friction=friction, rolling_friction=rolling)
 
 
-def _degrees(ratio: float) -> float:
-    return math.degrees(math.atan(ratio))
+def _sheared(
+    ratio: float, error: float, shear: float, tensor: np.ndarray, pressure: float, strain: np.ndarray,
+    ratios: np.ndarray,
+) -> Sheared:  # fmt: skip
+    """From the shear over normal stress at large strain, its error, and the stress tensor [Pa] with its shear."""
+    angle = math.degrees(math.atan(ratio))
+    return Sheared(
+        angle, triaxial_angle(tensor), mohr_angle(tensor), math.degrees(math.atan(ratio + error)) - angle,
+        3 * abs(float(shear)) / float(np.trace(tensor)), pressure, strain, ratios,
+    )  # fmt: skip
 
 
 def _here(stuff: Material, seed: int, tell: Tell, **otherwise: float) -> tuple[Sheared, ElementShear]:
@@ -120,13 +124,9 @@ def _here(stuff: Material, seed: int, tell: Tell, **otherwise: float) -> tuple[S
         stuff, pressure=PRESSURE, grain=GRAIN, size=SIZE, strain=STRAIN, seed=seed, threads=1, tell=tell, **options
     )
     said = summary_of(run, stuff.density)
-    ratio, tensor = said["shear"] / said["normal"], np.array(said["tensor"])
-    error = _degrees(ratio + said["error"] / said["normal"]) - _degrees(ratio)
-    found = Sheared(
-        _degrees(ratio), triaxial_angle(tensor), mohr_angle(tensor), error, _over_mean(tensor[0, 2], tensor),
-        said["normal"], run.strain, run.shear / run.normal,
-    )  # fmt: skip
-    return found, run
+    tensor, normal = np.array(said["tensor"]), said["normal"]
+    ratio, error = said["shear"] / normal, said["error"] / normal
+    return _sheared(ratio, error, tensor[0, 2], tensor, normal, run.strain, run.shear / run.normal), run
 
 
 def in_lammps(stuff: Material, *, young: float, packing: float, seed: int) -> Sheared:
@@ -141,10 +141,7 @@ def in_lammps(stuff: Material, *, young: float, packing: float, seed: int) -> Sh
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[:, :, late].mean(axis=2)
     ratio = float(-xy[late].mean() / yy[late].mean())
     error = float(parts.std(ddof=1)) / math.sqrt(_PARTS)
-    return Sheared(
-        _degrees(ratio), triaxial_angle(tensor), mohr_angle(tensor), _degrees(ratio + error) - _degrees(ratio),
-        _over_mean(tensor[0, 1], tensor), float(yy[late].mean()), strain, -xy / yy,
-    )  # fmt: skip
+    return _sheared(ratio, error, tensor[0, 1], tensor, float(yy[late].mean()), strain, -xy / yy)
 
 
 def _input(stuff: Material, young: float, packing: float, seed: int) -> tuple[str, str]:
@@ -198,12 +195,9 @@ def _samples(
 ) -> tuple[list[Sheared], list[ElementShear], float]:
     """One of each seed here, sheared, and their packing fraction at large strain [1]."""
     count = len(seeds)
-    pairs = [
-        _here(stuff, seed, lambda share, k=k: tell((k + share) / count), **otherwise)  # type: ignore[misc]
-        for k, seed in enumerate(seeds)
-    ]
+    pairs = [_here(stuff, seed, within(tell, k / count, (k + 1) / count), **otherwise) for k, seed in enumerate(seeds)]
     late = [run.packing[run.inside_strain > 0.5 * STRAIN].mean() for _, run in pairs]
-    return [one for one, _ in pairs], [run for _, run in pairs], float(np.mean([float(value) for value in late]))
+    return [one for one, _ in pairs], [run for _, run in pairs], float(np.mean(late))
 
 
 def _compute(tell: Tell) -> Outcome:
@@ -212,20 +206,19 @@ def _compute(tell: Tell) -> Outcome:
     rows, curves, words = [], [], []
     for k, rolling in enumerate(ROLLING):
         stuff = _stuff(rolling)
-        here, runs, packing = _samples(stuff, SEEDS, lambda share, k=k: tell((k + 0.97 * share) / len(ROLLING)))  # type: ignore[misc]
+        here, runs, packing = _samples(stuff, SEEDS, within(tell, k / len(ROLLING), (k + 0.97) / len(ROLLING)))
         there = [in_lammps(stuff, young=runs[0].young, packing=packing, seed=seed) for seed in SEEDS]
         about = f"rolling friction {rolling:g}"
         for name, words_of in (("angle", "plane of shear"), ("triaxial", "triaxial"), ("mohr", "Mohr's circle")):
-            rows.append(
-                Comparison(f"{about}, {words_of}", "degrees", _mean(there, name), _mean(here, name), BAND, False)
-            )
+            means = _mean(there, name), _mean(here, name)
+            rows.append(Comparison(f"{about}, {words_of}", "degrees", *means, BAND, False))
         for label, found in (("LAMMPS", there), ("bed", here)):
             strain = np.linspace(0.05, 0.98 * STRAIN, 60)
             ratio = np.mean([_smooth(one.strain, one.ratio, strain) for one in found], axis=0)
             curves.append(Curve(f"{label}, {rolling:g}", strain, ratio, label == "bed"))
         words.append(say(
             "sheared", about=about, grain_count=runs[0].grain_count, packing=packing, here=_each(here),
-            there=_each(there), pressure=np.mean([one.pressure for one in there]), ours=PRESSURE,
+            there=_each(there), pressure=_mean(there, "pressure"), ours=PRESSURE,
         ))  # fmt: skip
     remark = say(
         "samples", words="; ".join(words), spread=100 * SPREAD, inertial=INERTIAL, count=len(SEEDS),
@@ -238,7 +231,7 @@ def _published(tell: Tell) -> Outcome:
     rows, words = [], []
     everything: list[ElementShear] = []
     for k, (friction, (wanted, dense)) in enumerate(PUBLISHED.items()):
-        part = lambda share, k=k: tell((k + share) / len(PUBLISHED))  # noqa: E731
+        part = within(tell, k / len(PUBLISHED), (k + 1) / len(PUBLISHED))
         found, runs, packing = _samples(_stuff(0.0, friction), SEEDS_AS_PUBLISHED, part, **AS_PUBLISHED)
         everything += runs
         ratio, circle = _mean(found, "over_mean"), _mean(found, "mohr")
@@ -252,8 +245,7 @@ def _published(tell: Tell) -> Outcome:
         tensor = np.mean([run.stress[at].mean(axis=0) for run, at in zip(runs, late, strict=True)], axis=0)
         words.append(say(
             "circles", about=about, found=_each(found, "mohr"), found_2=_each(found, "over_mean", ".3f"),
-            found_3=_each(found),
-            along=tensor[0, 0] / tensor[2, 2], across=tensor[1, 1] / tensor[2, 2],
+            found_3=_each(found), along=tensor[0, 0] / tensor[2, 2], across=tensor[1, 1] / tensor[2, 2],
         ))  # fmt: skip
     remark = say(
         "as_published", words="; ".join(words), spread=100 * AS_PUBLISHED["spread"],

@@ -81,10 +81,10 @@ def published(speed: float) -> tuple[float, float]:
 
 def _scatter(falls: Sequence[dict[str, np.ndarray]]) -> tuple[float, float]:
     """Standard errors of d1 and k/m, by leaving out one drop after the other."""
-    left = np.array([fit_law([*falls[:k], *falls[k + 1 :]]) for k in range(len(falls))])
     count = len(falls)
-    errors = np.sqrt((count - 1) / count * ((left - left.mean(axis=0)) ** 2).sum(axis=0))
-    return float(errors[0]), float(errors[1])
+    left = np.array([fit_law([*falls[:k], *falls[k + 1 :]]) for k in range(count)])
+    d1, k_over_m = np.sqrt((count - 1) / count * ((left - left.mean(axis=0)) ** 2).sum(axis=0)).tolist()
+    return d1, k_over_m
 
 
 def _drops(fineness: tuple[str, int, Any], tell: Tell) -> Outcome:

@@ -17,7 +17,6 @@ less of the same grains.
 
 import math
 from collections.abc import Sequence
-from itertools import count
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -25,7 +24,7 @@ from scipy.optimize import least_squares
 from dem import Cone, Cylinder
 from dem.measure.element import shear_element
 from experiments.calibrate.tests import summary_of
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told, within
 from experiments.validate.base.drops import BEADS, SPREAD, drive_down, part, prepared
 from rigid.ground.laws import find_law
 from rigid.ground.rft import flat_plate, stress_gradient, tractions
@@ -108,24 +107,18 @@ def _between(run: dict[str, np.ndarray], depths: tuple[float, float]) -> tuple[n
 
 
 def _compute(tell: Tell) -> Outcome:
-    whole, done = len(SAMPLES) + len(PLACES) * (len(PLATES) + 1), count(1)
-
-    def ticked(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        tell(next(done) / whole)
-        return found
-
-    samples = [ticked(_sheared(seed)) for seed in SAMPLES]
-    told = {key: np.array([float(one[key]) for one in samples]) for key in ("over_mean", "over_normal", "packing")}
-    mu, density = float(told["over_mean"].mean()), float(told["packing"].mean()) * BEADS.density
+    samples = [_sheared(seed) for seed in told(SAMPLES, within(tell, 0.0, 0.4))]
+    means_of = {key: np.array([float(one[key]) for one in samples]) for key in ("over_mean", "over_normal", "packing")}
+    mu, density = float(means_of["over_mean"].mean()), float(means_of["packing"].mean()) * BEADS.density
     gradient = stress_gradient(bulk_density=density, friction=mu, gravity=GRAVITY)
     height = (CONE_DEPTHS[1] + 2) * GRAIN
     cone_shape = Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE))
-    cones = [ticked(_driven("cone", cone_shape, place, CONE_DEPTHS[1] + 0.5)) for place in PLACES]
+    cones = [_driven("cone", cone_shape, place, CONE_DEPTHS[1] + 0.5) for place in PLACES]
     pushes, means, curves = [], [], []
-    for across in PLATES:
+    for across in told(PLATES, within(tell, 0.5, 1.0)):
         diameter = across * GRAIN
         shape, name = Cylinder(0.0, GRAIN, 0.5 * diameter), f"plate {across:g}"
-        runs = [ticked(_driven(name, shape, place, PLATE_DEPTHS[1] + 0.5)) for place in PLACES]
+        runs = [_driven(name, shape, place, PLATE_DEPTHS[1] + 0.5) for place in PLACES]
         pieces = [_between(run, PLATE_DEPTHS) for run in runs]
         pushes += [(diameter, *piece) for piece in pieces]
         law = flat_plate() * gradient * 0.25 * math.pi * diameter**2
@@ -150,11 +143,11 @@ def _compute(tell: Tell) -> Outcome:
     shares = "; ".join(f"{pair} at {across:g} d" for across, pair in zip(PLATES, pairs, strict=True))
     stagnant = math.tan(math.radians(45) + 0.5 * math.asin(min(1.0, mu))) / 6
     remark = say(
-        "plates", mu=mu, over_mean=_each(told["over_mean"]), over_normal=told["over_normal"].mean(), density=density,
-        steep=steep, shares=shares, gradient=1e-6 * found, error=1e-6 * error, share=share, stagnant=stagnant,
-        half_angle=math.degrees(HALF_ANGLE), speed=SPEED, grain=1e3 * GRAIN, wide=SIZE[0] / GRAIN, deep=SIZE[2] / GRAIN,
-        plate_depths=PLATE_DEPTHS[0], plate_depths_2=PLATE_DEPTHS[1], cone_depths=CONE_DEPTHS[0],
-        cone_depths_2=CONE_DEPTHS[1], roots=_each(1e-6 * np.array(roots) ** 3),
+        "plates", mu=mu, over_mean=_each(means_of["over_mean"]), over_normal=means_of["over_normal"].mean(),
+        density=density, steep=steep, shares=shares, gradient=1e-6 * found, error=1e-6 * error, share=share,
+        stagnant=stagnant, half_angle=math.degrees(HALF_ANGLE), speed=SPEED, grain=1e3 * GRAIN, wide=SIZE[0] / GRAIN,
+        deep=SIZE[2] / GRAIN, plate_depths=PLATE_DEPTHS[0], plate_depths_2=PLATE_DEPTHS[1],
+        cone_depths=CONE_DEPTHS[0], cone_depths_2=CONE_DEPTHS[1], roots=_each(1e-6 * np.array(roots) ** 3),
     )  # fmt: skip
     whole_ball, radius = find_law("rft"), 0.5 * BALL
     beads = {"radius": radius, "bulk_density": 1520.0, "friction": math.tan(math.radians(24)), "gravity": GRAVITY}

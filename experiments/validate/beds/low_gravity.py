@@ -56,11 +56,8 @@ def collapsed(
     """
     last = max(run["time"][-1] / unit for run, unit in zip(runs, times, strict=True))
     grid = np.linspace(0, last, count)
-    depths = [
-        np.interp(grid, run["time"] / unit, run["depth"] / length)
-        for run, length, unit in zip(runs, lengths, times, strict=True)
-    ]
-    return grid, np.array(depths)
+    each = zip(runs, lengths, times, strict=True)
+    return grid, np.array([np.interp(grid, run["time"] / unit, run["depth"] / length) for run, length, unit in each])
 
 
 def _time_down(run: dict[str, np.ndarray]) -> float:
@@ -90,9 +87,7 @@ def _sink(tell: Tell) -> Outcome:
     settings = _sweep(0.0)
     runs = [one.run() for one in told(settings, tell)]
     depths, times = [float(run["depth"][-1]) for run in runs], [_time_down(run) for run in runs]
-    creeping = sum(not run["stopped"] for run in runs)
-    gravities = [one.gravity for one in settings]
-    mean = float(np.mean(depths))
+    gravities, mean = [one.gravity for one in settings], float(np.mean(depths))
     rows = [
         Comparison(f"final depth over D, {_name(*bed)}", "1", mean / BALL, depth / BALL, BAND)
         for bed, depth in zip(SWEEP, _means(depths), strict=True)
@@ -107,8 +102,8 @@ def _sink(tell: Tell) -> Outcome:
     curves.append(Curve("bed", gravities, np.array(depths) / BALL))
     plot = Plot("How deep a ball sinks from rest", "gravity [m/s2]", "depth over the ball's diameter [1]", curves, "x")
     remark = say(
-        "from_rest", about=_about(), steel=STEEL, spread=100 * spread, creeping=creeping, count=len(runs),
-        longest=LONGEST,
+        "from_rest", about=_about(), steel=STEEL, spread=100 * spread, longest=LONGEST, count=len(runs),
+        creeping=sum(not run["stopped"] for run in runs),
     )  # fmt: skip
     return Outcome(rows, [plot], [remark])
 
@@ -158,10 +153,9 @@ def _murdoch(tell: Tell) -> Outcome:
         for at in PLACES
     ]  # fmt: skip
     runs = [one.run() for one in told(settings, tell)]
-    shape = (len(MURDOCH_GRAVITIES), len(MURDOCH_SPEEDS))
+    shape, speeds = (len(MURDOCH_GRAVITIES), len(MURDOCH_SPEEDS)), np.array(MURDOCH_SPEEDS)
     depths = np.array(_means([run["depth"][-1] for run in runs])).reshape(shape)
     times = np.array(_means([_time_down(run) for run in runs])).reshape(shape)
-    speeds = np.array(MURDOCH_SPEEDS)
     rows, curves = [], []
     for (g, _), row in zip(MURDOCH_GRAVITIES, depths, strict=True):
         line = np.polyfit(speeds, row, 1)
@@ -171,8 +165,7 @@ def _murdoch(tell: Tell) -> Outcome:
                    Curve(f"bed, {g:g} m/s2", speeds, 1e3 * row)]  # fmt: skip
     logs = np.log([[g] * len(speeds) for g, _ in MURDOCH_GRAVITIES]).ravel(), np.log(np.tile(speeds, shape[0]))
     terms = np.column_stack([np.ones(depths.size), *logs])
-    of_depth = np.linalg.lstsq(terms, np.log(depths).ravel(), rcond=None)[0]
-    of_time = np.linalg.lstsq(terms, np.log(times).ravel(), rcond=None)[0]
+    of_depth, of_time = (np.linalg.lstsq(terms, np.log(found).ravel(), rcond=None)[0] for found in (depths, times))
     rows += [
         near_zero("exponent of g in the depth", of_depth[1], 0.1),
         near_zero("exponent of g in the duration", of_time[1], 0.1),

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from dem import Bed, Facing, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 from experiments.validate.base.spheres import upright_walls
 
 from .words import say
@@ -66,10 +66,8 @@ def fill(depth: float, *, seed: int = 3) -> Filling:
         floor=Facing(rolling_friction=0.0),
     )  # fmt: skip
     rough = {"friction": WALL_FRICTION, "rolling_friction": 0.0}
-    walls = [
-        (bed.add_body([wall], position=at, **rough), axis, sign)
-        for axis, sign, wall, at in upright_walls(WIDTH, WIDTH, margin)
-    ]
+    upright = upright_walls(WIDTH, WIDTH, margin)
+    walls = [(bed.add_body([wall], position=at, **rough), axis, sign) for axis, sign, wall, at in upright]
     fall = math.sqrt(2 * float(places[:, 2].max()) / GRAVITY)
     bed.advance(round((fall + SETTLED) / bed.time_step), drag_time=DRAG)
     for wall, _, _ in walls:
@@ -90,10 +88,7 @@ def carried(weight: np.ndarray | float, scale: float) -> np.ndarray:
 
 
 def _compute(tell: Tell) -> Outcome:
-    found: list[Filling] = []
-    for depth in DEPTHS:
-        found.append(fill(depth))
-        tell(sum(DEPTHS[: len(found)]) / sum(DEPTHS))
+    found = [fill(depth) for depth in told(DEPTHS, tell)]
     weights, floors = (np.array([getattr(one, name) for one in found]) for name in ("weight", "floor"))
     fit = minimize_scalar(
         lambda s: float((((carried(weights, s) - floors) / floors) ** 2).sum()),

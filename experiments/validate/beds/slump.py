@@ -18,7 +18,7 @@ from dem import Bed, Facing
 from dem.grains.materials import SAND, Material
 from dem.measure.repose import measure_flanks, thickness_profile
 from experiments.bed.tests import stiff_enough
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told, within
 from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, run_peer, spheres
 
 from .friction_angle import lammps_law
@@ -53,12 +53,10 @@ class Heap:
 
 def _block(stuff: Material) -> tuple[np.ndarray, np.ndarray, float, float]:
     """Places [m], shape [grain_count, 3], and radii [m] of the grains, their softened modulus [Pa], their packing."""
-    length, width, depth = (side * GRAIN for side in BLOCK)
-    young = stiff_enough(stuff, depth=depth, grain=GRAIN, spread=SPREAD, gravity=GRAVITY, bearing=2.0)
-    bed = Bed.prepare(
-        stuff, size=(length, width, depth), grain=GRAIN, spread=SPREAD, gravity=GRAVITY, seed=SEED, young=young,
-        threads=1,
-    )  # fmt: skip
+    length, width, depth = size = tuple(side * GRAIN for side in BLOCK)
+    like = {"grain": GRAIN, "spread": SPREAD, "gravity": GRAVITY}
+    young = stiff_enough(stuff, depth=depth, bearing=2.0, **like)
+    bed = Bed.prepare(stuff, size=size, seed=SEED, young=young, threads=1, **like)
     grains = bed.grains()
     places = grains.position.copy()
     places[:, 0] = np.mod(places[:, 0], length) + 0.5 * (LENGTH * GRAIN - length)
@@ -98,9 +96,8 @@ def slumped(stuff: Material, block: tuple[Any, ...], tell: Tell = lambda share: 
     """What a block (places, radii, modulus, packing) of this material comes to here."""
     places, radii, young, packing = block
     bed = _bed(stuff, places, radii, young)
-    for part in range(10):
+    for _ in told(range(10), tell):
         bed.advance(_steps(bed) // 10)
-        tell(0.1 * (part + 1))
     return _heap(bed, packing, bed.kinetic_energy / bed.weight / GRAIN)
 
 
@@ -137,7 +134,7 @@ def _compute(tell: Tell) -> Outcome:
     for k, rolling in enumerate(ROLLING):
         stuff = replace(SAND, name="slump", friction=0.5, rolling_friction=rolling)
         begin = 0.3 + 0.35 * k
-        here = slumped(stuff, block, lambda done, begin=begin: tell(begin + 0.2 * done))  # type: ignore[misc]
+        here = slumped(stuff, block, within(tell, begin, begin + 0.2))
         there = in_lammps(stuff, block)
         tell(begin + 0.35)
         about = f"rolling friction {rolling:g}"

@@ -11,11 +11,10 @@ from dem.contact.law import effective_moduli
 from experiments.validate.base import cloud
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 from experiments.validate.base.energy import Book, keep_book
-from experiments.validate.base.spheres import RADIUS
+from experiments.validate.base.spheres import RADIUS, SIXTEEN, row_of_grains
 
-__all__ = ["CASES", "CLUSTER_SIZE", "ROUGH", "cluster", "hertz_energy", "settled_cloud"]
+__all__ = ["CASES", "PARTS", "ROUGH", "cluster", "hertz_energy", "moments"]
 
-CLUSTER_SIZE = 16
 ROUGH = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
 GAS = Material("gas", 2600, 1e6, 0.25, 0.0, 1.0)
 
@@ -25,20 +24,19 @@ def cluster(material: Material, *, flat: bool = False, gravity: Any = 0.0, spin:
 
     ``spin``: standard deviation of each component [rad/s].
     """
-    rng = np.random.default_rng(5)
-    i = np.arange(CLUSTER_SIZE)
-    spins = None
+    rng, spins = np.random.default_rng(5), None
     if flat:
-        positions = np.column_stack([0.00625 + 0.0125 * (i % 4), 0.00625 + 0.0125 * (i // 4), np.full(16, 0.03)])
+        positions, _, _ = row_of_grains(0.03)
         positions[:, :2] += rng.uniform(-0.003, 0.003, (16, 2))
         velocities = rng.normal(0, 1.0, (16, 3)) * [1, 1, 0]
     else:
+        i = np.arange(SIXTEEN)
         lattice = np.column_stack([i % 2, i // 2 % 2, i // 4]) * 0.0052
         positions = lattice + [0.0224, 0.0224, 0.02] + rng.uniform(0, 1e-4, (16, 3))
         velocities = (positions.mean(axis=0) - positions) * 40 + rng.normal(0, 0.1, (16, 3))
         spins = rng.normal(0, spin, (16, 3)) if spin else None
     return Bed.from_grains(
-        material, positions=positions, radii=np.full(CLUSTER_SIZE, RADIUS), velocities=velocities, spins=spins,
+        material, positions=positions, radii=np.full(SIXTEEN, RADIUS), velocities=velocities, spins=spins,
         size=(0.05, 0.05, 0.05), height=0.08, gravity=gravity, floor=False, max_overlap=0.2, **options,
     )  # fmt: skip
 
@@ -59,10 +57,9 @@ def _momentum(tell: Tell) -> Outcome:
     bed = cloud.make(gravity=0.0, floor=False, shift=(0, 0, 0.03))
     before = bed.grains()
     bed.advance(500)
-    after = bed.grains()
-    scale = before.mass @ np.linalg.norm(before.velocity, axis=1)
-    change = before.mass @ (after.velocity - before.velocity)
-    slowest = np.linalg.norm(after.velocity - before.velocity, axis=1).min()
+    gained = bed.grains().velocity - before.velocity
+    scale, change = before.mass @ np.linalg.norm(before.velocity, axis=1), before.mass @ gained
+    slowest = np.linalg.norm(gained, axis=1).min()
     return Outcome(
         [near_zero("change over the sum of m v", np.abs(change).max() / scale, 1e-13)],
         remarks=[f"In these 500 steps every one of the 64 grains changes its velocity by at least {slowest:.2g} m/s."],
@@ -80,9 +77,8 @@ def _angular_momentum(tell: Tell) -> Outcome:
     """The sum of x x m v + I w of a cluster that reaches no boundary; pairs' torques balance at the contact point."""
     bed = cluster(ROUGH, time_step=4e-6)
     _, orbital, own = moments(bed)
-    for part in range(5):
+    for _ in told(range(5), tell):
         bed.advance(200)
-        tell((part + 1) / 5)
     _, later, own_later = moments(bed)
     change = (later + own_later - orbital - own).sum(axis=0)
     moved = np.abs(own_later - own).max() / np.abs(own).max()
@@ -152,7 +148,7 @@ def _energy(material: Material, tell: Tell, *, gravity: Any = 0.0, tensile: bool
     return Outcome(rows, [plot], [f"Of the first energy at the end: {said}."])
 
 
-def settled_cloud() -> Bed:
+def _floor_weight(tell: Tell) -> Outcome:
     """The cloud after it has fallen and come to rest, weighed over the last tenth of a second."""
     bed = cloud.make(time_step=None)
     for time, drag in ((0.4, 0.02), (0.1, 0.005), (0.4, math.inf)):
@@ -162,11 +158,6 @@ def settled_cloud() -> Bed:
         if bed.kinetic_energy < 1e-9 * bed.weight * cloud.DIAMETER:
             break
     bed.advance(round(0.1 / bed.time_step))
-    return bed
-
-
-def _floor_weight(tell: Tell) -> Outcome:
-    bed = settled_cloud()
     grains = bed.grains()
     weight = cloud.STUFF.density * 4 / 3 * math.pi * float((grains.radius**3).sum()) * 9.81
     uneven = np.abs(grains.force).max() / (weight / bed.grain_count)

@@ -11,15 +11,16 @@ Both contacts hold as long as what friction must pass on is below mu times what 
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from dem import Ball, Bed, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told
 from experiments.validate.base.spheres import mass_of, plane_modulus
 
-__all__ = ["CASES", "RATIOS", "roll_off", "rolling_angle"]
+__all__ = ["CASES", "RATIOS", "roll_off", "rolled"]
 
 SMALL = 0.001  # r [m]
 RATIOS = (1, 3, 10, 30)
@@ -35,29 +36,24 @@ def _geometry(ratio: float) -> tuple[float, float]:
     return rho, 1 + 0.4 * ((large + SMALL) / rho) ** 2
 
 
-def rolling_angle(ratio: float, times: np.ndarray) -> np.ndarray:
-    """phi at the times [s], from rest at ``START`` [rad]."""
+def rolled(ratio: float, end: float, **options: Any) -> Any:
+    """phi and its rate from rest at ``START`` until ``end`` [s]: what `solve_ivp` gives for these options."""
     rho, factor = _geometry(ratio)
-    found = solve_ivp(
-        lambda _, y: [y[1], GRAVITY * math.sin(y[0]) / (rho * factor)], (0, times[-1]), [START, 0.0], t_eval=times,
-        rtol=1e-10, atol=1e-12,
-    )  # fmt: skip
-    return found.y[0]
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        return [y[1], GRAVITY * math.sin(y[0]) / (rho * factor)]
+
+    return solve_ivp(rates, (0, end), [START, 0.0], rtol=1e-10, **options)
 
 
 def _time_to(ratio: float, angle: float) -> float:
-    """When it has come to an angle [s]: dt = dphi / sqrt(2 g / (rho factor) (cos START - cos phi))."""
-    rho, factor = _geometry(ratio)
+    """When it has come to an angle [s]."""
     reached = lambda _, y: y[0] - angle  # noqa: E731
     reached.terminal = True  # type: ignore[attr-defined]
-    found = solve_ivp(
-        lambda _, y: [y[1], GRAVITY * math.sin(y[0]) / (rho * factor)], (0, 10.0), [START, 0.0], events=reached,
-        rtol=1e-10,
-    )  # fmt: skip
-    return float(found.t_events[0][0])
+    return float(rolled(ratio, 10.0, events=reached).t_events[0][0])
 
 
-def roll_off(ratio: float, step: float | None = None) -> tuple[np.ndarray, np.ndarray, float]:
+def roll_off(ratio: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Times [s], phi [rad] of a small grain between two fixed balls ``ratio`` times larger, spin over v / (r sin b)."""
     large = ratio * SMALL
     rho, _ = _geometry(ratio)
@@ -71,29 +67,28 @@ def roll_off(ratio: float, step: float | None = None) -> tuple[np.ndarray, np.nd
     at = middle + reach * np.array([0.0, math.sin(START), math.cos(START)])
     bed = Bed.from_grains(
         Material("small", DENSITY, YOUNG, POISSON, FRICTION, 0.5), positions=at[None, :], radii=np.array([SMALL]),
-        size=(width, width, 0.01), height=4 * large + 8 * SMALL, gravity=GRAVITY, floor=False, time_step=step,
+        size=(width, width, 0.01), height=4 * large + 8 * SMALL, gravity=GRAVITY, floor=False,
     )  # fmt: skip
     for side in (-1.0, 1.0):
         bed.add_body([Ball(radius=large)], position=tuple(middle + [side * large, 0.0, 0.0]))
     steps = round(_time_to(ratio, END) / bed.time_step / SAMPLES)
-    times, angles, turns = [], [], [1.0]
+    times, angles = [], []
     for _ in range(SAMPLES):
         bed.advance(steps)
         grains = bed.grains()
         d = grains.position[0] - middle
         times.append(bed.time)
         angles.append(math.atan2(d[1], d[2]))
-        speed = math.hypot(*grains.velocity[0, 1:])
-        turns.append(abs(grains.spin[0, 0]) * SMALL * sine / speed if speed > 0 else 0.0)
-    return np.array(times), np.array(angles), float(turns[-1])
+    speed = math.hypot(*grains.velocity[0, 1:])
+    turn = abs(grains.spin[0, 0]) * SMALL * sine / speed if speed > 0 else 0.0
+    return np.array(times), np.array(angles), float(turn)
 
 
 def _neck(tell: Tell) -> Outcome:
     rows, curves = [], []
-    for done, ratio in enumerate(RATIOS):
+    for ratio in told(RATIOS, tell):
         times, angles, turn = roll_off(ratio)
-        tell((done + 1) / len(RATIOS))
-        closed = rolling_angle(ratio, times)
+        closed = rolled(ratio, times[-1], t_eval=times, atol=1e-12).y[0]
         scale = math.degrees(1.0)
         way = scale * (closed[-1] - START), scale * (angles[-1] - START)
         rows.append(Comparison(f"way rolled, ratio {ratio}", "deg", *way, 0.02))

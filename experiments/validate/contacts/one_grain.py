@@ -8,38 +8,39 @@ import numpy as np
 
 from dem import Bed, Grains, Material
 from dem.contact.law import damping_factor, effective_moduli
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, near_zero, worst
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, near_zero, told, worst
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
 
-__all__ = ["CASES", "GRAVITY", "MASS", "advance_to", "rigid_stiffness", "sixteen"]
+__all__ = ["CASES", "GRAVITY", "MASS", "advance_to", "downhill", "sixteen"]
 
 YOUNG, POISSON, DENSITY, GRAVITY = 1e8, 0.25, 2600.0, 9.81
 MASS = mass_of(DENSITY, RADIUS)
 DOWN = (0.0, 0.0, -GRAVITY)
 
 
-def rigid_stiffness(radius: float = RADIUS) -> float:
-    """k of F = k delta^1.5 on a rigid plane [N/m^1.5]."""
-    return 4 / 3 * plane_modulus(YOUNG, POISSON) * math.sqrt(radius)
+STIFFNESS = 4 / 3 * plane_modulus(YOUNG, POISSON) * math.sqrt(RADIUS)
+"""k of F = k delta^1.5 on a rigid plane [N/m^1.5]."""
+CONTACT = math.sqrt(RADIUS * (MASS * GRAVITY / STIFFNESS) ** (2 / 3))
+"""Radius of the contact that carries a grain's weight [m]."""
+
+
+def downhill(degrees: float) -> tuple[float, float, float]:
+    """Gravity on an incline, x down it [m/s2]."""
+    angle = math.radians(degrees)
+    return GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle)
 
 
 def sixteen(
-    *,
-    height: float | None = None,
-    gravity: Sequence[float] = DOWN,
-    friction: float = 0.4,
-    restitution: float = 0.5,
-    rolling: float = 0.0,
-    floor: bool = True,
+    *, height: float | None = None, gravity: Sequence[float] = DOWN, friction: float = 0.4, rolling: float = 0.0,
     **options: Any,
-) -> Bed:
+) -> Bed:  # fmt: skip
     """Sixteen grains 12.5 mm apart that do not meet, at rest on the floor unless a height is given [m]."""
     if height is None:
-        height = RADIUS - (MASS * -gravity[2] / rigid_stiffness()) ** (2 / 3)
+        height = RADIUS - (MASS * -gravity[2] / STIFFNESS) ** (2 / 3)
     positions, radii, given = row_of_grains(height, gravity=gravity)
     return Bed.from_grains(
-        Material("grain", DENSITY, YOUNG, POISSON, friction, restitution, rolling), positions=positions, radii=radii,
-        floor=floor, **given | options,
+        Material("grain", DENSITY, YOUNG, POISSON, friction, 0.5, rolling), positions=positions, radii=radii,
+        **given | options,
     )  # fmt: skip
 
 
@@ -58,22 +59,19 @@ def _free_fall(tell: Tell) -> Outcome:
         t, grains = bed.time, bed.grains()
         off[0] = max(off[0], np.abs(grains.velocity - v0 - down * t).max())
         off[1] = max(off[1], np.abs(grains.displacement - v0 * t - 0.5 * down * t**2).max())
-    rows = [
+    return Outcome([
         near_zero("largest error of the velocity", off[0], 1e-13, "m/s"),
         near_zero("largest error of the path", off[1], 1e-13, "m"),
-    ]
-    return Outcome(rows)
+    ])  # fmt: skip
 
 
 def _at_rest(tell: Tell) -> Outcome:
     bed = sixteen()
-    before = bed.grains()
     bed.advance(3000)
     after = bed.grains()
-    moved = np.abs(after.position - before.position).max()
     rows = [
         Comparison("floor force over the weight", "1", 1.0, bed.floor_force / (SIXTEEN * MASS * GRAVITY), 1e-9),
-        near_zero("path in 3000 steps", moved, 1e-12, "m"),
+        near_zero("path in 3000 steps", np.abs(after.displacement).max(), 1e-12, "m"),
         near_zero("speed afterwards", np.abs(after.velocity).max(), 1e-12, "m/s"),
     ]
     return Outcome(rows)
@@ -93,11 +91,11 @@ def _sliding(tell: Tell) -> Outcome:
     t, speed, spin = np.array(times)[:, None], np.array(speeds), np.array(spins)
     # The tangential spring, stretched to mu F_n / S_t when sliding ends, rings for a while: m* = 2/7 m, so its dashpot
     # takes 4 m / 7 c_t for a fall by e, here 0.2 ms.
-    a = math.sqrt(RADIUS * (MASS * GRAVITY / rigid_stiffness()) ** (2 / 3))
-    stiffness = 8 * effective_moduli(YOUNG, POISSON, math.inf, POISSON)[1] * a
+    stiffness = 8 * effective_moduli(YOUNG, POISSON, math.inf, POISSON)[1] * CONTACT
     ringing = 4 * MASS / (7 * damping_factor(bed.material.restitution) * math.sqrt(MASS * stiffness))
     slides, rolls = t < 0.99 * turning, t > turning + 8 * ringing
-    gap = np.abs(speed / (u0 - mu * GRAVITY * t) - 1)[slides].max()
+    slid = u0 - mu * GRAVITY * t
+    gap = np.abs(speed / slid - 1)[slides].max()
     # Each grain slides until its own time, and no longer: where its speed meets 5/7 of the first.
     stop = u0 * (2 / 7) / (-np.polyfit(t[:20, 0], speed[:20, -1], 1)[0])
     spun = (spin / np.maximum(2.5 * mu * GRAVITY * t / RADIUS, 1e-30))[1:][slides[1:]]
@@ -108,20 +106,19 @@ def _sliding(tell: Tell) -> Outcome:
         Comparison("speed once rolling over 5/7 u0, worst", "1", 1.0, worst((speed / (5 * u0 / 7))[rolls], 1.0), 1e-3),
         Comparison("spin r over speed once rolling, worst", "1", 1.0, worst((spin * RADIUS / speed)[rolls], 1.0), 1e-3),
     ]
-    closed = np.maximum(u0 - mu * GRAVITY * t, 5 * u0 / 7)
-    curves = []
-    for k in (3, 8, 15):
-        curves.append(Curve(f"closed form, {u0[k]:.2f} m/s", 1e3 * t[:, 0], closed[:, k], False))
-        curves.append(Curve(f"bed, {u0[k]:.2f} m/s", 1e3 * t[:, 0], speed[:, k]))
+    both = {"closed form": np.maximum(slid, 5 * u0 / 7), "bed": speed}
+    curves = [
+        Curve(f"{what}, {u0[k]:.2f} m/s", 1e3 * t[:, 0], values[:, k], what == "bed")
+        for k in (3, 8, 15) for what, values in both.items()
+    ]  # fmt: skip
     return Outcome(rows, [Plot("Sliding turns into rolling", "time [ms]", "speed [m/s]", curves)])
 
 
 def _incline(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
     angle = math.radians(20)
-    gravity = (GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle))
-    for done, rolling in enumerate((0.0, 0.05, 0.2), 1):
-        bed = sixteen(gravity=gravity, friction=0.5, rolling=rolling)
+    for rolling in told((0.0, 0.05, 0.2), tell):
+        bed = sixteen(gravity=downhill(20), friction=0.5, rolling=rolling)
         first = advance_to(bed, 0.02)
         start = bed.time
         second = advance_to(bed, 0.05)
@@ -130,18 +127,14 @@ def _incline(tell: Tell) -> Outcome:
         rows.append(Comparison(f"acceleration, mu_r = {rolling:g}", "m/s2", closed, pull, 2e-3))
         slip = float(second.spin[0, 1] * RADIUS / second.velocity[0, 0])
         rows.append(Comparison(f"spin r over speed, mu_r = {rolling:g}", "1", 1.0, slip, 5e-3))
-        tell(done / 3)
     return Outcome(rows)
 
 
 def _held(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
     for degrees in (5, 10, 20):
-        angle = math.radians(degrees)
-        gravity = (GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle))
-        bed = sixteen(gravity=gravity, friction=0.5, rolling=1.1 * math.tan(angle))
-        advance_to(bed, 0.02)
-        there = bed.grains()
+        bed = sixteen(gravity=downhill(degrees), friction=0.5, rolling=1.1 * math.tan(math.radians(degrees)))
+        there = advance_to(bed, 0.02)
         after = advance_to(bed, 0.06)
         crept = np.abs(after.position - there.position).max()
         rows.append(near_zero(f"speed after 0.06 s at {degrees} deg", np.abs(after.velocity).max(), 1e-8, "m/s"))
@@ -154,8 +147,7 @@ def _held(tell: Tell) -> Outcome:
 def _twisting(tell: Tell) -> Outcome:
     mu, w0 = 0.4, np.linspace(2.0, 8.0, SIXTEEN)
     bed = sixteen(friction=mu, rolling=0.1, spins=np.outer(w0, [0, 0, 1]))
-    a = math.sqrt(RADIUS * (MASS * GRAVITY / rigid_stiffness()) ** (2 / 3))
-    slowing = 3 * math.pi / 16 * mu * a * MASS * GRAVITY / (0.4 * MASS * RADIUS**2)
+    slowing = 3 * math.pi / 16 * mu * CONTACT * MASS * GRAVITY / (0.4 * MASS * RADIUS**2)
     grains = advance_to(bed, 0.5 * w0[0] / slowing)
     rows = compared(
         "spin", [f"{w:g} rad/s" for w in w0], w0 - slowing * bed.time, grains.spin[:, 2], unit="rad/s", band=1e-3
