@@ -63,14 +63,17 @@ class Comparison:
 
 
 def compared(
-    quantity: str, labels: Sequence[Any], reference: Any, ours: Any, *, unit: str = "1", band: float
-) -> list[Comparison]:
-    """A comparison for each of several numbers, called ``<quantity> at <label>``.
+    quantity: str, at: Sequence[Any] | np.ndarray, reference: Any, ours: Any, *, band: float, unit: str = "1",
+    form: str = "{}", only: np.ndarray | None = None,
+) -> list[Comparison]:  # fmt: skip
+    """A comparison for each of several numbers, called ``<quantity> at <at>``, each ``at`` written as ``form``.
 
-    Raises ValueError for other lengths.
+    ``reference``: of each, or one of all. ``only``: which are compared, shape [n]. Raises ValueError for other lengths.
     """
-    rows = zip(labels, np.asarray(reference, dtype=float), np.asarray(ours, dtype=float), strict=True)
-    return [Comparison(f"{quantity} at {label}", unit, float(a), float(b), band) for label, a, b in rows]
+    wanted = np.broadcast_to(np.asarray(reference, dtype=float), np.shape(ours))
+    rows = zip(at, wanted, np.asarray(ours, dtype=float), strict=True)
+    found = [Comparison(f"{quantity} at {form.format(x)}", unit, float(a), float(b), band) for x, a, b in rows]
+    return found if only is None else [one for one, chosen in zip(found, only, strict=True) if chosen]
 
 
 @dataclass(frozen=True)

@@ -45,15 +45,6 @@ def oblique(step: float = STEP, angles: np.ndarray = ANGLES) -> Grains:
     return meet_floor(Material("t4", friction=MU, restitution=E_N, **ALUMINA), velocities, step=step, time=1.5e-5)
 
 
-def one_spring_spin(angles: np.ndarray, law: str) -> np.ndarray:
-    """Spins of T4 by the contact law alone [rad/s], shape of ``angles`` [deg]."""
-    like, first = Material("t4", friction=MU, restitution=E_N, **ALUMINA), np.tan(np.radians(angles))
-    overlap = np.array([contact_of(like, RADIUS, SPEED * math.cos(angle))[0] for angle in np.radians(angles)])
-    unit = overlap / LARGEST / RADIUS
-    along, _ = one_spring(first, law=law, unit=unit, steps=8000, **_LIKE)
-    return spin_of(angles, along / first)
-
-
 def _sliding_spin(angles: np.ndarray) -> np.ndarray:
     return 2.5 * MU * (1 + E_N) * SPEED * np.cos(np.radians(angles)) / RADIUS
 
@@ -72,16 +63,16 @@ def _t4_tangential(tell: Tell) -> Outcome:
         Curve("as quoted", angles, quoted, False),
         Curve("bed", angles, found),
     ]
-    return Outcome(
-        compared("e_t", [f"{a:.4g} deg" for a in angles], quoted, found, band=PUBLISHED_BAND),
-        [Plot("Tangential restitution", "angle of impact [deg]", "e_t [1]", curves)],
-    )
+    rows = compared("e_t", angles, quoted, found, band=PUBLISHED_BAND, form="{:.4g} deg")
+    return Outcome(rows, [Plot("Tangential restitution", "angle of impact [deg]", "e_t [1]", curves)])
 
 
 def _t4_spin(tell: Tell) -> Outcome:
     angles, quoted = SPIN.T
-    found = oblique(angles=angles).spin[:, 1]
-    fine = oblique(STEP / 5, angles).spin[:, 1]
+    found, fine = oblique(angles=angles).spin[:, 1], oblique(STEP / 5, angles).spin[:, 1]
+    whole = oblique()  # how far the spins are from what angular momentum makes of e_t, relative
+    whole_e_t = whole.velocity[:, 0] / (SPEED * np.sin(np.radians(ANGLES)))
+    book = float(np.abs(spin_of(ANGLES, whole_e_t) / whole.spin[:, 1] - 1).max())
     # Where the contact slides to its end no law comes in: what the figure is off by there is how well it was read.
     slides = angles > SLIDES_FROM - 0.5
     reading = float(np.abs(quoted - _sliding_spin(angles))[slides].max())
@@ -95,45 +86,36 @@ def _t4_spin(tell: Tell) -> Outcome:
         Curve("as quoted", angles, quoted, False),
         Curve("bed", angles, found),
     ]
-    bare, held = (one_spring_spin(angles, law) - quoted for law in ("undamped", "bed"))
+    first = np.tan(np.radians(angles))
+    like = Material("t4", friction=MU, restitution=E_N, **ALUMINA)
+    overlap = np.array([contact_of(like, RADIUS, SPEED * math.cos(angle))[0] for angle in np.radians(angles)])
+    unit, laws = overlap / LARGEST / RADIUS, ("undamped", "bed")
+    after = (one_spring(first, law=law, unit=unit, steps=8000, **_LIKE)[0] for law in laws)
+    bare, held = (spin_of(angles, along / first) - quoted for along in after)
     slipping = spin_of(angles, np.array([tangential_restitution(angle, **_LIKE) for angle in angles]))
     ten = int(np.abs(angles - 10).argmin())
     worth = float((found[ten + 1] - found[ten - 1]) / (angles[ten + 1] - angles[ten - 1])) / 10
-    alone = {"off": held[ten], "bare_off": bare[ten], "rms": _rms(held), "bare_rms": _rms(bare)}
+    rms, bare_rms = (float(np.sqrt((off**2).mean())) for off in (held, bare))
+    alone = {"off": held[ten], "bare_off": bare[ten], "rms": rms, "bare_rms": bare_rms}
     lists = {"slipping": slipping, "angles": angles, "figure": quoted, "spring": bare + quoted}
     remarks = [
         say("figure_read", reading=reading, worth=worth, band=100 * PUBLISHED_BAND),
-        say("law_alone", angle=angles[ten], finer=np.abs(fine - found).max(), book=100 * _book(), **alone),
+        say("law_alone", angle=angles[ten], finer=np.abs(fine - found).max(), book=100 * book, **alone),
         say("rings", **{name: ", ".join(f"{v:.4g}" for v in values[:3]) for name, values in lists.items()}),
     ]
     curves.append(Curve("rings that slip one by one", angles, slipping, False))
     return Outcome(rows, [Plot("Spin after the impact", "angle of impact [deg]", "spin [rad/s]", curves)], remarks)
 
 
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt((values**2).mean()))
-
-
 def _t4_sliding(tell: Tell) -> Outcome:
-    after, angle = oblique(), np.radians(ANGLES)
-    e_t, spin = after.velocity[:, 0] / (SPEED * np.sin(angle)), after.spin[:, 1]
-    slides = ANGLES >= SLIDES_FROM
-    labels = [f"{a} deg" for a in ANGLES]
-    kept = [f"{a} deg" for a in ANGLES[slides]]
-    e_n = after.velocity[:, 2] / (SPEED * np.cos(angle))
-    return Outcome(
-        [
-            *compared("e_t", kept, (1 - MU * (1 + E_N) / np.tan(angle))[slides], e_t[slides], band=CLOSED_BAND),
-            *compared("spin", kept, _sliding_spin(ANGLES)[slides], spin[slides], unit="rad/s", band=ARM_BAND),
-            *compared("e_n", labels, np.full(13, E_N), e_n, band=1e-3),
-        ]
-    )
-
-
-def _book() -> float:
-    """How far the spins are from what angular momentum makes of e_t, relative."""
-    after, start = oblique(), SPEED * np.sin(np.radians(ANGLES))
-    return float(np.abs(spin_of(ANGLES, after.velocity[:, 0] / start) / after.spin[:, 1] - 1).max())
+    after, angle, slides = oblique(), np.radians(ANGLES), ANGLES >= SLIDES_FROM
+    e_t, e_n = after.velocity[:, 0] / (SPEED * np.sin(angle)), after.velocity[:, 2] / (SPEED * np.cos(angle))
+    closed, like = 1 - MU * (1 + E_N) / np.tan(angle), {"form": "{} deg", "only": slides}
+    return Outcome([
+        *compared("e_t", ANGLES, closed, e_t, band=CLOSED_BAND, **like),
+        *compared("spin", ANGLES, _sliding_spin(ANGLES), after.spin[:, 1], unit="rad/s", band=ARM_BAND, **like),
+        *compared("e_n", ANGLES, E_N, e_n, band=1e-3, form="{} deg"),
+    ])  # fmt: skip
 
 
 T5 = {"steel": (7850.0, 208e9, 0.30), "polyethylene": (1400.0, 1e9, 0.40)}  # normal speed held, angle varied
@@ -150,13 +132,11 @@ def _t5(tell: Tell) -> Outcome:
         along = T5_RATIOS * T5_MU * T5_SPEED
         velocities = np.column_stack([along, 0 * along, np.full(len(along), -T5_SPEED)])
         after = meet_floor(stuff, velocities, radius=T5_RADIUS, step=time / 300, time=1.5 * time, max_overlap=0.2)
-        slides, unit = T5_RATIOS > 7, T5_MU * T5_SPEED
-        scaled = after.spin[:, 1] * T5_RADIUS / unit
-        labels = [f"tan / mu = {ratio:g}" for ratio in T5_RATIOS[slides]]
-        lost, alike = (along - after.velocity[:, 0]) / unit, np.ones(slides.sum())
-        rows += compared(f"{name}: loss of v_t over mu v_n", labels, 2 * alike, lost[slides], band=CLOSED_BAND)
+        unit, like = T5_MU * T5_SPEED, {"form": "tan / mu = {:g}", "only": T5_RATIOS > 7}
+        scaled, lost = after.spin[:, 1] * T5_RADIUS / unit, (along - after.velocity[:, 0]) / unit
+        rows += compared(f"{name}: loss of v_t over mu v_n", T5_RATIOS, 2, lost, band=CLOSED_BAND, **like)
         band = CLOSED_BAND + overlap / T5_RADIUS  # the arm is shorter by the overlap at most
-        rows += compared(f"{name}: spin r over mu v_n", labels, 5 * alike, scaled[slides], band=band)
+        rows += compared(f"{name}: spin r over mu v_n", T5_RATIOS, 5, scaled, band=band, **like)
         e_n = worst(after.velocity[:, 2] / T5_SPEED, 1.0)
         rows.append(Comparison(f"{name}: e_n, worst", "1", 1.0, e_n, 1e-3))
         curves.append(Curve(name, T5_RATIOS, scaled))
@@ -168,6 +148,7 @@ SPIN_MU, SPIN_E, SPIN_SPEED, SPIN_RADIUS = 0.4, 0.5, 0.2, 0.1
 SPINS = np.array([0.175, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 7.0, 9.0, 12.0, 16.0, 22.0])
 SLIDES = SPINS * SPIN_RADIUS > 3.5 * SPIN_MU * (1 + SPIN_E) * SPIN_SPEED
 _KICK = SPIN_MU * (1 + SPIN_E) * SPIN_SPEED  # of the tangential speed
+_SLIDING = {"form": "{:g} rad/s", "only": SLIDES}
 E_BAND = 1e-3  # Thornton's fit of the damping
 
 
@@ -189,13 +170,14 @@ def _t6(tell: Tell) -> Outcome:
 
 def _spin_rows(name: str, along: np.ndarray, spin: np.ndarray, share: float, radius: float) -> list[Comparison]:
     """Speed mu (1 + e) v_n and spin less 5/2 of it over r, where the contact slides; ``share`` is m* over the mass."""
-    labels = [f"{s:g} rad/s" for s in SPINS[SLIDES]]
-    closed = np.full(SLIDES.sum(), share * _KICK)
-    lost = (SPINS - spin)[SLIDES]
+    closed = share * _KICK
     return [
-        *compared(f"{name}: speed", labels, closed, along[SLIDES], unit="m/s", band=E_BAND),
-        *compared(f"{name}: loss of spin", labels, 2.5 * closed / radius, lost, unit="rad/s", band=2 * E_BAND),
-    ]
+        *compared(f"{name}: speed", SPINS, closed, along, unit="m/s", band=E_BAND, **_SLIDING),
+        *compared(
+            f"{name}: loss of spin", SPINS, 2.5 * closed / radius, SPINS - spin, unit="rad/s", band=2 * E_BAND,
+            **_SLIDING,
+        ),
+    ]  # fmt: skip
 
 
 def _pair(name: str, radii: tuple[float, float], speeds: tuple[float, float], spins: tuple[float, float]) -> Grains:
@@ -235,10 +217,9 @@ def _t7(tell: Tell) -> Outcome:
 
 def _lost_in_sliding() -> str:
     """What the friction law alone makes of T6, as a remark."""
-    shares = {
-        held: 100 * sliding_share(SPIN_E, 22.0 * SPIN_RADIUS / SPIN_SPEED, spring_alone=held) for held in (False, True)
-    }
-    return say("sliding_law", alone=shares[True], together=shares[False])
+    ratio = 22.0 * SPIN_RADIUS / SPIN_SPEED
+    alone, together = (100 * sliding_share(SPIN_E, ratio, spring_alone=held) for held in (True, False))
+    return say("sliding_law", alone=alone, together=together)
 
 
 def _t7_same_way(tell: Tell) -> Outcome:
@@ -257,17 +238,16 @@ def _t8(tell: Tell) -> Outcome:
     after = [_pair(name, radii, (SPIN_SPEED, 0.0), (spin, 0.0)) for spin in told(SPINS, tell)]
     first, second = (mass_of(METALS[name][0], r) for r in radii)
     share = second / (first + second)
-    speed, spin = np.array([a.velocity[0, 1] for a in after]), np.array([a.spin[0, 2] for a in after])
-    other = np.array([a.spin[1, 2] for a in after])
-    closed = np.full(SLIDES.sum(), 2.5 * first / (first + second) * _KICK / radii[1])
-    labels = [f"{s:g} rad/s" for s in SPINS[SLIDES]]
+    speed = np.abs([a.velocity[0, 1] for a in after])
+    spin, other = np.array([a.spin[:, 2] for a in after]).T
+    closed = 2.5 * first / (first + second) * _KICK / radii[1]
     curves = [
         Curve("mu (1 + e) v_n m_2 / (m_1 + m_2)", SPINS[SLIDES], np.full(SLIDES.sum(), share * _KICK), False),
-        Curve("small sphere", SPINS, np.abs(speed)),
+        Curve("small sphere", SPINS, speed),
     ]
-    large = compared("large sphere: spin", labels, closed, np.abs(other)[SLIDES], unit="rad/s", band=2 * E_BAND)
+    large = compared("large sphere: spin", SPINS, closed, np.abs(other), unit="rad/s", band=2 * E_BAND, **_SLIDING)
     return Outcome(
-        [*_spin_rows("small sphere", np.abs(speed), spin, share, radii[0]), *large],
+        [*_spin_rows("small sphere", speed, spin, share, radii[0]), *large],
         [Plot("Tangential speed of the small sphere after the impact", "spin before [rad/s]", "speed [m/s]", curves)],
     )
 
@@ -279,14 +259,12 @@ def spin_impact(tell: Tell) -> Outcome:
         Material("spin", friction=MU, restitution=E_N, **ALUMINA), np.outer(-speeds, [0.0, 0.0, 1.0]),
         spins=np.tile([0.0, 3000.0, 0.0], (16, 1)), step=STEP, time=2e-5,
     )  # fmt: skip
-    closed, labels = MU * (1 + E_N) * speeds, [f"{v:.3g} m/s" for v in speeds]
+    closed, like = MU * (1 + E_N) * speeds, {"band": 1e-3, "form": "{:.3g} m/s"}
     # A spin about +y takes the lowest point towards -x, so friction drives the grain towards +x.
-    return Outcome(
-        [
-            *compared("v_x", labels, closed, after.velocity[:, 0], unit="m/s", band=1e-3),
-            *compared("spin", labels, 3000 - 2.5 * closed / RADIUS, after.spin[:, 1], unit="rad/s", band=1e-3),
-        ]
-    )
+    return Outcome([
+        *compared("v_x", speeds, closed, after.velocity[:, 0], unit="m/s", **like),
+        *compared("spin", speeds, 3000 - 2.5 * closed / RADIUS, after.spin[:, 1], unit="rad/s", **like),
+    ])  # fmt: skip
 
 
 CASES = {

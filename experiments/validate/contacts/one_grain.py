@@ -149,9 +149,8 @@ def _twisting(tell: Tell) -> Outcome:
     bed = sixteen(friction=mu, rolling=0.1, spins=np.outer(w0, [0, 0, 1]))
     slowing = 3 * math.pi / 16 * mu * CONTACT * MASS * GRAVITY / (0.4 * MASS * RADIUS**2)
     grains = advance_to(bed, 0.5 * w0[0] / slowing)
-    rows = compared(
-        "spin", [f"{w:g} rad/s" for w in w0], w0 - slowing * bed.time, grains.spin[:, 2], unit="rad/s", band=1e-3
-    )
+    closed = w0 - slowing * bed.time
+    rows = compared("spin", w0, closed, grains.spin[:, 2], unit="rad/s", band=1e-3, form="{:g} rad/s")
     grains = advance_to(bed, 4 * w0[-1] / slowing)
     rows.append(near_zero("spin at the end", np.abs(grains.spin).max(), 1e-6, "rad/s"))
     return Outcome(rows)
