@@ -35,12 +35,9 @@ _LEVEL = 0.05
 _THRESHOLDS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4, 12.8)
 """Least size of a term that is kept: root mean square of what it moves, over the noise of a row."""
 _FOLDS = 3
-_PARTS = 4
-"""Of a trial left out, in time, whose gains are ranked: campaigns have few trials."""
-_MOST_ROWS = 200
-"""Of a Gaussian process: its cost grows with the cube of this."""
-_FULL = 500
-"""Rows of a trial that the sparse regression looks at."""
+_PARTS = 4  # of a trial left out, in time, whose gains are ranked: campaigns have few trials
+_MOST_ROWS = 200  # of a Gaussian process: its cost grows with the cube of this
+_FULL = 500  # rows of a trial that the sparse regression looks at
 
 
 class Regressor(ABC):

@@ -37,8 +37,7 @@ NAMES = {
     "penetration": ("z", "v", "back", "inside"),
 }
 """The state, by kind of trial. y from where it stands; touch and inside are 1 where a tip is below the surface."""
-STANDING = {"tumble": ("force x", "force y", "torque"), "penetration": ("force",)}
-"""Targets, by kind of trial."""
+STANDING = {"tumble": ("force x", "force y", "torque"), "penetration": ("force",)}  # targets, by kind of trial
 _HALF = math.pi / 8
 _NEAR = 5e-4
 """Height of the lowest tip below which it is taken to touch: the smoothed camera knows it to two tenths of this [m]."""
@@ -49,15 +48,12 @@ _LOUD = 6.0
 
 @dataclass(frozen=True)
 class Rows:
-    """One trial: states [row_count, state_count], targets [row_count, target_count], in the order of time.
-
-    `std`: noise of the targets [target_count], of the middle trial.
-    """
+    """One trial, in the order of time."""
 
     trial: str
-    state: Array
-    target: Array
-    std: Array
+    state: Array  # [row_count, state_count]
+    target: Array  # [row_count, target_count]
+    std: Array  # noise of the targets [target_count], of the middle trial
 
 
 def make_rows(problem: Any, values: Mapping[str, float], trials: Sequence[str]) -> list[Rows]:

@@ -21,8 +21,7 @@ CASES_FILE = "cases.jsonl"
 Case = Json
 _BINS = ((0.0, 1.0), (1.0, 3.0), (3.0, 10.0), (10.0, math.inf))
 _PLAIN = 10.0
-_GAP = 1.5
-"""Chi-square per sample above which there is a gap that can be closed."""
+_GAP = 1.5  # chi-square per sample above which there is a gap that can be closed
 _NINETY_FIVE = 1.96
 
 

@@ -20,8 +20,7 @@ Names = Sequence[str]
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("floor-vibration", "loose-mass", "shock", "load-cell-drift", "sloshing")
 _STEP = 5e-6
-_COLOURED_DEPTH = 0.25
-"""Share of the campaigns whose depth sensor's noise is correlated from row to row."""
+_COLOURED_DEPTH = 0.25  # share of the campaigns whose depth sensor's noise is correlated from row to row
 
 _Columns = dict[str, np.ndarray]
 
@@ -33,13 +32,10 @@ class Hidden:
     effects: tuple[str, ...]
     outside: str | None
     parameters: dict[str, float]
-    signature: float
-    """Root mean square of what the effect changes, after K and C are fitted to it, over the noise."""
-    coloured: bool
-    """Whether the noise of force and acceleration is correlated from row to row."""
+    signature: float  # root mean square of what the effect changes, after K and C are fitted to it, over the noise
+    coloured: bool  # whether the noise of force and acceleration is correlated from row to row
     trials: int = 0
-    depth_persistence: float = 0.0
-    """Correlation of the depth's noise from row to row: 0 for white noise."""
+    depth_persistence: float = 0.0  # correlation of the depth's noise from row to row: 0 for white noise
     extra: Json = field(default_factory=dict)
 
 

@@ -26,8 +26,7 @@ Random = np.random.Generator
 _Columns = dict[str, Array]
 NUISANCES = {"bed": 0.2, "force-zero": 0.2, "depth-zero": 0.15, "loud": 0.2}
 """How often what is wrong beside: K (and C) differ from trial to trial, zeros of pushes, noise 1.3 times as loud."""
-SIZES = (0.012, 0.02, 0.032)
-"""Diameters [m]; numbers of a bed are those of the middle one."""
+SIZES = (0.012, 0.02, 0.032)  # diameters [m]; numbers of a bed are those of the middle one
 
 _LOUD = 1.3
 _MOST_ROWS = 1200
@@ -45,8 +44,7 @@ class Trial:
 
     driven: bool
     speed: float
-    size: float
-    """Diameter [m]"""
+    size: float  # diameter [m]
     factor_k: float = 1.0
     factor_c: float = 1.0
     force_zero: float = 0.0
@@ -68,25 +66,18 @@ class Rig:
     gravity: float
     believed: tuple[float, float]
     doubt: tuple[float, float]
-    power: float
-    """K and C go with this power of the diameter."""
-    noise: dict[str, float]
-    """Of depth [m], force [N], accel [m/s2], as stated."""
+    power: float  # K and C go with this power of the diameter
+    noise: dict[str, float]  # of depth [m], force [N], accel [m/s2], as stated
     louder: dict[str, float]
     persistence: dict[str, float]
-    steps: dict[str, float]
-    """Of readings that are quantised, 0 for those that are not."""
-    jitter: float
-    """Of the times, in rows."""
+    steps: dict[str, float]  # of readings that are quantised, 0 for those that are not
+    jitter: float  # of the times, in rows
     gaps: bool
-    only_depth: bool
-    """Whether the accelerometer was not fitted."""
+    only_depth: bool  # whether the accelerometer was not fitted
     small_units: bool
-    wandering: dict[str, float]
-    """Standard deviations of the nuisances from trial to trial."""
+    wandering: dict[str, float]  # standard deviations of the nuisances from trial to trial
     drop_time: float
-    flight: bool
-    """Whether drops are recorded from before they touch."""
+    flight: bool  # whether drops are recorded from before they touch
     trials: tuple[Trial, ...]
 
 

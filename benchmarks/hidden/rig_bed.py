@@ -32,12 +32,9 @@ LAWS: dict[str, tuple[str, ...]] = {
 }
 """What a law may be, by what it stands for; the last six are in no library."""
 
-_STEP = 1.25e-5
-"""s, of a drop."""
-_CREEP = 2e-4
-"""m/s below which the direction of a drive is not certain to friction that is not mobilised over a way."""
-_STEEPEST = 0.9
-"""Share of the depth of locking from which a hyperbola goes on straight."""
+_STEP = 1.25e-5  # s, of a drop
+_CREEP = 2e-4  # m/s below which the direction of a drive is not certain to friction that is not mobilised over a way
+_STEEPEST = 0.9  # share of the depth of locking from which a hyperbola goes on straight
 
 
 @dataclass(frozen=True)
@@ -289,8 +286,7 @@ class Path:
     time: Array
     depth: Array
     speed: Array
-    stops: float
-    """When the way in ends [s]."""
+    stops: float  # when the way in ends [s]
 
 
 def drive(segments: Sequence[tuple[float, float]], start: float, ramp: float, *, eased: bool, step: float) -> Path:

@@ -23,10 +23,8 @@ from . import tumble as hidden_tumble
 
 __all__ = ["KINDS", "STRENGTHS", "make_case", "suite", "write_suite"]
 
-KINDS = ("penetration", "tumble", "rig")
-"""Of made-up campaigns: those of a rig are penetrations, too, of another maker."""
-STRENGTHS = (0.7, 50.0)
-"""Signatures that are aimed at, over the noise: from not quite to be seen to plain."""
+KINDS = ("penetration", "tumble", "rig")  # of made-up campaigns: those of a rig are penetrations, too, of another maker
+STRENGTHS = (0.7, 50.0)  # signatures that are aimed at, over the noise: from not quite to be seen to plain
 
 _SHARES = {"effect": 0.53, "null": 0.22, "outside": 0.17, "pair": 0.08}
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)

@@ -45,17 +45,14 @@ class HiddenTumble:
 
     effects: tuple[str, ...]
     outside: str | None
-    parameters: dict[str, float]
-    """Those with fixed names (docs/diagnose.md), "<effect>.<name>"."""
-    settings: dict[str, float]
-    """All numbers of what is hidden, by `hidden_tumble_motion.COLUMNS`."""
+    parameters: dict[str, float]  # those with fixed names (docs/diagnose.md), "<effect>.<name>"
+    settings: dict[str, float]  # all numbers of what is hidden, by `tumble_motion.COLUMNS`
     signature: float
     """Root mean square of what it changes in the channel that it changes most, over the noise, after the change that
     the uncertain numbers explain, to first order and within their uncertainties, is taken out."""
     coloured: bool
     trials: int
-    true: dict[str, float] = field(default_factory=dict)
-    """The true values of the uncertain numbers."""
+    true: dict[str, float] = field(default_factory=dict)  # the true values of the uncertain numbers
 
     @property
     def kind(self) -> str:

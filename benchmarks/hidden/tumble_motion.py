@@ -32,10 +32,8 @@ COLUMNS = (
     "shock_turn", "shock_time", "unbalance", "wind", "wind_from", "wind_to",
 )  # fmt: skip
 """Numbers of one trial, SI units, in the order of the kernel's table."""
-STEP = 1e-5
-"""Of the integration [s]."""
-ROW = 1e-4
-"""Between two rows of the motion that is given back [s]."""
+STEP = 1e-5  # of the integration [s]
+ROW = 1e-4  # between two rows of the motion that is given back [s]
 _COUNT = 8
 HALF, TURN = math.pi / _COUNT, 2 * math.pi / _COUNT
 Numbers = ti.types.struct(**dict.fromkeys(COLUMNS, ti.f64))

@@ -38,8 +38,7 @@ CHANNELS = tuple(TOLERANCE)
 _LIMITS = np.array(list(TOLERANCE.values()))
 _PUSHES = (1e-6, 1e-5)
 _DIRECTIONS = 3
-_JUMP = 3.0
-"""A path that a push ten times larger moves by more than so many times ten has taken another branch."""
+_JUMP = 3.0  # A path that a push ten times larger moves by more than so many times ten has taken another branch
 
 
 def random_trial(rng: np.random.Generator, effects: Sequence[str], ranges: Ranges) -> Trial:
@@ -73,18 +72,12 @@ def random_trial(rng: np.random.Generator, effects: Sequence[str], ranges: Range
 class Agreement:
     """What a comparison found, over the trials that can stand."""
 
-    differences: Array
-    """Largest difference of a trial, shape [trial_count, channel], in `CHANNELS`' order and units."""
-    kinds: tuple[str, ...]
-    """Of each trial: "within", "branch", "step" or "unexplained" (see the module)."""
-    ratios: Array
-    """Largest difference over tolerance, shape [trial_count]."""
-    seconds: float
-    """Time of one accurate trial [s]."""
-    energy_residual: float
-    """The largest of the accurate ones [1]."""
-    strangers: int
-    """Trials that stand by one integrator and not by the other."""
+    differences: Array  # largest difference of a trial, shape [trial_count, channel], in `CHANNELS`' order and units
+    kinds: tuple[str, ...]  # of each trial: "within", "branch", "step" or "unexplained" (see the module)
+    ratios: Array  # largest difference over tolerance, shape [trial_count]
+    seconds: float  # time of one accurate trial [s]
+    energy_residual: float  # the largest of the accurate ones [1]
+    strangers: int  # trials that stand by one integrator and not by the other
 
     def share(self, kind: str) -> float:
         """Share of the trials of this kind [1]."""

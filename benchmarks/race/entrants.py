@@ -53,29 +53,18 @@ def find_mpirun() -> str | None:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a log says of its last, timed run.
+    """What a log says of its last, timed run."""
 
-    Attributes:
-        version: as the code gives it.
-        time: of the timed steps [s].
-        steps, grain_count, list_count: timed steps, grains, neighbour lists made meanwhile.
-        missed: lists that the code itself says came too late ("dangerous builds").
-        kinetic_energy: translation and rotation at the end [J].
-        coordination: contacts between grains, per grain, at the end [1].
-        mean_height: of the centres at the end [m].
-        period: (x, y) [m].
-    """
-
-    version: str
-    time: float
-    steps: int
+    version: str  # as the code gives it
+    time: float  # of the timed steps [s]
+    steps: int  # timed
     grain_count: int
-    list_count: int
-    missed: int
-    kinetic_energy: float
-    coordination: float
-    mean_height: float
-    period: tuple[float, float]
+    list_count: int  # neighbour lists made in the timed steps
+    missed: int  # lists that the code itself says came too late ("dangerous builds")
+    kinetic_energy: float  # translation and rotation at the end [J]
+    coordination: float  # contacts between grains, per grain, at the end [1]
+    mean_height: float  # of the centres at the end [m]
+    period: tuple[float, float]  # (x, y) [m]
 
 
 _LOOP = re.compile(r"^Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+) atoms", re.MULTILINE)
@@ -127,27 +116,16 @@ def run_peer(
 
 @dataclass(frozen=True)
 class Heat:
-    """One timed run of one entrant.
+    """One timed run of one entrant."""
 
-    Attributes:
-        speed: grains times steps over wall time [1/s].
-        list_count: neighbour lists made in the timed steps.
-        coordination: between grains, at the end [1].
-        packing: as ``grains.packing``, at the end [1].
-        kinetic_energy: translation and rotation, at the end [J].
-        version: of a peer; "" for ours.
-        command: of a peer; "" for ours.
-        missed: lists that came too late, by the peer's own word.
-    """
-
-    speed: float
-    list_count: int
-    coordination: float
-    packing: float
-    kinetic_energy: float
-    version: str = ""
-    command: str = ""
-    missed: int = 0
+    speed: float  # grains times steps over wall time [1/s]
+    list_count: int  # neighbour lists made in the timed steps
+    coordination: float  # between grains, at the end [1]
+    packing: float  # as ``grains.packing``, at the end [1]
+    kinetic_energy: float  # translation and rotation, at the end [J]
+    version: str = ""  # of a peer
+    command: str = ""  # of a peer
+    missed: int = 0  # lists that came too late, by the peer's own word
 
 
 class Entrant(ABC):

@@ -32,17 +32,11 @@ _TRIES = 4
 
 @dataclass(frozen=True)
 class Grains:
-    """Grains at rest on a floor at z = 0, periodic in x and y.
+    """Grains at rest on a floor at z = 0, periodic in x and y."""
 
-    Attributes:
-        positions: centres [m], x and y within the periods, shape [grain_count, 3].
-        radii: [m], shape [grain_count].
-        period: (x, y) [m].
-    """
-
-    positions: np.ndarray
-    radii: np.ndarray
-    period: tuple[float, float]
+    positions: np.ndarray  # centres [m], x and y within the periods, shape [grain_count, 3]
+    radii: np.ndarray  # [m], shape [grain_count]
+    period: tuple[float, float]  # (x, y) [m]
 
     @property
     def count(self) -> int:

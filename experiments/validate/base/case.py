@@ -18,23 +18,14 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Comparison:
-    """One number beside the one it should be.
+    """One number beside the one it should be."""
 
-    Attributes:
-        quantity: what it is, with the case it is of ("e_t at 10 deg").
-        unit: of both; "1" for a ratio.
-        reference: from the closed form, or published.
-        ours: measured on the bed.
-        band: the largest difference that passes, over the reference's size where ``relative``.
-        relative: False where ``band`` is in the unit itself.
-    """
-
-    quantity: str
-    unit: str
-    reference: float
-    ours: float
-    band: float
-    relative: bool = True
+    quantity: str  # what it is, with the case it is of ("e_t at 10 deg")
+    unit: str  # of both; "1" for a ratio
+    reference: float  # from the closed form, or published
+    ours: float  # measured on the bed
+    band: float  # the largest difference that passes, over the reference's size where ``relative``
+    relative: bool = True  # False where ``band`` is in the unit itself
 
     def __post_init__(self) -> None:
         if not self.band > 0 or (self.relative and self.reference == 0):
@@ -114,10 +105,8 @@ class Outcome:
         return "pass" if self.comparisons and all(one.passes for one in self.comparisons) else "fail"
 
 
-Tell = Callable[[float], None]
-"""Takes how far a case is, 0 to 1."""
-Compute = Callable[[Tell], Outcome]
-"""Computes a case."""
+Tell = Callable[[float], None]  # takes how far a case is, 0 to 1
+Compute = Callable[[Tell], Outcome]  # computes a case
 
 
 def told(items: Iterable[Item], tell: Tell) -> Iterator[Item]:
@@ -145,31 +134,18 @@ def near_zero(quantity: str, ours: float, band: float, unit: str = "1") -> Compa
 
 @dataclass(frozen=True)
 class Case:
-    """One row of the suite.
+    """One row of the suite."""
 
-    Attributes:
-        id: for ``--only``; letters, digits and hyphens.
-        family: the heading it stands under.
-        title: what is tested.
-        reference: the closed form, or what was published.
-        source: where that is from.
-        compute: does it; told how far it is through a function of 0 to 1. None where the bed cannot do it yet.
-        slow: left out by ``--quick``.
-        seconds: expected time, for the progress [s].
-        reason: why it fails, where it is known to; shown only while it does.
-        waits_for: what the bed lacks, where ``compute`` is None.
-    """
-
-    id: str
-    family: str
-    title: str
-    reference: str
-    source: str
-    compute: Compute | None = None
-    slow: bool = False
-    seconds: float = 2.0
-    reason: str = ""
-    waits_for: str = ""
+    id: str  # for ``--only``; letters, digits and hyphens
+    family: str  # the heading it stands under
+    title: str  # what is tested
+    reference: str  # the closed form, or what was published
+    source: str  # where that is from
+    compute: Compute | None = None  # None where the bed cannot do it yet
+    slow: bool = False  # left out by ``--quick``
+    seconds: float = 2.0  # expected time, for the progress [s]
+    reason: str = ""  # why it fails, where it is known to; shown only while it does
+    waits_for: str = ""  # what is missing in the bed, where ``compute`` is None
 
     def __post_init__(self) -> None:
         if (self.compute is None) != bool(self.waits_for):

@@ -26,10 +26,8 @@ BEADS = Material("beads", 2580.0, 65e9, 0.2, 0.5, 0.6, 0.05)
 """Glass beads: 1.52 g/cm3 at a packing of 0.59, as Katsuragi & Durian 2007 have them. Friction 0.5 and rolling friction
 0.05 are chosen for an internal friction near their tan 24 degrees; restitution 0.6 is a guess."""
 SPREAD = 0.15
-TOGETHER = 10
-"""Steps of the grains for one of the body."""
-STRUCK = 0.08
-"""Overlap over diameter that is let pass where the ball strikes; the bed itself stays below 0.05."""
+TOGETHER = 10  # steps of the grains for one of the body
+STRUCK = 0.08  # overlap over diameter that is let pass where the ball strikes; the bed itself stays below 0.05
 
 
 def prepared(*, grain: float, size: Sequence[float], gravity: float, seed: int, stiffer: float = 1.0) -> Bed:
@@ -98,23 +96,18 @@ def drop(
 
 @dataclass(frozen=True)
 class Drop:
-    """A ball let go in a bed of beads of its own; SI units.
+    """A ball let go in a bed of beads of its own; SI units."""
 
-    Attributes:
-        grain, ball: mean diameters. density: of the ball. size: of the bed. at: over its sides. seed: of the bed.
-        speed: downwards, on touching. longest: after which the ball is left. stiffer: than the bed would be by itself.
-    """
-
-    grain: float
-    ball: float
-    density: float
-    size: tuple[float, float, float]
+    grain: float  # mean diameter
+    ball: float  # diameter
+    density: float  # of the ball
+    size: tuple[float, float, float]  # of the bed
     gravity: float
-    seed: int
-    at: tuple[float, float]
-    speed: float
-    longest: float
-    stiffer: float = 1.0
+    seed: int  # of the bed
+    at: tuple[float, float]  # over the bed's sides
+    speed: float  # downwards, on touching
+    longest: float  # after which the ball is left
+    stiffer: float = 1.0  # than the bed would be by itself
 
     def run(self) -> dict[str, np.ndarray]:
         """What `drop` gives, with the packing fraction and the count of the bed's grains; kept."""

@@ -20,19 +20,16 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Book:
-    """What became of the energy of a cluster, shapes [n] [J].
+    """What became of the energy of a cluster, shapes [n].
 
-    Attributes:
-        time: [s].
-        parts: kinetic; stored in springs (normal, tangential, turning); lost since the start (damped: to the normal
-            dashpots; rubbed, turned: the work against tangential forces and turning torques less what their springs
-            hold); under gravity also potential, from the start.
-        force_error: largest difference of a grain's force from the bed's, over the largest force.
+    The parts [J] are: kinetic; stored in springs (normal, tangential, turning); lost since the start (damped: to the
+    normal dashpots; rubbed, turned: the work against tangential forces and turning torques less what their springs
+    hold); under gravity also potential, from the start.
     """
 
-    time: Array
+    time: Array  # [s]
     parts: dict[str, Array]
-    force_error: float
+    force_error: float  # largest difference of a grain's force from the bed's, over the largest force
 
     @property
     def total(self) -> Array:

@@ -20,8 +20,7 @@ __all__ = [
 ]  # fmt: skip
 
 HERTZ_TIME = 2.943275
-RADIUS = 0.0025
-"""Of the spheres of Chung & Ooi's T3 and T4 [m]."""
+RADIUS = 0.0025  # of the spheres of Chung & Ooi's T3 and T4 [m]
 SIXTEEN = 16
 ALUMINA: Json = {"density": 4000, "young": 380e9, "poisson": 0.23}
 CAST_IRON: Json = {"density": 7000, "young": 100e9, "poisson": 0.25}

@@ -60,21 +60,16 @@ _EVERY, _PARTS = 20, 5
 
 @dataclass(frozen=True)
 class Sheared:
-    """Angles on the plane of shear, of triaxial compression, of Mohr's circle, standard error of the first [degrees].
+    """What a sheared sample shows at large strain."""
 
-    Attributes:
-        over_mean: shear over the mean normal stress at large strain [1].
-        strain, ratio: shear over normal stress, shape [n]. pressure: normal stress at large strain [Pa].
-    """
-
-    angle: float
-    triaxial: float
-    mohr: float
-    error: float
-    over_mean: float
-    pressure: float
-    strain: np.ndarray
-    ratio: np.ndarray
+    angle: float  # on the plane of shear [degrees]
+    triaxial: float  # of triaxial compression [degrees]
+    mohr: float  # of Mohr's circle [degrees]
+    error: float  # standard error of the first [degrees]
+    over_mean: float  # shear over the mean normal stress [1]
+    pressure: float  # normal stress [Pa]
+    strain: np.ndarray  # shape [n]
+    ratio: np.ndarray  # shear over normal stress, shape [n]
 
 
 def lammps_law(stuff: Material, young: float, grain: float, *, friction: float | None = None) -> str:

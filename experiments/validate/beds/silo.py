@@ -33,21 +33,14 @@ DRAG, SETTLED = 0.02, 0.5  # time constant of the drag while it is filled [s], a
 
 @dataclass(frozen=True)
 class Filling:
-    """A filling weighed while the walls rise.
+    """A filling weighed while the walls rise."""
 
-    Attributes:
-        weight, floor: of the grains, and what the floor carries [N].
-        friction, pressing: of the walls together, upwards on the grains and along the normal [N].
-        height: of the highest grain's centre [m].
-        count: grains.
-    """
-
-    weight: float
-    floor: float
-    friction: float
-    pressing: float
-    height: float
-    count: int
+    weight: float  # of the grains [N]
+    floor: float  # what the floor carries [N]
+    friction: float  # of the walls together, upwards on the grains [N]
+    pressing: float  # of the walls together, along the normal [N]
+    height: float  # of the highest grain's centre [m]
+    count: int  # of grains
 
 
 def fill(depth: float, *, seed: int = 3) -> Filling:

@@ -37,18 +37,14 @@ LIMIT = 900.0  # for LAMMPS [s]
 
 @dataclass(frozen=True)
 class Heap:
-    """What is left: mean angle of the two slopes and half their difference [degrees], height of the crest [m].
+    """What is left of the block."""
 
-    Attributes:
-        distance, thickness: the profile [m], shape [n]. energy: kinetic, of a grain over m g d [1].
-    """
-
-    angle: float
-    error: float
-    crest: float
-    distance: np.ndarray
-    thickness: np.ndarray
-    energy: float
+    angle: float  # mean of the two slopes [degrees]
+    error: float  # half their difference [degrees]
+    crest: float  # its height [m]
+    distance: np.ndarray  # of the profile [m], shape [n]
+    thickness: np.ndarray  # of the profile [m], shape [n]
+    energy: float  # kinetic, of a grain over m g d [1]
 
 
 def _block(stuff: Material) -> tuple[np.ndarray, np.ndarray, float, float]:

@@ -130,8 +130,7 @@ def _all(test: Test, tell: Tell) -> Outcome:
 
 SPEEDS = np.geomspace(0.05, 5.0, SIXTEEN)
 RESTITUTIONS = (0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
-FINE_STEP = 2e-8
-"""A 300th of T3's contact time [s]."""
+FINE_STEP = 2e-8  # A 300th of T3's contact time [s]
 _CONTACT_TIME = 6.105e-6  # of T3's alumina sphere at 3.9 m/s [s]
 _FINE_BAND, _OWN_BAND = 1e-3, 0.015
 _PHASES, _LOW = 8, 0.2

@@ -16,8 +16,7 @@ from .words import say
 
 __all__ = ["CASES", "errors_of_pair", "oblique_pair"]
 
-COUNTS = (50, 100, 200, 400)
-"""Steps in seven tenths of a contact."""
+COUNTS = (50, 100, 200, 400)  # steps in seven tenths of a contact
 PAIR = Material("pair", 2600.0, 1e8, 0.25, 50.0, 1.0)
 MASS, INERTIA = mass_of(PAIR.density, RADIUS), 0.4 * mass_of(PAIR.density, RADIUS) * RADIUS * RADIUS
 STAR, SHEAR = effective_moduli(PAIR.young, PAIR.poisson, PAIR.young, PAIR.poisson)

@@ -21,8 +21,7 @@ from experiments.validate.base.spheres import HERTZ_TIME
 
 __all__ = ["one_spring", "sliding_share", "staggered_rebound", "tangential_restitution"]
 
-LARGEST = 1.25**0.4
-"""Overlap in an elastic collision."""
+LARGEST = 1.25**0.4  # overlap in an elastic collision
 _LONGEST = 2_000_000
 
 

@@ -18,8 +18,7 @@ MASS = mass_of(DENSITY, RADIUS)
 DOWN = (0.0, 0.0, -GRAVITY)
 
 
-STIFFNESS = 4 / 3 * plane_modulus(YOUNG, POISSON) * math.sqrt(RADIUS)
-"""k of F = k delta^1.5 on a rigid plane [N/m^1.5]."""
+STIFFNESS = 4 / 3 * plane_modulus(YOUNG, POISSON) * math.sqrt(RADIUS)  # k of F = k delta^1.5 on a rigid plane [N/m^1.5]
 CONTACT = math.sqrt(RADIUS * (MASS * GRAVITY / STIFFNESS) ** (2 / 3))
 """Radius of the contact that carries a grain's weight [m]."""
 
