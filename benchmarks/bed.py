@@ -96,25 +96,15 @@ class Lane:
         threads = f"{entrant.threads} thread{'s' if entrant.threads > 1 else ''}"
         return f"{entrant.name}, {entrant.precision}, {threads}{skin}"
 
-    def go(self, steps: int) -> None:
-        """One heat. What goes wrong is kept, and the lane is out of the race."""
-        try:
-            self.heats.append(self.entrant.heat(steps))
-        except RuntimeError as problem:
-            self.failure = str(problem)
-
     def as_dict(self) -> Json:
         """What bench.json keeps of it."""
-        heats = [asdict(heat) for heat in self.heats]
-        told = {key: getattr(self.entrant, key) for key in _TOLD}
-        return {"label": self.label} | told | {
-            "speed": self.speed,
-            "heats": [{k: v for k, v in heat.items() if k not in ("version", "command")} for heat in heats],
-            "other_work": self.other_work, "failure": self.failure, "command": heats[-1]["command"] if heats else "",
+        about = ("name", "ours", "counted", "rolling", "precision", "threads", "skin")
+        heats = [{k: v for k, v in asdict(heat).items() if k not in ("version", "command")} for heat in self.heats]
+        command = self.heats[-1].command if heats else ""
+        return {"label": self.label} | {key: getattr(self.entrant, key) for key in about} | {
+            "speed": self.speed, "heats": heats, "other_work": self.other_work, "failure": self.failure,
+            "command": command,
         }  # fmt: skip
-
-
-_TOLD = ("name", "ours", "counted", "rolling", "precision", "threads", "skin")
 
 
 def run(out: Path, *, progress: Any) -> Json:
@@ -223,13 +213,16 @@ def _race(count: int, settings: Settings, peers: list[Peer], cores: int, progres
 
 
 def _heats(stage: str, lanes: list[Lane], steps: int, progress: Any) -> None:
-    """One heat of each lane."""
+    """One heat of each lane; one in which it goes wrong is out of the race."""
     progress.stage(stage, len(lanes))
     for done, lane in enumerate(lanes, start=1):
-        lane.go(steps)
+        try:
+            lane.heats.append(lane.entrant.heat(steps))
+            went = f"{1e-6 * lane.heats[-1].speed:.2f} million grain-steps/s"
+        except RuntimeError as problem:
+            lane.failure = str(problem)
+            went = f"failed: {problem}"
         progress.update(done)
-        speed = lane.heats[-1].speed if not lane.failure else 0.0
-        went = f"failed: {lane.failure}" if lane.failure else f"{1e-6 * speed:.2f} million grain-steps/s"
         progress.message(f"{lane.label}: {went}")
 
 

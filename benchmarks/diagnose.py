@@ -83,7 +83,9 @@ def run(
         progress.message(missing)
     wanted = baselines == "yes" and not missing
     progress.plan({f"diagnose {one}": float(count) for one in kinds})
-    _mend(out / CASES_FILE)
+    path = out / CASES_FILE
+    if path.is_file() and not (data := path.read_bytes()).endswith(b"\n"):  # a process ended while it wrote a line
+        path.write_bytes(data[: data.rfind(b"\n") + 1])
     done = {
         _key(case["kind"], case["case"]): case
         for case in read_cases(out)
@@ -97,7 +99,7 @@ def run(
                 progress.message(f"{one}: {len(cases) - len(left)} of {len(cases)} campaigns were done before")
             for number, case in enumerate(left, 1):
                 done[_key(one, case)] = record = _one(one, case, asked, done.get(_key(one, case)), wanted)
-                with (out / CASES_FILE).open("a", encoding="utf-8") as file:
+                with path.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(record) + "\n")
                 progress.message(_line(record))
                 progress.update(number)
@@ -115,12 +117,6 @@ def run(
 def continues(out: Path) -> bool:
     """Whether `out` holds an unfinished or finished run of this benchmark, with which it goes on."""
     return (out / CASES_FILE).is_file()
-
-
-def _mend(path: Path) -> None:
-    """Take off a last line without an end, left by a process that ended while it wrote."""
-    if path.is_file() and not (data := path.read_bytes()).endswith(b"\n"):
-        path.write_bytes(data[: data.rfind(b"\n") + 1])
 
 
 @cache

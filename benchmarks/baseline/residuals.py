@@ -208,9 +208,15 @@ def _tumble_left(problem: Any, values: Mapping[str, float], trial: str, force: F
     end = float(max(edge.max(initial=0.0) for edge in edges)) + 1e-6
     times = np.unique(np.concatenate([[0.0, end], *(edge[edge > 0] for edge in edges)]))
     stand = made.spike_length * math.cos(math.pi / 8) - 0.5 * made.weight / made.stiffness
+
+    def acting(s: Any) -> tuple[float, ...]:
+        touch = float(touching(np.array([s.y - stand]), np.array([s.theta]), tables)[0])
+        state = np.array([[s.x, s.y - stand, s.theta, s.vx, s.vy, s.omega, 0.01 * abs(s.wheel_speed), touch]])
+        return tuple(force(state)[0].tolist())
+
     hooks = _hooks(term)
     if force is not None:
-        hooks.append(lambda s: _acting(s, stand, tables, force))
+        hooks.append(acting)
     try:
         motion = simulate(made, duration=end, times=times, tolerance=_TOLERANCE)
     finally:
@@ -222,14 +228,6 @@ def _tumble_left(problem: Any, values: Mapping[str, float], trial: str, force: F
 def _hooks(term: Any) -> list[Any]:
     """The list `acting` of the module in which the integrator finds the term."""
     return term.hooks["force"].__globals__["acting"]
-
-
-def _acting(s: Any, stand: float, tables: Any, force: Force) -> tuple[float, float, float]:
-    y = s.y - stand
-    touch = float(touching(np.array([y]), np.array([s.theta]), tables)[0])
-    state = np.array([[s.x, y, s.theta, s.vx, s.vy, s.omega, 0.01 * abs(s.wheel_speed), touch]])
-    x, up, turn = force(state)[0].tolist()
-    return x, up, turn
 
 
 def _residual(data: Any, motion: Any, window: float, pull: float) -> Array:

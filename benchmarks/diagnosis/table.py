@@ -52,6 +52,8 @@ def summarise(cases: Sequence[Case]) -> Json:
     plain = [c for c in single if c["signature"] >= _PLAIN]
     named = [c for c in single if c["verdict"] in ("named", "ambiguous")]
     right = [c for c in named if _right(c)]
+    tried = [c for c in cases if "baselines" in c]
+    names = sorted({name for c in tried for name in c["baselines"]} - {"code"})
     of_truth = [(_after(c), left) for c in right if (left := _by_truth(c)) is not None]
 
     def unknown(case: Case) -> bool:
@@ -84,7 +86,7 @@ def summarise(cases: Sequence[Case]) -> Json:
         ),
         "median_held_out_after": _median([_after(c) for c in right]),
         "median_gap_closed": _median([_closed(c["before"], c["after"]) for c in right if _gap(c["before"]) > _GAP]),
-        "baselines": _baselines(cases),
+        "baselines": {name: _baseline(name, tried) for name in ("ours", *names)} if tried else {},
         "seconds": _seconds(cases),
     }
 
@@ -148,15 +150,8 @@ def _parameters(right: Sequence[Case]) -> Json:
     return dict(reversed(pooled.items())) | {"by_name": {name: told(own) for name, own in sorted(rows.items())}}
 
 
-def _baselines(cases: Sequence[Case]) -> Json:
-    """The same figures for those that ran beside, and ours on the very same cases."""
-    tried = [c for c in cases if "baselines" in c]
-    names = {name for c in tried for name in c["baselines"]} - {"code"}
-    return {name: _baseline(name, tried) for name in ("ours", *sorted(names))} if tried else {}
-
-
 def _baseline(name: str, tried: Sequence[Case]) -> Json:
-    """The figures of one of them: of each case, and what it says of it."""
+    """The same figures for one that ran beside, or ours, on the very same cases."""
     own = [(c, c if name == "ours" else c["baselines"][name]) for c in tried if name in ("ours", *c["baselines"])]
     nulls = [said for c, said in own if not c["truth"] and not c["outside"]]
     seen = [(c, said) for c, said in own if (c["truth"] or c["outside"]) and c["signature"] >= 1]

@@ -135,11 +135,15 @@ def draw_rig(random: Random, effects: tuple[str, ...], outside: str | None, want
     trials += [Trial(False, round(float(heights[n % len(heights)]), 4), diameters[-1]) for n in range(drops)]
     noise = {"depth": 10 ** between(math.log10(2e-5), -4.0), "force": k * depth * 10 ** between(-2.6, -1.8),
              "accel": 10 ** between(-1.3, -0.5)}  # fmt: skip
-    coarse = chance(0.2)
+    coarse, power, loud = chance(0.2), between(1.0, 2.0), wandering["loud"] or 1.0
+    which = str(random.choice(["force", "depth", "all"]))
+    louder = dict.fromkeys(("depth", "force", "accel"), 1.0)
+    louder |= dict.fromkeys({"force": ("force", "accel"), "depth": ("depth",)}.get(which, louder), loud)
+    force, of_depth = between(0.3, 0.8) * chance(0.25), between(0.3, 0.7) * chance(0.2)
     rig = Rig(
         k=k, c=c, depth=depth, mass=mass, true_mass=mass, gravity=gravity, believed=believed, doubt=doubt,
-        power=between(1.0, 2.0), noise=noise, louder=_louder(random, wandering["loud"]),
-        persistence=_persistence(random), steps={name: std * between(0.4, 1.2) * coarse for name, std in noise.items()},
+        power=power, noise=noise, louder=louder, persistence={"force": force, "accel": force, "depth": of_depth},
+        steps={name: std * between(0.4, 1.2) * coarse for name, std in noise.items()},
         jitter=between(0.05, 0.15) if chance(0.15) else 0.0, gaps=chance(0.2), only_depth=chance(0.2),
         small_units=chance(0.3), wandering=wandering, drop_time=between(0.08, 0.25),
         flight=outside != "magnet", trials=(),
@@ -152,18 +156,6 @@ def draw_rig(random: Random, effects: tuple[str, ...], outside: str | None, want
     return replace(rig, trials=made), {"design": words | style, "sensors": {
         "coarse": coarse, "persistence": rig.persistence, "jitter": rig.jitter, "gaps": rig.gaps,
         "small units": rig.small_units, "noise": noise}}  # fmt: skip
-
-
-def _louder(random: Random, loud: float) -> dict[str, float]:
-    which = str(random.choice(["force", "depth", "all"]))
-    return {name: loud if loud and which in (name, "all", "force" if name == "accel" else "") else 1.0
-            for name in ("depth", "force", "accel")}  # fmt: skip
-
-
-def _persistence(random: Random) -> dict[str, float]:
-    force = float(random.uniform(0.3, 0.8)) * bool(random.random() < 0.25)
-    depth = float(random.uniform(0.3, 0.7)) * bool(random.random() < 0.2)
-    return {"force": force, "accel": force, "depth": depth}
 
 
 def _own(random: Random, rig: Rig, trial: Trial, style: Json, *, both: bool) -> Trial:

@@ -82,14 +82,10 @@ def make_hidden_tumble(
 ) -> tuple[Campaign, HiddenTumble]:
     """A campaign and what is hidden in it.
 
-    Args:
-        seed: fixes everything.
-        kind: "null", an effect's id, "pair" or one of `OUTSIDE`; None draws one: a null in one of four, outside in one
-            of six, a pair in one of twelve.
-        strength: the signature aimed at, over the noise; None draws one from 0.5 (not to be seen) to 50 (plain).
-        trials: how many; None draws 6 to 24.
-
-    Raises ValueError for a kind there is not.
+    `seed` fixes everything. `kind`: "null", an effect's id, "pair" or one of `OUTSIDE`; None draws one: a null in one
+    of four, outside in one of six, a pair in one of twelve. `strength`: the signature aimed at, over the noise; None
+    draws one from 0.5 (not to be seen) to 50 (plain). `trials`: how many; None draws 6 to 24. Raises ValueError for a
+    kind there is not.
     """
     random = np.random.default_rng(seed)
     kind, strength, effects, outside = draw_hidden(random, kind, strength, EFFECTS, OUTSIDE, (0.5, 50.0))

@@ -74,7 +74,11 @@ def prepare_grains(count: int, *, threads: int | None = None, progress: Any = No
     grains = bed.grains()
     period = bed.size[:2]
     lowest = np.argsort(grains.position[:, 2], kind="stable")[:count]
-    return _in_rows(Grains(wrapped(grains.position[lowest], period), grains.radius[lowest], period))
+    places, radii = wrapped(grains.position[lowest], period), grains.radius[lowest]
+    # In slices and rows two diameters wide, so that neighbours in space are near in memory for any code.
+    z, y = (np.floor(places[:, k] / (2 * DIAMETER)) for k in (2, 1))
+    order = np.lexsort((places[:, 0], y, z))
+    return Grains(places[order], radii[order], period)
 
 
 def wrapped(positions: np.ndarray, period: tuple[float, float]) -> np.ndarray:
@@ -84,13 +88,6 @@ def wrapped(positions: np.ndarray, period: tuple[float, float]) -> np.ndarray:
     # The remainder of a number just below zero rounds to the period itself.
     inside[:, :2][inside[:, :2] >= period] = 0.0
     return inside
-
-
-def _in_rows(grains: Grains) -> Grains:
-    """The same in slices and rows two diameters wide, so that neighbours in space are near in memory for any code."""
-    z, y = (np.floor(grains.positions[:, k] / (2 * DIAMETER)) for k in (2, 1))
-    order = np.lexsort((grains.positions[:, 0], y, z))
-    return Grains(grains.positions[order], grains.radii[order], grains.period)
 
 
 def write_data(path: Path, grains: Grains) -> None:

@@ -62,18 +62,14 @@ def wide_console() -> Console:
 
 def describe_machine(cores: int, load: float) -> Json:
     """Processor, cores, load at the start, system and the versions under us."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return {
-        "processor": _processor(),
+        "processor": names[0] if names else platform.processor() or platform.machine(),
         "cores": cores,
         "load": load,
         "system": platform.platform(),
         "python": platform.python_version(),
         "taichi": version("taichi"),
     }
-
-
-def _processor() -> str:
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()

@@ -149,7 +149,13 @@ def _result(rows: list[Json], entire: bool) -> Result:
     counts = {status: sum(row["status"] == status for row in rows) for status in STATUSES}
     words = [f"{counts['pass']} pass", f"{counts['fail']} fail"]
     words += [f"{counts[key]} {key}" for key in STATUSES[2:] if counts[key]]
-    sentences = [f"{row['id']} fails: {_why(row)}" for row in rows if row["status"] == "fail"]
+    sentences = []
+    for row in rows:
+        if row["status"] == "fail":
+            what, worst = "it ended with an error", row["worst"]
+            if worst:
+                what = f"{worst['quantity']} is {worst['ours']:.4g}, {worst['reference']:.4g} was wanted"
+            sentences.append(f"{row['id']} fails: {what}{f' ({reason})' if (reason := row['reason']) else ''}")
     sentences += [f"{row['id']} is skipped: {row['skipped']}" for row in rows if row["status"] == "skipped"]
     return Result.make(
         "validate",
@@ -162,13 +168,6 @@ def _result(rows: list[Json], entire: bool) -> Result:
         departures={"sentences": sentences},
         warnings=[] if entire else ["not the whole suite: see which cases were not run"],
     )
-
-
-def _why(row: Json) -> str:
-    what = "it ended with an error"
-    if worst := row["worst"]:
-        what = f"{worst['quantity']} is {worst['ours']:.4g}, {worst['reference']:.4g} was wanted"
-    return f"{what} ({row['reason']})" if row["reason"] else what
 
 
 def _is_checkout() -> bool:

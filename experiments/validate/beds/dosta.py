@@ -53,14 +53,6 @@ def grains() -> tuple[np.ndarray, np.ndarray]:
     return found[:, 1:], found[:, 0]
 
 
-def setup() -> Setup:
-    """The case when the ball arrives."""
-    positions, radii = grains()
-    height = first_touch(positions, radii, BALL_RADIUS) + 1e-6
-    speed = math.sqrt(SPEED**2 + 2 * GRAVITY * (THROWN_FROM - height))
-    return Setup(positions, radii, np.array([0.0, 0.0, height]), speed)
-
-
 def ours(case: Setup, tell: Tell) -> np.ndarray:
     """Height [m] and velocity [m/s] of the ball at each look, shape [looks, 2]."""
     shift = np.array([MARGIN - WALLS[0], MARGIN - WALLS[2], -FLOOR])
@@ -95,17 +87,14 @@ def ours(case: Setup, tell: Tell) -> np.ndarray:
 
 def theirs(case: Setup) -> np.ndarray:
     """The same by LIGGGHTS, in one process. Raises RuntimeError with its last lines where it fails."""
-    blocks = run_peer("liggghts", _data(case), _deck(), "ball.txt", limit=LIMIT).split("ITEM: ATOMS z vz")[1:]
-    return np.array([block.splitlines()[1].split() for block in blocks], dtype=float)
-
-
-def _data(case: Setup) -> str:
     box = [f"{WALLS[0]:g} {WALLS[1]:g} xlo xhi", f"{WALLS[2]:g} {WALLS[3]:g} ylo yhi", f"{FLOOR:.7f} 0.3 zlo zhi"]
-    grains = zip(case.radii, case.positions, strict=True)
-    atoms = [f"1 {2 * radius:.10g} {STUFF.density:g} {digits(place)}" for radius, place in grains]
+    beads = zip(case.radii, case.positions, strict=True)
+    atoms = [f"1 {2 * radius:.10g} {STUFF.density:g} {digits(place)}" for radius, place in beads]
     atoms.append(f"2 {2 * BALL_RADIUS:g} {BALL_DENSITY:g} {digits(case.ball)}")
     speeds = len(case.radii) * ["0 0 0 0 0 0"] + [f"0 0 {-case.speed:.17g} 0 0 0"]
-    return data_file(box, atoms, speeds, types=2)
+    data = data_file(box, atoms, speeds, types=2)
+    blocks = run_peer("liggghts", data, _deck(), "ball.txt", limit=LIMIT).split("ITEM: ATOMS z vz")[1:]
+    return np.array([block.splitlines()[1].split() for block in blocks], dtype=float)
 
 
 def _deck() -> str:
@@ -141,7 +130,10 @@ def _deck() -> str:
 def _compute(tell: Tell) -> Outcome:
     if PEERS["liggghts"].find() is None:
         return PEERS["liggghts"].lacking()
-    case = setup()
+    positions, radii = grains()
+    height = first_touch(positions, radii, BALL_RADIUS) + 1e-6
+    speed = math.sqrt(SPEED**2 + 2 * GRAVITY * (THROWN_FROM - height))
+    case = Setup(positions, radii, np.array([0.0, 0.0, height]), speed)
     there = theirs(case)
     tell(0.5)
     here = ours(case, within(tell, 0.5, 1.0))
