@@ -139,11 +139,11 @@ def _compute(tell: Tell) -> Outcome:
     here = ours(case, within(tell, 0.5, 1.0))
     depth, found = case.ball[2] - there[:, 0], case.ball[2] - here[:, 0]
     time, half = 1e3 * STEP * EVERY * np.arange(len(there)), len(there) // 2
-    slowed = (_time_to(time, one[:, 1], -0.8 * case.speed) for one in (there, here))
+    slowed, found_slowed = (_time_to(time, one[:, 1], -0.8 * case.speed) for one in (there, here))
     rows = [
         Comparison(f"depth {time[-1]:g} ms after the first touch", "mm", 1e3 * depth[-1], 1e3 * found[-1], 0.05),
         near_zero("height, largest difference over that depth", np.abs(found - depth).max() / depth[-1], 0.05),
-        Comparison("time to 0.8 of the speed", "ms", *slowed, 0.05),
+        Comparison("time to 0.8 of the speed", "ms", slowed, found_slowed, 0.05),
         Comparison(f"speed after {time[half]:g} ms", "m/s", -there[half, 1], -here[half, 1], 0.05),
     ]
     curves = [

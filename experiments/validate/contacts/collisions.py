@@ -83,8 +83,8 @@ def _compared(test: Test, name: str) -> list[Comparison]:
 
     The force is read in nine steps about the middle; the end comes from the gap after it, divided by the speed.
     """
-    *numbers, published = test.materials[name]
-    stuff, closing = Material(name, *numbers, 0.3, 1.0), test.speed * (2 if test.pair else 1)
+    density, young, poisson, published = test.materials[name]
+    stuff, closing = Material(name, density, young, poisson, 0.3, 1.0), test.speed * (2 if test.pair else 1)
     closed = contact_of(stuff, test.radius, closing, pair=test.pair)[:3]
     step, forces = closed[2] / STEPS, []
     bed = test.bed(stuff, step)

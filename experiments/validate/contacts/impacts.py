@@ -6,6 +6,7 @@ speed at the contact is above 7/2 mu (1 + e) v_n.
 """
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -110,10 +111,10 @@ def _t4_spin(tell: Tell) -> Outcome:
 def _t4_sliding(tell: Tell) -> Outcome:
     after, angle, slides = oblique(), np.radians(ANGLES), ANGLES >= SLIDES_FROM
     e_t, e_n = after.velocity[:, 0] / (SPEED * np.sin(angle)), after.velocity[:, 2] / (SPEED * np.cos(angle))
-    closed, like = 1 - MU * (1 + E_N) / np.tan(angle), {"form": "{} deg", "only": slides}
+    closed, sliding = 1 - MU * (1 + E_N) / np.tan(angle), partial(compared, form="{} deg", only=slides)
     return Outcome([
-        *compared("e_t", ANGLES, closed, e_t, band=CLOSED_BAND, **like),
-        *compared("spin", ANGLES, _sliding_spin(ANGLES), after.spin[:, 1], unit="rad/s", band=ARM_BAND, **like),
+        *sliding("e_t", ANGLES, closed, e_t, band=CLOSED_BAND),
+        *sliding("spin", ANGLES, _sliding_spin(ANGLES), after.spin[:, 1], unit="rad/s", band=ARM_BAND),
         *compared("e_n", ANGLES, E_N, e_n, band=1e-3, form="{} deg"),
     ])  # fmt: skip
 
@@ -132,11 +133,11 @@ def _t5(tell: Tell) -> Outcome:
         along = T5_RATIOS * T5_MU * T5_SPEED
         velocities = np.column_stack([along, 0 * along, np.full(len(along), -T5_SPEED)])
         after = meet_floor(stuff, velocities, radius=T5_RADIUS, step=time / 300, time=1.5 * time, max_overlap=0.2)
-        unit, like = T5_MU * T5_SPEED, {"form": "tan / mu = {:g}", "only": T5_RATIOS > 7}
+        unit, sliding = T5_MU * T5_SPEED, partial(compared, form="tan / mu = {:g}", only=T5_RATIOS > 7)
         scaled, lost = after.spin[:, 1] * T5_RADIUS / unit, (along - after.velocity[:, 0]) / unit
-        rows += compared(f"{name}: loss of v_t over mu v_n", T5_RATIOS, 2, lost, band=CLOSED_BAND, **like)
+        rows += sliding(f"{name}: loss of v_t over mu v_n", T5_RATIOS, 2, lost, band=CLOSED_BAND)
         band = CLOSED_BAND + overlap / T5_RADIUS  # the arm is shorter by the overlap at most
-        rows += compared(f"{name}: spin r over mu v_n", T5_RATIOS, 5, scaled, band=band, **like)
+        rows += sliding(f"{name}: spin r over mu v_n", T5_RATIOS, 5, scaled, band=band)
         e_n = worst(after.velocity[:, 2] / T5_SPEED, 1.0)
         rows.append(Comparison(f"{name}: e_n, worst", "1", 1.0, e_n, 1e-3))
         curves.append(Curve(name, T5_RATIOS, scaled))
@@ -148,7 +149,7 @@ SPIN_MU, SPIN_E, SPIN_SPEED, SPIN_RADIUS = 0.4, 0.5, 0.2, 0.1
 SPINS = np.array([0.175, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 7.0, 9.0, 12.0, 16.0, 22.0])
 SLIDES = SPINS * SPIN_RADIUS > 3.5 * SPIN_MU * (1 + SPIN_E) * SPIN_SPEED
 _KICK = SPIN_MU * (1 + SPIN_E) * SPIN_SPEED  # of the tangential speed
-_SLIDING = {"form": "{:g} rad/s", "only": SLIDES}
+_sliding = partial(compared, form="{:g} rad/s", only=SLIDES)
 E_BAND = 1e-3  # Thornton's fit of the damping
 
 
@@ -170,14 +171,11 @@ def _t6(tell: Tell) -> Outcome:
 
 def _spin_rows(name: str, along: np.ndarray, spin: np.ndarray, share: float, radius: float) -> list[Comparison]:
     """Speed mu (1 + e) v_n and spin less 5/2 of it over r, where the contact slides; ``share`` is m* over the mass."""
-    closed = share * _KICK
+    closed, lost = share * _KICK, SPINS - spin
     return [
-        *compared(f"{name}: speed", SPINS, closed, along, unit="m/s", band=E_BAND, **_SLIDING),
-        *compared(
-            f"{name}: loss of spin", SPINS, 2.5 * closed / radius, SPINS - spin, unit="rad/s", band=2 * E_BAND,
-            **_SLIDING,
-        ),
-    ]  # fmt: skip
+        *_sliding(f"{name}: speed", SPINS, closed, along, unit="m/s", band=E_BAND),
+        *_sliding(f"{name}: loss of spin", SPINS, 2.5 * closed / radius, lost, unit="rad/s", band=2 * E_BAND),
+    ]
 
 
 def _pair(name: str, radii: tuple[float, float], speeds: tuple[float, float], spins: tuple[float, float]) -> Grains:
@@ -245,7 +243,7 @@ def _t8(tell: Tell) -> Outcome:
         Curve("mu (1 + e) v_n m_2 / (m_1 + m_2)", SPINS[SLIDES], np.full(SLIDES.sum(), share * _KICK), False),
         Curve("small sphere", SPINS, speed),
     ]
-    large = compared("large sphere: spin", SPINS, closed, np.abs(other), unit="rad/s", band=2 * E_BAND, **_SLIDING)
+    large = _sliding("large sphere: spin", SPINS, closed, np.abs(other), unit="rad/s", band=2 * E_BAND)
     return Outcome(
         [*_spin_rows("small sphere", speed, spin, share, radii[0]), *large],
         [Plot("Tangential speed of the small sphere after the impact", "spin before [rad/s]", "speed [m/s]", curves)],
@@ -259,11 +257,11 @@ def spin_impact(tell: Tell) -> Outcome:
         Material("spin", friction=MU, restitution=E_N, **ALUMINA), np.outer(-speeds, [0.0, 0.0, 1.0]),
         spins=np.tile([0.0, 3000.0, 0.0], (16, 1)), step=STEP, time=2e-5,
     )  # fmt: skip
-    closed, like = MU * (1 + E_N) * speeds, {"band": 1e-3, "form": "{:.3g} m/s"}
+    closed, each = MU * (1 + E_N) * speeds, partial(compared, band=1e-3, form="{:.3g} m/s")
     # A spin about +y takes the lowest point towards -x, so friction drives the grain towards +x.
     return Outcome([
-        *compared("v_x", speeds, closed, after.velocity[:, 0], unit="m/s", **like),
-        *compared("spin", speeds, 3000 - 2.5 * closed / RADIUS, after.spin[:, 1], unit="rad/s", **like),
+        *each("v_x", speeds, closed, after.velocity[:, 0], unit="m/s"),
+        *each("spin", speeds, 3000 - 2.5 * closed / RADIUS, after.spin[:, 1], unit="rad/s"),
     ])  # fmt: skip
 
 
