@@ -28,7 +28,7 @@ _MODULES = {
         ),
         "dem.grains": "graded materials packing sizes",
         "dem.measure": "cutting element grading lid penetrometer repose shearing",
-        "dem.prepare": "bedfile laboratory pouring recipe stages",
+        "dem.prepare": "bedfile laboratory pouring=laboratory recipe stages",
         "dem.shapes": "mesh mesh_tree solids",
     },
     "experiments": {

@@ -8,7 +8,7 @@ import gc
 import pytest
 
 import dem.engine.base
-from dem.engine.engine import Engine
+import dem.engine.engine
 
 LEAST_GRAINS, LEAST_CELLS = 1024, 8192
 """Room in an engine of the tests. Where an engine is large enough it makes no difference to a bed how large it is, and
@@ -42,17 +42,17 @@ POOL = EnginePool()
 @pytest.fixture(scope="session", autouse=True)
 def roomy_engines():
     """Engines have room for ``LEAST_GRAINS`` and ``LEAST_CELLS``, but for those with one grain a chunk."""
-    plan = Engine.plan
+    capacities = dem.engine.engine.capacities
 
-    def roomy(**settings):
-        found = plan(**settings)
-        if not settings.get("gpu"):
+    def roomy(*counts, gpu):
+        found = capacities(*counts, gpu=gpu)
+        if not gpu:
             found["capacity"] = max(found["capacity"], LEAST_GRAINS)
             found["cell_capacity"] = max(found["cell_capacity"], LEAST_CELLS)
         return found
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Engine, "plan", staticmethod(roomy))
+        patch.setattr(dem.engine.engine, "capacities", roomy)
         yield
 
 

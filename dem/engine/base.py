@@ -54,26 +54,18 @@ class BedBase:
         self._generation = runtime.generation()
         self.settings = settings
         self.material = stuff = settings.material
-        self.size = settings.size
-        self.gravity = settings.gravity
-        self.time_step = settings.time_step
-        self.overlap_limit = settings.max_overlap
-        self.seed = settings.seed
-        self.steps = 0
-        self.list_count = 0
+        self.size, self.gravity, self.seed = settings.size, settings.gravity, settings.seed
+        self.time_step, self.overlap_limit = settings.time_step, settings.max_overlap
         self.grain_count = len(radii)
         # The same to the bit in whatever order the grains come, as a bed taken up again has them in another.
         self.mean_diameter = 2 * math.fsum(radii) / self.grain_count
         self.skin = _SKIN * self.mean_diameter
-        self.steps_since_lists = 0
-        self.reaction_steps = 0
+        self.steps = self.list_count = self.steps_since_lists = self.reaction_steps = self.grain_steps = 0
         self.tallied: np.ndarray | None = None
         self.sleeper: Sleeper | None = None
-        self.grain_steps = 0
         self.has_floor = False
         self.recipe: Json = {}
-        self.surface = math.nan
-        self.packing_fraction = math.nan
+        self.surface = self.packing_fraction = math.nan
         largest = float(radii.max())
         largest_skin = _LARGEST_SKIN * self.mean_diameter + _reach(stuff, largest / 2)
         self.engine = take_engine(
@@ -93,9 +85,7 @@ class BedBase:
             neighbours_per_grain=_rows_per_grain(radii, largest_skin, gpu=arch == "cuda"),
         )
         self.engine.grain_pair[None] = pair_row(stuff, tensile=settings.tensile)
-        turn = np.zeros((MOST_BODIES, 4))
-        turn[:, 0] = 1
-        self.engine.write("body_turn", turn.astype(self.runtime.dtype))
+        self.engine.write("body_turn", np.tile([1.0, 0.0, 0.0, 0.0], (MOST_BODIES, 1)))
 
     def alike(self, settings: BedSettings, radii: np.ndarray) -> Self:
         """Another bed of the same class, precision, architecture and threads, without grains in it yet."""
@@ -240,6 +230,7 @@ class BedBase:
         self.skin = min(_LARGEST_SKIN * self.mean_diameter, max(_LEAST_SKIN * self.mean_diameter, skin))
 
     def make_lists(self, *, all_awake: bool = False) -> None:
+        """Sort the grains and list who is near whom, the contacts' history carried over. Raises BedFailure."""
         e = self.engine
         e.keep_lists(e.rest, e.balance)
         awake = self.awake_count
@@ -257,21 +248,18 @@ class BedBase:
     def _explain(self, code: int, value: int) -> str:
         e = self.engine
         if code == 1:
-            position = e.read("position")
-            ids = e.read("id")
+            position, ids = e.read("position"), e.read("id")
             bad = ~np.isfinite(position).all(axis=1)
             if bad.any():
                 return f"the position of grain {int(ids[bad].min())} is not a number at t = {self.time:.6g} s"
-            lost = (position[:, 2] > self.settings.height) | (position[:, 2] < e.bottom)
+            lost = (position[:, 2] > self.height) | (position[:, 2] < e.bottom)
             first = int(ids[lost].min()) if lost.any() else value
-            where = position[ids == first][0, :3]
+            x, y, z = position[ids == first][0, :3]
             return (
                 f"grain {first} left the box ({int(lost.sum())} in all) at t = {self.time:.6g} s: it is at "
-                f"({where[0]:.4g}, {where[1]:.4g}, {where[2]:.4g}) m, the box reaches from {e.bottom:.4g} to "
-                f"{self.settings.height:.4g} m"
+                f"({x:.4g}, {y:.4g}, {z:.4g}) m, the box reaches from {e.bottom:.4g} to {self.height:.4g} m"
             )
-        room = e.chunk_room if code == 2 else e.near_room
-        what = "pairs" if code == 2 else "grains near bodies"
+        room, what = (e.chunk_room, "pairs") if code == 2 else (e.near_room, "grains near bodies")
         return f"the lists have room for {room} {what} a chunk and {value} are needed; the grains overlap too much"
 
     def compute_forces(self, elapsed: float = 0.0) -> None:
@@ -281,6 +269,7 @@ class BedBase:
         e.push_all(elapsed, e.shapes, e.rest, e.balance)
 
     def shift_velocities(self, part: float) -> None:
+        """Kick all grains by the present forces for this part of a time step, of either sign."""
         self.engine.shift_velocities(part * self.time_step)
 
     def measure_surface(self) -> None:
@@ -300,15 +289,14 @@ class BedBase:
         self.engine.overlap.fill(value)
 
     def fill(self, positions, velocities, spins, radii, mass) -> None:
+        """Put the grains into the fields, with ids in the order in which they come."""
         e = self.engine
-        dtype = self.runtime.dtype
-        n = self.grain_count
-        e.write("position", np.column_stack([positions, radii]).astype(dtype))
-        e.write("velocity", np.column_stack([velocities, mass]).astype(dtype))
-        e.write("spin", np.column_stack([spins, np.zeros(n)]).astype(dtype))
-        e.write("origin", positions.astype(dtype))
-        e.write("id", np.arange(n, dtype=np.int32))
-        e.write("near_end", (np.arange(e.chunk_count) * e.near_room).astype(np.int32))
+        e.write("position", np.column_stack([positions, radii]))
+        e.write("velocity", np.column_stack([velocities, mass]))
+        e.write("spin", np.column_stack([spins, np.zeros(self.grain_count)]))
+        e.write("origin", positions)
+        e.write("id", np.arange(self.grain_count))
+        e.write("near_end", np.arange(e.chunk_count) * e.near_room)
 
     def check_valid(self) -> None:
         if self._generation != runtime.generation():
@@ -326,9 +314,8 @@ def check_array(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
     if array.shape != shape:
         raise ValueError(f"{name} has shape {array.shape}, {shape} was expected")
     if not np.isfinite(array).all():
-        raise ValueError(
-            f"{name} holds a number that is not finite, in row {int(np.argwhere(~np.isfinite(array))[0][0])}"
-        )
+        row = int(np.argwhere(~np.isfinite(array))[0][0])
+        raise ValueError(f"{name} holds a number that is not finite, in row {row}")
 
 
 def _reach(material: Material, radius: float) -> float:

@@ -8,8 +8,7 @@ import numpy as np
 
 from dem.contact.law import pair_row
 from dem.grains.materials import Facing
-from dem.shapes.basic import Plane
-from dem.shapes.solids import AnyShape
+from dem.shapes.basic import Plane, Shape
 
 from .base import FLOOR, BedBase, check_array
 from .engine import MOST_PRIMITIVES
@@ -23,7 +22,7 @@ Array = np.ndarray
 class BedBodies(BedBase):
     """A bed into which bodies are put; they move as they are set to, and the grains give way."""
 
-    def add_body(self, shape: AnyShape | Sequence[AnyShape], *, position: Sequence[float], **facing: Any) -> int:
+    def add_body(self, shape: Shape | Sequence[Shape], *, position: Sequence[float], **facing: Any) -> int:
         """Put a body among the grains and return its number. ``move_body`` sets how it moves.
 
         Args:
@@ -57,15 +56,16 @@ class BedBodies(BedBase):
         self.max_overlap = max(kept, found)
         return body
 
-    def place_body(self, shape: AnyShape | Sequence[AnyShape], position: Sequence[float], facing: Facing) -> int:
+    def place_body(self, shape: Shape | Sequence[Shape], position: Sequence[float], facing: Facing) -> int:
+        """``add_body`` without new lists, and without a check of the grains that it overlaps."""
         e = self.engine
-        parts: list[Any] = [shape] if isinstance(shape, AnyShape) else list(shape)
+        parts: list[Any] = [shape] if isinstance(shape, Shape) else list(shape)
         body = int(e.body_count[None])
         used = int(e.body_primitives[body - 1][1]) if body else 0
         if not parts:
             raise ValueError("shape is empty; a body needs at least one primitive")
         for part in parts:
-            if not isinstance(part, AnyShape):
+            if not isinstance(part, Shape):
                 raise ValueError(
                     f"shape holds {part!r}, which is no shape; use Ball, Cylinder, Cone, Capsule, Box, Tube, "
                     f"Polyhedron, Mesh, Plane or Placed"
@@ -78,11 +78,8 @@ class BedBodies(BedBase):
         e.put_shapes(used, parts)
         e.body_primitives[body] = [used, used + len(parts)]
         e.body_extent[body] = min(1e35, max(p.extent() for p in parts))
-        e.body_position[body] = [float(p) for p in position]
-        e.body_velocity[body] = [0.0, 0.0, 0.0]
-        e.body_spin[body] = [0.0, 0.0, 0.0]
-        e.body_turn[body] = [1.0, 0.0, 0.0, 0.0]
         e.body_count[None] = body + 1
+        self.move_body(body, position=position, velocity=(0, 0, 0), turn=(1, 0, 0, 0), spin=(0, 0, 0))
         if body == FLOOR and any(isinstance(p, Plane) for p in parts):
             self.has_floor = True
         return body
@@ -110,20 +107,16 @@ class BedBodies(BedBase):
         Raises ValueError: a body that is not there, numbers that are not finite, a turn that is not of length 1.
         """
         self.check_body(body)
-        e = self.engine
-        for name, value, width in (
-            ("body_position", position, 3),
-            ("body_velocity", velocity, 3),
-            ("body_turn", turn, 4),
-            ("body_spin", spin, 3),
-        ):
-            if value is not None:
-                numbers = [float(v) for v in value]
-                if len(numbers) != width or not all(map(math.isfinite, numbers)):
-                    raise ValueError(f"{name[5:]} = {tuple(value)} must be {width} finite numbers")
-                if name == "body_turn":
-                    _refuse_turns("turn", np.array([numbers]))
-                getattr(e, name)[body] = numbers
+        given = {"position": position, "velocity": velocity, "turn": turn, "spin": spin}
+        for name, value in given.items():
+            if value is None:
+                continue
+            numbers, width = [float(v) for v in value], 4 if name == "turn" else 3
+            if len(numbers) != width or not all(map(math.isfinite, numbers)):
+                raise ValueError(f"{name} = {tuple(value)} must be {width} finite numbers")
+            if name == "turn":
+                _refuse_turns("turn", np.array([numbers]))
+            getattr(self.engine, f"body_{name}")[body] = numbers
 
     def move_bodies(
         self, bodies: Sequence[int], *, positions: Array, velocities: Array, turns: Array, spins: Array

@@ -1,6 +1,6 @@
-"""A bed held for a moment: all that its next steps depend on, copied and put back where it lies, on the device.
+"""Checkpoint and rollback: all that the next steps of a bed depend on, copied where it lies, on the device.
 
-``Bed.state`` gives the same as arrays of the host, packed, for files; a step of a coupling that is repeated wants it
+``Bed.state`` gives the same as arrays of the host, packed, for files; a step of a coupling that is repeated needs it
 often, and on a GPU without the bed leaving the device.
 """
 
@@ -9,8 +9,6 @@ from typing import Any
 
 import taichi as ti
 
-from dem.grains.sizes import Json
-
 from .base import BedBase
 
 __all__ = ["Checkpoint", "roll_back", "take"]
@@ -18,60 +16,61 @@ __all__ = ["Checkpoint", "roll_back", "take"]
 # What lists are made with, and what a step makes anew: nothing of it is read before it is written.
 _SCRATCH = ("old_", "cell_", "block_", "came_from", "key", "near_first", "touching", "rank", "ticket", "claim",
             "problem")  # fmt: skip
-_NUMBERS = ("steps", "list_count", "grain_steps", "steps_since_lists", "reaction_steps", "skin", "tallied")
-_SLEEPERS_NUMBERS = ("awake", "mass", "slept", "leaving")
+_BED_NUMBERS = ("steps", "list_count", "grain_steps", "steps_since_lists", "reaction_steps", "skin", "tallied")
+_SLEEP_NUMBERS = ("awake", "mass", "slept", "leaving")
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """What ``Bed.checkpoint`` gave; a bed has room for one, so the next one ends it."""
+    """What ``Bed.checkpoint`` returned; a bed has room for one, so the next one ends it.
 
-    tables: tuple[Any, ...]  # The engine, those that sleep, the balance: whose fields were copied
-    numbers: Json
-    sleeper: Json | None
-    under: tuple[Any, ...]
-    """Gravity, and who lets grains sleep by which rules: what a bed may not have changed meanwhile."""
+    Attributes:
+        tables: whose fields were copied: the engine, the sleepers, the balance.
+        numbers: (owner, attribute, value) of what no field holds.
+        conditions: gravity, and the rules of sleep at work, which must be the same at a rollback.
+    """
+
+    tables: tuple[Any, ...]
+    numbers: list[tuple[Any, str, Any]]
+    conditions: tuple[Any, ...]
 
 
 def take(bed: BedBase) -> Checkpoint:
     """Copy it. Room of the bed's own size is taken the first time, and kept."""
-    e = bed.engine
-    held = Checkpoint(
-        tables=(e, *(table for table in (e.rest, e.balance) if table.on)),
-        numbers={name: getattr(bed, name) for name in _NUMBERS},
-        sleeper=None if bed.sleeper is None else {name: getattr(bed.sleeper, name) for name in _SLEEPERS_NUMBERS},
-        under=_under(bed),
-    )
-    for table in held.tables:
+    owners: list[tuple[Any, tuple[str, ...]]] = [(bed, _BED_NUMBERS)]
+    if bed.sleeper is not None:
+        owners.append((bed.sleeper, _SLEEP_NUMBERS))
+    numbers = [(owner, name, getattr(owner, name)) for owner, names in owners for name in names]
+    kept = Checkpoint(_tables(bed), numbers, (*map(float, bed.gravity), bed.sleeper))
+    for table in kept.tables:
         for name, twin in _twins(table).items():
             twin.copy_from(getattr(table, name))
-    e.held = held
-    return held
+    bed.engine.held = kept
+    return kept
 
 
-def roll_back(bed: BedBase, held: Checkpoint) -> None:
+def roll_back(bed: BedBase, kept: Checkpoint) -> None:
     """Bring the bed back.
 
-    Raises ValueError for what is not the last that was held, or where sleep, its rules, gravity or balance changed.
+    Raises ValueError for what is not the last checkpoint, or where sleep, its rules, gravity or balance changed.
     """
     e = bed.engine
-    if e.held is not held or held.tables != (e, *(table for table in (e.rest, e.balance) if table.on)):
+    if e.held is not kept or kept.tables != _tables(bed):
         raise ValueError("this bed holds another state by now: only the last one that was held can be taken back")
-    if held.under != _under(bed):
+    if kept.conditions != (*map(float, bed.gravity), bed.sleeper):
         raise ValueError("gravity or the rules of sleep are others by now than when this bed was held")
-    for table in held.tables:
+    for table in kept.tables:
         for name, twin in _twins(table).items():
             getattr(table, name).copy_from(twin)
     if e.rest.on:
-        e.rest.whole[None] = 1  # of what lists were made with nothing is held
-    for name, value in held.numbers.items():
-        setattr(bed, name, value)
-    for name, value in (held.sleeper or {}).items():
-        setattr(bed.sleeper, name, value)
+        e.rest.whole[None] = 1  # of what lists were made with nothing is kept
+    for owner, name, value in kept.numbers:
+        setattr(owner, name, value)
 
 
-def _under(bed: BedBase) -> tuple[Any, ...]:
-    return (*(float(part) for part in bed.gravity), bed.sleeper)
+def _tables(bed: BedBase) -> tuple[Any, ...]:
+    e = bed.engine
+    return (e, *(table for table in (e.rest, e.balance) if table.on))
 
 
 def _twins(table: Any) -> dict[str, ti.Field]:

@@ -20,7 +20,7 @@ from . import checkpoint, state
 from .base import FLOOR, check_array
 from .bodies import BedBodies
 from .checkpoint import Checkpoint
-from .dissipation import PARTS, TURNED
+from .dissipation import PARTS, TURNED, Balance
 from .stress import find_contacts
 from .values import BedSettings, Grains, State
 
@@ -91,7 +91,11 @@ class BedCore(BedBodies):
             np.zeros((len(radii), 3)) if values is None else np.asarray(values, dtype=float)
             for values in (positions, velocities, spins)
         )
-        _check_grains(radii, positions, velocities, spins)
+        check_array("radii", radii, (len(radii),))
+        if not len(radii) or not (radii > 0).all():
+            raise ValueError("radii must be positive and there must be at least one grain")
+        for name, values in (("positions", positions), ("velocities", velocities), ("spins", spins)):
+            check_array(name, values, (len(radii), 3))
         if len(size) != 3 or not all(math.isfinite(s) and s > 0 for s in size):
             raise ValueError(f"size = {tuple(size)} must be three positive lengths [m]")
         if not 0 < max_overlap <= 0.2:
@@ -129,19 +133,11 @@ class BedCore(BedBodies):
         e = self.engine
         order = np.argsort(e.read("id"))
         names = ("position", "velocity", "spin", "force", "torque", "origin")
-        position, velocity, spin, force, torque, origin = (e.read(name)[order].astype(float) for name in names)
-        rates = self.rates_now(position, velocity, spin, force, torque)
-        return Grains(
-            id=np.arange(self.grain_count),
-            position=position[:, :3],
-            radius=position[:, 3],
-            mass=velocity[:, 3],
-            velocity=rates[0],
-            spin=rates[1],
-            force=force,
-            displacement=position[:, :3] - origin,
-            coordination=self.contact_counts() if contacts else np.zeros(0, dtype=np.int32),
-        )
+        x, v, w, force, torque, origin = (e.read(name)[order].astype(float) for name in names)
+        velocity, spin = self.rates_now(x, v, w, force, torque)
+        counts = self.contact_counts() if contacts else np.zeros(0, dtype=np.int32)
+        ids = np.arange(self.grain_count)
+        return Grains(ids, x[:, :3], x[:, 3], v[:, 3], velocity, spin, force, x[:, :3] - origin, counts)
 
     def contact_counts(self) -> np.ndarray:
         """Contacts of each grain with grains and bodies, by id, shape [grain_count]."""
@@ -161,8 +157,7 @@ class BedCore(BedBodies):
         """Translation and rotation [J]."""
         g = self.grains(contacts=False)
         moving = 0.5 * g.mass @ (g.velocity**2).sum(axis=1)
-        turning = 0.2 * (g.mass * g.radius**2) @ (g.spin**2).sum(axis=1)
-        return float(moving + turning)
+        return float(moving + 0.2 * (g.mass * g.radius**2) @ (g.spin**2).sum(axis=1))
 
     @property
     def weight(self) -> float:
@@ -193,7 +188,6 @@ class BedCore(BedBodies):
 
     def state(self) -> State:
         """Everything that the next step depends on, to the bit: a flat dict of numpy arrays."""
-        self.check_valid()
         return state.take(self)
 
     def restore(self, values: State) -> None:
@@ -222,9 +216,7 @@ class BedCore(BedBodies):
 
     def save(self, path: str | Path) -> Path:
         """Write the bed to one file (.npz), whole or not at all. Returns the path."""
-        path = Path(path)
-        self.check_valid()
-        state.write_file(self, path)
+        state.write_file(self, path := Path(path))
         return path
 
     @classmethod
@@ -247,15 +239,12 @@ class BedCore(BedBodies):
         Args:
             remove: by id, bool, shape [grain_count].
         """
-        self.check_valid()
         self.wake()
-        ids = self.engine.read("id")
-        order = np.argsort(ids)
         keep = ~np.asarray(remove, dtype=bool)
         if not keep.any():
             raise ValueError("no grain would be left")
         values = self.state()
-        radii = values["position"][order, 3][keep].astype(float)
+        radii = values["position"][np.argsort(values["id"]), 3][keep].astype(float)
         bed = self.alike(replace(self.settings, gravity=self.gravity), radii)
         state.adopt(bed, values, keep=keep)
         return bed
@@ -334,9 +323,12 @@ class BedCore(BedBodies):
         against tangential forces, and against rolling and twisting torques; it is lost but for what their springs hold
         more than at the start (``dem.engine.energy.bed_energies``). Raises ValueError: it is not tracked.
         """
+        return dict(zip(PARTS, self._balance().sums().tolist(), strict=True))
+
+    def _balance(self) -> Balance:
         if not self.engine.balance.on:
             raise ValueError("this bed tracks no contact work: track_contact_work() starts it")
-        return dict(zip(PARTS, self.engine.balance.sums().tolist(), strict=True))
+        return self.engine.balance
 
     def momentum(self) -> np.ndarray:
         """Of the grains [N s], shape [3], with the velocities half a step ahead, where the forces so far bring them."""
@@ -355,23 +347,13 @@ class BedCore(BedBodies):
 
         Raises ValueError: it is not tracked.
         """
-        if not self.engine.balance.on:
-            raise ValueError("this bed tracks no contact work: track_contact_work() starts it")
+        balance = self._balance()
         x, v, w, f, t = self.awake_rows("position", "velocity", "spin", "force", "torque")
         radius, mass = x[:, 3], v[:, 3]
         momentum = mass[:, None] * v[:, :3] + self.time_step * f
         own = (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * t
         total = np.cross(x[:, :3], momentum).sum(axis=0) + own.sum(axis=0)
-        return {"grains": total, **dict(zip(TURNED, self.engine.balance.turns(), strict=True))}
-
-
-def _check_grains(radii: np.ndarray, positions: np.ndarray, velocities: np.ndarray, spins: np.ndarray) -> None:
-    n = len(radii)
-    check_array("radii", radii, (n,))
-    if n == 0 or not (radii > 0).all():
-        raise ValueError("radii must be positive and there must be at least one grain")
-    for name, values in (("positions", positions), ("velocities", velocities), ("spins", spins)):
-        check_array(name, values, (n, 3))
+        return {"grains": total, **dict(zip(TURNED, balance.turns(), strict=True))}
 
 
 def _height(height: float | None, positions: np.ndarray, radii: np.ndarray) -> float:

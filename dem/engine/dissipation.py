@@ -18,7 +18,7 @@ import numpy as np
 import taichi as ti
 
 from .lists import INDEX_BITS, INDEX_MASK, SAME_IMAGE
-from .rows import put_rows, take_rows
+from .rows import Rows
 from .values import EnginePart
 
 __all__ = ["NO_BALANCE", "OUTSIDE", "PARTS", "TURNED", "BalanceKernels", "Balance"]
@@ -50,10 +50,8 @@ class Balance:
     def __init__(self, *, rows: int, near: int, chunks: int, real):
         self.real = real
         F = ti.Vector.field
-        self.last = F(_WIDTH, real, rows)
-        self.old_last = F(_WIDTH, real, rows)
-        self.near_last = F(_WIDTH, real, near)
-        self.old_near_last = F(_WIDTH, real, near)
+        self.last, self.old_last = (F(_WIDTH, real, rows) for _ in range(2))
+        self.near_last, self.old_near_last = (F(_WIDTH, real, near) for _ in range(2))
         self.taken = F(len(PARTS), ti.f64, chunks)
         # Angular impulses about the bed's origin: from outside, to the first body (the floor, where there is one), to
         # the other bodies; and gravity.
@@ -73,22 +71,10 @@ class Balance:
         """Angular impulses over all chunks, in their order: a row each of ``TURNED`` [N m s], shape [3, 3]."""
         return np.asarray(np.cumsum(self.turned.to_numpy(), axis=0)[-1])
 
-    def state(self, rows: np.ndarray, near: np.ndarray) -> dict[str, np.ndarray]:
-        """All that its next step depends on; ``rows``, ``near``: of the lists, those in use."""
-        return {
-            "ledger_last": take_rows(self.last, rows),
-            "ledger_near_last": take_rows(self.near_last, near),
-            "ledger_taken": self.taken.to_numpy(),
-            "ledger_turned": self.turned.to_numpy(),
-        }
-
-    def restore(self, state: dict[str, np.ndarray], rows: np.ndarray, near: np.ndarray) -> None:
-        """Go back to what ``state`` gave; the lists are already as they were."""
-        for field, name, where in (
-            (self.last, "ledger_last", rows), (self.near_last, "ledger_near_last", near),
-            (self.taken, "ledger_taken", slice(None)), (self.turned, "ledger_turned", slice(None)),
-        ):  # fmt: skip
-            put_rows(field, state[name], where)
+    @staticmethod
+    def rows(pairs: np.ndarray, near: np.ndarray) -> dict[str, Rows]:
+        """Rows of the fields that its next step depends on; ``pairs``, ``near``: those of the lists in use."""
+        return {"last": pairs, "near_last": near, "taken": slice(None), "turned": slice(None)}
 
     @ti.func
     def nothing(self):

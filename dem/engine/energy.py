@@ -15,8 +15,8 @@ import numpy as np
 from dem.contact.cohesion import COHESIONS, DMT, JKR
 
 from .base import BedBase
-from .lists import INDEX_BITS, INDEX_MASK
-from .state import take
+from .state import take, touching_pairs
+from .values import State
 
 __all__ = ["bed_energies", "body_pushes"]
 
@@ -117,17 +117,13 @@ def _normal_spring(law: int, row: Array, overlap: Array, radius: Array) -> tuple
     return a, energy - 2 * pi_w * radius * pressed if law == DMT else energy
 
 
-def _pairs(bed: BedBase, state: Mapping[str, Array], law: int) -> Array:
+def _pairs(bed: BedBase, state: State, law: int) -> Array:
     """Of two grains. A pair within a chunk is listed once, one across chunks by both."""
     count = bed.grain_count
     position = state["position"].astype(float)
-    first = np.repeat(np.arange(count), state["pair_count"])
-    touching = state["pair"] < 0
-    i, bits = first[touching], ~state["pair"][touching]
-    j, image = bits & INDEX_MASK, bits >> INDEX_BITS
+    i, j, back = touching_pairs(state)
     d = position[i, :3] - position[j, :3]
-    d[:, 0] += (image % 3 - 1) * bed.size[0]
-    d[:, 1] += (image // 3 - 1) * bed.size[1]
+    d[:, :2] += back * bed.size[:2]
     slide = state["slide"].astype(float)
     turned = state["roll"].astype(float) if "roll" in state else np.zeros_like(d)
     awake, chunks = state.get("sleep_numbers", (count, len(state["near_count"])))[:2]
@@ -145,7 +141,7 @@ def _pairs(bed: BedBase, state: Mapping[str, Array], law: int) -> Array:
     return _springs(law, row, overlap, r_i * r_j / (r_i + r_j), slide[:, :3], turned, d / length[:, None], share)
 
 
-def _asleep(bed: BedBase, state: Mapping[str, Array]) -> tuple[Array, ...]:
+def _asleep(bed: BedBase, state: State) -> tuple[Array, ...]:
     """Of two sleepers: grains, distance, history and share of each contact, as ``_pairs`` has them."""
     grains = state["sleep_store_who"] >= 0
     owner, who = (state[f"sleep_store_{name}"][grains].astype(np.int64) for name in ("owner", "who"))
@@ -169,7 +165,7 @@ def _twice(keys: Array) -> Array:
     return found
 
 
-def _near(state: Mapping[str, Array], surfaces: Mapping[int, Gap], law: int) -> Array:
+def _near(state: State, surfaces: Mapping[int, Gap], law: int) -> Array:
     rows = [state[name] for name in ("near_grain", "near_body", "near_slide", "near_roll")]
     if "sleep_numbers" in state:
         bodies = state["sleep_store_who"] < 0

@@ -25,7 +25,6 @@ import taichi as ti
 
 from dem.contact.law import PAIR_WIDTH
 from dem.grains.curve import curve_ranks
-from dem.grains.sizes import Json
 from dem.shapes.basic import ROW_WIDTH
 
 from . import runtime
@@ -49,23 +48,60 @@ MOST_PRIMITIVES = 64
 _free: dict[tuple, list] = {}
 
 
-def take_engine(owner: Any, **settings: Any) -> "Engine":
-    """An engine for ``owner``, set up by ``settings`` (those of ``Engine.set_up``, and ``rolling``, ``tensile``,
-    ``cohesion``, ``real``, ``gpu``, ``threads``); one that an earlier owner has left, where there is one of the shape.
+def take_engine(
+    owner: Any,
+    *,
+    grain_count: int,
+    period: tuple[float, float],
+    bottom: float,
+    height: float,
+    largest_diameter: float,
+    largest_skin: float,
+    gpu: bool,
+    chunk_count: int | None = None,
+    **build: Any,
+) -> "Engine":
+    """An engine set up for ``owner``: one that an earlier owner has left, where there is one of the same build.
+
+    Args:
+        grain_count: number of grains. period: lateral period (x, y) [m].
+        bottom, height: z of the box's bottom and top [m].
+        largest_diameter: of the grains [m]. largest_skin: of the lists [m].
+        gpu: one grain a chunk. chunk_count: chosen when None.
+        build: the other arguments of ``Engine``, but for its capacities.
 
     Raises ValueError: a bed less than three grains wide.
     """
-    fixed = {key: settings.pop(key) for key in ("rolling", "tensile", "cohesion", "real", "gpu", "threads")}
-    plan = Engine.plan(gpu=fixed["gpu"], **settings)
-    shape = {key: plan.pop(key) for key in ("capacity", "cell_capacity", "chunk_capacity", "neighbours_per_grain")}
-    key = (runtime.generation(), *shape.values(), *(str(value) for value in fixed.values()))
+    cell = largest_diameter + largest_skin
+    nx, ny = (max(1, int(length / cell)) for length in period)
+    cells = (nx, ny, max(1, int((height - bottom) / cell) + 1))
+    if min(nx, ny) < 3:
+        # With fewer the same neighbour would be met through two images.
+        raise ValueError(
+            f"the bed is {min(period):g} m across, less than three grains of {largest_diameter:g} m; "
+            f"make it at least {3 * cell:.3g} m wide"
+        )
+    if chunk_count is None:
+        chunk_count = grain_count if gpu else max(1, min(MOST_CHUNKS, round(grain_count / GRAINS_PER_CHUNK)))
+    build |= {"gpu": gpu, **capacities(grain_count, math.prod(cells), chunk_count, gpu=gpu)}
+    key = (runtime.generation(), *(str(build[name]) for name in sorted(build)))
     for old in [k for k in _free if k[0] != key[0]]:
         del _free[old]
     idle = _free.setdefault(key, [])
-    engine = idle.pop() if idle else Engine(**shape, **fixed)
-    engine.set_up(**plan)
+    engine = idle.pop() if idle else Engine(**build)
+    box = (*period, bottom, height, period[0] / nx, period[1] / ny, cell)
+    engine.set_up(grain_count=grain_count, chunk_count=chunk_count, cells=cells, box=box)
     weakref.finalize(owner, idle.append, engine).atexit = False
     return engine
+
+
+def capacities(grain_count: int, cell_count: int, chunk_count: int, *, gpu: bool) -> dict[str, int]:
+    """How many grains, cells and chunks an engine is compiled for that has to hold these."""
+    return {
+        "capacity": _roomy(grain_count, least=64),
+        "cell_capacity": _roomy(cell_count, least=1024),
+        "chunk_capacity": _roomy(chunk_count, least=MOST_CHUNKS),
+    }
 
 
 def _roomy(count: int, *, least: int) -> int:
@@ -94,68 +130,12 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         threads: of the CPU.
     """
 
-    # Fields with a row for each grain: ``read`` and ``write`` see those in use.
-    GRAIN_FIELDS = (
-        "position",
-        "velocity",
-        "spin",
-        "force",
-        "torque",
-        "origin",
-        "listed",
-        "id",
-        "pair_start",
-        "pair_end",
+    # Fields of the state: with a row for each grain, and of the bodies and their shapes.
+    GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
+    BODY_FIELDS = (
+        *(f"body_{name}" for name in ("position", "velocity", "spin", "turn", "listed", "listed_turn", "extent")),
+        *("body_primitives", "body_pair", "primitive_kind", "primitive_row"),
     )
-
-    @staticmethod
-    def plan(
-        *,
-        grain_count: int,
-        period: tuple[float, float],
-        bottom: float,
-        height: float,
-        largest_diameter: float,
-        largest_skin: float,
-        gpu: bool = False,
-        neighbours_per_grain: int = 16,
-        chunk_count: int | None = None,
-    ) -> Json:
-        """The shape to compile and the numbers to set up.
-
-        Args:
-            grain_count: number of grains.
-            period: lateral period (x, y) [m].
-            bottom, height: z of the box's bottom and top [m].
-            largest_diameter: of the grains [m]. largest_skin: of the lists [m].
-            gpu: one grain a chunk.
-            neighbours_per_grain: room in the lists.
-            chunk_count: chosen when None.
-        """
-        cell = largest_diameter + largest_skin
-        cells = (
-            max(1, int(period[0] / cell)),
-            max(1, int(period[1] / cell)),
-            max(1, int((height - bottom) / cell) + 1),
-        )
-        if min(cells[:2]) < 3:
-            # With fewer the same neighbour would be met through two images.
-            raise ValueError(
-                f"the bed is {min(period):g} m across, less than three grains of {largest_diameter:g} m; "
-                f"make it at least {3 * cell:.3g} m wide"
-            )
-        if chunk_count is None:
-            chunk_count = grain_count if gpu else max(1, min(MOST_CHUNKS, round(grain_count / GRAINS_PER_CHUNK)))
-        return {
-            "capacity": _roomy(grain_count, least=64),
-            "cell_capacity": _roomy(math.prod(cells), least=1024),
-            "chunk_capacity": _roomy(chunk_count, least=MOST_CHUNKS),
-            "neighbours_per_grain": neighbours_per_grain,
-            "grain_count": grain_count,
-            "chunk_count": chunk_count,
-            "cells": cells,
-            "box": (*period, bottom, height, period[0] / cells[0], period[1] / cells[1], cell),
-        }
 
     def __init__(
         self,
@@ -168,8 +148,8 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         tensile: bool,
         cohesion: int,
         real,
-        gpu: bool = False,
-        threads: int = 1,
+        gpu: bool,
+        threads: int,
     ):
         self.real = real
         self.rolling = rolling
@@ -274,11 +254,8 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         for k, value in enumerate(box):
             self.box[k] = value
         self.write("rank", curve_ranks(*cells))
-        bodies = (self.body_position, self.body_velocity, self.body_spin, self.body_turn, self.body_listed,
-            self.body_listed_turn, self.body_extent, self.body_primitives, self.body_pair, self.primitive_kind,
-            self.primitive_row)  # fmt: skip
-        for field in (self.pair_start, self.pair_end, self.overlap, self.ticket, self.near_end, *bodies):
-            field.fill(0)
+        for name in ("pair_start", "pair_end", "overlap", "ticket", "near_end", *self.BODY_FIELDS):
+            getattr(self, name).fill(0)
         for counter in (self.body_count, self.moved, self.halted, self.done):
             counter[None] = 0
         self.problem[None] = [0, 0]
@@ -295,13 +272,8 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
                 grains=self.id.shape[0], cells=self.rank.shape[0], chunks=self.overlap.shape[0],
                 rows=self.pair.shape[0], real=self.real,
             )  # fmt: skip
-        self.rest = rest = self._kept_rest
-        for field in (rest.asleep, rest.was, rest.woken, rest.leaves, rest.quiet, rest.start, rest.end):
-            field.fill(0)
-        for field in (rest.side, rest.mass, rest.news, rest.held, rest.begins, rest.block, rest.force):
-            field.fill(0)
-        rest.whole[None] = 1
-        rest.last[None] = -1
+        self.rest = self._kept_rest
+        self.rest.clear()
 
     def wake_all(self) -> None:
         """All are awake, and the kernels are those that know of no sleep."""
@@ -326,11 +298,9 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
     def read(self, name: str) -> np.ndarray:
         """A field as a numpy array: the rows of the grains or chunks there are, or all of them."""
         array = getattr(self, name).to_numpy()
-        if name in self.GRAIN_FIELDS:
+        if name in (*self.GRAIN_FIELDS, "pair_start", "pair_end"):
             return array[: self.grain_count]
-        if name in ("overlap", "pushes", "near_end"):
-            return array[: self.chunk_count]
-        return array
+        return array[: self.chunk_count] if name in ("overlap", "pushes", "near_end") else array
 
     def write(self, name: str, values: np.ndarray, rows: np.ndarray | None = None) -> None:
         """Put values into the first rows of a field, or into the rows given; the others become zero."""

@@ -7,7 +7,7 @@ import taichi as ti
 
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range
-from dem.shapes.basic import distance_to, rotate
+from dem.shapes.basic import rotate
 
 from .values import EnginePart
 
@@ -98,18 +98,11 @@ class Lists(EnginePart):
         primitives = self.body_primitives[b]
         for k in range(primitives[0], primitives[1]):
             row = self.primitive_row[k]
-            if ti.static(shapes.full):
-                distance, n_k, c_k = shapes.distance_to(k, self.primitive_kind[k], row, local, reach, deep)
-                if distance < best:
-                    best = distance
-                    normal = n_k
-                    curvature = c_k
-            else:
-                distance, n_k, c_k = distance_to(self.primitive_kind[k], row, local)
-                if distance < best:
-                    best = distance
-                    normal = n_k
-                    curvature = c_k
+            distance, n_k, c_k = shapes.distance_to(k, self.primitive_kind[k], row, local, reach, deep)
+            if distance < best:
+                best = distance
+                normal = n_k
+                curvature = c_k
         normal = rotate(q, normal)
         return best, normal, curvature, d - best * normal
 
@@ -379,19 +372,9 @@ class Lists(EnginePart):
                     for dj, di in ti.ndrange((-1, 2), (-1, 2)):
                         # Stepping out on the left means the neighbour's image one period to the left.
                         gi, gj = ci + di, cj + dj
-                        mi, mj = 0, 0
-                        if gi < 0:
-                            gi += self.count[self.NX]
-                            mi = 1
-                        elif gi >= self.count[self.NX]:
-                            gi -= self.count[self.NX]
-                            mi = -1
-                        if gj < 0:
-                            gj += self.count[self.NY]
-                            mj = 1
-                        elif gj >= self.count[self.NY]:
-                            gj -= self.count[self.NY]
-                            mj = -1
+                        mi = ti.select(gi < 0, 1, 0) - ti.select(gi >= self.count[self.NX], 1, 0)
+                        mj = ti.select(gj < 0, 1, 0) - ti.select(gj >= self.count[self.NY], 1, 0)
+                        gi, gj = gi + mi * self.count[self.NX], gj + mj * self.count[self.NY]
                         r = self.rank[self.cell_index(gi, gj, k)]
                         for part in range(rest.sets):
                             if ti.static(rest.on):

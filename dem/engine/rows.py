@@ -1,22 +1,32 @@
 """Some rows of a field as a numpy array: fields have room for many times the rows in use, and copying room costs."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import taichi as ti
 from taichi.lang.util import to_numpy_type
 
-__all__ = ["put_rows", "take_rows"]
+__all__ = ["put_rows", "read_fields", "row_numbers", "take_rows", "write_fields"]
+
+Rows = np.ndarray | slice
 
 
-def take_rows(field: Any, rows: np.ndarray, *, part: int | None = None) -> np.ndarray:
+def row_numbers(start: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Numbers of the rows of several runs, one after the other: ``counts`` rows from each ``start`` on."""
+    return np.repeat(start - (np.cumsum(counts) - counts), counts) + np.arange(int(counts.sum()))
+
+
+def take_rows(field: Any, rows: Rows, *, part: int | None = None) -> np.ndarray:
     """``field.to_numpy()[rows]``, or of a field with two indices ``field.to_numpy()[part][rows]``."""
+    if isinstance(rows, slice):
+        return np.asarray(field.to_numpy()[rows])
     width = () if isinstance(field, ti.ScalarField) else (field.n,)
-    values = np.zeros((len(rows), *width), dtype=to_numpy_type(field.dtype))
+    values = np.zeros((len(rows), *(width or (1,))), dtype=to_numpy_type(field.dtype))
     if len(rows):
         whole = (0 if part is None else part, part is not None)
-        (_take_vectors if width else _take_numbers)(field, np.ascontiguousarray(rows, dtype=np.int32), values, *whole)
-    return values
+        _take(field, np.ascontiguousarray(rows, dtype=np.int32), values, bool(width), *whole)
+    return values.reshape(len(rows), *width)
 
 
 def put_rows(field: Any, values: np.ndarray, where: Any) -> None:
@@ -27,32 +37,34 @@ def put_rows(field: Any, values: np.ndarray, where: Any) -> None:
     field.from_numpy(array)
 
 
-@ti.kernel
-def _take_numbers(
-    field: ti.template(),
-    rows: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    values: ti.types.ndarray(ndim=1),
-    part: int,
-    parted: ti.template(),
-):
-    for k in range(rows.shape[0]):
-        if ti.static(parted):
-            values[k] = field[part, rows[k]]
-        else:
-            values[k] = field[rows[k]]
+def read_fields(table: Any, rows: Mapping[str, Rows], prefix: str) -> dict[str, np.ndarray]:
+    """These rows of the fields of a table, by the field's name behind ``prefix``."""
+    return {prefix + name: take_rows(getattr(table, name), where) for name, where in rows.items()}
+
+
+def write_fields(table: Any, rows: Mapping[str, Rows], prefix: str, state: Mapping[str, np.ndarray]) -> None:
+    """Put back what ``read_fields`` gave; all other rows become zero."""
+    for name, where in rows.items():
+        put_rows(getattr(table, name), state[prefix + name], where)
 
 
 @ti.kernel
-def _take_vectors(
+def _take(
     field: ti.template(),
     rows: ti.types.ndarray(dtype=ti.i32, ndim=1),
     values: ti.types.ndarray(ndim=2),
+    vectors: ti.template(),
     part: int,
     parted: ti.template(),
 ):
     for k in range(rows.shape[0]):
-        for d in ti.static(range(field.n)):
-            if ti.static(parted):
-                values[k, d] = field[part, rows[k]][d]
-            else:
-                values[k, d] = field[rows[k]][d]
+        if ti.static(vectors):
+            for d in ti.static(range(field.n)):
+                if ti.static(parted):
+                    values[k, d] = field[part, rows[k]][d]
+                else:
+                    values[k, d] = field[rows[k]][d]
+        elif ti.static(parted):
+            values[k, 0] = field[part, rows[k]]
+        else:
+            values[k, 0] = field[rows[k]]

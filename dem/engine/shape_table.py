@@ -4,27 +4,18 @@ A bed whose bodies are of planes, balls, cylinders and cones alone has ``PLAIN``
 compiled without all this. The table is a template argument of the kernels, so they are compiled anew for a larger one.
 """
 
+from collections import defaultdict
 from typing import Any
 
 import numpy as np
 import taichi as ti
 
-from dem.shapes.basic import FRUSTUM, distance_to, rotate
-from dem.shapes.mesh import MESH, Mesh, Polyhedron
+from dem.shapes.basic import BOX, CAPSULE, FRUSTUM, MESH, PLACE_WIDTH, PLACED, TUBE, Shape, distance_to, rotate
+from dem.shapes.mesh import Mesh, Surface
 from dem.shapes.mesh_tree import CORNER_A, CORNER_B, CORNER_C, EDGE_AB, EDGE_BC, EDGE_CA, FACE, FEATURES, mesh_tree
-from dem.shapes.solids import (
-    BOX,
-    CAPSULE,
-    PLACE_WIDTH,
-    PLACED,
-    TUBE,
-    bare,
-    box_distance,
-    capsule_distance,
-    place_row,
-    tube_distance,
-)
+from dem.shapes.solids import box_distance, capsule_distance, tube_distance
 
+from .rows import put_rows
 from .values import EnginePart
 
 __all__ = ["PLAIN", "ShapeTable", "Shapes"]
@@ -39,7 +30,11 @@ class PlainTable:
     """Stands where no table is needed."""
 
     full = False
-    triangle_capacity = 0
+
+    @ti.func
+    def distance_to(self, k, kind, row: ti.template(), p, reach, deep: ti.template()):
+        """As ``ShapeTable`` has it."""
+        return distance_to(kind, row, p)
 
 
 PLAIN = PlainTable()
@@ -59,41 +54,25 @@ class ShapeTable:
         self.real = real
         self.triangle_capacity = triangles
         self.place = F(PLACE_WIDTH, real, primitives)
-        self.low = F(3, real, 2 * triangles)
-        self.high = F(3, real, 2 * triangles)
-        self.skip = ti.field(ti.i32, 2 * triangles)
-        self.leaf = ti.field(ti.i32, 2 * triangles)
-        self.corner = F(3, real, triangles)
-        self.side_ab = F(3, real, triangles)
-        self.side_ac = F(3, real, triangles)
-        self.normal = F(3, real, FEATURE_COUNT * triangles)
+        self.low, self.high = (F(3, real, 2 * triangles) for _ in range(2))
+        self.skip, self.leaf = (ti.field(ti.i32, 2 * triangles) for _ in range(2))
+        self.corner, self.side_ab, self.side_ac = (F(3, real, triangles) for _ in range(3))
+        self.normals = F(3, real, FEATURE_COUNT * triangles)
 
-    def fill(self, meshes: list[Mesh], dtype) -> None:
+    def fill(self, meshes: list[Mesh]) -> None:
         """Put these meshes' trees into the fields."""
-        columns: dict[str, list[np.ndarray]] = {}
+        columns: dict[str, list[np.ndarray]] = defaultdict(list)
         nodes = triangles = 0
         for mesh in meshes:
             tree = mesh_tree(mesh)
-            parts = {
-                "low": tree.low,
-                "high": tree.high,
-                "skip": tree.skip + nodes,
-                "leaf": np.where(tree.leaf < 0, -1, tree.leaf + triangles),
-                "corner": tree.corner,
-                "side_ab": tree.side_ab,
-                "side_ac": tree.side_ac,
-                "normal": tree.normals.reshape(-1, 3),
-            }
-            for name, array in parts.items():
-                columns.setdefault(name, []).append(array)
+            behind = {"skip": tree.skip + nodes, "leaf": np.where(tree.leaf < 0, -1, tree.leaf + triangles)}
+            for name, array in (vars(tree) | behind | {"normals": tree.normals.reshape(-1, 3)}).items():
+                columns[name].append(array)
             nodes += len(tree.leaf)
             triangles += len(tree.corner)
         for name, arrays in columns.items():
-            field = getattr(self, name)
             rows = np.concatenate(arrays)
-            whole = np.zeros((*field.shape, *rows.shape[1:]), dtype=dtype if rows.ndim == 2 else np.int32)
-            whole[: len(rows)] = rows
-            field.from_numpy(whole)
+            put_rows(getattr(self, name), rows, slice(len(rows)))
 
     @ti.func
     def distance_to(self, k, kind, row: ti.template(), p, reach, deep: ti.template()):
@@ -158,7 +137,7 @@ class ShapeTable:
         distance = p.x * 0.0 + FAR
         normal = p * 0.0
         if found >= 0:
-            normal = self.normal[FEATURE_COUNT * found + feature]
+            normal = self.normals[FEATURE_COUNT * found + feature]
             if feature == FACE:
                 distance = normal.dot(p - self.corner[found])
             else:
@@ -212,7 +191,7 @@ class ShapeTable:
         nearest = a + v * ab + w * ac
         square = (p - nearest).norm_sqr()
         if feature == FACE:
-            square = self.normal[FEATURE_COUNT * t].dot(ap) ** 2
+            square = self.normals[FEATURE_COUNT * t].dot(ap) ** 2
         return square, feature, nearest
 
 
@@ -223,24 +202,21 @@ class Shapes(EnginePart):
     _kept: ShapeTable | None
     _meshes: list[Mesh]
 
-    def put_shapes(self, first: int, shapes: list) -> None:
+    def put_shapes(self, first: int, shapes: list[Shape]) -> None:
         """Put the shapes of a new body into the rows from ``first`` on; what was there is forgotten."""
         self.drop_shapes(first)
         for shape in shapes:
-            inner = bare(shape)
-            if isinstance(inner, Mesh | Polyhedron) and not any(inner.mesh is other for other in self._meshes):
-                self._meshes.append(inner.mesh)
+            if isinstance(shape.bare, Surface) and not any(shape.bare.mesh is other for other in self._meshes):
+                self._meshes.append(shape.bare.mesh)
         if any(shape.kind > FRUSTUM for shape in shapes):
             self._make_table()
         for k, shape in enumerate(shapes, first):
-            inner = bare(shape)
+            inner = shape.bare
             self.primitive_kind[k] = shape.kind
-            if isinstance(inner, Mesh | Polyhedron):
-                self.primitive_row[k] = [*self._nodes_of(inner.mesh), 0, 0, 0, 0]
-            else:
-                self.primitive_row[k] = inner.row()
+            row = [*self._nodes_of(inner.mesh), 0, 0, 0, 0] if isinstance(inner, Surface) else inner.row()
+            self.primitive_row[k] = row
             if self.shapes.full:
-                self.shapes.place[k] = place_row(shape)
+                self.shapes.place[k] = shape.place()
 
     def shape_state(self) -> dict[str, np.ndarray]:
         """What of the shapes is in no other field: nothing where the kernels are plain."""
@@ -291,7 +267,7 @@ class Shapes(EnginePart):
         self.shapes = self._kept
         if before is not self.shapes:
             self.shapes.place.copy_from(before.place) if before.full else self.shapes.place.fill(0)
-        self.shapes.fill(self._meshes, np.float64 if self.real == ti.f64 else np.float32)
+        self.shapes.fill(self._meshes)
 
     def _nodes_of(self, mesh: Mesh) -> tuple[int, int]:
         """First node of a mesh's tree and the one after its last."""

@@ -29,7 +29,7 @@ import numpy as np
 
 from .engine import Engine
 from .lists import INDEX_MASK
-from .rows import put_rows, take_rows
+from .rows import Rows, put_rows, read_fields, row_numbers, take_rows, write_fields
 from .sleep_kernels import FULL, LEAVING, WOKEN
 from .values import BedFailure, State
 
@@ -134,12 +134,7 @@ class Sleeper:
                 raise BedFailure(f"there is room for {rest.who.shape[1]} contacts of sleepers and {needed} are needed")
         e.recount(e.awake_per_chunk, rest)
         self.leaving = False
-        self.read()
-
-    def read(self) -> None:
-        """How many are awake, and the mass of the others."""
-        e = self.bed.engine
-        self.awake, self.mass = int(e.count[e.AWAKE]), float(e.rest.mass[None])
+        self.awake, self.mass = int(e.count[e.AWAKE]), float(rest.mass[None])
 
     def on_floor(self) -> np.ndarray:
         """What sleepers add to the impulse on the floor over the last advance, over the time step [N], shape [3]."""
@@ -159,8 +154,7 @@ class Sleeper:
         touches = frozen["slide"][:, 3] != 0  # of a body's rows: what only is near it remembers nothing
         counts += np.bincount(owner[~grains & touches], minlength=n)
         start, end = e.read("pair_start")[: self.awake], e.read("pair_end")[: self.awake]
-        rows = np.repeat(end - np.cumsum(end - start), end - start) + np.arange((end - start).sum())
-        pair = take_rows(e.pair, rows)
+        pair = take_rows(e.pair, row_numbers(start, end - start))
         others = ~pair[pair < 0] & INDEX_MASK
         return np.asarray(counts + np.bincount(ids[others[others >= self.awake]], minlength=n), dtype=np.int32)
 
@@ -174,36 +168,34 @@ class Sleeper:
         asleep = rest.asleep.to_numpy()[:n] == 1
         counts = np.where(asleep, end - start, 0)
         owner = np.repeat(np.arange(n), counts)
-        rows = np.repeat(start, counts) + np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        rows = row_numbers(start, counts)
         who = take_rows(rest.who, rows, part=side)
         stays = (who < 0) | asleep[np.maximum(who, 0)]
         rows = rows[stays]
         parts = {name: take_rows(getattr(rest, name), rows, part=side) for name in ("slide", "roll")}
         return {"owner": owner[stays].astype(np.int32), "who": who[stays], **parts}
 
+    def _rows(self, pairs: np.ndarray) -> dict[str, Rows]:
+        """Rows of the fields that the next steps depend on; ``pairs``: those of the pair lists in use."""
+        grains = slice(self.bed.grain_count)
+        return {"asleep": grains, "quiet": grains, "force": pairs, "held": slice(self.bed.engine.chunk_count)}
+
     def state(self, rows: np.ndarray) -> State:
         """All that the next steps depend on; ``rows``: of the pair lists, those in use."""
-        e, rest, n = self.bed.engine, self.bed.engine.rest, self.bed.grain_count
-        own: State = {
-            "rules": np.array(astuple(self.rules), dtype=float),
-            "asleep": rest.asleep.to_numpy()[:n],
-            "quiet": rest.quiet.to_numpy()[:n],
-            "force": take_rows(rest.force, rows),
-            "held": rest.held.to_numpy()[: e.chunk_count],
-            "numbers": np.array([self.awake, int(e.count[e.CHUNKS]), self.bed.grain_steps]),
-            "reals": np.array([self.mass, self.slept]),
-            "order": np.array([int(rest.begins[None]), int(rest.block[None])]),
+        e, rest = self.bed.engine, self.bed.engine.rest
+        return {
+            "sleep_rules": np.array(astuple(self.rules), dtype=float),
+            **read_fields(rest, self._rows(rows), "sleep_"),
+            "sleep_numbers": np.array([self.awake, int(e.count[e.CHUNKS]), self.bed.grain_steps]),
+            "sleep_reals": np.array([self.mass, self.slept]),
+            "sleep_order": np.array([int(rest.begins[None]), int(rest.block[None])]),
+            **{f"sleep_store_{name}": values for name, values in self.frozen().items()},
         }
-        own |= {f"store_{name}": values for name, values in self.frozen().items()}
-        return {f"sleep_{name}": values for name, values in own.items()}
 
     def restore(self, state: State, rows: np.ndarray) -> None:
         """Go back to what ``state`` gave; the lists are already as they were."""
         e, rest, n = self.bed.engine, self.bed.engine.rest, self.bed.grain_count
-        for name in ("asleep", "quiet"):
-            put_rows(getattr(rest, name), state[f"sleep_{name}"], slice(n))
-        put_rows(rest.force, state["sleep_force"], rows)
-        put_rows(rest.held, state["sleep_held"], slice(e.chunk_count))
+        write_fields(rest, self._rows(rows), "sleep_", state)
         owner = state["sleep_store_owner"]
         counts = np.bincount(owner, minlength=n)
         end = np.cumsum(counts)
@@ -211,9 +203,7 @@ class Sleeper:
         put_rows(rest.end, end, (0, slice(n)))
         for name in ("who", "slide", "roll"):
             put_rows(getattr(rest, name), state[f"sleep_store_{name}"], (0, slice(len(owner))))
-        rest.side[None] = 0
-        rest.news.fill(0)
-        for field in (rest.woken, rest.leaves):
+        for field in (rest.side, rest.news, rest.woken, rest.leaves):
             field.fill(0)
         self.mass, self.slept = (float(value) for value in state["sleep_reals"])
         self.awake, _, self.bed.grain_steps = (int(number) for number in state["sleep_numbers"])

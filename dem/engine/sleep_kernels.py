@@ -43,22 +43,18 @@ class Rest:
 
     def __init__(self, *, grains: int, cells: int, chunks: int, rows: int, real):
         F = ti.Vector.field
-        self.asleep = ti.field(ti.i32, grains)
-        self.was = ti.field(ti.i32, grains)  # before the lists were last made
-        self.woken = ti.field(ti.i32, grains)
-        self.leaves = ti.field(ti.i32, grains)
-        self.quiet = ti.field(ti.i32, grains)  # looks in a row at which it was slow
-        self.busy = ti.field(ti.i32, grains)
+        # ``was``: before the lists were last made. ``quiet``: looks in a row at which it was slow.
+        self.asleep, self.was, self.woken, self.leaves, self.quiet, self.busy = (
+            ti.field(ti.i32, grains) for _ in range(6)
+        )
         self.cell = ti.field(ti.i32, grains)  # a sleeper's
         self.flagged = ti.field(ti.i32, cells)
         # Of a row of the pair lists whose neighbour sleeps: the spring force that it had when the two were last alike.
-        self.force = F(3, real, rows)
-        self.old_force = F(3, real, rows)
+        self.force, self.old_force = (F(3, real, rows) for _ in range(2))
         # Frozen contacts, by the id of the grain that keeps them; the other's id, or -1 less a body's number. There
         # are two stores, and ``side`` says which one holds: the other is filled when grains fall asleep.
         self.side = ti.field(ti.i32, ())
-        self.start = ti.field(ti.i32, (2, grains))
-        self.end = ti.field(ti.i32, (2, grains))
+        self.start, self.end = (ti.field(ti.i32, (2, grains)) for _ in range(2))
         self.who = ti.field(ti.i32, (2, _STORE_ROOM * grains))
         self.slide = F(4, real, (2, _STORE_ROOM * grains))
         self.roll = F(3, real, (2, _STORE_ROOM * grains))
@@ -67,14 +63,20 @@ class Rest:
         self.total = ti.field(ti.f64, ())  # of all grains [kg]
         # Which sleepers the next lists pass over: 1 in ``whole`` is none. Else those of the cells behind that of rank
         # ``last``, whose places stay; and of rows of those behind how many were awake then nothing is to be cleared.
-        self.whole = ti.field(ti.i32, ())
-        self.last = ti.field(ti.i32, ())
-        self.kept = ti.field(ti.i32, ())
-        self.made = ti.field(ti.i32, ())
+        self.whole, self.last, self.kept, self.made = (ti.field(ti.i32, ()) for _ in range(4))
         self.news = ti.field(ti.i32, 4)
         self.begins = ti.field(ti.i32, ())  # rank of the cell whose sleepers come first in memory
         self.block = ti.field(ti.i32, ())  # its block along x
         self.near = ti.field(real, 3)
+
+    def clear(self) -> None:
+        """All are awake."""
+        for field in (self.asleep, self.was, self.woken, self.leaves, self.quiet, self.start, self.end):
+            field.fill(0)
+        for field in (self.side, self.mass, self.news, self.held, self.begins, self.block, self.force):
+            field.fill(0)
+        self.whole[None] = 1
+        self.last[None] = -1
 
     @ti.func
     def before(self, awake, grains):

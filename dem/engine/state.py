@@ -1,8 +1,9 @@
 """A bed's state as numpy arrays: taken, put back to the bit, kept in a file, taken over by a bed of another layout."""
 
-import os
 import tempfile
 import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,35 +12,33 @@ import numpy as np
 from dem.grains.materials import Material
 
 from .base import BedBase
+from .engine import Engine
 from .lists import INDEX_BITS, INDEX_MASK
-from .rows import take_rows
+from .rows import read_fields, row_numbers, take_rows, write_fields
 from .sleep import Sleep, Sleeper
 from .values import BedSettings, State
 
-__all__ = ["STATE_FORMAT", "adopt", "laid_end_to_end", "put_back", "read_file", "take", "write_file"]
+__all__ = [
+    "STATE_FORMAT",
+    "adopt",
+    "laid_end_to_end",
+    "put_back",
+    "read_file",
+    "take",
+    "touching_pairs",
+    "whole_file",
+    "write_file",
+]
 
 STATE_FORMAT = "hedgebed-bed/3"
 # Before there was cohesion, and before contacts remembered their last step; these files can still be read.
 STATE_FORMATS = ("hedgebed-bed/1", "hedgebed-bed/2", STATE_FORMAT)
 
 MATERIAL_NUMBERS = ("density", "young", "poisson", "friction", "restitution", "rolling_friction", "surface_energy")
-GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
-BODY_FIELDS = (
-    "body_position",
-    "body_velocity",
-    "body_spin",
-    "body_turn",
-    "body_listed",
-    "body_listed_turn",
-    "body_extent",
-    "body_primitives",
-    "body_pair",
-    "primitive_kind",
-    "primitive_row",
-    "overlap",
-    "pushes",
-)
-LIST_NAMES = ("pair_count", "pair", "slide", "near_count", "near_grain", "near_body", "near_slide", "near_roll")
+GRAIN_FIELDS = Engine.GRAIN_FIELDS
+BODY_FIELDS = (*Engine.BODY_FIELDS, "overlap", "pushes")
+NEAR_FIELDS = ("near_grain", "near_body", "near_slide", "near_roll")
+LIST_NAMES = ("pair_count", "pair", "slide", "near_count", *NEAR_FIELDS)
 NAMES = (*GRAIN_FIELDS, *BODY_FIELDS, *LIST_NAMES, "numbers", "reals")
 ABOUT = ("material", "material_numbers", "cohesion", "size", "height", "tensile", "seed", "precision")
 
@@ -51,32 +50,23 @@ def take(bed: BedBase) -> State:
     state = {name: e.read(name) for name in (*GRAIN_FIELDS, *BODY_FIELDS)}
     start, end = e.read("pair_start"), e.read("pair_end")
     counts = end - start
-    rows = np.repeat(start - np.concatenate(([0], np.cumsum(counts)[:-1])), counts) + np.arange(counts.sum())
+    rows = row_numbers(start, counts)
     pair = take_rows(e.pair, rows)
     touching = rows[pair < 0]
     state |= {"pair_count": counts, "pair": pair, "slide": take_rows(e.slide, touching)}
-    near_end = e.read("near_end")
-    near_count = near_end - np.arange(e.chunk_count) * e.near_room
-    near = _near_rows(near_count, e.near_room)
-    state |= {"near_count": near_count}
-    for name in ("near_grain", "near_body", "near_slide", "near_roll"):
-        state[name] = take_rows(getattr(e, name), near)
+    near_count = e.read("near_end") - _near_starts(e)
+    near = row_numbers(_near_starts(e), near_count)
+    state |= {"near_count": near_count, **read_fields(e, dict.fromkeys(NEAR_FIELDS, near), "")}
     if e.rolling:
         state["roll"] = take_rows(e.roll, touching)
     state |= e.shape_state()
     if bed.sleeper is not None:
         state |= bed.sleeper.state(rows)
     if e.balance.on:
-        state |= e.balance.state(rows, near)
+        state |= read_fields(e.balance, e.balance.rows(rows, near), "ledger_")
+    bodies = int(e.body_count[None])
     state["numbers"] = np.array(
-        [
-            bed.steps,
-            int(e.body_count[None]),
-            bed.list_count,
-            bed.steps_since_lists,
-            bed.reaction_steps,
-            int(bed.has_floor),
-        ]
+        [bed.steps, bodies, bed.list_count, bed.steps_since_lists, bed.reaction_steps, int(bed.has_floor)]
     )
     state["reals"] = np.array(
         [bed.time_step, bed.skin, *bed.gravity, bed.surface, bed.packing_fraction, bed.overlap_limit]
@@ -104,22 +94,19 @@ def put_back(bed: BedBase, state: State) -> None:
     which = np.repeat(np.arange(chunks), np.diff(chunk))
     start = np.zeros(bed.grain_count, dtype=np.int32)
     start[:awake] = before[:awake] - before[chunk[which]] + which * e.chunk_room
-    rows = np.repeat(start - before[:-1], counts) + np.arange(before[-1])
+    rows = row_numbers(start, counts)
     touching = rows[state["pair"] < 0]
     e.write("pair_start", start)
     e.write("pair_end", (start + counts).astype(np.int32))
     e.write("first", np.repeat(np.arange(bed.grain_count), counts).astype(np.int32), rows)
     for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
         e.write(name, state[name], at)
-    near = _near_rows(state["near_count"], e.near_room)
-    e.write("near_end", (state["near_count"] + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
-    for name in ("near_grain", "near_body", "near_slide", "near_roll"):
-        e.write(name, state[name], near)
+    near = _write_near(e, state["near_count"], state)
     e.close_balance()
     if "ledger_taken" in state:
         x, y, z = (float(v) for v in state["reals"][2:5])
         e.open_balance((x, y, z))
-        e.balance.restore(state, rows, near)
+        write_fields(e.balance, e.balance.rows(rows, near), "ledger_", state)
     numbers = [int(v) for v in state["numbers"]]
     bed.steps, bodies, bed.list_count, bed.steps_since_lists, bed.reaction_steps, floor = numbers
     bed.has_floor, bed.tallied = bool(floor), None
@@ -141,7 +128,6 @@ def put_back(bed: BedBase, state: State) -> None:
 
 def write_file(bed: BedBase, path: Path) -> None:
     """Write a bed to an .npz file, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     stuff = bed.material
     about: State = {
         "format": np.array(STATE_FORMAT),
@@ -155,14 +141,17 @@ def write_file(bed: BedBase, path: Path) -> None:
         "precision": np.array(bed.runtime.precision),
     }
     about |= {f"state.{key}": values for key, values in take(bed).items()}
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".npz")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, **about)  # type: ignore[arg-type]
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink()
-        raise
+    with whole_file(path) as part, part.open("wb") as file:
+        np.savez(file, **about)  # type: ignore[arg-type]
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A file to write to that becomes ``path`` at the end, so that this is written whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent) as scratch:
+        yield (part := Path(scratch) / path.name)
+        part.replace(path)
 
 
 def read_file(path: Path) -> tuple[BedSettings, State, str]:
@@ -223,8 +212,7 @@ def adopt(bed: BedBase, state: State, *, keep: np.ndarray | None = None) -> None
         e.write(name, state[name][stay].astype(dtype))
     e.write("id", new_id[ids[stay]].astype(np.int32))
     # The contacts as one list a grain, each pair once, rows from 0: what make_lists takes over as history.
-    first = np.repeat(np.arange(len(ids)), state["pair_count"])[state["pair"] < 0]
-    second = (~state["pair"][state["pair"] < 0]) & INDEX_MASK
+    first, second, _ = touching_pairs(state)
     chosen = stay[first] & stay[second]
     a, b = place[first[chosen]], place[second[chosen]]
     counts = np.bincount(a, minlength=bed.grain_count)
@@ -240,14 +228,9 @@ def adopt(bed: BedBase, state: State, *, keep: np.ndarray | None = None) -> None
     starts = _chunk_starts(bed.grain_count, e.chunk_count)
     chunk = np.searchsorted(starts, grain, side="right") - 1
     near_count = np.bincount(chunk, minlength=e.chunk_count)
-    rows = _near_rows(near_count, e.near_room)
-    e.write("near_end", (near_count + np.arange(e.chunk_count) * e.near_room).astype(np.int32))
-    e.write("near_grain", grain.astype(np.int32), rows)
-    for name in ("near_body", "near_slide", "near_roll"):
-        e.write(name, state[name][near], rows)
-    for name in BODY_FIELDS:
-        if name not in ("overlap", "pushes"):
-            e.write(name, state[name])
+    _write_near(e, near_count, {name: state[name][near] for name in NEAR_FIELDS} | {"near_grain": grain})
+    for name in Engine.BODY_FIELDS:
+        e.write(name, state[name])
     e.restore_shapes(state)
     e.body_count[None] = int(state["numbers"][1])
     bed.has_floor = bool(state["numbers"][5])
@@ -280,13 +263,9 @@ def laid_end_to_end(state: State, times: int, *, period: float) -> State:
         found[name][:, 0] += (period * copy).astype(found[name].dtype)
     found["id"] = np.tile(state["id"], times) + count * copy
     # Those that touch, which alone have a history.
-    touches = state["pair"] < 0
-    first = np.repeat(np.arange(count), state["pair_count"])[touches]
-    bits = ~state["pair"][touches].astype(np.int64)
-    ahead = 1 - (bits >> INDEX_BITS) % 3  # periods from the copy of the first to that of the second
+    first, second, back = touching_pairs(state)
     found["pair_count"] = np.tile(np.bincount(first, minlength=count), times)
-    pair = [~((bits & INDEX_MASK) + count * ((k + ahead) % times)) for k in range(times)]
-    found["pair"] = np.concatenate(pair)
+    found["pair"] = np.concatenate([~(second + count * ((k - back[:, 0]) % times)) for k in range(times)])
     found["near_grain"] = np.concatenate([state["near_grain"].astype(np.int64) + count * k for k in range(times)])
     found["near_body"] = np.tile(state["near_body"], times)
     for name in ("slide", "roll", "near_slide", "near_roll"):
@@ -302,6 +281,26 @@ def _chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:
     return c * base + np.minimum(c, rest)
 
 
-def _near_rows(near_count: np.ndarray, room: int) -> np.ndarray:
-    before = np.concatenate(([0], np.cumsum(near_count)[:-1]))
-    return np.repeat(np.arange(len(near_count)) * room - before, near_count) + np.arange(int(near_count.sum()))
+def touching_pairs(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The touching rows of the pair lists: grain, neighbour, and periods (x, y) from the neighbour's image back to it.
+
+    Grains are places in memory; shapes [row_count], [row_count], [row_count, 2].
+    """
+    touching = state["pair"] < 0
+    first = np.repeat(np.arange(len(state["id"])), state["pair_count"])[touching]
+    bits = ~state["pair"][touching].astype(np.int64)
+    image = bits >> INDEX_BITS
+    return first, bits & INDEX_MASK, np.column_stack([image % 3 - 1, image // 3 - 1])
+
+
+def _near_starts(e: Engine) -> np.ndarray:
+    """First row of each chunk in the lists of grains near bodies."""
+    return np.arange(e.chunk_count) * e.near_room
+
+
+def _write_near(e: Engine, counts: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Put the lists of grains near bodies into the engine, ``counts`` of them in each chunk; their rows."""
+    rows = row_numbers(_near_starts(e), counts)
+    e.write("near_end", (counts + _near_starts(e)).astype(np.int32))
+    write_fields(e, dict.fromkeys(NEAR_FIELDS, rows), "", values)
+    return rows

@@ -16,8 +16,7 @@ from dem.contact.law import effective_moduli
 from dem.shapes.basic import PLANE
 
 from .base import BedBase
-from .lists import INDEX_BITS, INDEX_MASK
-from .state import take
+from .state import take, touching_pairs
 from .values import State
 
 __all__ = ["Contacts", "find_contacts", "stress_profile"]
@@ -50,17 +49,11 @@ def find_contacts(bed: BedBase) -> Contacts:
     """The contacts of a bed with their spring forces. Of its bodies those count that are planes, as the floor is."""
     state = take(bed)
     ids, position = state["id"], state["position"].astype(float)
-    code, counts = state["pair"], state["pair_count"]
-    first = np.repeat(np.arange(len(ids)), counts)[code < 0]
-    bits = ~code[code < 0].astype(np.int64)
-    second = bits & INDEX_MASK
-    slide = state["slide"][:, :3].astype(float)
+    first, second, back = touching_pairs(state)
     once = first < second  # a pair across chunks is listed by both
-    first, second, bits, slide = first[once], second[once], bits[once], slide[once]
-    image = bits >> INDEX_BITS
+    first, second, back, slide = first[once], second[once], back[once], state["slide"][once, :3].astype(float)
     branch = position[first, :3] - position[second, :3]
-    branch[:, 0] += (image % 3 - 1) * bed.size[0]
-    branch[:, 1] += (image // 3 - 1) * bed.size[1]
+    branch[:, :2] += back * bed.size[:2]
     length = np.linalg.norm(branch, axis=1)
     radii = position[first, 3], position[second, 3]
     overlap = radii[0] + radii[1] - length
@@ -104,12 +97,8 @@ def _on_plane(state: State, body: int, cohesion: str) -> Contacts:
     )
     touches = np.abs(force).sum(axis=1) > 0
     branch = (position[:, 3] - overlap)[:, None] * normal
-    return Contacts(
-        *(
-            values[touches]
-            for values in (state["id"][grain], np.full(len(grain), -1 - body), position[:, :3], branch, force, overlap)
-        )
-    )
+    found = (state["id"][grain], np.full(len(grain), -1 - body), position[:, :3], branch, force, overlap)
+    return Contacts(*(values[touches] for values in found))
 
 
 def _turned(q: np.ndarray, x: np.ndarray) -> np.ndarray:

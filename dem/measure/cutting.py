@@ -16,7 +16,8 @@ import numpy as np
 from dem.engine.core import BedCore
 from dem.engine.values import BedFailure
 
-from .repose import COLUMN, Flank, measure_flanks, thickness_profile
+from .lid import Tell, refuse_tilted
+from .repose import COLUMN, Flank, from_middle, measure_flanks, thickness_profile
 
 __all__ = ["FALLEN_SHARE", "LEAST", "MOST", "VerticalCut", "check_width", "cohesion_of", "cut_and_load"]
 
@@ -80,7 +81,7 @@ def cohesion_of(height: float, unit_weight: float, friction_angle: float) -> flo
 
 
 def cut_and_load(
-    bed: BedCore, *, width: float | None = None, most: float = MOST, tell: Callable[[float], None] = lambda share: None
+    bed: BedCore, *, width: float | None = None, most: float = MOST, tell: Tell = lambda share: None
 ) -> VerticalCut:
     """Cut a strip out about x = 0 at a tenth of the bed's gravity and let gravity rise until a face falls.
 
@@ -93,8 +94,7 @@ def cut_and_load(
     ``LEAST``. BedFailure: the bed did not come to rest, or its own reasons.
     """
     grain = 2 * float(bed.grains().radius.mean())
-    if bed.gravity[0] or bed.gravity[1] or not bed.gravity[2] < 0:
-        raise ValueError(f"gravity = {bed.gravity} m/s2: a level bed under gravity is needed")
+    refuse_tilted(bed)
     if not LEAST < most < math.inf:
         raise ValueError(f"most = {most}: a gravity above {LEAST:g} of the bed's own would do")
     check_width(width, width=bed.size[0], height=bed.surface, grain=grain)
@@ -103,8 +103,7 @@ def cut_and_load(
     weight = packing * bed.material.density * own
     _ramp(bed, LEAST * own, height)
     _rest(bed, grain, height)
-    x = np.mod(bed.grains().position[:, 0] + 0.5 * bed.size[0], bed.size[0]) - 0.5 * bed.size[0]
-    bed = bed.without(np.abs(x) < 0.5 * width)
+    bed = bed.without(np.abs(from_middle(bed.grains().position[:, 0], bed.size[0])) < 0.5 * width)
     watched, places = _wedges(bed, width, height)
     period = np.array(bed.size[:2])
 
@@ -115,33 +114,36 @@ def cut_and_load(
         far = np.linalg.norm(way, axis=1) > _FALLEN * grain
         return float(max(far[inside].mean() for inside in watched))
 
+    def stands(level: float) -> bool:
+        """Whether the faces stand at this gravity, over the bed's own."""
+        trials.append((level, _watch(bed, level * own, height, grain, watched, moved)))
+        return trials[-1][1] <= FALLEN_SHARE
+
+    def profile() -> tuple[np.ndarray, np.ndarray]:
+        return thickness_profile(bed, packing=packing, width=COLUMN * grain)
+
     trials: list[tuple[float, float]] = []
     stood, fell, before, kept = 0.0, None, None, bed.state()
     levels = [LEAST * STEP**k for k in range(round(math.log(most / LEAST, STEP)) + 1)]
     for k, level in enumerate(levels):
-        share = _watch(bed, level * own, height, grain, watched, moved)
-        trials.append((level, share))
+        standing = stands(level)
         tell(0.8 * (k + 1) / len(levels))
-        if share > FALLEN_SHARE:
+        if not standing:
             fell = level
             break
-        stood, kept = level, bed.state()
-        before = thickness_profile(bed, packing=packing, width=COLUMN * grain)
+        stood, kept, before = level, bed.state(), profile()
     if fell is not None and stood:
         bed.set_gravity(stood * own)
         bed.restore(kept)
         middle = math.sqrt(stood * fell)
-        share = _watch(bed, middle * own, height, grain, watched, moved)
-        trials.append((middle, share))
-        if share > FALLEN_SHARE:
-            fell = middle
-        else:
-            stood = middle
-            before = thickness_profile(bed, packing=packing, width=COLUMN * grain)
+        if stands(middle):
+            stood, before = middle, profile()
             _watch(bed, fell * own, height, grain, watched, moved)
+        else:
+            fell = middle
     _ramp(bed, own, height)
     _rest(bed, grain, height)
-    after = thickness_profile(bed, packing=packing, width=COLUMN * grain)
+    after = profile()
     flanks = None
     if fell is not None:
         flanks = measure_flanks(*after, start=0.0, end=0.5 * bed.size[0], period=bed.size[0], grain=grain)
@@ -157,11 +159,9 @@ def check_width(cut: float | None, *, width: float, height: float, grain: float)
     cut = height if cut is None else cut
     most = width - 2 * (_WEDGE * height + 3 * grain)
     if not 2 * grain <= cut <= most:
-        would_do = (
-            f"to {most:.4g} m would do"
-            if most >= 2 * grain
-            else f"and a bed {width + 2 * grain - most:.4g} m wide would do"
-        )
+        would_do = f"and a bed {width + 2 * grain - most:.4g} m wide would do"
+        if most >= 2 * grain:
+            would_do = f"to {most:.4g} m would do"
         raise ValueError(
             f"width = {cut:.4g} m of the cut: two wedges and three grains beside each must be left; from two grains, "
             f"{2 * grain:.4g} m, {would_do}"
@@ -171,8 +171,7 @@ def check_width(cut: float | None, *, width: float, height: float, grain: float)
 def _wedges(bed: BedCore, width: float, height: float) -> tuple[list[np.ndarray], np.ndarray]:
     """The grains in front of Rankine's plane behind each face (masks by id), and where all grains are [m]."""
     position = bed.grains().position
-    period = bed.size[0]
-    x = np.mod(position[:, 0] + 0.5 * period, period) - 0.5 * period
+    x = from_middle(position[:, 0], bed.size[0])
     reach = 0.5 * width + _WEDGE * np.maximum(0.0, np.minimum(position[:, 2], height))
     return [(sign * x > 0) & (np.abs(x) < reach) for sign in (1.0, -1.0)], position
 

@@ -16,7 +16,6 @@ Units of time below are d sqrt(density / pressure).
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,12 +31,11 @@ from dem.grains.materials import Facing, Material
 from dem.grains.packing import draw_radii
 from dem.grains.profile import packing_profile
 from dem.grains.sizes import Uniform
-from dem.shapes.basic import Plane
+
+from .lid import ROUGH, Tell, add_lid, refuse_not_positive
 
 __all__ = ["ElementShear", "press_element", "shear_element"]
 
-# Friction and rolling friction of a grain on lid and floor [1]: ten times what any grain has.
-_ROUGH = 10.0
 # Distance of the column's sites [largest diameters].
 _SITES = 1.06
 # Packing that the height is reckoned with.
@@ -152,15 +150,10 @@ def press_element(
     """
     if pressed_friction is not None and not 0 <= pressed_friction < math.inf:
         raise ValueError(f"pressed_friction = {pressed_friction} must be 0 or more")
-    for name, value, least in (
-        ("pressure", pressure, 0.0),
-        ("grain", grain, 0.0),
-        ("size: x", size[0], 6.0),
-        ("size: y", size[1], 6.0),
-        ("size: z", size[2], 6.0),
-    ):
-        if not (math.isfinite(value) and value > 0 and value >= least):
-            raise ValueError(f"{name} = {value} must be positive" + (f" and at least {least:g}" if least else ""))
+    refuse_not_positive(pressure=pressure, grain=grain)
+    for name, value in zip("xyz", size, strict=True):
+        if not 6 <= value < math.inf:
+            raise ValueError(f"size: {name} = {value} must be positive and at least 6")
     young = choose_young(material, pressure=_SPARE * pressure, speed=0.0, max_overlap=max_overlap, diameter=grain)
     sizes = Uniform(grain, spread)
     period = (size[0] * grain, size[1] * grain)
@@ -182,7 +175,7 @@ def press_element(
         threads=threads,
     )
     bed.overlap_limit = max(_BOUND * max_overlap, _HARMLESS)
-    body = bed.add_body([Plane(normal=(0.0, 0.0, -1.0))], position=(0.0, 0.0, top + 0.01 * grain))
+    body = add_lid(bed, grain, Facing())
     _touch(bed, body, friction=pressed_friction, adhesive=False)
     wall = _Wall(bed, body, pressure=pressure, grain=grain)
     _rest(bed, wall, grain)
@@ -209,7 +202,7 @@ def _touch(bed: BedCore, body: int, *, friction: float | None = None, adhesive: 
     alike = Facing(
         friction=friction, rolling_friction=None if friction is None else 0.0, surface_energy=None if adhesive else 0.0
     )
-    rough = alike if friction is not None else replace(alike, friction=_ROUGH, rolling_friction=_ROUGH)
+    rough = alike if friction is not None else replace(alike, friction=ROUGH, rolling_friction=ROUGH)
     bed.engine.grain_pair[None] = pair_row(stuff, replace(alike, young=stuff.young, poisson=stuff.poisson))
     bed.engine.body_pair[body] = bed.engine.body_pair[FLOOR] = pair_row(stuff, rough)
 
@@ -236,7 +229,7 @@ def shear_element(
     grain: float,
     strain: float = 1.5,
     inertial_number: float = 5e-3,
-    tell: Callable[[float], None] = lambda share: None,
+    tell: Tell = lambda share: None,
     **options,
 ) -> ElementShear:
     """Press a sample (``press_element``, whose options these are) and shear it.
@@ -248,9 +241,7 @@ def shear_element(
     Raises ValueError: as ``press_element``; a strain or a number that is not positive. BedFailure: it did not come to
     rest, or the bed's own reasons.
     """
-    for name, value in (("strain", strain), ("inertial_number", inertial_number)):
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} = {value} must be positive")
+    refuse_not_positive(strain=strain, inertial_number=inertial_number)
     bed, body = press_element(material, pressure=pressure, grain=grain, **options)
     tell(0.1)
     wall = _Wall(bed, body, pressure=pressure, grain=grain)
@@ -264,12 +255,12 @@ def shear_element(
         if gone >= looks[-1][0] + _LOOK:
             looks.append(_look(bed, gone, wall.height, grain))
             tell(0.1 + 0.9 * min(1.0, gone / strain))
-    series = np.array(rows).T
+    inside_strain, packing, stress = (np.array(values) for values in zip(*looks, strict=True))
     return ElementShear(
-        *series,
-        inside_strain=np.array([look[0] for look in looks]),
-        packing=np.array([look[1] for look in looks]),
-        stress=np.array([look[2] for look in looks]),
+        *np.array(rows).T,
+        inside_strain=inside_strain,
+        packing=packing,
+        stress=stress,
         pressure=pressure,
         inertial_number=inertial_number,
         packing_before=looks[0][1],

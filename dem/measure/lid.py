@@ -1,15 +1,19 @@
-"""A flat lid on the bed that a servo presses down to a pressure and lifts off again."""
+"""What tests of a bed share: walls on which grains do not slide, and a flat lid that a servo presses on the bed."""
 
 import math
-from typing import Any
+from collections.abc import Callable
 
 from dem.engine.core import BedCore
 from dem.engine.values import BedFailure
+from dem.grains.materials import Facing
 from dem.grains.sizes import Json
 from dem.shapes.basic import Plane
 
-__all__ = ["Lid"]
+__all__ = ["ROUGH", "Lid", "Tell", "add_lid", "refuse_not_positive", "refuse_tilted"]
 
+Tell = Callable[[float], None]  # Called with the share done, 0 to 1
+ROUGH = 10.0
+"""Friction and rolling friction of a grain on a rough wall [1]: ten times what any grain has."""
 # Steps between two looks of the servo at the force; its fastest speed over sqrt(g d); and how long the pressure must
 # hold, over the time that a grain takes to fall the bed's depth.
 _STEPS, _SPEED, _HOLDS = 10, 0.1, 0.3
@@ -18,39 +22,62 @@ _NEAR, _CALM = 0.01, 1e-4
 _LONGEST = 60.0
 
 
-class Lid:
-    """A lid over the whole bed. What it remembers is in ``notes``, so that its work can be kept between two pieces.
+def refuse_not_positive(**values: float) -> None:
+    """Raise ValueError for a number that is not positive and finite, with its name."""
+    for name, value in values.items():
+        if not 0 < value < math.inf:
+            raise ValueError(f"{name} = {value} must be positive")
 
-    The servo moves it down at a speed in proportion to the force that lacks, and at ``_SPEED`` sqrt(g d) at most.
+
+def refuse_tilted(bed: BedCore) -> None:
+    """Raise ValueError for a bed without gravity, or whose gravity is not straight down."""
+    if bed.gravity[0] or bed.gravity[1] or not bed.gravity[2] < 0:
+        raise ValueError(f"gravity = {bed.gravity} m/s2: a level bed under gravity is needed")
+
+
+def add_lid(bed: BedCore, grain: float, facing: Facing) -> int:
+    """Put a flat lid just above all grains, whose mean diameter is ``grain`` [m]; the number of the body."""
+    grains = bed.grains()
+    top = float((grains.position[:, 2] + grains.radius).max())
+    return bed.add_body(Plane(normal=(0.0, 0.0, -1.0)), position=(0.0, 0.0, top + 0.01 * grain), **vars(facing))
+
+
+class Lid:
+    """A lid over the whole bed. Its state is in ``notes``, so that its work can be kept between two pieces.
+
+    The servo moves it down at a speed in proportion to the missing force, and at ``_SPEED`` sqrt(g d) at most.
     Grains do not stick to it: those that do would hang on it when it is lifted, and tear the bed open.
     """
 
-    def __init__(self, bed: BedCore, notes: Json, *, grain: float, fall_time: float, drag_time: float):
-        """``grain``: mean diameter [m]; ``drag_time``: of the drag in which the grains come to rest under it [s]."""
+    def __init__(
+        self, bed: BedCore, notes: Json, *, grain: float, fall_time: float, drag_time: float, rough: bool = False
+    ):
+        """A lid at its beginning, or where ``notes`` left it.
+
+        Args:
+            grain: mean diameter [m]. drag_time: of the drag in which the grains come to rest under it [s].
+            fall_time: in which a grain falls the bed's depth [s].
+            rough: whether grains neither slide nor roll on it; then they stick to it as to one another.
+        """
         self.bed, self.notes = bed, notes
-        g = math.hypot(*bed.gravity)
-        self.speed = _SPEED * math.sqrt(g * grain)
-        self._fall_time, self._drag_time = fall_time, drag_time
+        self.speed = _SPEED * math.sqrt(math.hypot(*bed.gravity) * grain)
+        self._grain, self._fall_time, self._drag_time = grain, fall_time, drag_time
         self._area = bed.size[0] * bed.size[1]
         if "body" not in notes:
-            grains = bed.grains()
-            top = float((grains.position[:, 2] + grains.radius).max())
-            plane = Plane(normal=(0.0, 0.0, -1.0))
-            body = bed.add_body([plane], position=(0.0, 0.0, top + 0.01 * grain), surface_energy=0.0)
-            notes |= {"body": body, "began": bed.time, "held": 0.0, "lifting": 0.0}
+            facing = Facing(friction=ROUGH, rolling_friction=ROUGH) if rough else Facing(surface_energy=0.0)
+            notes |= {"body": add_lid(bed, grain, facing), "began": bed.time, "held": 0.0, "lifting": 0.0}
 
     @property
     def _force(self) -> float:
         """What the grains push it up with [N]."""
         return float(self.bed.reaction(self.notes["body"])[0][2])
 
-    def piece(self, pressure: float, energy: Any, *, stay: bool = False) -> bool:
+    def piece(self, pressure: float, *, stay: bool = False) -> bool:
         """One piece of the work; whether the lid has pressed and is off again.
 
         Args:
-            stay: it stays on, pressing; ``notes["lifting"]`` says that the pressure is there.
             pressure: wanted [Pa].
-            energy: a function that gives the grains' mean kinetic energy over m g d [1].
+            stay: it stays on, pressing; ``notes["lifting"]`` says that the pressure is there.
 
         Raises BedFailure: the pressure is not met in time.
         """
@@ -68,7 +95,7 @@ class Lid:
             bed.advance(_STEPS, drag_time=self._drag_time)
             lacking = (target - self._force) / target
             bed.move_body(notes["body"], velocity=(0.0, 0.0, -self.speed * max(-1.0, min(1.0, lacking))))
-            calm = abs(lacking) < _NEAR and energy() < _CALM
+            calm = abs(lacking) < _NEAR and bed.kinetic_energy / bed.weight / self._grain < _CALM
             notes["held"] = notes["held"] + _STEPS * bed.time_step if calm else 0.0
             if notes["held"] > _HOLDS * self._fall_time:
                 bed.measure_surface()

@@ -5,13 +5,15 @@ what it gains with the depth of the base [Pa/m].
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from dem.engine.core import BedCore
 from dem.shapes.basic import Cone, Cylinder
+
+from .lid import Tell, refuse_tilted
 
 __all__ = ["SHAFT", "ConePush", "check_cone", "cone_gradient", "cone_length", "push_cone", "standard_speed"]
 
@@ -77,7 +79,7 @@ def push_cone(
     place: Sequence[float] | None = None,
     shaft: float | None = None,
     friction: float | None = None,
-    tell: Callable[[float], None] = lambda share: None,
+    tell: Tell = lambda share: None,
 ) -> ConePush:
     """Push a cone down at constant speed. The bed is used up by it.
 
@@ -97,8 +99,7 @@ def push_cone(
     grains = bed.grains()
     grain = 2 * float(grains.radius.mean())
     place = (0.5 * bed.size[0], 0.5 * bed.size[1]) if place is None else (float(place[0]), float(place[1]))
-    if bed.gravity[0] or bed.gravity[1] or not bed.gravity[2] < 0:
-        raise ValueError(f"gravity = {bed.gravity} m/s2: a level bed under gravity is needed")
+    refuse_tilted(bed)
     check_cone(
         size=bed.size, surface=bed.surface, grain=grain, diameter=diameter, angle=angle, depth=depth, shaft=shaft
     )

@@ -7,7 +7,6 @@ below, so that no foot runs out, and the plate is rough, so that the slope is th
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,15 +16,17 @@ from dem.engine.values import BedFailure
 from dem.grains.profile import packing_profile
 from dem.shapes.solids import Box
 
+from .lid import ROUGH, Tell, refuse_tilted
+
 __all__ = [
     "COLUMN",
-    "LEAST_FLANK",
     "SLOT",
     "Flank",
     "Repose",
     "angle_of_repose",
     "check_width",
     "fit_flank",
+    "from_middle",
     "measure_flanks",
     "thickness_profile",
 ]
@@ -42,8 +43,6 @@ _LEAST_POINTS = 6  # of them on a slope
 _CALM, _QUIET, _LONGEST = 1e-5, 2.0, 80.0
 # Of the plate [mean diameters]; and of the pit below it, over the bed's height: what drains lies there in a heap.
 _PLATE, _PIT, _LEAST_PIT = 2.0, 1.5, 0.8
-# Friction and rolling friction of a grain on a rough plate, as on the lid of ``dem.measure.shearing`` [1].
-_ROUGH = 10.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ class Repose:
 
 
 def angle_of_repose(
-    bed: BedCore, *, slot: float | None = None, rough: bool = True, tell: Callable[[float], None] = lambda share: None
+    bed: BedCore, *, slot: float | None = None, rough: bool = True, tell: Tell = lambda share: None
 ) -> Repose:
     """Drain a level bed through a slot about x = 0 and measure the slopes that stay. The bed is used up by it.
 
@@ -110,7 +109,10 @@ def angle_of_repose(
     """
     grain = 2 * float(bed.grains().radius.mean())
     slot = SLOT * grain if slot is None else slot
-    _check(bed, grain, slot)
+    refuse_tilted(bed)
+    if not 3 * grain <= slot < math.inf:
+        raise ValueError(f"slot = {slot:g} m is narrower than three grains, {3 * grain:.4g} m: grains would bridge it")
+    check_width(bed.size[0], slot=slot, grain=grain, depth=bed.surface)
     height, packing = bed.surface, bed.packing_fraction
     plate = _set_on_plate(bed, grain, slot, rough=rough)
     drained = _drain(bed, grain, slot, plate, height, tell)
@@ -155,14 +157,6 @@ def check_width(width: float, *, slot: float | None, grain: float, depth: float)
         )
 
 
-def _check(bed: BedCore, grain: float, slot: float) -> None:
-    if bed.gravity[0] or bed.gravity[1] or not bed.gravity[2] < 0:
-        raise ValueError(f"gravity = {bed.gravity} m/s2: a level bed under gravity is needed")
-    if not 3 * grain <= slot < math.inf:
-        raise ValueError(f"slot = {slot:g} m is narrower than three grains, {3 * grain:.4g} m: grains would bridge it")
-    check_width(bed.size[0], slot=slot, grain=grain, depth=bed.surface)
-
-
 def _set_on_plate(bed: BedCore, grain: float, slot: float, *, rough: bool) -> float:
     """Lift the bed onto a plate with a slot about x = 0: the height of the plate's upper face [m]."""
     e = bed.engine
@@ -175,15 +169,13 @@ def _set_on_plate(bed: BedCore, grain: float, slot: float, *, rough: bool) -> fl
             f"the bed's box ends {room:.4g} m above the bed: a pit for what drains needs "
             f"{_LEAST_PIT * bed.surface + _PLATE * grain:.4g} m at least; give the bed more height"
         )
-    position[:, 2] += plate
-    e.write("position", position)
-    origin = e.read("origin")
-    origin[:, 2] += plate
-    e.write("origin", origin)
+    for name, values in (("position", position), ("origin", e.read("origin"))):
+        values[:, 2] += plate
+        e.write(name, values)
     bed.make_lists()
     bed.compute_forces()
     length, width = bed.size[0] - slot, bed.size[1] + 2 * grain
-    rub = _ROUGH if rough else None
+    rub = ROUGH if rough else None
     bed.add_body(
         [Box(size=(length, width, _PLATE * grain))],
         position=(0.5 * bed.size[0], 0.5 * bed.size[1], plate - 0.5 * _PLATE * grain),
@@ -193,10 +185,9 @@ def _set_on_plate(bed: BedCore, grain: float, slot: float, *, rough: bool) -> fl
     return plate
 
 
-def _drain(bed: BedCore, grain: float, slot: float, plate: float, height: float, tell: Callable[[float], None]) -> int:
+def _drain(bed: BedCore, grain: float, slot: float, plate: float, height: float, tell: Tell) -> int:
     """Wait until nothing drains and nothing moves: how many grains lie below the plate."""
-    g, period = -bed.gravity[2], bed.size[0]
-    fall = math.sqrt(2 * height / g)
+    fall = math.sqrt(2 * height / -bed.gravity[2])
     steps = max(1, round(0.5 * fall / bed.time_step))
     time = quiet = 0.0
     drained = 0
@@ -215,14 +206,18 @@ def _drain(bed: BedCore, grain: float, slot: float, plate: float, height: float,
                 f"wanted, {drained} grains drained"
             )
         tell(min(0.99, time / (12 * fall)))
-    position = bed.grains().position
-    off = np.abs(np.mod(position[:, 0] + 0.5 * period, period) - 0.5 * period)
-    if ((off < 0.5 * slot - grain) & (position[:, 2] > plate - _PLATE * grain)).any():
+    x, _, z = bed.grains().position.T
+    if ((np.abs(from_middle(x, bed.size[0])) < 0.5 * slot - grain) & (z > plate - _PLATE * grain)).any():
         raise BedFailure(
             f"the slot of {slot:.4g} m is blocked: grains bridge it, or the pit below it is full; a wider one, or "
             f"grains that stick less"
         )
     return drained
+
+
+def from_middle(x: np.ndarray, period: float) -> np.ndarray:
+    """The same places within half a period of x = 0 [m]."""
+    return np.mod(x + 0.5 * period, period) - 0.5 * period
 
 
 def thickness_profile(
@@ -240,7 +235,7 @@ def thickness_profile(
     grains = bed.grains()
     counts = grains.position[:, 2] > above
     x, radius, period = grains.position[counts, 0], grains.radius[counts], bed.size[0]
-    x = np.mod(x + 0.5 * period, period) - 0.5 * period
+    x = from_middle(x, period)
     edges = np.linspace(-0.5 * period, 0.5 * period, round(period / width) + 1)
     around = np.concatenate([x - period, x, x + period])
     share = packing_profile(around, np.tile(radius, 3), bed.size[1], edges)

@@ -5,25 +5,19 @@ and rolling friction that the grains on them neither slide nor roll: those are t
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from dem.contact.law import pair_row
 from dem.engine.base import FLOOR
 from dem.engine.core import BedCore
 from dem.engine.values import BedFailure
 from dem.grains.materials import Facing
-from dem.shapes.basic import Plane
 
-from .lid import Lid
+from .lid import ROUGH, Lid, Tell, refuse_not_positive
 
-__all__ = ["MOST_PRESSURE", "Shearing", "roughen_floor", "shear_bed"]
+__all__ = ["MOST_PRESSURE", "Shearing", "shear_bed"]
 
-Tell = Callable[[float], None]
-# Friction and rolling friction of a grain on lid and floor [1]: ten times what any grain has.
-_ROUGH = 10.0
 # Steps between two looks of the servo; and over the time in which a grain falls the bed's depth, how long it takes what
 # still lacks into its speed: a bed that dilates steadily needs a lid that rises steadily.
 _STEPS, _REMEMBERS = 20, 0.2
@@ -53,12 +47,6 @@ class Shearing:
     overburden: float
 
 
-def roughen_floor(bed: BedCore) -> None:
-    """Give the floor so much friction and rolling friction that grains neither slide nor roll on it."""
-    facing = Facing(friction=_ROUGH, rolling_friction=_ROUGH)
-    bed.engine.body_pair[FLOOR] = pair_row(bed.material, facing, tensile=bed.settings.tensile)
-
-
 def shear_bed(
     bed: BedCore, *, pressure: float, way: float, inertial_number: float, grain: float, tell: Tell = lambda share: None
 ) -> Shearing:
@@ -72,30 +60,22 @@ def shear_bed(
     Raises ValueError: a pressure, a way or a number that is not positive. BedFailure: the pressure is not met, or the
     bed's own reasons.
     """
-    for name, value in (("pressure", pressure), ("way", way), ("inertial_number", inertial_number)):
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} = {value} must be positive")
+    refuse_not_positive(pressure=pressure, way=way, inertial_number=inertial_number)
     floor = bed.weight / (bed.size[0] * bed.size[1])
     if pressure > MOST_PRESSURE * floor * (1 + 1e-9):
         raise ValueError(
             f"pressure = {pressure:g} Pa is more than {MOST_PRESSURE:g} times what lies on the bed's floor, for which "
             f"its grains are too soft: at most {MOST_PRESSURE * floor:.4g} Pa would do, or a deeper bed"
         )
-    roughen_floor(bed)
+    bed.set_facing(FLOOR, Facing(friction=ROUGH, rolling_friction=ROUGH))
     packing, area = bed.packing_fraction, bed.size[0] * bed.size[1]
     g = math.hypot(*bed.gravity)
     fall = math.sqrt(2 * bed.size[2] / g)
-    top = float((bed.grains().position[:, 2] + bed.grains().radius).max())
-    body = bed.add_body(
-        [Plane(normal=(0.0, 0.0, -1.0))],
-        position=(0.0, 0.0, top + 0.01 * grain),
-        friction=_ROUGH,
-        rolling_friction=_ROUGH,
-    )
-    notes: dict[str, float] = {"body": body, "began": bed.time, "held": 0.0, "lifting": 0.0}
-    lid = Lid(bed, notes, grain=grain, fall_time=fall, drag_time=0.1 * fall)
+    notes: dict[str, float] = {}
+    lid = Lid(bed, notes, grain=grain, fall_time=fall, drag_time=0.1 * fall, rough=True)
+    body = int(notes["body"])
     while not notes["lifting"]:
-        lid.piece(pressure, lambda: bed.kinetic_energy / bed.weight / grain, stay=True)
+        lid.piece(pressure, stay=True)
         tell(0.0)
     start = bed.body_position(body)
     height = float(start[2])

@@ -6,7 +6,6 @@ The file is what ``Bed.save`` writes (.npz, a zip archive) with ``preparation.js
 import json
 import os
 import re
-import tempfile
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
@@ -14,11 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from dem.engine.core import BedCore
-from dem.engine.state import read_file
+from dem.engine.state import read_file, whole_file
 from dem.grains.sizes import Json
 
-from .report import Prepared, StageReport
-from .specification import B
+from .report import B, Prepared, StageReport
 
 __all__ = ["bed_shelf", "find_bed", "list_beds", "load_prepared", "read_preparation", "save_prepared", "share_bed"]
 
@@ -56,19 +54,12 @@ def shelf_path(name: str) -> Path:
 
 def save_prepared(prepared: Prepared, path: str | Path) -> Path:
     """Write a bed with its preparation to one file, whole or not at all. Returns the path."""
-    bed = prepared.whole
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    about = {
-        "format": PREPARATION_FORMAT,
-        "recipe": prepared.recipe,
-        "reports": [asdict(report) for report in prepared.reports],
-    }
-    with tempfile.TemporaryDirectory(dir=path.parent) as scratch:
-        part = bed.save(Path(scratch) / "bed.npz")
+    path, bed, reports = Path(path), prepared.whole, [asdict(report) for report in prepared.reports]
+    about = {"format": PREPARATION_FORMAT, "recipe": prepared.recipe, "reports": reports}
+    with whole_file(path) as part:
+        bed.save(part)
         with zipfile.ZipFile(part, "a") as archive:
             archive.writestr(_MEMBER, json.dumps(about, indent=1))
-        part.replace(path)
     return path
 
 
@@ -116,13 +107,13 @@ def share_bed(path: str | Path, to: str | Path) -> Path:
     read_file(path)
     if to.exists():
         raise ValueError(f"to = {str(to)!r} is there already: name a file that is not")
-    to.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=to.parent) as scratch:
-        part = Path(scratch) / "bed.npz"
-        with zipfile.ZipFile(path) as source, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as target:
-            for member in source.infolist():
-                target.writestr(member.filename, source.read(member))
-        part.replace(to)
+    with (
+        whole_file(to) as part,
+        zipfile.ZipFile(path) as source,
+        zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as target,
+    ):
+        for member in source.infolist():
+            target.writestr(member.filename, source.read(member))
     return to
 
 

@@ -2,30 +2,36 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dem.contact.timestep import time_step_for
+from dem.engine import state
+from dem.engine.base import FLOOR
 from dem.engine.values import BedFailure
 from dem.grains.graded import Graded
+from dem.grains.materials import Facing, Material
 from dem.grains.sizes import Json
 from dem.measure.grading import measure_grading
 from dem.measure.lid import Lid
 
 from .recipe import FLUFF, Stage
-from .report import ENERGY_RATIO, StageReport, measure_stage
+from .report import ENERGY_RATIO, B, StageReport, measure_stage
 from .specification import BEARING
-from .stages import DRAG, PAST, SHORT, B, Preparation
+from .stages import DRAG, PAST, SHORT, Preparation
 
-__all__ = ["Laboratory"]
+__all__ = ["Laboratory", "touching_as"]
 
 # Nearly at rest, as a bed is that is cut level before it has settled.
 _ROUGH_ENERGY_RATIO = 1e-2
 # A bed that is tilted moves while it settles anew; it flows once it still does so after this many fall times.
 _FLOWS = 15.0
+_KEEP_INTERVAL = 60.0  # between two times that it is kept [s of waiting]
 
 
 class Laboratory(Preparation[B]):
@@ -37,28 +43,74 @@ class Laboratory(Preparation[B]):
         *,
         stages: Sequence[Stage],
         grain: float,
-        progress: Any,
-        path: Path | None,
+        progress: Any = None,
+        path: Path | None = None,
         recipe: Json | None = None,
         graded: Graded | None = None,
-        sticking: Callable[[B], B] | None = None,
-        reporting: bool = True,
+        sticking: tuple[Material, Facing | None] | None = None,
         labels: dict[str, str] | None = None,
     ):
         """A preparation at its beginning.
 
         Args:
-            path: as for ``Preparation``. recipe: what was kept at ``path`` is continued only for the same recipe.
+            grain: mean diameter [m]. progress: as ``prepare_as`` takes it.
+            path: where it is kept now and then (.npz, and .json beside it); None: nowhere.
+            recipe: what was kept at ``path`` is continued only for the same recipe.
             graded: where sizes belong; every stage's report then contains how they lie.
-            sticking: returns the same grains, which touch as their material says (the stage 'stick').
-            reporting: whether stages have reports. labels: what progress calls a stage where not as it is written.
+            sticking: the material, and the floor, as which grains touch from the stage 'stick' on.
+            labels: what progress calls a stage where not as it is written; with labels stages have no reports.
         """
-        super().__init__(bed, grain=grain, progress=progress, path=path)
+        super().__init__(bed, grain=grain)
         self.stages = list(stages)
         self.reports: list[StageReport] = []
         self.done = 0
-        self._recipe, self._graded, self._sticking = recipe, graded, sticking
-        self._reporting, self._labels = reporting, labels or {}
+        self._progress, self._path, self._kept = progress, path, time.monotonic()
+        self._recipe, self._graded, self._sticking, self._labels = recipe, graded, sticking, labels
+
+    def keep(self) -> None:
+        """Write it down as it is."""
+        if self._path is not None:
+            self.bed.save(self._path)
+            if self._densest:
+                np.savez(self._path.with_suffix(".densest.npz"), **self._densest)  # type: ignore[arg-type]
+            reports = [asdict(report) for report in self.reports]
+            kept = {"recipe": self._recipe, "done": self.done, "reports": reports, "notes": self.notes}
+            self._path.with_suffix(".json").write_text(json.dumps(kept | {"steps": self.bed.steps}))
+            self._kept = time.monotonic()
+
+    def find(self, **options: Any) -> None:
+        """Go back to what was kept, if there is something whole; options are those of ``Bed.load``."""
+        if self._path is None or not self._path.exists():
+            return
+        try:
+            kept = json.loads(self._path.with_suffix(".json").read_text())
+            bed, notes = type(self.bed).load(self._path, **options), dict(kept["notes"])
+            # The work ended between the two files, or is another's.
+            if kept["steps"] != bed.steps or kept["recipe"] != json.loads(json.dumps(self._recipe)):
+                return
+            reports, done = [StageReport(**report) for report in kept["reports"]], int(kept["done"])
+            if (densest := self._path.with_suffix(".densest.npz")).exists():
+                with np.load(densest) as file:
+                    self._densest = dict(file)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return
+        self.bed, self.notes, self.reports, self.done = bed, notes, reports, done
+
+    def forget(self) -> None:
+        """Remove what was kept."""
+        if self._path is not None:
+            for path in (self._path, *(self._path.with_suffix(suffix) for suffix in (".json", ".densest.npz"))):
+                path.unlink(missing_ok=True)
+
+    def _pause(self, done: float) -> None:
+        try:
+            if self._progress is not None:
+                self._progress.update(done)
+        except KeyboardInterrupt:
+            self.keep()
+            raise
+        if time.monotonic() - self._kept >= _KEEP_INTERVAL:
+            self.keep()
 
     def run(self) -> B:
         """Go on to the end; the bed. Raises as ``prepare_as`` does.
@@ -78,10 +130,10 @@ class Laboratory(Preparation[B]):
         while self.done < len(self.stages):
             stage = self.stages[self.done]
             if self._progress is not None:
-                self._progress.stage(self._labels.get(stage.name, str(stage)), 1.0)
+                self._progress.stage((self._labels or {}).get(stage.name, str(stage)), 1.0)
             notes = work[stage.name](stage)
             self.bed.measure_surface()
-            if self._reporting:
+            if self._labels is None:
                 if self._graded is not None:
                     notes["grading"] = asdict(measure_grading(self.bed, self._graded))
                 across = self._left
@@ -101,15 +153,6 @@ class Laboratory(Preparation[B]):
         margin = min(self.bed.size[2], 0.3 * block)
         return 0.5 * max(widths) + margin, self.bed.size[0] - 0.5 * max(widths) - margin
 
-    def _to_keep(self) -> Json:
-        return {"recipe": self._recipe, "done": self.done, "reports": [asdict(report) for report in self.reports]}
-
-    def _recall(self, kept: Json) -> bool:
-        if kept["recipe"] != json.loads(json.dumps(self._recipe)):
-            return False
-        self.reports, self.done = [StageReport(**report) for report in kept["reports"]], int(kept["done"])
-        return True
-
     def _rain_down(self, stage: Stage) -> Json:
         if "settle" not in self.notes:
             self._fall()
@@ -122,7 +165,7 @@ class Laboratory(Preparation[B]):
         notes = self.notes
         if not notes:
             notes |= {"before": self.bed.packing_fraction, "settle": {}}
-            self.bed = self._sticking(self.bed)
+            self.bed = touching_as(self.bed, *self._sticking)
         self._settle(ENERGY_RATIO, notes["settle"])
         return {"before": notes["before"]}
 
@@ -181,7 +224,7 @@ class Laboratory(Preparation[B]):
                         )
                     notes["pressure"] = min(most, max(weight, 2 * notes["pressure"]))
                 lid = Lid(bed, notes, grain=self._grain, fall_time=self._fall_time, drag_time=DRAG * self._fall_time)
-                while not lid.piece(notes["pressure"], lambda: self._energy):
+                while not lid.piece(notes["pressure"]):
                     self._pause(0.0)
                 notes["settle"] = {}
             self._settle(ENERGY_RATIO, notes["settle"])
@@ -231,3 +274,32 @@ class Laboratory(Preparation[B]):
             notes |= {"held": angle, "settle": None}
             self._pause(min(1.0, angle / stage.value))
         return {"angle": notes["held"]}
+
+
+def touching_as(bed: B, material: Material, floor: Facing | None = None) -> B:
+    """The same grains where they are, contacts and histories kept, which touch as this material's from now on.
+
+    Args:
+        material: of the same density, with or without rolling friction as the bed's own.
+        floor: how they touch the floor, where there is one; as one another when None.
+
+    Raises ValueError: a material of which these grains cannot be.
+    """
+    own = bed.material
+    if material.density != own.density or (material.rolling_friction > 0) != (own.rolling_friction > 0):
+        raise ValueError(
+            f"material = {material.name!r}: density {material.density:g} kg/m3, rolling friction "
+            f"{material.rolling_friction:g}, where the grains have {own.density:g} and {own.rolling_friction:g}: the "
+            f"same density, and rolling friction in both or in none, would do"
+        )
+    bed.wake()
+    values = bed.state()
+    radii = values["position"][values["id"].argsort(), 3].astype(float)
+    step = time_step_for(material, diameter=2 * float(radii.min()), max_overlap=bed.settings.max_overlap)
+    settings = replace(bed.settings, material=material, gravity=bed.gravity, time_step=min(bed.time_step, step))
+    new = bed.alike(settings, radii)
+    state.adopt(new, values)
+    new.overlap_limit, new.recipe = bed.overlap_limit, bed.recipe
+    if new.has_floor:
+        new.set_facing(FLOOR, floor or Facing())
+    return new

@@ -2,8 +2,7 @@
 
 import json
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -16,11 +15,9 @@ from dem.grains.sizes import Json, Uniform
 
 from .bedfile import load_prepared, save_prepared
 from .laboratory import Laboratory
-from .pouring import poured, poured_on, touching_as
 from .recipe import DENSEST_UNIFORM, Stage, check_packing, check_stages, parse_stage
-from .report import Prepared
+from .report import B, Prepared
 from .specification import (
-    B,
     BedOptions,
     Specification,
     bound_of_mean,
@@ -35,6 +32,8 @@ __all__ = ["bound_of_mean", "cache_folder", "check_options", "fingerprint", "pre
 
 # More is rained in than is kept, for a level surface: this much higher, and at least this many diameters.
 _SURPLUS, _SURPLUS_DIAMETERS = 0.06, 2.0
+# What progress calls a stage of ``prepare_bed``.
+_LABELS = {"level": "settle", "packing": "tap"}
 
 
 def prepare_as(
@@ -73,12 +72,10 @@ def prepare_as(
         raise ValueError(f"keep = {str(keep)!r} beside cache: the cache has a place of its own for what is under way")
     dense = DENSEST_UNIFORM if isinstance(wanted.local, Uniform) else 0.70
     volume = (z + _SURPLUS_DIAMETERS * wanted.coarsest) * dense * x * y
-    first = wanted
-    if plan[0].dry:
-        first = replace(wanted, material=poured(stuff, friction=plan[0].value), floor=poured_on(wanted.floor))
+    first = wanted.poured(plan[0].value) if plan[0].dry else wanted
     return _prepared(
-        wanted, plan, recipe, lambda: _rain(first, volume, make), make=make, cache=cache, save=save_prepared,
-        keep=None if keep is None else Path(keep), progress=progress,
+        wanted, plan, recipe, make=make, first=first, volume=volume, cache=cache, progress=progress,
+        keep=None if keep is None else Path(keep),
     )  # fmt: skip
 
 
@@ -126,33 +123,26 @@ def prepare_bed(
     }
     volume = 0.60 * max(z * (1 + _SURPLUS), z + _SURPLUS_DIAMETERS * wanted.coarsest) * x * y
     return _prepared(
-        wanted, plan, recipe, lambda: _rain(wanted, volume, make), make=make, cache=cache, save=_save_plain,
-        progress=progress, labels={"level": "settle", "packing": "tap"}, failed=cache_folder() / "failed",
-    ).whole  # fmt: skip
-
-
-def _rain(wanted: Specification, volume: float, make: type[B]) -> B:
-    """The grains in the air, at rest, in a loose column."""
-    return wanted.rain(volume, make)
+        wanted, plan, recipe, make=make, first=wanted, volume=volume, cache=cache, progress=progress, plain=True
+    ).whole
 
 
 def _prepared(
     wanted: Specification,
     plan: list[Stage],
     recipe: Json,
-    rain: Callable[[], B],
     *,
     make: type[B],
+    first: Specification,
+    volume: float,
     cache: bool,
-    save: Callable[[Prepared[B], Path], Any],
     progress: Any,
     keep: Path | None = None,
-    labels: dict[str, str] | None = None,
-    failed: Path | None = None,
+    plain: bool = False,
 ) -> Prepared[B]:
-    """The bed from the cache, or made and left there. A recipe with ``labels`` has no reports.
+    """The bed from the cache, or made of what ``first`` rains, ``volume`` of solid [m3], and left there.
 
-    ``save`` writes it; ``failed``: the folder where a bed that did not come to rest is saved.
+    ``plain``: without reports; if it does not come to rest it is saved beside the cached beds.
     """
     runtime.start(arch=wanted.arch, threads=wanted.threads, precision=wanted.precision)
     own = wanted.material.softened(wanted.young)
@@ -163,46 +153,39 @@ def _prepared(
             try:
                 found = load_prepared(shelf, arch=wanted.arch, threads=wanted.threads, make=make)
             except ValueError as problem:
-                _warn(f"the cached bed {shelf.name} cannot be read and is made anew: {problem}")
+                warnings.warn(f"the cached bed {shelf.name} cannot be read and is made anew: {problem}", stacklevel=3)
             else:
                 found.whole.material, found.whole.recipe = own, found.recipe or recipe
                 return found
     work = Laboratory(
-        rain(),
+        first.rain(volume, make),
         stages=plan,
         grain=wanted.sizes.mean,
         progress=progress,
         path=keep,
         recipe=recipe,
         graded=wanted.sizes if isinstance(wanted.sizes, Graded) else None,
-        sticking=lambda bed: touching_as(bed, own, floor=wanted.floor),
-        reporting=labels is None,
-        labels=labels,
+        sticking=(own, wanted.floor),
+        labels=_LABELS if plain else None,
     )
     work.find(arch=wanted.arch, threads=wanted.threads)
     try:
         bed = work.run()
     except BedFailure as failure:
-        if failed is None:
+        if not plain:
             raise
-        kept = work.bed.save(failed / shelf.name)
+        kept = work.bed.save(cache_folder() / "failed" / shelf.name)
         raise BedFailure(f"{failure.reason}; the bed as it was is in {kept}") from None
     prepared = Prepared(wanted.finish(bed, recipe), recipe, work.reports)
     if cache:
         try:
-            save(prepared, shelf)
+            if plain:
+                bed.save(shelf)
+                shelf.with_suffix(".json").write_text(json.dumps(recipe, indent=1))
+            else:
+                save_prepared(prepared, shelf)
         except OSError as problem:
-            _warn(f"the bed could not be kept in the cache: {problem}")
+            warnings.warn(f"the bed could not be kept in the cache: {problem}", stacklevel=3)
         else:
             work.forget()
     return prepared
-
-
-def _warn(text: str) -> None:
-    warnings.warn(text, stacklevel=4)
-
-
-def _save_plain(prepared: Prepared, path: Path) -> None:
-    """A bed without reports, as ``Bed.save`` writes it; its recipe beside it."""
-    prepared.whole.save(path)
-    path.with_suffix(".json").write_text(json.dumps(prepared.recipe, indent=1))

@@ -10,20 +10,21 @@ import math
 import os
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Required, TypedDict, TypeVar
+from typing import Any, Required, TypedDict
 
 import numpy as np
 
 from dem.contact.timestep import choose_young
-from dem.engine.core import BedCore
 from dem.grains.graded import Graded
-from dem.grains.materials import Facing, Material
+from dem.grains.materials import LEAST_ROLLING, Facing, Material
 from dem.grains.materials import material as find_material
 from dem.grains.packing import RAIN_COLUMN, draw_radii, rain_column, rain_positions
 from dem.grains.sizes import Json, Sizes, describe, sizes_of
 from dem.measure.grading import measure_grading, surface_under
+
+from .report import B
 
 __all__ = [
     "BEARING",
@@ -47,8 +48,6 @@ _RAIN_OVERLAP = 0.05
 _NUMBERS = ("gravity", "seed", "young", "max_overlap", "time_step")
 # Smallest over mean diameter of the sizes with which ``CHAIN`` was measured.
 _NARROW = 0.85
-
-B = TypeVar("B", bound=BedCore)
 
 
 def cache_folder() -> Path:
@@ -135,16 +134,22 @@ class Specification:
         x, y, z = (float(s) for s in size)
         if young is None:
             young = soft_enough(stuff, size=(x, y, z), sizes=sizes, gravity=gravity, max_overlap=max_overlap)
-        return cls(
-            material=stuff,
-            size=(x, y, z),
-            sizes=sizes,
-            gravity=float(gravity),
-            seed=int(seed),
-            young=float(young),
-            max_overlap=float(max_overlap),
-            **others,
-        )
+        numbers = {"gravity": float(gravity), "young": float(young), "max_overlap": float(max_overlap)}
+        return cls(material=stuff, size=(x, y, z), sizes=sizes, seed=int(seed), **numbers, **others)
+
+    def poured(self, friction: float | None) -> "Specification":
+        """The same of grains that stick neither to one another nor to the floor.
+
+        With this friction and no rolling friction, or their own where it is None [1]. Enlarged grains that keep a
+        powder's strength rain into a gauze far looser than the powder ever is, and neither taps nor a lid bring them
+        together (docs/bed.md). So they are poured like this, and stick once the bed lies as it should
+        (``dem.prepare.laboratory.touching_as``). ``dem.measure.element`` presses its samples in the same way.
+        """
+        stuff = replace(self.material, cohesion="none", surface_energy=0.0)
+        if friction is not None:
+            stuff = replace(stuff, friction=friction, rolling_friction=min(stuff.rolling_friction, LEAST_ROLLING))
+        floor = None if self.floor is None else replace(self.floor, surface_energy=None)
+        return replace(self, material=stuff, floor=floor)
 
     @property
     def local(self) -> Sizes:

@@ -1,10 +1,7 @@
 """What stages are made of: falling, settling, loosening, tapping; kept between any two pieces of the work."""
 
-import json
 import math
-import time
-from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic
 
 import numpy as np
 
@@ -13,11 +10,9 @@ from dem.engine.values import BedFailure, State
 from dem.grains.sizes import Json
 
 from .recipe import FLUFF
-from .report import ENERGY_RATIO, FLOOR_RATIO
+from .report import ENERGY_RATIO, FLOOR_RATIO, B
 
-__all__ = ["ENERGY_RATIO", "FLOOR_RATIO", "Preparation", "lift_apart"]
-
-B = TypeVar("B", bound=BedCore)
+__all__ = ["Preparation", "lift_apart"]
 
 # Time constant of the drag while settling, in the time that a grain takes to fall the bed's depth.
 DRAG = 0.1
@@ -37,7 +32,6 @@ _SUNK = 1e-3
 # It is stirred first: velocities at random, of this standard deviation over sqrt(g d), for the time in which a grain
 # with that speed goes so many diameters. Without, it comes down in the order in which it was.
 _STIR, _STIR_WAY = 1.0, 2.0
-_KEEP_INTERVAL = 60.0  # between two times that it is kept [s of waiting]
 
 
 class Preparation(Generic[B]):
@@ -47,69 +41,14 @@ class Preparation(Generic[B]):
     on bitwise reproducibly.
     """
 
-    def __init__(self, bed: B, *, grain: float, progress: Any, path: Path | None):
-        """``path``: where it is kept now and then (.npz, and .json beside it); None: nowhere."""
+    def __init__(self, bed: B, *, grain: float):
         self.bed = bed
         self.notes: Json = {}
         self._grain = grain
-        self._progress = progress
-        self._path = path
-        self._kept = time.monotonic()
         self._densest: State = {}  # state of the bed where taps had it densest
 
-    def keep(self) -> None:
-        """Write it down as it is."""
-        if self._path is not None:
-            self.bed.save(self._path)
-            if self._densest:
-                np.savez(self._path.with_suffix(".densest.npz"), **self._densest)  # type: ignore[arg-type]
-            kept = self._to_keep() | {"notes": self.notes, "steps": self.bed.steps}
-            self._path.with_suffix(".json").write_text(json.dumps(kept))
-            self._kept = self._now()
-
-    def find(self, **options: Any) -> None:
-        """Go back to what was kept, if there is something whole; options are those of ``Bed.load``."""
-        if self._path is None or not self._path.exists():
-            return
-        try:
-            kept = json.loads(self._path.with_suffix(".json").read_text())
-            bed, notes = type(self.bed).load(self._path, **options), dict(kept["notes"])
-            if kept["steps"] != bed.steps or not self._recall(kept):  # ended between the two files, or another's
-                return
-            if (densest := self._path.with_suffix(".densest.npz")).exists():
-                with np.load(densest) as file:
-                    self._densest = {key: file[key] for key in file.files}
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
-            return
-        self.bed, self.notes = bed, notes
-
-    def _to_keep(self) -> Json:
-        raise NotImplementedError
-
-    def _recall(self, kept: Json) -> bool:
-        """Take up again what ``_to_keep`` returned; whether it is of this work. Nothing changes where it raises."""
-        raise NotImplementedError
-
-    def forget(self) -> None:
-        """Remove what was kept."""
-        if self._path is not None:
-            for path in (self._path, self._path.with_suffix(".json"), self._path.with_suffix(".densest.npz")):
-                path.unlink(missing_ok=True)
-
-    @staticmethod
-    def _now() -> float:
-        return time.monotonic()
-
     def _pause(self, done: float) -> None:
-        """Between two pieces of the work: say how far it is, keep it if it is time."""
-        try:
-            if self._progress is not None:
-                self._progress.update(done)
-        except KeyboardInterrupt:
-            self.keep()
-            raise
-        if self._now() - self._kept >= _KEEP_INTERVAL:
-            self.keep()
+        """Between two pieces of the work: report the share done of the stage, keep the work if it is time."""
 
     @property
     def _energy(self) -> float:

@@ -9,20 +9,21 @@ which meet a grain as a plane does). Further shapes are in ``dem.shapes.solids``
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import taichi as ti
 
 __all__ = ["Ball", "Cone", "Cylinder", "Plane", "Primitive", "Shape", "distance_to", "rotate"]
 
-PLANE, BALL, FRUSTUM = 0, 1, 2
-ROW_WIDTH = 6
+PLANE, BALL, FRUSTUM, CAPSULE, BOX, TUBE, MESH = range(7)
+PLACED = 16  # Added to the kind of a shape that has a place of its own in the body
+ROW_WIDTH, PLACE_WIDTH = 6, 8  # Numbers in ``Shape.row`` and in ``Shape.place``
 
 
 def refuse_length(kind: str, **values: float) -> None:
     """Raises ValueError for a length that is not positive and finite; ``kind`` says whose."""
     for name, value in values.items():
-        if not (math.isfinite(value) and value > 0):
+        if not 0 < value < math.inf:
             raise ValueError(f"{kind}: {name} = {value} must be a positive length [m]")
 
 
@@ -33,19 +34,23 @@ def refuse_point(kind: str, **points: tuple[float, ...]) -> None:
             raise ValueError(f"{kind}: {name} = {tuple(point)} must be 3 finite numbers [m]")
 
 
-def _refuse_heights(kind: str, bottom: float, top: float) -> None:
-    if not (math.isfinite(bottom) and math.isfinite(top) and top > bottom):
-        raise ValueError(f"{kind}: top = {top} must lie above bottom = {bottom}, both finite [m]")
-
-
 class Shape:
     """What every shape has, in the frame of its body."""
 
     kind: int
 
+    @property
+    def bare(self) -> "Shape":
+        """The shape without its place."""
+        return self
+
     def row(self) -> list[float]:
         """The six numbers that the kernels read."""
         raise NotImplementedError
+
+    def place(self) -> list[float]:
+        """Position, rotation (quaternion, scalar first) and one number that its row has no room for, eight in all."""
+        return [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
 
     def extent(self) -> float:
         """Largest distance from the body's origin to the surface [m], or a little more; infinite for a plane."""
@@ -59,12 +64,12 @@ class Plane(Shape):
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
+    kind = PLANE
+
     def __post_init__(self):
         refuse_point("Plane", point=self.point)
         if len(self.normal) != 3 or not 0 < math.hypot(*self.normal) < math.inf:
             raise ValueError(f"Plane: normal = {tuple(self.normal)} must be 3 finite numbers, not all zero")
-
-    kind = PLANE
 
     def row(self) -> list[float]:
         length = math.hypot(*self.normal)
@@ -81,11 +86,11 @@ class Ball(Shape):
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
     radius: float = 0.0
 
+    kind = BALL
+
     def __post_init__(self):
         refuse_point("Ball", center=self.center)
         refuse_length("Ball", radius=self.radius)
-
-    kind = BALL
 
     def row(self) -> list[float]:
         return [*self.center, self.radius, 0.0, 0.0]
@@ -95,16 +100,36 @@ class Ball(Shape):
 
 
 @dataclass(frozen=True)
-class Cone(Shape):
-    """A truncated cone about the body's z axis, from ``bottom`` to ``top`` [m]; a radius of 0 is an apex."""
+class Round(Shape):
+    """A shape that is round about the body's z axis, from ``bottom`` to ``top`` [m], with two radii."""
 
     bottom: float
     top: float
+
+    kind = FRUSTUM
+
+    def __post_init__(self):
+        if not -math.inf < self.bottom < self.top < math.inf:
+            raise ValueError(
+                f"{type(self).__name__}: top = {self.top} must lie above bottom = {self.bottom}, both finite [m]"
+            )
+
+    def row(self) -> list[float]:
+        return [*map(float, astuple(self)), 0.0, 0.0]
+
+    def extent(self) -> float:
+        return math.hypot(max(abs(self.bottom), abs(self.top)), max(astuple(self)[2:]))
+
+
+@dataclass(frozen=True)
+class Cone(Round):
+    """A truncated cone about the body's z axis, from ``bottom`` to ``top`` [m]; a radius of 0 is an apex."""
+
     bottom_radius: float
     top_radius: float
 
     def __post_init__(self):
-        _refuse_heights("Cone", self.bottom, self.top)
+        super().__post_init__()
         radii = (self.bottom_radius, self.top_radius)
         if not all(0 <= radius < math.inf for radius in radii) or not any(radii):
             raise ValueError(
@@ -112,34 +137,22 @@ class Cone(Shape):
                 f"and not both 0 [m]"
             )
 
-    kind = FRUSTUM
-
-    def row(self) -> list[float]:
-        return [self.bottom, self.top, self.bottom_radius, self.top_radius, 0.0, 0.0]
-
     def extent(self) -> float:
         return max(math.hypot(self.bottom, self.bottom_radius), math.hypot(self.top, self.top_radius))
 
 
 @dataclass(frozen=True)
-class Cylinder(Shape):
+class Cylinder(Round):
     """A cylinder about the body's z axis, from ``bottom`` to ``top`` [m]."""
 
-    bottom: float
-    top: float
     radius: float
 
     def __post_init__(self):
         refuse_length("Cylinder", radius=self.radius)
-        _refuse_heights("Cylinder", self.bottom, self.top)
-
-    kind = FRUSTUM
+        super().__post_init__()
 
     def row(self) -> list[float]:
         return [self.bottom, self.top, self.radius, self.radius, 0.0, 0.0]
-
-    def extent(self) -> float:
-        return math.hypot(max(abs(self.bottom), abs(self.top)), self.radius)
 
 
 Primitive = Plane | Ball | Cone | Cylinder

@@ -11,15 +11,30 @@ from pathlib import Path
 
 import numpy as np
 
+from .basic import MESH, Shape
+
 __all__ = ["Mesh", "Polyhedron", "mesh_from_file"]
 
-MESH = 6
 # A triangle whose height is less than this share of its longest side has no normal to speak of.
 _LEAST_HEIGHT = 1e-10
 
 
+class Surface(Shape):
+    """A body that its surface of triangles, ``mesh``, encloses."""
+
+    kind = MESH
+    mesh: "Mesh"
+
+    def extent(self) -> float:
+        return float(np.sqrt((self.mesh.vertices**2).sum(axis=1).max()))
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest coordinates in the body's frame [m], each of shape [3]."""
+        return self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
+
+
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Surface):
     """A closed surface of triangles in the body's frame; what it encloses is solid. Cavities are allowed.
 
     A grain touches it at the point of the surface nearest to its centre, wherever that lies: in a face, on an edge or
@@ -36,8 +51,6 @@ class Mesh:
     vertices: np.ndarray
     triangles: np.ndarray
 
-    kind = MESH
-
     def __post_init__(self):
         vertices, triangles = _arrays(self.vertices, self.triangles)
         _refuse_degenerate(vertices, triangles)
@@ -49,8 +62,8 @@ class Mesh:
         object.__setattr__(self, "triangles", triangles)
 
     @property
-    def mesh(self) -> "Mesh":
-        """Itself: what all shapes of triangles offer."""
+    def mesh(self) -> "Mesh":  # type: ignore[override]
+        """Itself."""
         return self
 
     @property
@@ -58,17 +71,9 @@ class Mesh:
         """What the surface encloses [m3]."""
         return float(_volumes(self.vertices, self.triangles).sum())
 
-    def extent(self) -> float:
-        """Largest distance from the body's origin to the surface [m]."""
-        return float(np.sqrt((self.vertices**2).sum(axis=1).max()))
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest coordinates in the body's frame [m], each of shape [3]."""
-        return self.vertices.min(axis=0), self.vertices.max(axis=0)
-
 
 @dataclass(frozen=True, eq=False)
-class Polyhedron:
+class Polyhedron(Surface):
     """A convex polyhedron: the hull of its corners.
 
     Attributes:
@@ -80,8 +85,6 @@ class Polyhedron:
 
     vertices: np.ndarray | Sequence[Sequence[float]]
     mesh: Mesh = field(init=False, repr=False)
-
-    kind = MESH
 
     def __post_init__(self):
         from scipy.spatial import ConvexHull, QhullError
@@ -108,14 +111,6 @@ class Polyhedron:
         triangles[inwards] = triangles[inwards][:, ::-1]
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "mesh", Mesh(vertices, triangles))
-
-    def extent(self) -> float:
-        """Largest distance from the body's origin to the surface [m]."""
-        return self.mesh.extent()
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest coordinates in the body's frame [m], each of shape [3]."""
-        return self.mesh.bounds()
 
 
 def mesh_from_file(path: str | Path, *, scale: float = 1.0, flip: bool = False) -> Mesh:

@@ -10,17 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import taichi as ti
 
-from .basic import Ball, Cone, Cylinder, Plane, Shape, refuse_length, refuse_point
-from .mesh import Mesh, Polyhedron
+from .basic import BOX, CAPSULE, PLACED, TUBE, Round, Shape, refuse_length, refuse_point
 
-__all__ = ["BOX", "Box", "CAPSULE", "Capsule", "PLACE_WIDTH", "PLACED", "Placed", "TUBE", "Tube", "AnyShape"]
-
-CAPSULE, BOX, TUBE = 3, 4, 5  # mesh.MESH is 6
-# Added to the kind of a shape that has a place of its own in the body.
-PLACED = 16
-# Of a row of places: x y z of the shape's origin, its turn, and one number more of the shape's own.
-PLACE_WIDTH = 8
-_NOWHERE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+__all__ = ["Box", "Capsule", "Placed", "Tube"]
 
 
 @dataclass(frozen=True)
@@ -40,8 +32,10 @@ class Capsule(Shape):
             raise ValueError(f"Capsule: end = {self.end} must be another point than start; use a Ball")
 
     def row(self) -> list[float]:
-        # The radius comes with the place.
         return [*map(float, self.start), *(float(b) - float(a) for a, b in zip(self.start, self.end, strict=True))]
+
+    def place(self) -> list[float]:
+        return [*super().place()[:7], float(self.radius)]
 
     def extent(self) -> float:
         return max(math.hypot(*self.start), math.hypot(*self.end)) + self.radius
@@ -72,14 +66,12 @@ class Box(Shape):
 
 
 @dataclass(frozen=True)
-class Tube(Shape):
+class Tube(Round):
     """A hollow cylinder about the body's z axis, open at both ends: the wall of a container.
 
     Grains may be inside it (and then keep to it: it needs a floor of its own) as well as outside.
     """
 
-    bottom: float
-    top: float
     inner_radius: float
     outer_radius: float
 
@@ -91,21 +83,14 @@ class Tube(Shape):
             raise ValueError(
                 f"Tube: outer_radius = {self.outer_radius} must be larger than inner_radius = {self.inner_radius} [m]"
             )
-        if not (math.isfinite(self.bottom) and math.isfinite(self.top) and self.top > self.bottom):
-            raise ValueError(f"Tube: top = {self.top} must lie above bottom = {self.bottom} [m]")
-
-    def row(self) -> list[float]:
-        return [float(self.bottom), float(self.top), float(self.inner_radius), float(self.outer_radius), 0.0, 0.0]
-
-    def extent(self) -> float:
-        return math.hypot(max(abs(self.bottom), abs(self.top)), self.outer_radius)
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
-class Placed:
+class Placed(Shape):
     """A shape put elsewhere in a body: its origin at ``position`` [m], ``turn`` a quaternion (scalar first)."""
 
-    shape: Plane | Ball | Cone | Cylinder | Capsule | Box | Tube | Mesh | Polyhedron
+    shape: Shape
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
 
@@ -117,30 +102,20 @@ class Placed:
             raise ValueError(f"Placed: turn = {tuple(self.turn)} must be a quaternion of four numbers, scalar first")
 
     @property
-    def kind(self) -> int:
+    def kind(self) -> int:  # type: ignore[override]
         """Of the shape, and that it has a place."""
         return self.shape.kind + PLACED
 
+    @property
+    def bare(self) -> Shape:
+        return self.shape
+
+    def place(self) -> list[float]:
+        turn = np.array(self.turn, dtype=float) / math.hypot(*self.turn)
+        return [*map(float, self.position), *turn.tolist(), self.shape.place()[7]]
+
     def extent(self) -> float:
         return math.hypot(*self.position) + self.shape.extent()
-
-
-AnyShape = Plane | Ball | Cone | Cylinder | Capsule | Box | Tube | Mesh | Polyhedron | Placed
-
-
-def bare(shape: AnyShape) -> Plane | Ball | Cone | Cylinder | Capsule | Box | Tube | Mesh | Polyhedron:
-    """The shape without its place."""
-    return shape.shape if isinstance(shape, Placed) else shape
-
-
-def place_row(shape: AnyShape) -> list[float]:
-    """Where the shape is in the body, and what its own row had no room for: ``PLACE_WIDTH`` numbers."""
-    place = list(_NOWHERE)
-    if isinstance(shape, Placed):
-        turn = np.array(shape.turn, dtype=float)
-        place = [*map(float, shape.position), *(turn / math.hypot(*shape.turn)).tolist()]
-    inner = bare(shape)
-    return [*place, float(inner.radius) if isinstance(inner, Capsule) else 0.0]
 
 
 # Each returns the signed distance [m], the outward unit normal and the curvature [1/m] at a point of the shape's frame.

@@ -8,7 +8,8 @@ import pytest
 
 from dem import SAND, Bed, Material
 from dem.measure.lid import Lid
-from dem.prepare.pouring import poured, touching_as
+from dem.prepare.laboratory import touching_as
+from dem.prepare.specification import Specification
 
 GRAIN = 0.004
 # Pull-off of two grains, 4 pi gamma R*, is 14 times the weight of one.
@@ -64,13 +65,14 @@ def test_a_lid_comes_off_a_bed_of_grains_that_stick(made):
     fall = math.sqrt(2 * BED["size"][2] / 9.81)
     lid = Lid(bed, notes, grain=GRAIN, fall_time=fall, drag_time=0.1 * fall)
     pressure = bed.weight / (BED["size"][0] * BED["size"][1])
-    while not lid.piece(pressure, lambda: bed.kinetic_energy / bed.weight / GRAIN):
+    while not lid.piece(pressure):
         pass
     assert int(bed.state()["numbers"][1]) == 1  # the floor alone
     bed.restore(state)
 
 
 def test_grains_cannot_change_their_density(made):
-    assert poured(SAND, friction=0.2).rolling_friction == 1e-9
+    poured = Specification.of(SAND, size=BED["size"], grain=GRAIN).poured(0.2)
+    assert poured.material.rolling_friction == 1e-9
     with pytest.raises(ValueError, match="density 2700"):
         touching_as(made[0].bed, replace(STICKY, density=2700.0))

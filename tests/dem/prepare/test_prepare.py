@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import dem.prepare.laboratory
 import dem.prepare.prepare
+import dem.prepare.stages
 from dem import SAND, Bed, Facing, LogNormal, Normal, Uniform
 from dem.prepare.laboratory import Laboratory
 from dem.prepare.prepare import check_options, prepare_bed
 from dem.prepare.recipe import Stage, check_stages, parse_stage
 from dem.prepare.report import ENERGY_RATIO
+from dem.prepare.specification import Specification
 from dem.prepare.stages import Preparation
 
 GRAIN = 0.004
@@ -112,7 +115,7 @@ def test_another_seed_rains_other_grains(monkeypatch):
 
 def test_a_cached_bed_is_the_bed_to_the_bit_and_needs_no_making(made, monkeypatch):
     monkeypatch.setenv("HEDGEBED_CACHE", str(made[2]))
-    monkeypatch.setattr(dem.prepare.prepare, "_rain", lambda *_: pytest.fail("it was made anew"))
+    monkeypatch.setattr(Specification, "rain", lambda *_: pytest.fail("it was made anew"))
     bed = prepare_bed(SAND, **BED)
     assert same(bed.state(), made[1])
     for name in ("surface", "packing_fraction", "size", "gravity", "time_step", "seed", "material", "overlap_limit"):
@@ -129,7 +132,7 @@ def test_a_damaged_file_in_the_cache_is_said_and_made_anew(made, monkeypatch, tm
     here = tmp_path / "cache" / "beds" / file.name
     here.parent.mkdir(parents=True)
     here.write_bytes(whole[: len(whole) // 3] if damage is None else damage)
-    monkeypatch.setattr(dem.prepare.prepare, "_rain", stop)
+    monkeypatch.setattr(Specification, "rain", stop)
     with pytest.warns(UserWarning, match="cannot be read and is made anew"), pytest.raises(Stop):
         prepare_bed(SAND, **BED)
 
@@ -153,7 +156,7 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
             asked.append(path.name)
             path.parent.mkdir(parents=True, exist_ok=True)
 
-    monkeypatch.setattr(dem.prepare.prepare, "_rain", lambda *_: NoBed())
+    monkeypatch.setattr(Specification, "rain", lambda *_: NoBed())
     monkeypatch.setattr(Laboratory, "run", lambda work: work.bed)
     monkeypatch.setattr(dem.prepare.prepare.runtime, "start", lambda **_: None)
 
@@ -196,7 +199,7 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
 @pytest.fixture
 def already_rained(bed, monkeypatch):
     """Preparation starts from the bed at rest, so that tapping alone is tested."""
-    monkeypatch.setattr(dem.prepare.prepare, "_rain", lambda *_: bed)
+    monkeypatch.setattr(Specification, "rain", lambda *_: bed)
     monkeypatch.setattr(Laboratory, "_rain_down", lambda work, stage: {})
     monkeypatch.setattr(Laboratory, "_level", lambda work, stage: work._settle(ENERGY_RATIO, {}) or {})
     return bed.packing_fraction
@@ -223,7 +226,7 @@ def test_a_packing_out_of_reach_is_refused(already_rained, monkeypatch, packing,
 
 def test_a_bed_that_does_not_come_to_rest_says_so(bed, monkeypatch):
     monkeypatch.setattr(dem.prepare.stages, "_LONGEST", 0.1)
-    work = Preparation(bed, grain=GRAIN, progress=None, path=None)
+    work = Preparation(bed, grain=GRAIN)
     with pytest.raises(dem.BedFailure, match="did not come to rest"):
         work._settle(1e-30, {})
 
@@ -261,9 +264,9 @@ def test_a_preparation_that_was_stopped_goes_on_to_the_same_bits(made, monkeypat
 
 def test_a_preparation_is_kept_every_minute(made, monkeypatch, tmp_path):
     monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
-    monkeypatch.setattr(dem.prepare.stages, "_KEEP_INTERVAL", 0.0)
+    monkeypatch.setattr(dem.prepare.laboratory, "_KEEP_INTERVAL", 0.0)
     kept = []
-    keep = Preparation.keep
+    keep = Laboratory.keep
 
     def keep_and_stop(work):
         keep(work)
@@ -271,10 +274,10 @@ def test_a_preparation_is_kept_every_minute(made, monkeypatch, tmp_path):
         if len(kept) == 4:
             stop()
 
-    monkeypatch.setattr(Preparation, "keep", keep_and_stop)
+    monkeypatch.setattr(Laboratory, "keep", keep_and_stop)
     with pytest.raises(Stop):  # as kill -9 would end it
         prepare_bed(SAND, **BED)
-    monkeypatch.setattr(Preparation, "keep", lambda work: None)
+    monkeypatch.setattr(Laboratory, "keep", lambda work: None)
     bed = prepare_bed(SAND, **BED)
     assert same(bed.state(), made[1])
 

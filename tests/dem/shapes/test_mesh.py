@@ -36,7 +36,7 @@ def look():
                 out[i, 1 + k] = normal[k]
 
     def ask(mesh, points, reach, deep=False):
-        table.fill([mesh], np.float64)
+        table.fill([mesh])
         out = np.zeros((len(points), 4))
         each(2 * len(mesh.triangles) - 1, np.ascontiguousarray(points), out, reach, deep)
         return out[:, 0], out[:, 1:]

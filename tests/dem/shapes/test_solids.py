@@ -12,7 +12,6 @@ from dem import Ball, Box, Capsule, Cylinder, Facing, Material, Mesh, Placed, Po
 from dem.contact.law import effective_moduli
 from dem.engine import runtime
 from dem.engine.shape_table import ShapeTable
-from dem.shapes.solids import bare, place_row
 
 TURN = (math.cos(0.35), 0.6 * math.sin(0.35), 0.0, 0.8 * math.sin(0.35))
 """A turn by 0.7 rad about (0.6, 0, 0.8)."""
@@ -51,10 +50,10 @@ def distances():
             out[i, 4] = curvature
 
     def ask(shape, points):
-        table.place[0] = place_row(shape)
+        table.place[0] = shape.place()
         points = np.ascontiguousarray(points, dtype=float)
         out = np.zeros((len(points), 5))
-        look(shape.kind, ti.Vector(bare(shape).row(), dt=ti.f64), points, out)
+        look(shape.kind, ti.Vector(shape.bare.row(), dt=ti.f64), points, out)
         return out[:, 0], out[:, 1:4], out[:, 4]
 
     return ask
