@@ -190,7 +190,7 @@ _NAMES = {
         "dem.engine.dissipation": "Bookkeeping=BalanceKernels Ledger=Balance NO_LEDGER=NO_BALANCE",
     },
     "dem.engine.lists": {
-        "dem.grains.curve": "curve_ranks",
+        "dem.grains.packing": "curve_ranks",
     },
     "dem.measure": {
         "dem.grains.profile": "bulk_packing packing_profile surface_height",

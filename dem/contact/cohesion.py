@@ -21,18 +21,7 @@ import math
 
 import taichi as ti
 
-__all__ = [
-    "COHESIONS",
-    "DMT",
-    "JKR",
-    "NO_COHESION",
-    "jkr_contact",
-    "jkr_force",
-    "jkr_range",
-    "jkr_reach",
-    "pull_off",
-    "work_of_adhesion",
-]
+__all__ = ["COHESIONS", "DMT", "JKR", "jkr_contact", "jkr_force", "jkr_range", "jkr_reach", "pull_off"]
 
 NO_COHESION, DMT, JKR = range(3)
 COHESIONS = {"none": NO_COHESION, "dmt": DMT, "jkr": JKR}  # The laws by name
@@ -41,23 +30,18 @@ COHESIONS = {"none": NO_COHESION, "dmt": DMT, "jkr": JKR}  # The laws by name
 _RANGE = 0.75 * 0.25 ** (1 / 3)
 
 
-def work_of_adhesion(surface_energy: float) -> float:
-    """w = 2 gamma [J/m2]."""
-    return 2 * surface_energy
-
-
 def pull_off(law: str, *, surface_energy: float, radius: float) -> float:
     """The largest force with which a pair of effective radius R* [m] can be pulled before it parts [N]; 0 for "none".
 
     Raises KeyError: an unknown law.
     """
     factor = {"none": 0.0, "dmt": 2.0, "jkr": 1.5}[law]
-    return factor * math.pi * work_of_adhesion(surface_energy) * radius
+    return factor * math.pi * (2 * surface_energy) * radius
 
 
 def jkr_range(*, surface_energy: float, radius: float, effective_young: float) -> float:
     """How far apart the surfaces of a JKR pair are when it parts [m]."""
-    return _RANGE * (2 * math.pi * work_of_adhesion(surface_energy) / effective_young) ** (2 / 3) * radius ** (1 / 3)
+    return _RANGE * (2 * math.pi * (2 * surface_energy) / effective_young) ** (2 / 3) * radius ** (1 / 3)
 
 
 def jkr_contact(overlap: float, *, surface_energy: float, radius: float, effective_young: float) -> tuple[float, float]:
@@ -65,7 +49,7 @@ def jkr_contact(overlap: float, *, surface_energy: float, radius: float, effecti
 
     Raises ValueError: the pair has parted at this overlap.
     """
-    w = work_of_adhesion(surface_energy)
+    w = 2 * surface_energy
     unit = (2 * math.pi * w * radius**2 / effective_young) ** (1 / 3)
     d = overlap * radius / unit**2
     if d < -_RANGE:

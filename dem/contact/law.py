@@ -39,22 +39,19 @@ The dashpots of friction, rolling and twisting see the half-step velocity.
 """
 
 import math
+from typing import Any
 
 import taichi as ti
 
 from dem.grains.materials import Facing, Material
 
-from .cohesion import DMT, JKR, jkr_force, jkr_reach, work_of_adhesion
+from .cohesion import DMT, JKR, jkr_force, jkr_reach
 
-__all__ = [
-    "adhesive_range",
-    "contact_force",
-    "damping_factor",
-    "effective_moduli",
-    "pair_parameters",
-    "turning_torque",
-    "PAIR_WIDTH",
-]
+__all__ = ["contact_force", "damping_factor", "effective_moduli", "pair_parameters", "pair_row", "turning_torque"]
+
+Template: Any = (
+    ti.template()
+)  # An argument that is taken as it is: known as the kernel is compiled, or updated in place
 
 # Entries of a row of pair parameters.
 PAIR_WIDTH = 8
@@ -74,11 +71,9 @@ def damping_factor(restitution: float, *, tensile: bool = False) -> float:
     """The factor c_n of the normal damping force c_n sqrt(m* S_n) v that gives a restitution at any speed.
 
     Args:
-        restitution: rebound over approach speed [1], 0.01 to 1.
+        restitution: rebound over approach speed [1], 0.01 to 1; ValueError outside.
         tensile: True where the contact may pull at its end (Tsuji et al. 1992: 2 sqrt(5/6) |beta|); False where the
             force is cut at zero (Thornton et al. 2013's fit up to 0.9).
-
-    Raises ValueError: a restitution outside 0.01 to 1.
     """
     if not _LEAST_RESTITUTION <= restitution <= 1:
         raise ValueError(f"restitution = {restitution} must lie between {_LEAST_RESTITUTION} and 1")
@@ -116,12 +111,8 @@ def pair_parameters(
 ) -> list[float]:
     """One row of the table that the kernels read: everything of a pair that does not depend on the grains' sizes.
 
-    Args:
-        effective_young, effective_shear: E*, G* [Pa].
-        restitution, friction, rolling_friction: [1].
-        surface_energy: of the pair [J/m2].
-
-    Raises ValueError: from ``damping_factor``; a negative friction or surface energy.
+    E*, G* [Pa]; restitution, friction, rolling_friction [1]; surface_energy of the pair [J/m2]. Raises ValueError: from
+    ``damping_factor``; a negative friction or surface energy.
     """
     if not (friction >= 0 and rolling_friction >= 0):
         raise ValueError(f"friction = {friction} and rolling friction = {rolling_friction} must not be negative")
@@ -130,16 +121,8 @@ def pair_parameters(
     factor = damping_factor(restitution, tensile=tensile)
     ratio = math.sqrt(8 * effective_shear / (2 * effective_young))
     turning = 2 * TURNING_DAMPING_RATIO * math.sqrt(0.4) * ratio
-    return [
-        2 * effective_young,
-        8 * effective_shear,
-        factor,
-        friction,
-        rolling_friction,
-        factor * ratio,
-        turning,
-        math.pi * work_of_adhesion(surface_energy),
-    ]
+    stiffness = [2 * effective_young, 8 * effective_shear]
+    return [*stiffness, factor, friction, rolling_friction, factor * ratio, turning, math.pi * (2 * surface_energy)]
 
 
 def pair_row(material: Material, facing: Facing | None = None, *, tensile: bool = False) -> list[float]:
@@ -148,39 +131,21 @@ def pair_row(material: Material, facing: Facing | None = None, *, tensile: bool 
     young = math.inf if facing.young is None else facing.young
     poisson = material.poisson if facing.young is None else facing.poisson
     effective_young, effective_shear = effective_moduli(material.young, material.poisson, young, poisson)
-
-    def own_or(name: str) -> float:
-        value = getattr(facing, name)
-        return float(getattr(material, name) if value is None else value)
-
     names = ("restitution", "friction", "rolling_friction", "surface_energy")
-    return pair_parameters(
-        effective_young=effective_young,
-        effective_shear=effective_shear,
-        tensile=tensile,
-        **{name: own_or(name) for name in names},
-    )
+    own = {name: float(getattr(material, name)) for name in names}
+    own |= {name: float(value) for name in names if (value := getattr(facing, name)) is not None}
+    return pair_parameters(effective_young=effective_young, effective_shear=effective_shear, tensile=tensile, **own)
 
 
 @ti.func
-def adhesive_range(p: ti.template(), radius):
+def adhesive_range(p: Template, radius):
     """How far apart the surfaces of a JKR pair are when it parts [m]; ``radius`` the effective one [m]."""
     return jkr_reach(p[_TWO_E], p[_PI_W], radius)
 
 
 @ti.func
 def contact_force(
-    p: ti.template(),
-    n,
-    v_n,
-    v_t,
-    overlap,
-    radius,
-    mass,
-    dt,
-    u: ti.template(),
-    tensile: ti.template(),
-    cohesion: ti.template(),
+    p: Template, n, v_n, v_t, overlap, radius, mass, dt, u: Template, tensile: Template, cohesion: Template
 ):
     """Force on the first of a pair, without rolling.
 
@@ -262,7 +227,7 @@ def bounded(stiffness, damping, stretch, rate, bound):
 
 
 @ti.func
-def turning_torque(p: ti.template(), n, spin, load, k_t, a, radius, root, dt, q: ti.template()):
+def turning_torque(p: Template, n, spin, load, k_t, a, radius, root, dt, q: Template):
     """Rolling and twisting torque on the first of a pair [N m].
 
     ``spin`` the relative angular velocity, ``load`` what presses the surfaces together [N], ``a`` the contact radius

@@ -40,9 +40,7 @@ def contact_time(material: Material, *, diameter: float, max_overlap: float) -> 
     a grain on a rigid plane, whichever is shorter. A Hertzian collision that reaches this overlap lasts 1.28 times as
     long, and one that reaches a tenth of it 2.3 times.
 
-    Args:
-        diameter: of the smallest grain [m].
-        max_overlap: overlap over diameter [1].
+    ``diameter``: of the smallest grain [m]; ``max_overlap``: overlap over diameter [1].
     """
     mass = material.density * math.pi * diameter**3 / 6
     delta = max_overlap * diameter
@@ -59,13 +57,11 @@ def contact_time(material: Material, *, diameter: float, max_overlap: float) -> 
 def stable_step(restitution: float, *, neighbours: float = NEIGHBOURS, sticking: bool = False) -> float:
     """The longest stable step of a lattice of like grains, over the half-period pi sqrt(m* / S_n) of its contacts [1].
 
-    See the module. The restitution is brought about by damping that does not pull (``damping_factor``).
+    See the module. The damping is that of ``damping_factor``, whose ValueError it raises.
 
     Args:
         neighbours: z, of each grain, in all directions alike; 3 is a pair alone.
         sticking: with friction's springs, for spins of one sense; without, for the normal forces.
-
-    Raises ValueError: from ``damping_factor``.
     """
     c, n = damping_factor(restitution), neighbours / 3
     # a q^2 + 2 b q = 4

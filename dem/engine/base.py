@@ -35,17 +35,13 @@ FLOOR = 0
 class BedBase:
     """Grains in an engine, the bodies among them, and the clock.
 
-    Attributes:
+    Attributes, beside those of ``dem.Bed``:
         engine: fields and kernels. runtime: what Taichi runs on. settings: what the bed was made with.
         material, size, gravity, time_step, seed: in force now; SI units.
-        overlap_limit: the bound on overlap over diameter [1]; ``advance`` raises BedFailure past it.
         mean_diameter: of the grains [m]. skin: of the neighbour lists [m].
         steps, list_count: time steps and neighbour lists so far. steps_since_lists: since the last lists.
         reaction_steps: of the last ``advance``. tallied: sums of the forces on bodies since, or None.
         sleeper: the rules of sleep at work, or None. has_floor: whether body 0 is a plane.
-        grain_steps: grains computed, summed over the steps since the bed was made in this process.
-        recipe: what the bed was prepared from; empty where it was made otherwise.
-        surface: height of the undisturbed surface [m]. packing_fraction: bulk value [1].
     """
 
     def __init__(self, settings: BedSettings, radii: np.ndarray, *, precision: str, arch: str, threads: int | None):

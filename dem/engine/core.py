@@ -126,8 +126,7 @@ class BedCore(BedBodies):
     def grains(self, *, contacts: bool = True) -> Grains:
         """The grains now: positions, velocities, forces and more, in the order of ids.
 
-        Args:
-            contacts: whether to count them (``coordination``), which takes as long as the rest.
+        ``contacts``: whether to count them (``coordination``), which takes as long as the rest.
         """
         self.check_valid()
         e = self.engine
@@ -234,10 +233,9 @@ class BedCore(BedBodies):
         return bed
 
     def without(self, remove: np.ndarray) -> Self:
-        """A bed with some grains taken out; the others keep their contacts. Ids are counted anew, in order.
+        """A bed without some grains; the others keep their contacts. Ids are counted anew, in order.
 
-        Args:
-            remove: by id, bool, shape [grain_count].
+        ``remove``: by id, bool, shape [grain_count]. Raises ValueError where no grain would be left.
         """
         self.wake()
         keep = ~np.asarray(remove, dtype=bool)

@@ -58,11 +58,8 @@ def bed_energies(bed: BedBase, *, bodies: Mapping[int, Gap]) -> dict[str, float]
 def body_pushes(bed: BedBase, *, bodies: Mapping[int, Gap]) -> tuple[Array, Array]:
     """Where grains touch bodies, and the normal springs' forces on the bodies: Hertz's 2/3 (2 E*) a d.
 
-    Args:
-        bodies: as `bed_energies` has them.
-
-    Returns:
-        Points on the bodies' surfaces [m] and forces [N], shape [contact, 3] both; without damping and friction.
+    ``bodies``: as for ``bed_energies``. Returns points on the bodies' surfaces [m] and forces [N], shape [contact, 3]
+    both; without damping and friction.
     """
     state = take(bed)
     points, forces = [np.zeros((0, 3))], [np.zeros((0, 3))]

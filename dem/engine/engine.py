@@ -18,13 +18,14 @@ An engine is compiled for a capacity, not for a number of grains, and is used ag
 
 import math
 import weakref
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import taichi as ti
 
 from dem.contact.law import PAIR_WIDTH
-from dem.grains.curve import curve_ranks
+from dem.grains.packing import curve_ranks
 from dem.shapes.basic import ROW_WIDTH
 
 from . import runtime
@@ -48,6 +49,30 @@ MOST_PRIMITIVES = 64
 _free: dict[tuple, list] = {}
 
 
+@dataclass(frozen=True, kw_only=True)
+class Build:
+    """What an engine is compiled for.
+
+    Attributes:
+        capacity: grains that there is room for, at most 2^26. cell_capacity, chunk_capacity: likewise.
+        neighbours_per_grain: rows of the pair lists for each.
+        rolling: whether contacts carry a rolling spring. tensile: whether a contact's damping may pull at its end.
+        cohesion: a law of ``dem.contact.cohesion.COHESIONS``. real: ti.f64 or ti.f32.
+        gpu: one grain a chunk. threads: of the CPU.
+    """
+
+    capacity: int
+    cell_capacity: int
+    chunk_capacity: int
+    neighbours_per_grain: int = 16
+    rolling: bool
+    tensile: bool
+    cohesion: int
+    real: Any
+    gpu: bool
+    threads: int
+
+
 def take_engine(
     owner: Any,
     *,
@@ -57,7 +82,6 @@ def take_engine(
     height: float,
     largest_diameter: float,
     largest_skin: float,
-    gpu: bool,
     chunk_count: int | None = None,
     **build: Any,
 ) -> "Engine":
@@ -67,8 +91,7 @@ def take_engine(
         grain_count: number of grains. period: lateral period (x, y) [m].
         bottom, height: z of the box's bottom and top [m].
         largest_diameter: of the grains [m]. largest_skin: of the lists [m].
-        gpu: one grain a chunk. chunk_count: chosen when None.
-        build: the other arguments of ``Engine``, but for its capacities.
+        chunk_count: chosen when None. build: the attributes of ``Build``, but for its capacities.
 
     Raises ValueError: a bed less than three grains wide.
     """
@@ -81,14 +104,16 @@ def take_engine(
             f"the bed is {min(period):g} m across, less than three grains of {largest_diameter:g} m; "
             f"make it at least {3 * cell:.3g} m wide"
         )
+    gpu = bool(build["gpu"])
     if chunk_count is None:
         chunk_count = grain_count if gpu else max(1, min(MOST_CHUNKS, round(grain_count / GRAINS_PER_CHUNK)))
-    build |= {"gpu": gpu, **capacities(grain_count, math.prod(cells), chunk_count, gpu=gpu)}
-    key = (runtime.generation(), *(str(build[name]) for name in sorted(build)))
+    build |= capacities(grain_count, math.prod(cells), chunk_count, gpu=gpu)
+    shape = Build(**build)
+    key = (runtime.generation(), shape)
     for old in [k for k in _free if k[0] != key[0]]:
         del _free[old]
     idle = _free.setdefault(key, [])
-    engine = idle.pop() if idle else Engine(**build)
+    engine = idle.pop() if idle else Engine(shape)
     box = (*period, bottom, height, period[0] / nx, period[1] / ny, cell)
     engine.set_up(grain_count=grain_count, chunk_count=chunk_count, cells=cells, box=box)
     weakref.finalize(owner, idle.append, engine).atexit = False
@@ -116,19 +141,7 @@ def _roomy(count: int, *, least: int) -> int:
 
 @ti.data_oriented
 class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
-    """Grains, lists and bodies in Taichi fields, and the kernels that advance them.
-
-    Args:
-        capacity: grains that there is room for, at most 2^26.
-        cell_capacity, chunk_capacity: likewise.
-        neighbours_per_grain: rows of the pair lists for each.
-        rolling: whether contacts carry a rolling spring.
-        tensile: whether a contact's damping may pull at its end.
-        cohesion: a law of ``dem.contact.cohesion.COHESIONS``.
-        real: ti.f64 or ti.f32.
-        gpu: one grain a chunk.
-        threads: of the CPU.
-    """
+    """Grains, lists and bodies in Taichi fields, and the kernels that advance them."""
 
     # Fields of the state: with a row for each grain, and of the bodies and their shapes.
     GRAIN_FIELDS = ("position", "velocity", "spin", "force", "torque", "origin", "listed", "id")
@@ -137,35 +150,20 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         *("body_primitives", "body_pair", "primitive_kind", "primitive_row"),
     )
 
-    def __init__(
-        self,
-        *,
-        capacity: int,
-        cell_capacity: int,
-        chunk_capacity: int,
-        neighbours_per_grain: int,
-        rolling: bool,
-        tensile: bool,
-        cohesion: int,
-        real,
-        gpu: bool,
-        threads: int,
-    ):
-        self.real = real
-        self.rolling = rolling
-        self.tensile = tensile
-        self.cohesion = cohesion
-        self.gpu = gpu
-        self.cpu_items = threads * ITEMS_PER_THREAD
-        self.block_stride = SCAN_BLOCKS if gpu else threads
+    def __init__(self, build: Build):
+        self.real = real = build.real
+        self.rolling, self.tensile, self.cohesion, self.gpu = build.rolling, build.tensile, build.cohesion, build.gpu
+        self.cpu_items = build.threads * ITEMS_PER_THREAD
+        self.block_stride = SCAN_BLOCKS if self.gpu else build.threads
+        capacity, chunk_capacity = build.capacity, build.chunk_capacity
         self.count = ti.field(ti.i32, 12)
         self.box = ti.field(real, 7)
-        self._make_grain_fields(capacity, cell_capacity)
-        self._make_list_fields(capacity, chunk_capacity, capacity * neighbours_per_grain + 8 * chunk_capacity)
+        self._make_grain_fields(capacity, build.cell_capacity)
+        self._make_list_fields(capacity, chunk_capacity, capacity * build.neighbours_per_grain + 8 * chunk_capacity)
         self._make_body_fields(chunk_capacity)
         # Who computes which chunk, each counter in a cache line of its own.
         self.ticket = ti.field(ti.i32, 2 * CACHE_LINE)
-        self.claim = ti.field(ti.i32, chunk_capacity * CACHE_LINE if not gpu else 1)
+        self.claim = ti.field(ti.i32, chunk_capacity * CACHE_LINE if not self.gpu else 1)
         self.shapes = PLAIN  # the table of the shapes that need one; kernels are compiled anew for another
         self._kept = None
         self._meshes = []
@@ -175,9 +173,7 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.balance: Any = NO_BALANCE  # the table of the energy balance, likewise
         self._kept_balance: Balance | None = None
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
-        self.moved = ti.field(ti.i32, ())
-        self.halted = ti.field(ti.i32, ())
-        self.done = ti.field(ti.i32, ())
+        self.moved, self.halted, self.done = (ti.field(ti.i32, ()) for _ in range(3))
         self.problem = ti.Vector.field(2, ti.i32, ())
 
     def _make_grain_fields(self, n: int, cell_capacity: int) -> None:

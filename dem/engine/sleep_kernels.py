@@ -6,7 +6,7 @@ A bed whose grains do not sleep has ``EVERYONE`` for a table, and its kernels ar
 
 import taichi as ti
 
-from .lists import BUILT, INDEX_MASK, QUEUE
+from .lists import BUILT, INDEX_MASK
 from .values import EnginePart
 
 __all__ = ["EVERYONE", "FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
@@ -130,30 +130,17 @@ class Sleepers(EnginePart):
     def look(self, limit: float, share: float, fast: float, rest: ti.template()):
         """Raise the flags of sleepers that are to wake: a contact's force changed by ``limit`` [N] and this share of
         it, a ``fast`` [m/s] neighbour."""
-        for _ in range(1):
-            self.ticket[QUEUE] = 0
-        for w in range(self.cpu_items):
-            c = self.next_chunk(w, True)
-            while c < self.count[self.CHUNKS]:
-                self.look_around(
-                    c, ti.cast(limit, self.real), ti.cast(share, self.real), ti.cast(fast, self.real), rest
-                )
-                c = self.next_chunk(w, False)
-
-    @ti.func
-    def look_around(self, c, limit, share, fast, rest: ti.template()):
-        start, end = self.chunk_range(c)
-        awake = self.count[self.AWAKE]
-        for i in range(start, end):
-            quick = self.velocity[i].xyz.norm_sqr() > fast * fast
+        for i in range(self.count[self.AWAKE]):
+            force, part, speed = ti.cast(limit, self.real), ti.cast(share, self.real), ti.cast(fast, self.real)
+            quick = self.velocity[i].xyz.norm_sqr() > speed * speed
             for s in range(self.pair_start[i], self.pair_end[i]):
                 code = self.pair[s]
                 bits = ti.select(code < 0, ~code, code)
                 j = bits & INDEX_MASK
-                if j >= awake:
+                if j >= self.count[self.AWAKE]:
                     f = self.spring_force(self.position[i], self.position[j], bits, self.slide[s])
                     before = rest.force[s]
-                    least = ti.max(limit * limit, share * share * before.norm_sqr())
+                    least = ti.max(force * force, part * part * before.norm_sqr())
                     if quick or (f - before).norm_sqr() > least:
                         rest.woken[self.id[j]] = 1
                         rest.news[WOKEN] = 1

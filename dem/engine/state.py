@@ -18,17 +18,7 @@ from .rows import read_fields, row_numbers, take_rows, write_fields
 from .sleep import Sleep, Sleeper
 from .values import BedSettings, State
 
-__all__ = [
-    "STATE_FORMAT",
-    "adopt",
-    "laid_end_to_end",
-    "put_back",
-    "read_file",
-    "take",
-    "touching_pairs",
-    "whole_file",
-    "write_file",
-]
+__all__ = ["adopt", "laid_end_to_end", "put_back", "read_file", "take", "touching_pairs", "whole_file", "write_file"]
 
 STATE_FORMAT = "hedgebed-bed/3"
 # Before there was cohesion, and before contacts remembered their last step; these files can still be read.

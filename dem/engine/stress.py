@@ -59,22 +59,14 @@ def find_contacts(bed: BedBase) -> Contacts:
     overlap = radii[0] + radii[1] - length
     stuff = bed.material
     young, shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
-    force = _spring_force(
-        stuff.cohesion,
-        (2 * young, 8 * shear, stuff.friction, 2 * math.pi * stuff.surface_energy),
-        branch / length[:, None],
-        overlap,
-        radii[0] * radii[1] / (radii[0] + radii[1]),
-        slide,
-    )
+    pair = (2 * young, 8 * shear, stuff.friction, 2 * math.pi * stuff.surface_energy)
+    radius = radii[0] * radii[1] / (radii[0] + radii[1])
+    force = _spring_force(stuff.cohesion, pair, branch / length[:, None], overlap, radius, slide)
     found = [Contacts(ids[first], ids[second], position[first, :3], branch, force, overlap)]
-    found += [_on_plane(state, body, stuff.cohesion) for body in _planes(state)]
+    for body, (start, end) in enumerate(state["body_primitives"][: int(state["numbers"][1])]):
+        if end == start + 1 and state["primitive_kind"][start] == PLANE:
+            found.append(_on_plane(state, body, stuff.cohesion))
     return Contacts(*(np.concatenate([getattr(part, name) for part in found]) for name in Contacts.__annotations__))
-
-
-def _planes(state: State) -> list[int]:
-    ranges = state["body_primitives"][: int(state["numbers"][1])]
-    return [b for b, (start, end) in enumerate(ranges) if end == start + 1 and state["primitive_kind"][start] == PLANE]
 
 
 def _on_plane(state: State, body: int, cohesion: str) -> Contacts:
@@ -87,14 +79,8 @@ def _on_plane(state: State, body: int, cohesion: str) -> Contacts:
     position = state["position"][grain].astype(float)
     overlap = position[:, 3] - (position[:, :3] - point) @ normal
     two_e, eight_g, _, friction, _, _, _, pi_w = state["body_pair"][body].astype(float)
-    force = _spring_force(
-        cohesion,
-        (two_e, eight_g, friction, pi_w),
-        np.tile(normal, (len(grain), 1)),
-        overlap,
-        position[:, 3],
-        state["near_slide"][here, :3].astype(float),
-    )
+    slide, normals = state["near_slide"][here, :3].astype(float), np.tile(normal, (len(grain), 1))
+    force = _spring_force(cohesion, (two_e, eight_g, friction, pi_w), normals, overlap, position[:, 3], slide)
     touches = np.abs(force).sum(axis=1) > 0
     branch = (position[:, 3] - overlap)[:, None] * normal
     found = (state["id"][grain], np.full(len(grain), -1 - body), position[:, :3], branch, force, overlap)
@@ -148,20 +134,17 @@ def stress_profile(
 
     Args:
         edges: heights of the planes [m], ascending, shape [layer_count + 1].
-        contacts: those of ``find_contacts``, where they are there already.
+        contacts: those of ``find_contacts``, where they are known already.
         across: (from, to) [m]: only this part of the bed's width in x.
 
-    Returns:
-        Stress tensors, shape [layer_count, 3, 3].
+    Returns stress tensors, shape [layer_count, 3, 3].
     """
     found = find_contacts(bed) if contacts is None else contacts
-    width = bed.size[0]
-    force, branch, top = found.force, found.branch, found.position[:, 2]
+    width, force, branch, top = bed.size[0], found.force, found.branch, found.position[:, 2]
     if across is not None:
         middle = np.mod(found.position[:, 0] - 0.5 * branch[:, 0], bed.size[0])
         inside = (middle >= across[0]) & (middle < across[1])
-        force, branch, top = force[inside], branch[inside], top[inside]
-        width = across[1] - across[0]
+        width, force, branch, top = across[1] - across[0], force[inside], branch[inside], top[inside]
     low = np.minimum(top, top - branch[:, 2])
     high = np.maximum(low + 1e-12 * bed.size[2], np.maximum(top, top - branch[:, 2]))
     stresses = np.empty((len(edges) - 1, 3, 3))

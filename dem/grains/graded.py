@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .curve import curve_ranks
+from .packing import curve_ranks
 from .sizes import Json, Uniform
 
 __all__ = ["THROAT", "Graded", "middles", "steepest"]
@@ -40,10 +40,8 @@ def steepest(spread: float) -> float:
     with the spread s the smallest of the one kind and the largest of the other by (1 - s) / (1 + s) more. The ratio
     stays at ``THROAT`` or above.
 
-    Args:
-        spread: of the diameters about their mean, over it [1].
-
-    Raises ValueError: a spread so wide that grains of one place would drain through one another.
+    ``spread``: of the diameters about their mean, over it [1]. Raises ValueError: one so wide that grains of one place
+    would drain through one another.
     """
     if not 0 <= spread < (1 - THROAT) / (1 + THROAT):
         raise ValueError(
@@ -115,11 +113,7 @@ class Graded:
         return Uniform(self.fine, self.spread)
 
     def check(self, size: Sequence[float]) -> None:
-        """Refuse a bed that these sizes do not fit. Raises ValueError.
-
-        Args:
-            size: of the bed, both widths and the depth [m].
-        """
+        """Raise ValueError for a bed of a ``size``, widths and depth [m], that these sizes do not fit."""
         for low, high in self.footprints:
             if low < 0 or high > size[0]:
                 raise ValueError(
@@ -141,10 +135,9 @@ class Graded:
                 )
 
     def distance(self, x: np.ndarray, z: np.ndarray, size: Sequence[float]) -> np.ndarray:
-        """How far a place is from the fine grains [m], 0 among them; periodic along x.
+        """How far places ``x``, ``z`` [m], arrays of one shape, are from the fine grains [m], 0 among them.
 
-        Args:
-            x, z: of the places [m], arrays of one shape. size: of the bed [m].
+        Periodic along x; ``size`` is the bed's [m].
         """
         along = np.mod(x, size[0])
         aside = np.full(np.shape(along), np.inf)
@@ -178,10 +171,8 @@ class Graded:
         additive recurrence of Roberts 2018, alpha_k = phi^-k with phi^5 = phi + 1), kept with probability (fine / d)^3;
         grains that overlap there are pushed apart.
 
-        Returns:
-            Centres [m], shape [grain_count, 3]; radii [m], shape [grain_count]. In the order of a curve through space.
-
-        Raises RuntimeError: no room found, which a bed that passes ``check`` does not come to.
+        Returns centres [m], shape [grain_count, 3], and radii [m], shape [grain_count], in the order of a curve through
+        space. Raises RuntimeError: no room found, which a bed that passes ``check`` does not come to.
         """
         top = volume / (_START * size[0] * size[1])
         count = round(volume / (math.pi / 6 * self.fine**3 * (1 + self.spread**2)))
@@ -232,9 +223,7 @@ def _moved_apart(places: np.ndarray, radii: np.ndarray, period: tuple[float, flo
     places = _within(places, radii, period)
     for _ in range(_ROUNDS):
         one, other = _meeting(places, radii, period)
-        between = places[one] - places[other]
-        for axis, length in enumerate(period):
-            between[:, axis] -= length * np.round(between[:, axis] / length)
+        between = _between(places, one, other, period)
         apart, need = np.linalg.norm(between, axis=1), radii[one] + radii[other]
         if not (apart < _CLEAR * need).any():
             return places
@@ -247,6 +236,13 @@ def _moved_apart(places: np.ndarray, radii: np.ndarray, period: tuple[float, flo
     raise RuntimeError(f"the {len(places)} grains of a graded bed found no room in their column")
 
 
+def _between(places: np.ndarray, one: np.ndarray, other: np.ndarray, period: tuple[float, float]) -> np.ndarray:
+    """From each other to each one, or to its nearest image [m], shape [pair, 3]."""
+    between = places[one] - places[other]
+    between[:, :2] -= period * np.round(between[:, :2] / period)
+    return between
+
+
 def _meeting(places: np.ndarray, radii: np.ndarray, period: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Pairs closer than ``_PUSHED`` sums of radii; the first is the larger one, so that its own reach finds all."""
     tree = cKDTree(places, boxsize=(*period, 0.0))
@@ -257,9 +253,7 @@ def _meeting(places: np.ndarray, radii: np.ndarray, period: tuple[float, float])
         one = np.repeat(block, [len(others) for others in near])
         other = np.concatenate(near).astype(np.intp)
         larger = (radii[other] < radii[one]) | ((radii[other] == radii[one]) & (other < one))
-        between = places[one] - places[other]
-        for axis, length in enumerate(period):
-            between[:, axis] -= length * np.round(between[:, axis] / length)
+        between = _between(places, one, other, period)
         close = (between**2).sum(axis=1) < (_PUSHED * (radii[one] + radii[other])) ** 2
         found.append((one[larger & close], other[larger & close]))
     return np.concatenate([a for a, _ in found]), np.concatenate([b for _, b in found])

@@ -30,9 +30,6 @@ from pathlib import Path
 from typing import Any
 
 __all__ = [
-    "CAVEATS",
-    "COHESIONS",
-    "Facing",
     "MATERIALS",
     "MATERIAL_FORMAT",
     "Material",
@@ -81,10 +78,8 @@ class Material:
             raise ValueError(f"material {self.name!r}: {key} = {getattr(self, key)} must be {bounds}")
 
         for key in ("density", "young"):
-            if not getattr(self, key) > 0:
-                refuse(key, "positive")
-            if math.isinf(getattr(self, key)):
-                refuse(key, "finite")
+            if not 0 < getattr(self, key) < math.inf:
+                refuse(key, "finite" if math.isinf(getattr(self, key)) else "positive")
         if not 0 <= self.poisson < 0.5:
             refuse("poisson", "at least 0 and below 0.5")
         if not LEAST_RESTITUTION <= self.restitution <= 1:
@@ -227,13 +222,9 @@ def _read(path: Path) -> Material:
             near = difflib.get_close_matches(key, known, n=1)
             hint = f"did you mean {near[0]!r}?" if near else f"there is {', '.join(known)}"
             raise ValueError(f"{path}: {key} = {table[key]!r} is no key of a material; {hint}")
-    lacking = [
-        key
-        for key, one in known.items()
-        if key not in table and one.default is MISSING and one.default_factory is MISSING
-    ]
-    if lacking:
-        raise ValueError(f"{path}: {', '.join(lacking)} must be given")
+    needed = [key for key, one in known.items() if one.default is MISSING and one.default_factory is MISSING]
+    if missing := [key for key in needed if key not in table]:
+        raise ValueError(f"{path}: {', '.join(missing)} must be given")
     return Material(**{key: _of_its_kind(path, key, value) for key, value in table.items()})
 
 
@@ -246,9 +237,8 @@ def _of_its_kind(path: Path, key: str, value: Any) -> Any:
         if not isinstance(value, str):
             raise ValueError(f"{path}: {key} = {value!r} must be a text")
         if key == "name" and not _NAME.fullmatch(value):
-            raise ValueError(
-                f"{path}: name = {value!r} cannot name a material: small letters, digits, '.', '_', '+', '-'"
-            )
+            allowed = "small letters, digits, '.', '_', '+', '-'"
+            raise ValueError(f"{path}: name = {value!r} cannot name a material: {allowed}")
         return value
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{path}: {key} = {value!r} must be a number")
@@ -279,11 +269,22 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
 
     Args:
         name: of a material that ships, or the path of a file: what ends in .toml or has a slash in it.
-        grain: mean diameter of the grains that it is wanted for [m], see ``Material.for_grain``.
+        grain: mean diameter of its grains [m], see ``Material.for_grain``.
 
     Raises ValueError: no material of that name, with those there are; a file that will not do (``read_material``).
     """
-    stuff = name if isinstance(name, Material) else _find(name)
+    word = str(name)
+    if isinstance(name, Material):
+        stuff = name
+    elif word.lower() in MATERIALS:
+        stuff = MATERIALS[word.lower()]
+    elif isinstance(name, Path) or word.endswith(".toml") or "/" in word:
+        stuff = read_material(name)
+    else:
+        near = difflib.get_close_matches(word.lower(), MATERIALS, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        there = ", ".join(sorted(MATERIALS))
+        raise ValueError(f"material = {name!r} is not known; there is {there}, and files that end in .toml{hint}")
     return stuff if grain is None else stuff.for_grain(grain)
 
 
@@ -291,16 +292,3 @@ def caveat(stuff: Material) -> str | None:
     """A sentence for the warnings of a run: what ``CAVEATS`` says of the material; None where there is nothing."""
     said = CAVEATS.get(stuff.name)
     return said and f"the grains are {stuff.name!r}: {said} (docs/materials.md)"
-
-
-def _find(name: str | Path) -> Material:
-    word = str(name)
-    if word.lower() in MATERIALS:
-        return MATERIALS[word.lower()]
-    if isinstance(name, Path) or word.endswith(".toml") or "/" in word:
-        return read_material(name)
-    near = difflib.get_close_matches(word.lower(), MATERIALS, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise ValueError(
-        f"material = {name!r} is not known; there is {', '.join(sorted(MATERIALS))}, and files that end in .toml{hint}"
-    )

@@ -1,4 +1,4 @@
-"""How many grains of which size, and their first positions."""
+"""How many grains of which size, their first positions, and an order in which near ones lie near."""
 
 import math
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ import numpy as np
 
 from .sizes import Sizes, Uniform, sizes_of
 
-__all__ = ["RAIN_COLUMN", "draw_radii", "rain_column", "rain_positions"]
+__all__ = ["RAIN_COLUMN", "curve_ranks", "draw_radii", "rain_column", "rain_positions"]
 
 RAIN_COLUMN = 2.5  # Upper bound of the rain's column over the depth of the levelled bed [1]: what a grain can fall
 
@@ -19,11 +19,9 @@ def draw_radii(
 
     Args:
         volume: of solid [m3].
-        grain: a distribution of ``dem.grains.sizes``, or a mean diameter [m].
-        spread: with a mean diameter: uniform within this share of it [1]; 0.15 when None.
+        grain, spread: as ``dem.grains.sizes.sizes_of`` takes them.
 
-    Returns:
-        Radii [m], shape [grain_count]; at least one.
+    Returns radii [m], shape [grain_count]; at least one.
 
     Raises ValueError: a volume that is not positive, or what ``dem.grains.sizes.sizes_of`` refuses.
     """
@@ -56,11 +54,9 @@ def rain_positions(rng: np.random.Generator, radii: np.ndarray, period: Sequence
     Layers are one and a half of the largest diameters apart, so that the grains fall as rain rather than as a block.
 
     Args:
-        radii: [m], shape [grain_count].
-        period: (x, y) [m].
+        radii: [m], shape [grain_count]. period: (x, y) [m].
 
-    Returns:
-        Centres [m], shape [grain_count, 3].
+    Returns centres [m], shape [grain_count, 3].
     """
     largest = 2 * float(radii.max())
     nx, ny = (max(1, int(length / (1.02 * largest))) for length in period)
@@ -71,3 +67,20 @@ def rain_positions(rng: np.random.Generator, radii: np.ndarray, period: Sequence
     # A grain may go as far from its site as its own radius leaves room.
     play = 0.5 * (np.array(cell) - 2 * radii[:, None]) * 0.98
     return lattice + rng.uniform(-1, 1, lattice.shape) * play
+
+
+def curve_ranks(nx: int, ny: int, nz: int) -> np.ndarray:
+    """Rank of each cell on a Morton curve, shape [nx ny nz], x fastest: cells that are near get ranks that are near."""
+    bits = max(1, math.ceil(math.log2(max(nx, ny, nz, 2))))
+
+    def spread(a):
+        result = np.zeros_like(a)
+        for bit in range(bits):
+            result |= ((a >> bit) & 1) << (3 * bit)
+        return result
+
+    k, j, i = np.meshgrid(np.arange(nz), np.arange(ny), np.arange(nx), indexing="ij")
+    code = spread(i.ravel()) | spread(j.ravel()) << 1 | spread(k.ravel()) << 2
+    rank = np.empty(code.size, dtype=np.int32)
+    rank[np.argsort(code, kind="stable")] = np.arange(code.size, dtype=np.int32)
+    return rank

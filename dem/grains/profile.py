@@ -11,13 +11,10 @@ def packing_profile(heights: np.ndarray, radii: np.ndarray, area: float, edges: 
     """Laterally averaged packing fraction between horizontal planes, exact for spheres.
 
     Args:
-        heights: z of the centres [m], shape [grain_count].
-        radii: [m], shape [grain_count].
-        area: of the bed [m2].
+        heights, radii: z of the centres and radii of the grains [m], shape [grain_count]. area: of the bed [m2].
         edges: heights of the planes [m], ascending, shape [slab_count + 1].
 
-    Returns:
-        Packing fraction of each slab [1], shape [slab_count].
+    Returns the packing fraction of each slab [1], shape [slab_count].
     """
     below = np.empty(len(edges))
     for k, z in enumerate(edges):
@@ -51,9 +48,7 @@ def surface_height(heights: np.ndarray, radii: np.ndarray, area: float, *, bulk:
     profile = packing_profile(heights, radii, area, edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
     reached = np.flatnonzero(profile >= 0.5 * bulk)
-    if not len(reached):
-        return top
-    k = int(reached[-1])
+    k = int(reached[-1]) if len(reached) else len(profile) - 1
     if k + 1 == len(profile):
         return top
     above, below = profile[k + 1], profile[k]

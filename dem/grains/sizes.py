@@ -8,7 +8,6 @@ does; a sieve table weighs them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -28,26 +27,25 @@ def _refuse(kind: str, key: str, value: Any, bounds: str) -> None:
     raise ValueError(f"{kind}: {key} = {value} must be {bounds}")
 
 
-def _check_mean(kind: str, mean: float) -> None:
-    if not (math.isfinite(mean) and mean > 0):
-        _refuse(kind, "mean", mean, "a positive diameter [m]")
+@dataclass(frozen=True)
+class _About:
+    """Sizes by number about a mean diameter ``mean`` [m]."""
 
+    mean: float
 
-def _between(rng: np.random.Generator, cut: float, count: int) -> np.ndarray:
-    """Standard normal numbers between -cut and cut."""
-    low = ndtr(-cut)
-    return ndtri(low + (1 - 2 * low) * rng.uniform(0, 1, count))
+    def __post_init__(self):
+        if not 0 < self.mean < math.inf:
+            _refuse(type(self).__name__, "mean", self.mean, "a positive diameter [m]")
 
 
 @dataclass(frozen=True)
-class Uniform:
+class Uniform(_About):
     """By number, uniform within mean (1 +- spread). ``mean`` [m], ``spread`` [1], at most 0.5."""
 
-    mean: float
     spread: float = 0.15
 
     def __post_init__(self):
-        _check_mean("Uniform", self.mean)
+        super().__post_init__()
         if not 0 <= self.spread <= 0.5:
             _refuse("Uniform", "spread", self.spread, "between 0 and 0.5 of the mean diameter")
 
@@ -67,7 +65,27 @@ class Uniform:
 
 
 @dataclass(frozen=True)
-class Normal:
+class _Cut(_About):
+    """Sizes of a normal number, cut off on both sides at ``cut`` standard deviations."""
+
+    deviation: float
+    cut: float = 2.0
+
+    def __post_init__(self):
+        super().__post_init__()
+        if not 0 <= self.deviation <= 1:
+            _refuse(type(self).__name__, "deviation", self.deviation, "between 0 and 1")
+        if not 0 < self.cut <= 4:
+            _refuse(type(self).__name__, "cut", self.cut, "above 0 and at most 4 standard deviations")
+
+    def _normal(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Standard normal numbers between -cut and cut."""
+        low = ndtr(-self.cut)
+        return ndtri(low + (1 - 2 * low) * rng.uniform(0, 1, count))
+
+
+@dataclass(frozen=True)
+class Normal(_Cut):
     """By number, normal about ``mean`` [m] and cut off on both sides.
 
     Attributes:
@@ -75,20 +93,11 @@ class Normal:
         cut: where it is cut off, in standard deviations; deviation times cut stays below 0.9.
     """
 
-    mean: float
-    deviation: float
-    cut: float = 2.0
-
     def __post_init__(self):
-        _check_mean("Normal", self.mean)
-        _check_cut("Normal", self.deviation, self.cut)
+        super().__post_init__()
         if not self.deviation * self.cut < 0.9:
-            _refuse(
-                "Normal",
-                "deviation",
-                self.deviation,
-                f"below {0.9 / self.cut:g} with cut = {self.cut:g}, or the smallest grains vanish",
-            )
+            bounds = f"below {0.9 / self.cut:g} with cut = {self.cut:g}, or the smallest grains vanish"
+            _refuse("Normal", "deviation", self.deviation, bounds)
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -104,25 +113,17 @@ class Normal:
 
     def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
         """Diameters [m], shape [count]."""
-        return self.mean * (1 + self.deviation * _between(rng, self.cut, count))
+        return self.mean * (1 + self.deviation * self._normal(rng, count))
 
 
 @dataclass(frozen=True)
-class LogNormal:
+class LogNormal(_Cut):
     """By number, log-normal with the mean diameter ``mean`` [m] and cut off on both sides.
 
     Attributes:
         deviation: standard deviation of ln(diameter) before the cut [1].
         cut: where it is cut off, in those standard deviations.
     """
-
-    mean: float
-    deviation: float
-    cut: float = 2.0
-
-    def __post_init__(self):
-        _check_mean("LogNormal", self.mean)
-        _check_cut("LogNormal", self.deviation, self.cut)
 
     @property
     def median(self) -> float:
@@ -148,7 +149,7 @@ class LogNormal:
 
     def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
         """Diameters [m], shape [count]."""
-        return self.median * np.exp(self.deviation * _between(rng, self.cut, count))
+        return self.median * np.exp(self.deviation * self._normal(rng, count))
 
 
 @dataclass(frozen=True)
@@ -172,9 +173,9 @@ class Sieve:
             _refuse("Sieve", "openings", self.openings, "two or more diameters [m]")
         if len(self.passing) != len(self.openings):
             _refuse("Sieve", "passing", self.passing, f"as many shares as there are openings, {len(self.openings)}")
-        if not (self.openings[0] > 0 and math.isfinite(self.openings[-1]) and _ascending(self.openings, strictly=True)):
+        if not (self.openings[0] > 0 and math.isfinite(self.openings[-1]) and (np.diff(self.openings) > 0).all()):
             _refuse("Sieve", "openings", self.openings, "positive and ascending [m]")
-        if not (_ascending(self.passing, strictly=False) and self.passing[0] == 0 and self.passing[-1] == 1):
+        if not ((np.diff(self.passing) >= 0).all() and self.passing[0] == 0 and self.passing[-1] == 1):
             _refuse("Sieve", "passing", self.passing, "shares of the mass that rise from 0 to 1")
         if not (math.isfinite(self.scale) and self.scale > 0):
             _refuse("Sieve", "scale", self.scale, "positive")
@@ -219,18 +220,6 @@ class Sieve:
 
 
 Sizes = Uniform | Normal | LogNormal | Sieve
-
-
-def _check_cut(kind: str, deviation: float, cut: float) -> None:
-    if not 0 <= deviation <= 1:
-        _refuse(kind, "deviation", deviation, "between 0 and 1")
-    if not 0 < cut <= 4:
-        _refuse(kind, "cut", cut, "above 0 and at most 4 standard deviations")
-
-
-def _ascending(values: Sequence[float], *, strictly: bool) -> bool:
-    steps = np.diff(values)
-    return bool((steps > 0).all() if strictly else (steps >= 0).all())
 
 
 def sizes_of(grain: float | Sizes, spread: float | None = None) -> Sizes:

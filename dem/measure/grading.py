@@ -1,5 +1,6 @@
 """What has become of a graded bed: sizes by place and depth, packing by zone, and whether small grains have drained."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -107,20 +108,16 @@ def surface_under(bed: BedCore, graded: Graded) -> float:
     grains = bed.grains()
     here = _under(graded, grains.position[:, 0], bed.size[0])
     heights, radii = grains.position[here, 2], grains.radius[here]
-    area = bed.size[1] * _covered(graded)
-    return surface_height(heights, radii, area, bulk=bulk_packing(heights, radii, area))
-
-
-def _covered(graded: Graded) -> float:
-    """Length along x that footprints cover [m]."""
-    covered, end = 0.0, 0.0
+    covered = end = 0.0  # length along x that footprints cover [m]
     for low, high in graded.footprints:
         covered += max(0.0, high - max(low, end))
         end = max(end, high)
-    return covered
+    area = bed.size[1] * covered
+    return surface_height(heights, radii, area, bulk=bulk_packing(heights, radii, area))
 
 
 def _under(graded: Graded, x: np.ndarray, length: float) -> np.ndarray:
+    """Whether places are under the footprints."""
     along = np.mod(x, length)
     return np.logical_or.reduce([(along >= low) & (along <= high) for low, high in graded.footprints])
 
@@ -161,8 +158,8 @@ def _layers(
     edges = np.linspace(0.0, surface, max(3, round(surface / (2 * graded.largest(size)))) + 1)
     under = _under(graded, x, size[0])
     layers = []
-    for k in range(len(edges) - 1):
-        here = (z >= edges[k]) & ((z < edges[k + 1]) | (k == len(edges) - 2))
+    for bottom, top in itertools.pairwise(edges.tolist()):
+        here = (z >= bottom) & ((z < top) | (top == edges[-1]))
         means = (float(sizes.mean()) if len(sizes) else None for sizes in (d[here & under], d[here & ~under]))
-        layers.append(Layer(float(edges[k]), float(edges[k + 1]), *means))
+        layers.append(Layer(bottom, top, *means))
     return layers

@@ -100,11 +100,11 @@ def push_cone(
     grain = 2 * float(grains.radius.mean())
     place = (0.5 * bed.size[0], 0.5 * bed.size[1]) if place is None else (float(place[0]), float(place[1]))
     refuse_tilted(bed)
+    depth = 0.5 * bed.surface if depth is None else depth
+    shaft = SHAFT * diameter if shaft is None else shaft
     check_cone(
         size=bed.size, surface=bed.surface, grain=grain, diameter=diameter, angle=angle, depth=depth, shaft=shaft
     )
-    depth = 0.5 * bed.surface if depth is None else depth
-    shaft = SHAFT * diameter if shaft is None else shaft
     length = cone_length(diameter, angle)
     speed = standard_speed(diameter, -bed.gravity[2]) if speed is None else speed
     if not 0 < speed < math.inf:
@@ -116,14 +116,9 @@ def push_cone(
     top = float((grains.position[near, 2] + grains.radius[near]).max()) if near.any() else bed.surface
     start = max(top, bed.surface) + 0.01 * grain
     surface, packing = bed.surface, bed.packing_fraction
-    body = bed.add_body(
-        [
-            Cone(bottom=0.0, top=length, bottom_radius=0.0, top_radius=0.5 * diameter),
-            Cylinder(bottom=length * shaft / diameter, top=depth + diameter, radius=0.5 * shaft),
-        ],
-        position=(*place, start),
-        friction=friction,
-    )
+    cone = Cone(bottom=0.0, top=length, bottom_radius=0.0, top_radius=0.5 * diameter)
+    rod = Cylinder(bottom=length * shaft / diameter, top=depth + diameter, radius=0.5 * shaft)
+    body = bed.add_body([cone, rod], position=(*place, start), friction=friction)
     bed.move_body(body, velocity=(0.0, 0.0, -speed))
     total = math.ceil((start - surface + depth) / (speed * bed.time_step))
     done, rows = 0, []
@@ -153,12 +148,10 @@ def check_cone(
     shaft = SHAFT * diameter if shaft is None else shaft
     least, most = LEAST_GRAINS * grain, min(size[:2]) / LEAST_WIDTH
     if not least <= diameter <= most:
-        narrow = (
-            f"; the bed is too narrow for any, a width of {LEAST_WIDTH * least:.4g} m is needed" if most < least else ""
-        )
+        narrow = f"; the bed is too narrow for any, a width of {LEAST_WIDTH * least:.4g} m is needed"
         raise ValueError(
             f"diameter = {diameter:g} m: from three grains, {least:.4g} m, to a third of the bed's width, "
-            f"{most:.4g} m, would do{narrow}"
+            f"{most:.4g} m, would do{narrow if most < least else ''}"
         )
     if not 10 <= angle <= 150:
         raise ValueError(f"angle = {angle:g} degrees: a full angle of 10 to 150 would do")

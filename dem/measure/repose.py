@@ -18,18 +18,7 @@ from dem.shapes.solids import Box
 
 from .lid import ROUGH, Tell, refuse_tilted
 
-__all__ = [
-    "COLUMN",
-    "SLOT",
-    "Flank",
-    "Repose",
-    "angle_of_repose",
-    "check_width",
-    "fit_flank",
-    "from_middle",
-    "measure_flanks",
-    "thickness_profile",
-]
+__all__ = ["Flank", "Repose", "angle_of_repose", "check_width", "fit_flank", "measure_flanks", "thickness_profile"]
 
 SLOT = 6.0  # Width of the slot [mean diameters], wide enough that grains do not bridge it
 LEAST_FLANK = 10.0  # Least width of bed on each side of the slot [mean diameters]

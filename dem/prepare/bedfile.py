@@ -122,10 +122,10 @@ def list_beds(folder: str | Path) -> list[Json]:
 
     A file that is no bed is listed with ``problem``.
     """
-    return [_listed(path) for path in sorted(Path(folder).glob("*.npz"))]
+    return [_entry(path) for path in sorted(Path(folder).glob("*.npz"))]
 
 
-def _listed(path: Path) -> Json:
+def _entry(path: Path) -> Json:
     entry: Json = {"file": str(path), "name": path.stem}
     try:
         about = read_preparation(path)

@@ -181,7 +181,7 @@ class Laboratory(Preparation[B]):
         return {"removed": notes["removed"]}
 
     def _loosen(self, stage: Stage) -> Json:
-        self._fluff(FLUFF if stage.value is None else stage.value, self.notes)
+        self._fluff(stage.value or FLUFF, self.notes)
         return {}
 
     def _to_packing(self, stage: Stage) -> Json:
@@ -238,9 +238,13 @@ class Laboratory(Preparation[B]):
         """Dig a strip out about x = 0 and let the faces do what they do: without drag first, so that they may fall."""
         assert stage.value is not None
         notes, half = self.notes, 0.5 * stage.value
-        if not notes:
+
+        def in_strip() -> np.ndarray:
             x = np.mod(self.bed.grains().position[:, 0], self.bed.size[0])
-            gone = (x < half) | (x > self.bed.size[0] - half)
+            return np.asarray((x < half) | (x > self.bed.size[0] - half))
+
+        if not notes:
+            gone = in_strip()
             notes |= {"removed": int(gone.sum()), "height": self.bed.surface, "settle": {}}
             self.bed = self.bed.without(gone)
             notes["began"] = self.bed.time
@@ -249,9 +253,7 @@ class Laboratory(Preparation[B]):
             bed.advance(max(1, round(0.05 * fall / bed.time_step)))
             self._pause(min(1.0, (bed.time - notes["began"]) / (5 * fall)))
         self._settle(ENERGY_RATIO, notes["settle"])
-        x = np.mod(bed.grains().position[:, 0], bed.size[0])
-        fallen = int(((x < half) | (x > bed.size[0] - half)).sum())
-        return {"removed": notes["removed"], "fallen": fallen, "height": notes["height"]}
+        return {"removed": notes["removed"], "fallen": int(in_strip().sum()), "height": notes["height"]}
 
     def _tilt(self, stage: Stage) -> Json:
         assert stage.value is not None

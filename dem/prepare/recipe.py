@@ -46,12 +46,9 @@ class Stage:
     by: str = "tap"
 
     def __str__(self) -> str:
-        if self.name == "compact":
-            what = "densest" if self.value is None else f"{self.value:.12g}"
-            return f"compact:{what}" + ("@lid" if self.by == "lid" else "")
-        if self.dry and self.value is None:
-            return "rain:dry"
-        return self.name if self.value is None else f"{self.name}:{self.value:.12g}"
+        without = {"compact": "compact:densest", "rain": "rain:dry" if self.dry else "rain"}.get(self.name, self.name)
+        lid = "@lid" if self.name == "compact" and self.by == "lid" else ""
+        return without if self.value is None else f"{self.name}:{self.value:.12g}{lid}"
 
     @property
     def dry(self) -> bool:
@@ -76,8 +73,8 @@ def parse_stage(words: str) -> Stage:
         return Stage(name, by="dry")
     if name == "stick" and colon:
         raise ValueError(f"stages: {words!r}: 'stick' takes no number")
-    if name in ("compact", "packing", "cut", "tilt") and not rest:
-        example = {"compact": "compact:0.6", "packing": "packing:0.58", "cut": "cut:0.02", "tilt": "tilt:20"}[name]
+    example = {"compact": "compact:0.6", "packing": "packing:0.58", "cut": "cut:0.02", "tilt": "tilt:20"}.get(name)
+    if example and not rest:
         raise ValueError(f"stages: {words!r} lacks its number: {example} would do ({STAGES[name]})")
     if name == "compact" and rest == "densest":
         if by == "lid":

@@ -73,8 +73,7 @@ def measure_stage(
 ) -> StageReport:
     """The report of a bed as it is now; ``across``: profiles of this part of its width in x only [m]."""
     grains = bed.grains()
-    position, radius = grains.position, grains.radius
-    width = bed.size[0]
+    position, radius, width = grains.position, grains.radius, bed.size[0]
     if across is not None:
         x = np.mod(position[:, 0], bed.size[0])
         inside = (x >= across[0]) & (x < across[1])
@@ -87,13 +86,11 @@ def measure_stage(
     inner = (middle > 2 * grain) & (middle < bed.surface - 2 * grain) & (stress[:, 2, 2] > 0)
     ratio = 0.5 * (stress[:, 0, 0] + stress[:, 1, 1])[inner] / stress[:, 2, 2][inner]
     energy = bed.kinetic_energy / bed.weight / grain
-    cosine = -bed.gravity[2] / math.hypot(*bed.gravity)
-    share = bed.floor_force / (bed.weight * cosine)
+    share = bed.floor_force / (bed.weight * (-bed.gravity[2] / math.hypot(*bed.gravity)))
+    parts = packing[inner] if inner.any() else packing
     return StageReport(
         stage=stage,
-        packing_fraction=float(
-            bed.packing_fraction if across is None else (packing[inner] if inner.any() else packing).mean()
-        ),
+        packing_fraction=float(bed.packing_fraction if across is None else parts.mean()),
         coordination_number=bed.coordination_number,
         surface=float(bed.surface),
         grain_count=bed.grain_count,

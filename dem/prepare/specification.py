@@ -134,8 +134,8 @@ class Specification:
         x, y, z = (float(s) for s in size)
         if young is None:
             young = soft_enough(stuff, size=(x, y, z), sizes=sizes, gravity=gravity, max_overlap=max_overlap)
-        numbers = {"gravity": float(gravity), "young": float(young), "max_overlap": float(max_overlap)}
-        return cls(material=stuff, size=(x, y, z), sizes=sizes, seed=int(seed), **numbers, **others)
+        others |= {"gravity": float(gravity), "young": float(young), "max_overlap": float(max_overlap)}
+        return cls(material=stuff, size=(x, y, z), sizes=sizes, seed=int(seed), **others)
 
     def poured(self, friction: float | None) -> "Specification":
         """The same of grains that stick neither to one another nor to the floor.

@@ -189,13 +189,17 @@ def _arrays(vertices, triangles) -> tuple[np.ndarray, np.ndarray]:
     return vertices[first[order]], place[triangles]
 
 
+def _point(p: np.ndarray) -> str:
+    return "({:.6g}, {:.6g}, {:.6g})".format(*p)
+
+
 def _refuse_degenerate(vertices: np.ndarray, triangles: np.ndarray) -> None:
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     longest = np.sqrt(np.max([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)], axis=0))
     flat = ~(np.linalg.norm(np.cross(b - a, c - a), axis=1) > _LEAST_HEIGHT * longest**2)
     if flat.any():
         k = int(flat.argmax())
-        corners = "; ".join("({:.6g}, {:.6g}, {:.6g})".format(*p[k]) for p in (a, b, c))
+        corners = "; ".join(_point(p[k]) for p in (a, b, c))
         raise ValueError(
             f"Mesh: triangle {k} has no area ({int(flat.sum())} in all): its corners are {corners} m; take out such "
             f"triangles by joining the vertices that coincide, and close what opens"
@@ -211,28 +215,24 @@ def _refuse_open(vertices: np.ndarray, triangles: np.ndarray) -> None:
 
     def where(edge: int) -> str:
         k = int(np.flatnonzero(which == edge)[0])
-        ends_here = (vertices[starts[k]], vertices[ends[k]])
-        return " to ".join("({:.6g}, {:.6g}, {:.6g})".format(*p) for p in ends_here) + " m"
+        return f"{_point(vertices[starts[k]])} to {_point(vertices[ends[k]])} m"
 
-    single = counts == 1
-    if single.any():
+    if (single := counts == 1).any():
         raise ValueError(
             f"Mesh: open: {int(single.sum())} of {len(edges)} edges have one triangle only, the first from "
             f"{where(int(single.argmax()))}; close the surface (a sheet needs a thickness; vertices that should "
             f"coincide must do so exactly)"
         )
-    many = counts > 2
-    if many.any():
+    if (many := counts > 2).any():
         raise ValueError(
             f"Mesh: {int(many.sum())} edges have more than two triangles, the first from {where(int(many.argmax()))}; "
             f"take out double triangles, or part the solids that share the edge"
         )
-    forward = np.bincount(which, weights=starts < ends)
-    if (forward != 1).any():
-        edge = int((forward != 1).argmax())
+    wrong = np.bincount(which, weights=starts < ends) != 1
+    if wrong.any():
         raise ValueError(
-            f"Mesh: the two triangles at the edge from {where(edge)} disagree on which side is out "
-            f"({int((forward != 1).sum())} such edges); order the corners of all triangles counter-clockwise, seen "
+            f"Mesh: the two triangles at the edge from {where(int(wrong.argmax()))} disagree on which side is out "
+            f"({int(wrong.sum())} such edges); order the corners of all triangles counter-clockwise, seen "
             f"from outside"
         )
 
@@ -268,8 +268,7 @@ def _refuse_inverted(vertices: np.ndarray, triangles: np.ndarray) -> None:
     for k in np.flatnonzero(each < 0):
         within = (lowest[solid] <= lowest[k]).all(axis=1) & (highest[solid] >= highest[k]).all(axis=1)
         if not within.any():
-            at = "({:.6g}, {:.6g}, {:.6g})".format(*vertices[part == k][0])
             raise ValueError(
-                f"Mesh: inverted: the part with the vertex {at} m has a volume of {each[k]:.6g} m3 and is no cavity of "
-                f"another; turn its triangles round"
+                f"Mesh: inverted: the part with the vertex {_point(vertices[part == k][0])} m has a volume of "
+                f"{each[k]:.6g} m3 and is no cavity of another; turn its triangles round"
             )
