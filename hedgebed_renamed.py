@@ -23,7 +23,7 @@ _MODULES = {
     "dem": {
         "dem.contact": "cohesion timestep",
         "dem.engine": (
-            "energy holding=checkpoint ledger=dissipation lists rows runtime shape_table sleep sleep_kernels "
+            "energy holding=state ledger=dissipation lists rows runtime shape_table sleep sleep_kernels "
             "state stress"
         ),
         "dem.grains": "graded materials packing sizes",
@@ -183,11 +183,11 @@ _NAMES = {
         "dem.engine.engine": "Engine MOST_PRIMITIVES STEPS_PER_LAUNCH take_engine",
         "dem.engine.lists": "MOST_BODIES",
     },
-    "dem.engine.checkpoint": {
-        "dem.engine.checkpoint": "Held=Checkpoint hold=take take_back=roll_back",
+    "dem.engine.state": {
+        "dem.engine.state": "Held=Checkpoint",
     },
     "dem.engine.dissipation": {
-        "dem.engine.dissipation": "Bookkeeping=BalanceKernels Ledger=Balance NO_LEDGER=NO_BALANCE",
+        "dem.engine.dissipation": "Bookkeeping=BalanceKernels Ledger=Balance",
     },
     "dem.engine.lists": {
         "dem.grains.packing": "curve_ranks",

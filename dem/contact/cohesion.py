@@ -31,10 +31,7 @@ _RANGE = 0.75 * 0.25 ** (1 / 3)
 
 
 def pull_off(law: str, *, surface_energy: float, radius: float) -> float:
-    """The largest force with which a pair of effective radius R* [m] can be pulled before it parts [N]; 0 for "none".
-
-    Raises KeyError: an unknown law.
-    """
+    """Pull-off force [N] of a pair of effective radius R* [m]; 0 for "none". Raises KeyError: an unknown law."""
     factor = {"none": 0.0, "dmt": 2.0, "jkr": 1.5}[law]
     return factor * math.pi * (2 * surface_energy) * radius
 
@@ -45,10 +42,7 @@ def jkr_range(*, surface_energy: float, radius: float, effective_young: float) -
 
 
 def jkr_contact(overlap: float, *, surface_energy: float, radius: float, effective_young: float) -> tuple[float, float]:
-    """Contact radius [m] and force [N] of a JKR pair at an overlap [m], at rest.
-
-    Raises ValueError: the pair has parted at this overlap.
-    """
+    """Contact radius [m] and force [N] of a JKR pair at rest. Raises ValueError: it has parted at this overlap [m]."""
     w = 2 * surface_energy
     unit = (2 * math.pi * w * radius**2 / effective_young) ** (1 / 3)
     d = overlap * radius / unit**2

@@ -208,10 +208,7 @@ def _first_touch(share):
 
 @ti.func
 def bounded(stiffness, damping, stretch, rate, bound):
-    """Force of a spring that slides at a bound and of a dashpot while it does not; and the share of the stretch left.
-
-    With the dashpot the force stays within the bound as well.
-    """
+    """Force of a spring that slides at a bound, with a dashpot while it sticks; and the share of the stretch left."""
     force = -stiffness * stretch
     share = bound * 0.0 + 1.0
     square = force.norm_sqr()

@@ -284,9 +284,9 @@ class BedBase:
     def max_overlap(self, value: float) -> None:
         self.engine.overlap.fill(value)
 
-    def fill(self, positions, velocities, spins, radii, mass) -> None:
+    def fill(self, positions, velocities, spins, radii) -> None:
         """Put the grains into the fields, with ids in the order in which they come."""
-        e = self.engine
+        e, mass = self.engine, self.material.density * 4 / 3 * math.pi * radii**3
         e.write("position", np.column_stack([positions, radii]))
         e.write("velocity", np.column_stack([velocities, mass]))
         e.write("spin", np.column_stack([spins, np.zeros(self.grain_count)]))

@@ -66,10 +66,8 @@ class BedBodies(BedBase):
             raise ValueError("shape is empty; a body needs at least one primitive")
         for part in parts:
             if not isinstance(part, Shape):
-                raise ValueError(
-                    f"shape holds {part!r}, which is no shape; use Ball, Cylinder, Cone, Capsule, Box, Tube, "
-                    f"Polyhedron, Mesh, Plane or Placed"
-                )
+                names = "Ball, Cylinder, Cone, Capsule, Box, Tube, Polyhedron, Mesh, Plane or Placed"
+                raise ValueError(f"shape holds {part!r}, which is no shape; use {names}")
         if len(position) != 3 or not all(math.isfinite(p) for p in position):
             raise ValueError(f"position = {tuple(position)} must be 3 finite numbers [m]")
         if body >= MOST_BODIES or used + len(parts) > MOST_PRIMITIVES:
@@ -133,10 +131,9 @@ class BedBodies(BedBase):
         count = int(self.engine.body_count[None])
         if not all(0 <= body < count for body in bodies):
             raise ValueError(f"bodies = {list(bodies)}: the bed has bodies 0 to {count - 1}")
-        n = len(bodies)
         given = {"positions": positions, "velocities": velocities, "turns": turns, "spins": spins}
         for name, values in given.items():
-            check_array(name, np.asarray(values, dtype=float), (n, 4 if name == "turns" else 3))
+            check_array(name, np.asarray(values, dtype=float), (len(bodies), 4 if name == "turns" else 3))
         _refuse_turns("turns", np.asarray(turns, dtype=float))
         self.engine.place_bodies(np.array(bodies, dtype=np.int32), np.hstack(list(given.values())).astype(float))
 
@@ -151,10 +148,7 @@ class BedBodies(BedBase):
         return np.array(self.engine.body_turn[body], dtype=float)
 
     def reaction(self, body: int) -> tuple[np.ndarray, np.ndarray]:
-        """Force [N] and torque about the body's origin [N m] from the grains, each of shape [3].
-
-        The mean over the last ``advance``: the impulse divided by the time.
-        """
+        """Mean force [N] and torque about its origin [N m] by the grains in the last ``advance``, each of shape [3]."""
         self.check_body(body)
         row = self.reactions()[body]
         return row[:3], row[3:]

@@ -6,7 +6,6 @@ The modules of dem.engine, dem.measure and dem.prepare are written against ``Bed
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -16,18 +15,16 @@ from dem.grains.materials import Facing, Material
 from dem.grains.materials import material as find_material
 from dem.shapes.basic import Plane
 
-from . import checkpoint, state
 from .base import FLOOR, check_array
-from .bodies import BedBodies
-from .checkpoint import Checkpoint
 from .dissipation import PARTS, TURNED, Balance
+from .state import BedState, adopt, laid_end_to_end
 from .stress import find_contacts
 from .values import BedSettings, Grains, State
 
 __all__ = ["BedCore"]
 
 
-class BedCore(BedBodies):
+class BedCore(BedState):
     """Spherical grains on a floor at z = 0, periodic in x and y, open above; ``dem.Bed`` documents it for users."""
 
     def __repr__(self) -> str:
@@ -77,7 +74,7 @@ class BedCore(BedBodies):
                 the longest stable one where that is shorter, as for strongly damped grains.
             floor: whether there is a floor at z = 0; a Facing where grains touch it otherwise than one another.
             tensile: whether the damping may pull at the end of a contact (as LIGGGHTS does by default).
-            precision, arch, threads: see ``dem.engine.runtime.start``.
+            precision: "float64" or "float32". arch: "cpu" or "cuda". threads: of the CPU; all when None.
 
         Raises ValueError: arrays of wrong shape, numbers that are not finite, a negative size, a step too long, a bed
         narrower than three grains, grains that overlap one another or the floor by more than ``max_overlap``, grains
@@ -100,20 +97,19 @@ class BedCore(BedBodies):
             raise ValueError(f"size = {tuple(size)} must be three positive lengths [m]")
         if not 0 < max_overlap <= 0.2:
             raise ValueError(f"max_overlap = {max_overlap} must be above 0 and at most 0.2 of a diameter")
-        dt = time_step_for(stuff, diameter=2 * float(radii.min()), max_overlap=max_overlap, wanted=time_step)
+        x, y, z = map(float, size)
         settings = BedSettings(
             material=stuff,
-            size=(float(size[0]), float(size[1]), float(size[2])),
+            size=(x, y, z),
             gravity=_vector(gravity),
-            time_step=dt,
+            time_step=time_step_for(stuff, diameter=2 * float(radii.min()), max_overlap=max_overlap, wanted=time_step),
             max_overlap=float(max_overlap),
             height=_height(height, positions, radii),
             tensile=bool(tensile),
             seed=seed,
         )
         bed = cls(settings, radii, precision=precision, arch=arch, threads=threads)
-        mass = stuff.density * 4 / 3 * math.pi * radii**3
-        bed.fill(positions, velocities, spins, radii, mass)
+        bed.fill(positions, velocities, spins, radii)
         if floor:
             bed.place_body([Plane()], (0.0, 0.0, 0.0), floor if isinstance(floor, Facing) else Facing())
         bed.make_lists()
@@ -124,10 +120,7 @@ class BedCore(BedBodies):
         return bed
 
     def grains(self, *, contacts: bool = True) -> Grains:
-        """The grains now: positions, velocities, forces and more, in the order of ids.
-
-        ``contacts``: whether to count them (``coordination``), which takes as long as the rest.
-        """
+        """The grains now, in the order of ids; with ``contacts`` their ``coordination`` too, which doubles the time."""
         self.check_valid()
         e = self.engine
         order = np.argsort(e.read("id"))
@@ -185,53 +178,6 @@ class BedCore(BedBodies):
         self.compute_forces()
         self.shift_velocities(-0.5)
 
-    def state(self) -> State:
-        """Everything that the next step depends on, to the bit: a flat dict of numpy arrays."""
-        return state.take(self)
-
-    def restore(self, values: State) -> None:
-        """Go back to a state of this bed, or of one that was made with the same settings.
-
-        Raises ValueError: a state of another number of grains, of another layout or precision.
-        """
-        self.check_valid()
-        state.put_back(self, values)
-
-    def checkpoint(self) -> Checkpoint:
-        """Keep what the next steps depend on for ``rollback``, in the memory of the device: on a GPU nothing is read.
-
-        A bed has one checkpoint at a time; the first one takes as much memory again as grains and lists do.
-        """
-        self.check_valid()
-        return checkpoint.take(self)
-
-    def rollback(self, kept: Checkpoint) -> None:
-        """Go back to the last checkpoint, to the bit; as often as you like.
-
-        Raises ValueError: another checkpoint has been taken since, or sleep or the contact work has begun or ended.
-        """
-        self.check_valid()
-        checkpoint.roll_back(self, kept)
-
-    def save(self, path: str | Path) -> Path:
-        """Write the bed to one file (.npz), whole or not at all. Returns the path."""
-        state.write_file(self, path := Path(path))
-        return path
-
-    @classmethod
-    def load(cls, path: str | Path, *, arch: str = "cpu", threads: int | None = None) -> Self:
-        """Read a bed that ``save`` wrote; it continues bitwise the same on the same kind of processor.
-
-        Raises ValueError: the file is missing or is not a bed.
-        """
-        settings, values, precision = state.read_file(Path(path))
-        bed = cls(settings, values["position"][:, 3].astype(float), precision=precision, arch=arch, threads=threads)
-        if len(values["near_count"]) == bed.engine.chunk_count:
-            bed.restore(values)
-        else:
-            state.adopt(bed, values)
-        return bed
-
     def without(self, remove: np.ndarray) -> Self:
         """A bed without some grains; the others keep their contacts. Ids are counted anew, in order.
 
@@ -244,7 +190,7 @@ class BedCore(BedBodies):
         values = self.state()
         radii = values["position"][np.argsort(values["id"]), 3][keep].astype(float)
         bed = self.alike(replace(self.settings, gravity=self.gravity), radii)
-        state.adopt(bed, values, keep=keep)
+        adopt(bed, values, keep=keep)
         return bed
 
     def repeated(self, times: int, *, height: float | None = None) -> Self:
@@ -263,14 +209,14 @@ class BedCore(BedBodies):
         self.check_valid()
         if isinstance(times, bool) or int(times) != times or times < 1:
             raise ValueError(f"times = {times} must be a whole number, 1 or more")
+        times = int(times)
         if height is not None and not 0 < height < math.inf:
             raise ValueError(f"height = {height} must be a length [m]")
         bodies = int(self.engine.body_count[None]) - int(self.has_floor)
         if bodies:
             raise ValueError(f"{bodies} bodies beside the floor: a bed is repeated without them, each is in one place")
         self.wake()
-        times = int(times)
-        values = state.laid_end_to_end(self.state(), times, period=self.size[0])
+        values = laid_end_to_end(self.state(), times, period=self.size[0])
         settings = replace(
             self.settings,
             size=(times * self.size[0], *self.size[1:]),
@@ -280,7 +226,7 @@ class BedCore(BedBodies):
             height=max(self.height, height or 0.0),
         )
         bed = self.alike(settings, values["position"][:, 3].astype(float))
-        state.adopt(bed, values)
+        adopt(bed, values)
         bed.steps = 0
         bed.material = self.material
         bed.recipe = self.recipe | {"repeats": times} if self.recipe else {}
@@ -306,10 +252,7 @@ class BedCore(BedBodies):
         )
 
     def track_contact_work(self) -> None:
-        """From here on what contacts take is summed (``contact_work``), from 0; about a fifth more time a step.
-
-        A drag (``advance``) is not in it.
-        """
+        """Sum from now on what contacts take (``contact_work``), without a drag's part; a fifth more time a step."""
         self.check_valid()
         self.engine.open_balance(self.gravity)
 

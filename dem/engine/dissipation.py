@@ -11,7 +11,7 @@ from outside, which is weight, contacts across the periodic sides (the torques o
 not cancel but leave the period x F), grains put back into the box at its other side, and sleepers (what those awake do
 to them, and what falling asleep takes). Leapfrog's x_n x m v_(n+1/2) changes by exactly the sum of these each step.
 
-A bed without a balance has ``NO_BALANCE`` for a table, and its kernels are compiled without all this.
+A bed without a balance has ``ABSENT`` for a table, and its kernels are compiled without all this.
 """
 
 import numpy as np
@@ -21,23 +21,13 @@ from .lists import INDEX_BITS, INDEX_MASK, SAME_IMAGE
 from .rows import Rows
 from .values import EnginePart
 
-__all__ = ["NO_BALANCE", "OUTSIDE", "PARTS", "TURNED", "BalanceKernels", "Balance"]
+__all__ = ["OUTSIDE", "PARTS", "TURNED", "BalanceKernels", "Balance"]
 
 PARTS = ("damping", "tangential", "turning")
 TURNED = ("outside", "first_body", "bodies")
 OUTSIDE, FIRST, OTHERS = range(3)
 # Of a row of ``last``: the normal dashpot's force, the tangential force, the turning torque.
 _WIDTH = 7
-
-
-@ti.data_oriented
-class _NoBalance:
-    """Stands where no balance is kept."""
-
-    on = False
-
-
-NO_BALANCE = _NoBalance()
 
 
 @ti.data_oriented

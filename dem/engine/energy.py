@@ -14,8 +14,7 @@ import numpy as np
 
 from dem.contact.cohesion import COHESIONS, DMT, JKR
 
-from .base import BedBase
-from .state import take, touching_pairs
+from .state import BedState, touching_pairs
 from .values import State
 
 __all__ = ["bed_energies", "body_pushes"]
@@ -25,7 +24,7 @@ Gap = Callable[[Array], tuple[Array, Array, Array]]
 _TWO_E, _EIGHT_G, _PI_W = 0, 1, 7  # of a row of pair parameters
 
 
-def bed_energies(bed: BedBase, *, bodies: Mapping[int, Gap]) -> dict[str, float]:
+def bed_energies(bed: BedState, *, bodies: Mapping[int, Gap]) -> dict[str, float]:
     """Energies of the grains [J].
 
     Args:
@@ -44,7 +43,7 @@ def bed_energies(bed: BedBase, *, bodies: Mapping[int, Gap]) -> dict[str, float]
     moving = 0.5 * mass @ (velocity**2).sum(axis=1)
     turning = 0.2 * (mass * radius**2) @ (rates**2).sum(axis=1)
     height = -(kept[:, 3] @ (position[:, :3] @ np.array(bed.gravity, dtype=float)))
-    state = take(bed)
+    state = bed.state()
     surfaces: dict[int, Gap] = {}
     if bed.has_floor:
         surfaces[0] = lambda x: (x[:, 2], np.broadcast_to([0.0, 0.0, 1.0], x.shape), np.zeros(len(x)))
@@ -55,13 +54,13 @@ def bed_energies(bed: BedBase, *, bodies: Mapping[int, Gap]) -> dict[str, float]
     return found | {name: float(value) for name, value in zip(names, springs, strict=True)}
 
 
-def body_pushes(bed: BedBase, *, bodies: Mapping[int, Gap]) -> tuple[Array, Array]:
+def body_pushes(bed: BedState, *, bodies: Mapping[int, Gap]) -> tuple[Array, Array]:
     """Where grains touch bodies, and the normal springs' forces on the bodies: Hertz's 2/3 (2 E*) a d.
 
     ``bodies``: as for ``bed_energies``. Returns points on the bodies' surfaces [m] and forces [N], shape [contact, 3]
     both; without damping and friction.
     """
-    state = take(bed)
+    state = bed.state()
     points, forces = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for body, surface in bodies.items():
         centres = state["position"][state["near_grain"][state["near_body"] == body]].astype(float)
@@ -114,7 +113,7 @@ def _normal_spring(law: int, row: Array, overlap: Array, radius: Array) -> tuple
     return a, energy - 2 * pi_w * radius * pressed if law == DMT else energy
 
 
-def _pairs(bed: BedBase, state: State, law: int) -> Array:
+def _pairs(bed: BedState, state: State, law: int) -> Array:
     """Of two grains. A pair within a chunk is listed once, one across chunks by both."""
     count = bed.grain_count
     position = state["position"].astype(float)
@@ -138,7 +137,7 @@ def _pairs(bed: BedBase, state: State, law: int) -> Array:
     return _springs(law, row, overlap, r_i * r_j / (r_i + r_j), slide[:, :3], turned, d / length[:, None], share)
 
 
-def _asleep(bed: BedBase, state: State) -> tuple[Array, ...]:
+def _asleep(bed: BedState, state: State) -> tuple[Array, ...]:
     """Of two sleepers: grains, distance, history and share of each contact, as ``_pairs`` has them."""
     grains = state["sleep_store_who"] >= 0
     owner, who = (state[f"sleep_store_{name}"][grains].astype(np.int64) for name in ("owner", "who"))
@@ -154,12 +153,9 @@ def _asleep(bed: BedBase, state: State) -> tuple[Array, ...]:
 
 
 def _twice(keys: Array) -> Array:
-    order = np.argsort(keys)
-    same = np.diff(keys[order]) == 0
-    found = np.zeros(len(keys), dtype=bool)
-    found[order[1:]] = same
-    found[order[:-1]] |= same
-    return found
+    """Whether each key comes more than once."""
+    _, which, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    return np.asarray(counts[which.reshape(-1)] > 1)
 
 
 def _near(state: State, surfaces: Mapping[int, Gap], law: int) -> Array:

@@ -19,6 +19,7 @@ An engine is compiled for a capacity, not for a number of grains, and is used ag
 import math
 import weakref
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,12 +30,12 @@ from dem.grains.packing import curve_ranks
 from dem.shapes.basic import ROW_WIDTH
 
 from . import runtime
-from .dissipation import NO_BALANCE, Balance, BalanceKernels
-from .lists import CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
+from .dissipation import Balance, BalanceKernels
+from .lists import ABSENT, CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
 from .readings import TALLY_BLOCKS, Readings
 from .rows import put_rows
 from .shape_table import PLAIN, Shapes
-from .sleep_kernels import EVERYONE, Rest, Sleepers
+from .sleep_kernels import Rest, Sleepers
 from .steps import Steps
 
 __all__ = ["Engine", "MOST_BODIES", "MOST_PRIMITIVES", "STEPS_PER_LAUNCH", "take_engine"]
@@ -167,11 +168,9 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.shapes = PLAIN  # the table of the shapes that need one; kernels are compiled anew for another
         self._kept = None
         self._meshes = []
-        self.rest: Any = EVERYONE  # the table of those that sleep, likewise
-        self._kept_rest: Rest | None = None
-        self.held: Any = None  # what `dem.engine.checkpoint` copied last
-        self.balance: Any = NO_BALANCE  # the table of the energy balance, likewise
-        self._kept_balance: Balance | None = None
+        self.rest: Any = ABSENT  # the table of those that sleep, likewise
+        self.held: Any = None  # the last checkpoint
+        self.balance: Any = ABSENT  # the table of the energy balance, likewise
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
         self.moved, self.halted, self.done = (ti.field(ti.i32, ()) for _ in range(3))
         self.problem = ti.Vector.field(2, ti.i32, ())
@@ -258,38 +257,39 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.clear_pushes()
         self.clear_shapes()
         self.held = None
-        self.rest = EVERYONE
-        self.balance = NO_BALANCE
+        self.rest = ABSENT
+        self.balance = ABSENT
 
     def let_sleep(self) -> None:
         """From here on kernels know of sleep; all are awake still."""
-        if self._kept_rest is None:
-            self._kept_rest = Rest(
-                grains=self.id.shape[0], cells=self.rank.shape[0], chunks=self.overlap.shape[0],
-                rows=self.pair.shape[0], real=self.real,
-            )  # fmt: skip
-        self.rest = self._kept_rest
+        self.rest = self._own_rest
         self.rest.clear()
+
+    @cached_property
+    def _own_rest(self) -> Rest:
+        rows, chunks = self.pair.shape[0], self.overlap.shape[0]
+        return Rest(grains=self.id.shape[0], cells=self.rank.shape[0], chunks=chunks, rows=rows, real=self.real)
 
     def wake_all(self) -> None:
         """All are awake, and the kernels are those that know of no sleep."""
-        self.rest = EVERYONE
+        self.rest = ABSENT
         self.count[self.AWAKE], self.count[self.CHUNKS] = self.grain_count, self.chunk_count
         self.count[self.SORTED], self.count[self.SORTED_CELLS] = self.grain_count, self.count[self.CELLS]
 
     def open_balance(self, gravity: tuple[float, float, float]) -> None:
         """From here on kernels sum what contacts take."""
-        if self._kept_balance is None:
-            self._kept_balance = Balance(
-                rows=self.pair.shape[0], near=self.near_grain.shape[0], chunks=self.overlap.shape[0], real=self.real
-            )
-        self.balance = self._kept_balance
+        self.balance = self._own_balance
         self.balance.clear()
         self.balance.pull[None] = gravity
 
+    @cached_property
+    def _own_balance(self) -> Balance:
+        rows, near, chunks = self.pair.shape[0], self.near_grain.shape[0], self.overlap.shape[0]
+        return Balance(rows=rows, near=near, chunks=chunks, real=self.real)
+
     def close_balance(self) -> None:
         """The kernels are those that sum nothing."""
-        self.balance = NO_BALANCE
+        self.balance = ABSENT
 
     def read(self, name: str) -> np.ndarray:
         """A field as a numpy array: the rows of the grains or chunks there are, or all of them."""

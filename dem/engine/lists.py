@@ -11,7 +11,7 @@ from dem.shapes.basic import rotate
 
 from .values import EnginePart
 
-__all__ = ["INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE"]
+__all__ = ["ABSENT", "INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE"]
 
 ITEMS_PER_THREAD = 512
 # Places of the counters in Engine.ticket: of a plain loop over chunks; of ``Engine.run``.
@@ -25,6 +25,17 @@ MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
 INDEX_BITS = 26
 INDEX_MASK = (1 << INDEX_BITS) - 1
 SAME_IMAGE = 1 + 3 * 1  # (0 + 1) + 3 * (0 + 1)
+
+
+@ti.data_oriented
+class Absent:
+    """Stands for the table of sleepers or of the energy balance where a bed has none; kernels are compiled without."""
+
+    on = False
+    sets = 1  # of cells: that of the grains awake
+
+
+ABSENT = Absent()
 
 
 @ti.data_oriented
@@ -472,10 +483,8 @@ class Lists(EnginePart):
     def next_near(self, o, i):
         """The row of the old near list behind row o if it is of the same grain (i, its old index), or -1."""
         result = o + 1
-        if (
-            result % self.count[self.NEAR_ROOM] == 0
-            or result >= self.old_near_end[result // self.count[self.NEAR_ROOM]]
-        ):
+        room = self.count[self.NEAR_ROOM]
+        if result % room == 0 or result >= self.old_near_end[result // room]:
             result = -1
         elif self.old_near_grain[result] != i:
             result = -1

@@ -119,13 +119,11 @@ class Readings(EnginePart):
                         ti.atomic_add(counts[self.id[j]], 1)
         for c in range(self.count[self.CHUNKS]):
             for s in range(c * self.count[self.NEAR_ROOM], self.near_end[c]):
-                i = self.near_grain[s]
+                i, b = self.near_grain[s], self.near_body[s]
                 r = self.position[i].w
                 reach = r
                 if ti.static(shapes.full):
-                    reach += self.body_range(self.near_body[s], r, 0.0)
-                distance, n, curvature, arm = self.nearest(
-                    self.near_body[s], self.position[i].xyz, reach, shapes, False
-                )
-                if distance < r + self.body_range(self.near_body[s], r, curvature):
+                    reach += self.body_range(b, r, 0.0)
+                distance, n, curvature, arm = self.nearest(b, self.position[i].xyz, reach, shapes, False)
+                if distance < r + self.body_range(b, r, curvature):
                     ti.atomic_add(counts[self.id[i]], 1)

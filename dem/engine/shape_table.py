@@ -4,6 +4,7 @@ A bed whose bodies are of planes, balls, cylinders and cones alone has ``PLAIN``
 compiled without all this. The table is a template argument of the kernels, so they are compiled anew for a larger one.
 """
 
+import itertools
 from collections import defaultdict
 from typing import Any
 
@@ -42,10 +43,7 @@ PLAIN = PlainTable()
 
 @ti.data_oriented
 class ShapeTable:
-    """Fields for the places of ``primitives`` shapes and for ``triangles`` triangles, and distances to them.
-
-    Trees of several meshes lie one behind the other.
-    """
+    """Places of ``primitives`` shapes, ``triangles`` triangles of meshes, one behind the other; distances to them."""
 
     full = True
 
@@ -235,18 +233,12 @@ class Shapes(EnginePart):
         if "primitive_place" not in state:
             self.clear_shapes()
             return
-        ends = np.cumsum(state["mesh_sizes"], axis=0)
-        starts = ends - state["mesh_sizes"]
-        parts = [
-            (state["mesh_vertices"][a:b], state["mesh_triangles"][c:d])
-            for (a, c), (b, d) in zip(starts, ends, strict=True)
-        ]
-        same = len(parts) == len(self._meshes) and all(
-            np.array_equal(m.vertices, vertices) and np.array_equal(m.triangles, triangles)
-            for m, (vertices, triangles) in zip(self._meshes, parts, strict=True)
-        )
-        if not same or not self.shapes.full:
-            self._meshes = [Mesh(*part) for part in parts]
+        known = self.shape_state()
+        if not known or not all(np.array_equal(known[name], state[name]) for name in known if name.startswith("mesh")):
+            ends = np.cumsum(state["mesh_sizes"], axis=0)
+            vertices = np.split(state["mesh_vertices"], ends[:, 0])[:-1]
+            triangles = np.split(state["mesh_triangles"], ends[:, 1])[:-1]
+            self._meshes = [Mesh(*part) for part in zip(vertices, triangles, strict=True)]
             self._make_table()
         self.shapes.place.from_numpy(state["primitive_place"])
 
@@ -271,13 +263,9 @@ class Shapes(EnginePart):
 
     def _nodes_of(self, mesh: Mesh) -> tuple[int, int]:
         """First node of a mesh's tree and the one after its last."""
-        first = 0
-        for other in self._meshes:
-            count = 2 * len(other.triangles) - 1
-            if other is mesh:
-                return first, first + count
-            first += count
-        raise KeyError("the mesh is not in the table")
+        before = itertools.takewhile(lambda other: other is not mesh, self._meshes)
+        first = sum(2 * len(other.triangles) - 1 for other in before)
+        return first, first + 2 * len(mesh.triangles) - 1
 
     def drop_shapes(self, first: int) -> None:
         """Forget what rows from ``first`` on hold, as of a body that was refused."""

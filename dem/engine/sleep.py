@@ -22,7 +22,7 @@ force of those awake on them, and the momentum that falling asleep took.
 """
 
 import math
-from dataclasses import astuple, dataclass, fields
+from dataclasses import asdict, astuple, dataclass
 from typing import Protocol
 
 import numpy as np
@@ -66,10 +66,9 @@ class Sleep:
     """Steps between two looks: what wakes makes new lists, and those cost as much as four steps of all grains."""
 
     def __post_init__(self):
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"Sleep: {field.name} = {value} must be above 0")
+        for name, value in asdict(self).items():
+            if not 0 < value < math.inf:
+                raise ValueError(f"Sleep: {name} = {value} must be above 0")
         if int(self.every) != self.every:
             raise ValueError(f"Sleep: every = {self.every} must be a whole number of steps")
         if self.waking_speed <= self.speed:
@@ -90,9 +89,8 @@ class Sleeper:
         total = math.fsum(bed.engine.read("velocity")[:, 3])
         bed.engine.rest.total[None] = total
         weight = g * total / bed.grain_count
-        self.limit = rules.force * weight
+        self.limit, self.reach = rules.force * weight, rules.reach * d
         self.fast, self.slow = (share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed))
-        self.reach = rules.reach * d
         looks = rules.calm * math.sqrt(d / g) / bed.time_step / rules.every / _LOOKS_OF_CALM
         self.rest_every = max(1, round(looks)) * rules.every
         self.awake = bed.grain_count

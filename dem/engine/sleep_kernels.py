@@ -1,7 +1,7 @@
 """The kernels of sleep (``dem.engine.sleep`` has the rules): they belong to ``dem.engine.engine.Engine``, whose
 fields they use.
 
-A bed whose grains do not sleep has ``EVERYONE`` for a table, and its kernels are compiled without all this.
+A bed whose grains do not sleep has ``ABSENT`` for a table, and its kernels are compiled without all this.
 """
 
 import taichi as ti
@@ -9,7 +9,7 @@ import taichi as ti
 from .lists import BUILT, INDEX_MASK
 from .values import EnginePart
 
-__all__ = ["EVERYONE", "FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
+__all__ = ["FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
 
 # Frozen contacts that there is room for, of a grain: both sides may keep a contact.
 _STORE_ROOM = 8
@@ -21,17 +21,6 @@ _BLOCK = 32
 _MIDDLE, _HALF, _BELOW = range(3)
 # Places of what a look found, in Rest.news.
 WOKEN, LEAVING, FULL = 0, 1, 3  # and lists.BUILT
-
-
-@ti.data_oriented
-class Everyone:
-    """Stands where nobody sleeps."""
-
-    on = False
-    sets = 1
-
-
-EVERYONE = Everyone()
 
 
 @ti.data_oriented
@@ -204,9 +193,8 @@ class Sleepers(EnginePart):
             if flagged:
                 rest.asleep[k] = 0
                 rest.quiet[k] = 0
-                ti.atomic_max(
-                    rest.last[None], self.place_asleep(self.rank[rest.cell[k]], rest) - self.count[self.CELLS]
-                )
+                place = self.place_asleep(self.rank[rest.cell[k]], rest)
+                ti.atomic_max(rest.last[None], place - self.count[self.CELLS])
         for c in range(self.count[self.CHUNKS]):
             if leaving == 1:
                 start, end = self.chunk_range(c)
@@ -346,10 +334,7 @@ class Sleepers(EnginePart):
 
     @ti.func
     def list_sleeper(self, s, i, j, code, old, rest: ti.template()):
-        """What a row of the pair lists has of sleep: springs out of the store, the force to compare with.
-
-        ``old``: the row that the contact had, or -1.
-        """
+        """Springs out of the store and the force to compare with, of a row that was ``old`` (-1: none) before."""
         a, b = self.id[i], self.id[j]
         if rest.was[a] == 1 and rest.was[b] == 1:
             sign = ti.cast(1.0, self.real)

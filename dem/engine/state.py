@@ -1,24 +1,31 @@
-"""A bed's state as numpy arrays: taken, put back to the bit, kept in a file, taken over by a bed of another layout."""
+"""The state of a bed: as numpy arrays, in a file, in a bed of another layout; and checkpoint and rollback.
+
+A checkpoint is all that the next steps depend on, copied where it lies, on the device. ``Bed.state`` gives the same as
+arrays of the host, packed, for files; a step of a coupling that is repeated needs it often, and on a GPU without the
+bed leaving the device.
+"""
 
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+import taichi as ti
 
 from dem.grains.materials import Material
 
-from .base import BedBase
+from .bodies import BedBodies
 from .engine import Engine
 from .lists import INDEX_BITS, INDEX_MASK
 from .rows import read_fields, row_numbers, take_rows, write_fields
 from .sleep import Sleep, Sleeper
 from .values import BedSettings, State
 
-__all__ = ["adopt", "laid_end_to_end", "put_back", "read_file", "take", "touching_pairs", "whole_file", "write_file"]
+__all__ = ["BedState", "Checkpoint", "adopt", "laid_end_to_end", "read_file", "touching_pairs", "whole_file"]
 
 STATE_FORMAT = "hedgebed-bed/3"
 # Before there was cohesion, and before contacts remembered their last step; these files can still be read.
@@ -33,106 +40,196 @@ NAMES = (*GRAIN_FIELDS, *BODY_FIELDS, *LIST_NAMES, "numbers", "reals")
 ABOUT = ("material", "material_numbers", "cohesion", "size", "height", "tensile", "seed", "precision")
 
 
-def take(bed: BedBase) -> State:
-    """Everything that the next step depends on, to the bit."""
-    bed.check_valid()
-    e = bed.engine
-    state = {name: e.read(name) for name in (*GRAIN_FIELDS, *BODY_FIELDS)}
-    start, end = e.read("pair_start"), e.read("pair_end")
-    counts = end - start
-    rows = row_numbers(start, counts)
-    pair = take_rows(e.pair, rows)
-    touching = rows[pair < 0]
-    state |= {"pair_count": counts, "pair": pair, "slide": take_rows(e.slide, touching)}
-    near_count = e.read("near_end") - _near_starts(e)
-    near = row_numbers(_near_starts(e), near_count)
-    state |= {"near_count": near_count, **read_fields(e, dict.fromkeys(NEAR_FIELDS, near), "")}
-    if e.rolling:
-        state["roll"] = take_rows(e.roll, touching)
-    state |= e.shape_state()
-    if bed.sleeper is not None:
-        state |= bed.sleeper.state(rows)
-    if e.balance.on:
-        state |= read_fields(e.balance, e.balance.rows(rows, near), "ledger_")
-    bodies = int(e.body_count[None])
-    state["numbers"] = np.array(
-        [bed.steps, bodies, bed.list_count, bed.steps_since_lists, bed.reaction_steps, int(bed.has_floor)]
-    )
-    state["reals"] = np.array(
-        [bed.time_step, bed.skin, *bed.gravity, bed.surface, bed.packing_fraction, bed.overlap_limit]
-    )
-    return state
+# What lists are made with, and what a step makes anew: nothing of it is read before it is written.
+_SCRATCH = ("old_", "cell_", "block_", "came_from", "key", "near_first", "touching", "rank", "ticket", "claim",
+            "problem")  # fmt: skip
+_BED_NUMBERS = ("steps", "list_count", "grain_steps", "steps_since_lists", "reaction_steps", "skin", "tallied")
+_SLEEP_NUMBERS = ("awake", "mass", "slept", "leaving")
 
 
-def put_back(bed: BedBase, state: State) -> None:
-    """Bring a bed of the same layout to a state. Raises ValueError for a state of another bed."""
-    e = bed.engine
-    if len(state["id"]) != bed.grain_count or len(state["near_count"]) != e.chunk_count:
-        raise ValueError(
-            f"this state has {len(state['id'])} grains in {len(state['near_count'])} chunks, the bed "
-            f"{bed.grain_count} in {e.chunk_count}; it belongs to another bed"
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """What ``Bed.checkpoint`` returned; a bed has room for one, so the next one ends it.
+
+    Attributes:
+        tables: whose fields were copied: the engine, the sleepers, the balance.
+        numbers: (owner, attribute, value) of what no field holds.
+        conditions: gravity, and the rules of sleep at work, which must be the same at a rollback.
+    """
+
+    tables: tuple[Any, ...]
+    numbers: list[tuple[Any, str, Any]]
+    conditions: tuple[Any, ...]
+
+
+class BedState(BedBodies):
+    """A bed whose state can be taken, brought back and kept in a file."""
+
+    def state(self) -> State:
+        """Everything that the next step depends on, to the bit: a flat dict of numpy arrays."""
+        self.check_valid()
+        e = self.engine
+        state = {name: e.read(name) for name in (*GRAIN_FIELDS, *BODY_FIELDS)}
+        start, end = e.read("pair_start"), e.read("pair_end")
+        counts = end - start
+        rows = row_numbers(start, counts)
+        pair = take_rows(e.pair, rows)
+        touching = rows[pair < 0]
+        state |= {"pair_count": counts, "pair": pair, "slide": take_rows(e.slide, touching)}
+        near_count = e.read("near_end") - _near_starts(e)
+        near = row_numbers(_near_starts(e), near_count)
+        state |= {"near_count": near_count, **read_fields(e, dict.fromkeys(NEAR_FIELDS, near), "")}
+        if e.rolling:
+            state["roll"] = take_rows(e.roll, touching)
+        state |= e.shape_state()
+        if self.sleeper is not None:
+            state |= self.sleeper.state(rows)
+        if e.balance.on:
+            state |= read_fields(e.balance, e.balance.rows(rows, near), "ledger_")
+        bodies = int(e.body_count[None])
+        state["numbers"] = np.array(
+            [self.steps, bodies, self.list_count, self.steps_since_lists, self.reaction_steps, int(self.has_floor)]
         )
-    if state["position"].dtype != bed.runtime.dtype:
-        raise ValueError(f"this state is in {state['position'].dtype}, the bed in {bed.runtime.precision}")
-    for name in (*GRAIN_FIELDS, *BODY_FIELDS):
-        e.write(name, state[name])
-    e.restore_shapes(state)
-    counts = state["pair_count"]
-    awake, chunks = state.get("sleep_numbers", (bed.grain_count, e.chunk_count))[:2]
-    chunk = _chunk_starts(awake, chunks)
-    before = np.concatenate(([0], np.cumsum(counts)))
-    which = np.repeat(np.arange(chunks), np.diff(chunk))
-    start = np.zeros(bed.grain_count, dtype=np.int32)
-    start[:awake] = before[:awake] - before[chunk[which]] + which * e.chunk_room
-    rows = row_numbers(start, counts)
-    touching = rows[state["pair"] < 0]
-    e.write("pair_start", start)
-    e.write("pair_end", (start + counts).astype(np.int32))
-    e.write("first", np.repeat(np.arange(bed.grain_count), counts).astype(np.int32), rows)
-    for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
-        e.write(name, state[name], at)
-    near = _write_near(e, state["near_count"], state)
-    e.close_balance()
-    if "ledger_taken" in state:
-        x, y, z = (float(v) for v in state["reals"][2:5])
-        e.open_balance((x, y, z))
-        write_fields(e.balance, e.balance.rows(rows, near), "ledger_", state)
-    numbers = [int(v) for v in state["numbers"]]
-    bed.steps, bodies, bed.list_count, bed.steps_since_lists, bed.reaction_steps, floor = numbers
-    bed.has_floor, bed.tallied = bool(floor), None
-    e.body_count[None] = bodies
-    e.moved[None] = 0
-    e.halted[None] = 0
-    reals = [float(v) for v in state["reals"]]
-    bed.time_step, bed.skin = reals[:2]
-    bed.gravity = tuple(reals[2:5])
-    bed.surface, bed.packing_fraction, bed.overlap_limit = reals[5:]
-    e.wake_all()
-    bed.sleeper = None
-    if "sleep_rules" in state:
-        e.let_sleep()
-        e.count[e.AWAKE], e.count[e.CHUNKS] = int(awake), int(chunks)
-        bed.sleeper = Sleeper(bed, Sleep(*state["sleep_rules"][:-1], every=int(state["sleep_rules"][-1])))
-        bed.sleeper.restore(state, rows)
+        state["reals"] = np.array(
+            [self.time_step, self.skin, *self.gravity, self.surface, self.packing_fraction, self.overlap_limit]
+        )
+        return state
+
+    def restore(self, values: State) -> None:
+        """Go back to a state of this bed, or of one that was made with the same settings.
+
+        Raises ValueError: a state of another number of grains, of another layout or precision.
+        """
+        self.check_valid()
+        e = self.engine
+        if len(values["id"]) != self.grain_count or len(values["near_count"]) != e.chunk_count:
+            raise ValueError(
+                f"this state has {len(values['id'])} grains in {len(values['near_count'])} chunks, the bed "
+                f"{self.grain_count} in {e.chunk_count}; it belongs to another bed"
+            )
+        if values["position"].dtype != self.runtime.dtype:
+            raise ValueError(f"this state is in {values['position'].dtype}, the bed in {self.runtime.precision}")
+        for name in (*GRAIN_FIELDS, *BODY_FIELDS):
+            e.write(name, values[name])
+        e.restore_shapes(values)
+        counts = values["pair_count"]
+        awake, chunks = values.get("sleep_numbers", (self.grain_count, e.chunk_count))[:2]
+        chunk = _chunk_starts(awake, chunks)
+        before = np.concatenate(([0], np.cumsum(counts)))
+        which = np.repeat(np.arange(chunks), np.diff(chunk))
+        start = np.zeros(self.grain_count, dtype=np.int32)
+        start[:awake] = before[:awake] - before[chunk[which]] + which * e.chunk_room
+        rows = row_numbers(start, counts)
+        touching = rows[values["pair"] < 0]
+        e.write("pair_start", start)
+        e.write("pair_end", start + counts)
+        e.write("first", np.repeat(np.arange(self.grain_count), counts), rows)
+        for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
+            e.write(name, values[name], at)
+        near = _write_near(e, values["near_count"], values)
+        e.close_balance()
+        if "ledger_taken" in values:
+            x, y, z = (float(v) for v in values["reals"][2:5])
+            e.open_balance((x, y, z))
+            write_fields(e.balance, e.balance.rows(rows, near), "ledger_", values)
+        numbers = [int(v) for v in values["numbers"]]
+        self.steps, bodies, self.list_count, self.steps_since_lists, self.reaction_steps, floor = numbers
+        self.has_floor, self.tallied, self.sleeper = bool(floor), None, None
+        e.body_count[None] = bodies
+        e.moved[None] = e.halted[None] = 0
+        reals = [float(v) for v in values["reals"]]
+        self.time_step, self.skin, self.gravity = reals[0], reals[1], tuple(reals[2:5])
+        self.surface, self.packing_fraction, self.overlap_limit = reals[5:]
+        e.wake_all()
+        if "sleep_rules" in values:
+            e.let_sleep()
+            e.count[e.AWAKE], e.count[e.CHUNKS] = int(awake), int(chunks)
+            self.sleeper = Sleeper(self, Sleep(*values["sleep_rules"][:-1], every=int(values["sleep_rules"][-1])))
+            self.sleeper.restore(values, rows)
+
+    def checkpoint(self) -> Checkpoint:
+        """Keep what the next steps depend on for ``rollback``, in the memory of the device: on a GPU nothing is read.
+
+        A bed has one checkpoint at a time; the first one takes as much memory again as grains and lists do.
+        """
+        self.check_valid()
+        owners: list[tuple[Any, tuple[str, ...]]] = [(self, _BED_NUMBERS)]
+        if self.sleeper is not None:
+            owners.append((self.sleeper, _SLEEP_NUMBERS))
+        numbers = [(owner, name, getattr(owner, name)) for owner, names in owners for name in names]
+        kept = Checkpoint(_tables(self.engine), numbers, (*map(float, self.gravity), self.sleeper))
+        for table in kept.tables:
+            for name, twin in _twins(table).items():
+                twin.copy_from(getattr(table, name))
+        self.engine.held = kept
+        return kept
+
+    def rollback(self, kept: Checkpoint) -> None:
+        """Go back to the last checkpoint, to the bit; as often as you like.
+
+        Raises ValueError: another checkpoint has been taken since, or sleep, its rules, gravity or the balance changed.
+        """
+        self.check_valid()
+        e = self.engine
+        if e.held is not kept or kept.tables != _tables(e):
+            raise ValueError("this bed holds another state by now: only the last one that was held can be taken back")
+        if kept.conditions != (*map(float, self.gravity), self.sleeper):
+            raise ValueError("gravity or the rules of sleep are others by now than when this bed was held")
+        for table in kept.tables:
+            for name, twin in _twins(table).items():
+                getattr(table, name).copy_from(twin)
+        if e.rest.on:
+            e.rest.whole[None] = 1  # of what lists were made with nothing is kept
+        for owner, name, value in kept.numbers:
+            setattr(owner, name, value)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the bed to one file (.npz), whole or not at all. Returns the path."""
+        stuff = self.material
+        about: State = {
+            "format": np.array(STATE_FORMAT),
+            "material": np.array(stuff.name),
+            "material_numbers": np.array([getattr(stuff, key) for key in MATERIAL_NUMBERS]),
+            "cohesion": np.array(stuff.cohesion),
+            "size": np.array(self.size),
+            "height": np.array(self.settings.height),
+            "tensile": np.array(self.settings.tensile),
+            "seed": np.array(-1 if self.seed is None else self.seed),
+            "precision": np.array(self.runtime.precision),
+        }
+        about |= {f"state.{key}": values for key, values in self.state().items()}
+        with whole_file(Path(path)) as part, part.open("wb") as file:
+            np.savez(file, **about)  # type: ignore[arg-type]
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | Path, *, arch: str = "cpu", threads: int | None = None) -> Self:
+        """Read a bed that ``save`` wrote; it continues bitwise the same on the same kind of processor.
+
+        Raises ValueError: the file is missing or is not a bed.
+        """
+        settings, values, precision = read_file(Path(path))
+        bed = cls(settings, values["position"][:, 3].astype(float), precision=precision, arch=arch, threads=threads)
+        if len(values["near_count"]) == bed.engine.chunk_count:
+            bed.restore(values)
+        else:
+            adopt(bed, values)
+        return bed
 
 
-def write_file(bed: BedBase, path: Path) -> None:
-    """Write a bed to an .npz file, whole or not at all."""
-    stuff = bed.material
-    about: State = {
-        "format": np.array(STATE_FORMAT),
-        "material": np.array(stuff.name),
-        "material_numbers": np.array([getattr(stuff, key) for key in MATERIAL_NUMBERS]),
-        "cohesion": np.array(stuff.cohesion),
-        "size": np.array(bed.size),
-        "height": np.array(bed.settings.height),
-        "tensile": np.array(bed.settings.tensile),
-        "seed": np.array(-1 if bed.seed is None else bed.seed),
-        "precision": np.array(bed.runtime.precision),
-    }
-    about |= {f"state.{key}": values for key, values in take(bed).items()}
-    with whole_file(path) as part, part.open("wb") as file:
-        np.savez(file, **about)  # type: ignore[arg-type]
+def _tables(e: Engine) -> tuple[Any, ...]:
+    """The tables of fields at work: the engine, the sleepers, the balance."""
+    return (e, *(table for table in (e.rest, e.balance) if table.on))
+
+
+def _twins(table: Any) -> dict[str, ti.Field]:
+    """A field beside each of a table's, of its shape; as many as there are by now."""
+    twins: dict[str, ti.Field] = table.__dict__.setdefault("twins", {})
+    for name, field in list(vars(table).items()):
+        if isinstance(field, ti.Field) and not name.startswith(_SCRATCH) and name not in twins:
+            kind = ti.Vector.field(field.n, field.dtype, field.shape) if isinstance(field, ti.MatrixField) else None
+            twins[name] = kind if kind is not None else ti.field(field.dtype, field.shape)
+    return twins
 
 
 @contextmanager
@@ -186,33 +283,29 @@ def _three(values: np.ndarray) -> tuple[float, float, float]:
     return x, y, z
 
 
-def adopt(bed: BedBase, state: State, *, keep: np.ndarray | None = None) -> None:
+def adopt(bed: BedBodies, state: State, *, keep: np.ndarray | None = None) -> None:
     """Take over the grains, contacts and bodies of a state whose layout is another; ``keep``: which grains, by id."""
     e = bed.engine
     if "sleep_rules" in state:
         raise ValueError("this state has grains that sleep, and its layout is another: wake the bed before it is saved")
     ids = state["id"]
-    if keep is None:
-        keep = np.ones(len(ids), dtype=bool)
+    keep = np.ones(len(ids), dtype=bool) if keep is None else keep
     new_id = np.cumsum(keep) - 1
     stay = keep[ids]
     place = np.cumsum(stay) - 1  # row in the old order -> row in the new one
-    dtype = bed.runtime.dtype
     for name in ("position", "velocity", "spin", "origin"):
-        e.write(name, state[name][stay].astype(dtype))
-    e.write("id", new_id[ids[stay]].astype(np.int32))
+        e.write(name, state[name][stay])
+    e.write("id", new_id[ids[stay]])
     # The contacts as one list a grain, each pair once, rows from 0: what make_lists takes over as history.
     first, second, _ = touching_pairs(state)
     chosen = stay[first] & stay[second]
     a, b = place[first[chosen]], place[second[chosen]]
     counts = np.bincount(a, minlength=bed.grain_count)
-    start = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int32)
-    e.write("pair_start", start)
-    e.write("pair_end", (start + counts).astype(np.int32))
-    e.write("pair", ~b.astype(np.int32))
-    e.write("slide", state["slide"][chosen])
-    if e.rolling:
-        e.write("roll", state["roll"][chosen])
+    start = np.cumsum(counts) - counts
+    for name, rows in (("pair_start", start), ("pair_end", start + counts), ("pair", ~b)):
+        e.write(name, rows)
+    for name in ("slide", "roll") if e.rolling else ("slide",):
+        e.write(name, state[name][chosen])
     near = stay[state["near_grain"]]
     grain = place[state["near_grain"][near]]
     starts = _chunk_starts(bed.grain_count, e.chunk_count)
@@ -228,14 +321,13 @@ def adopt(bed: BedBase, state: State, *, keep: np.ndarray | None = None) -> None
     bed.make_lists()
     bed.compute_forces()
     # Computed anew they would lack what dashpots know of the step before: only where a contact has gone.
-    lost = np.zeros(len(ids), dtype=bool)
-    apart = stay[first] != stay[second]
+    lost, apart = np.zeros(len(ids), dtype=bool), stay[first] != stay[second]
     lost[first[apart]] = lost[second[apart]] = True
     row = np.empty(bed.grain_count, dtype=np.int64)
     row[new_id[ids[stay]]] = np.flatnonzero(stay)
     row = row[e.read("id")]
     for name in ("force", "torque"):
-        e.write(name, np.where(lost[row, None], e.read(name), state[name][row].astype(dtype)))
+        e.write(name, np.where(lost[row, None], e.read(name), state[name][row]))
     bed.measure_surface()
 
 

@@ -23,10 +23,7 @@ class Steps(EnginePart):
 
     @ti.func
     def move(self, c, dt, limit, gravity, keep):
-        """Kick and drift the grains of a chunk; chunk 0 moves the bodies as well.
-
-        ``keep`` is the share of its speed that drag leaves a grain in a step; 1 without drag.
-        """
+        """Kick and drift the grains of a chunk, with chunk 0 the bodies; drag leaves ``keep`` of a grain's speed."""
         start, end = self.chunk_range(c)
         far = 0
         for i in range(start, end):

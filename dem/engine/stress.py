@@ -15,8 +15,7 @@ from dem.contact.cohesion import jkr_contact
 from dem.contact.law import effective_moduli
 from dem.shapes.basic import PLANE
 
-from .base import BedBase
-from .state import take, touching_pairs
+from .state import BedState, touching_pairs
 from .values import State
 
 __all__ = ["Contacts", "find_contacts", "stress_profile"]
@@ -45,9 +44,9 @@ class Contacts:
     overlap: np.ndarray
 
 
-def find_contacts(bed: BedBase) -> Contacts:
+def find_contacts(bed: BedState) -> Contacts:
     """The contacts of a bed with their spring forces. Of its bodies those count that are planes, as the floor is."""
-    state = take(bed)
+    state = bed.state()
     ids, position = state["id"], state["position"].astype(float)
     first, second, back = touching_pairs(state)
     once = first < second  # a pair across chunks is listed by both
@@ -125,7 +124,7 @@ def _spring_force(
 
 
 def stress_profile(
-    bed: BedBase, edges: np.ndarray, *, contacts: Contacts | None = None, across: Sequence[float] | None = None
+    bed: BedState, edges: np.ndarray, *, contacts: Contacts | None = None, across: Sequence[float] | None = None
 ) -> np.ndarray:
     """Mean stress between horizontal planes [Pa], pressure positive: sum of f l over the volume (Love, Weber).
 

@@ -135,10 +135,7 @@ class Graded:
                 )
 
     def distance(self, x: np.ndarray, z: np.ndarray, size: Sequence[float]) -> np.ndarray:
-        """How far places ``x``, ``z`` [m], arrays of one shape, are from the fine grains [m], 0 among them.
-
-        Periodic along x; ``size`` is the bed's [m].
-        """
+        """Distance [m] from the fine grains, 0 among them, of places x, z [m], of one shape; periodic along x."""
         along = np.mod(x, size[0])
         aside = np.full(np.shape(along), np.inf)
         for low, high in self.footprints:

@@ -152,10 +152,7 @@ def cut_and_load(
 
 
 def check_width(cut: float | None, *, width: float, height: float, grain: float) -> None:
-    """Refuse a cut (None: as wide as the bed is high) in a bed of this width in x and this height [m].
-
-    Raises ValueError as ``cut_and_load`` does.
-    """
+    """Raise ValueError for a cut that does not fit a bed of this width in x and height [m]; None: as wide as high."""
     cut = height if cut is None else cut
     most = width - 2 * (_WEDGE * height + 3 * grain)
     if not 2 * grain <= cut <= most:

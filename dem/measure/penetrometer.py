@@ -168,10 +168,7 @@ def check_cone(
 
 
 def cone_gradient(push: ConePush) -> tuple[float, float]:
-    """Gradient of the cone index with depth [Pa/m], and the index at the surface that the line begins with [Pa].
-
-    Least squares over all samples at which the cone is all in.
-    """
+    """Gradient of the cone index [Pa/m] and its value at the surface [Pa]: least squares where the cone is all in."""
     inside = push.base_depth >= 0
     slope, start = np.polyfit(push.base_depth[inside], push.index[inside], 1)
     return float(slope), float(start)

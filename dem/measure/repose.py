@@ -132,11 +132,7 @@ def angle_of_repose(
 
 
 def check_width(width: float, *, slot: float | None, grain: float, depth: float) -> None:
-    """Raise ValueError for a bed too narrow in x for two slopes beside a slot; lengths [m].
-
-    Args:
-        slot: six mean diameters when None. grain: mean diameter. depth: of the bed.
-    """
+    """Raise ValueError for a bed too narrow in x [m] for two slopes beside a slot [m], six mean diameters when None."""
     slot = SLOT * grain if slot is None else slot
     least = slot + 2 * LEAST_FLANK * grain
     if width < least:

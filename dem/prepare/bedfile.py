@@ -87,10 +87,7 @@ def read_preparation(path: str | Path) -> Prepared:
 def load_prepared(
     path: str | Path, *, arch: str = "cpu", threads: int | None = None, make: type[B] = BedCore
 ) -> Prepared[B]:
-    """A bed of the class ``make`` with its preparation, as ``save_prepared`` wrote it.
-
-    Raises ValueError: as ``read_preparation`` and ``Bed.load``.
-    """
+    """A bed of the class ``make`` with its preparation. Raises ValueError: as ``read_preparation`` and ``Bed.load``."""
     about = read_preparation(path)
     bed = make.load(path, arch=arch, threads=threads)
     bed.recipe = about.recipe

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from dem.contact.timestep import time_step_for
-from dem.engine import state
 from dem.engine.base import FLOOR
+from dem.engine.state import adopt
 from dem.engine.values import BedFailure
 from dem.grains.graded import Graded
 from dem.grains.materials import Facing, Material
@@ -113,10 +113,7 @@ class Laboratory(Preparation[B]):
             self.keep()
 
     def run(self) -> B:
-        """Go on to the end; the bed. Raises as ``prepare_as`` does.
-
-        After a KeyboardInterrupt out of ``progress.update``, between two pieces of the work, it is kept first.
-        """
+        """Go on to the end; the bed. Raises as ``prepare_as``; a KeyboardInterrupt of ``progress`` keeps the work."""
         work = {
             "rain": self._rain_down,
             "stick": self._stick,
@@ -300,7 +297,7 @@ def touching_as(bed: B, material: Material, floor: Facing | None = None) -> B:
     step = time_step_for(material, diameter=2 * float(radii.min()), max_overlap=bed.settings.max_overlap)
     settings = replace(bed.settings, material=material, gravity=bed.gravity, time_step=min(bed.time_step, step))
     new = bed.alike(settings, radii)
-    state.adopt(new, values)
+    adopt(new, values)
     new.overlap_limit, new.recipe = bed.overlap_limit, bed.recipe
     if new.has_floor:
         new.set_facing(FLOOR, floor or Facing())

@@ -36,10 +36,7 @@ _FILLS = ("stick", "fluff", "level", "compact", "packing")
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage.
-
-    ``value``: what stands after the colon, None where no number does; ``by``: "tap" or "lid" (compact), "dry" (rain).
-    """
+    """One stage: ``value`` after the colon, or None; ``by``: "tap" or "lid" (compact), "dry" (rain)."""
 
     name: str
     value: float | None = None
@@ -106,13 +103,7 @@ def check_packing(packing: float, sizes: Sizes, *, cohesive: bool, key: str = "p
 
 
 def check_stages(stages: Sequence[Stage], *, size: Sequence[float], grain: float, sizes: Sizes, cohesive: bool) -> None:
-    """Refuse an order or a number that cannot be, before any work.
-
-    Args:
-        size: of the bed, both widths and the depth [m]. grain: mean diameter [m].
-
-    Raises ValueError: with the key, the stage and what is allowed.
-    """
+    """Raise ValueError for an order or a number that cannot be; ``size`` of the bed, ``grain`` mean diameter [m]."""
     if not stages:
         raise ValueError("stages is empty: 'rain' at least would do")
     if stages[0].name != "rain":

@@ -26,17 +26,7 @@ from dem.measure.grading import measure_grading, surface_under
 
 from .report import B
 
-__all__ = [
-    "BEARING",
-    "BedOptions",
-    "Specification",
-    "bound_of_mean",
-    "cache_folder",
-    "check_options",
-    "fingerprint",
-    "kept_in_cache",
-    "soft_enough",
-]
+__all__ = ["BEARING", "BedOptions", "Specification", "kept_in_cache"]
 
 _EXPECTED_PACKING = 0.57
 # Penetration resistance of sand grows with depth about sixty times as fast as its overburden (3D-RFT, Agarwal et al.
@@ -67,10 +57,8 @@ class BedOptions(TypedDict, total=False):
         (``dem.contact.timestep.choose_young``).
     max_overlap: bound on overlap over diameter, 0.05 if not given; also ends a later run that goes past it. While the
         bed is being made the bound is 5 % if that is more: grains that land do so harder than they are ever pressed.
-    time_step: [s]; at most ``dem.contact.timestep.longest_step``. When None an eighth of the contact time, or the
-        longest stable one where that is shorter, as for strongly damped grains.
     floor: how grains touch the floor; as one another when None.
-    precision: "float64" or "float32". arch: "cpu" or "cuda". threads: all when None.
+    time_step, precision, arch, threads: as for ``Bed.from_grains``.
     """
 
     size: Required[Sequence[float]]

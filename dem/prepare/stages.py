@@ -217,21 +217,15 @@ class Preparation(Generic[B]):
 
 
 def lift_apart(bed: BedCore, times: float, *, speed: float, seed: int) -> None:
-    """Every grain at ``times`` its height, clear of one another, and moving at random, as in a flow from below.
-
-    ``speed``: standard deviation of each component of the velocity [m/s]; their mean is zero.
-    """
+    """Put every grain at ``times`` its height, with random velocities of the standard deviation ``speed`` [m/s]."""
     e = bed.engine
-    position, order = e.read("position"), e.read("id")
+    position, velocity, spin, order = (e.read(name) for name in ("position", "velocity", "spin", "id"))
     position[:, 2] *= times
-    e.write("position", position)
-    velocity = e.read("velocity")
     random = np.random.default_rng(seed).normal(0.0, speed, (len(order), 3))
     velocity[:, :3] = (random - random.mean(axis=0))[order]
-    e.write("velocity", velocity)
-    spin = e.read("spin")
     spin[:, :3] = 0
-    e.write("spin", spin)
+    for name, values in (("position", position), ("velocity", velocity), ("spin", spin)):
+        e.write(name, values)
     bed.make_lists()
     bed.compute_forces()
     bed.shift_velocities(-0.5)

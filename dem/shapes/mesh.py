@@ -4,6 +4,8 @@ A mesh is refused unless a grain can tell its inside from its outside: every edg
 along it in opposite directions, and the normals point outwards. Whether the surface runs through itself is not checked.
 """
 
+import contextlib
+import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -123,9 +125,6 @@ def mesh_from_file(path: str | Path, *, scale: float = 1.0, flip: bool = False) 
     Raises ValueError: no such file, one that meshio cannot read or that holds no surface; a scale that is not positive;
     and what ``Mesh`` refuses.
     """
-    import contextlib
-    import io
-
     import meshio
 
     path = Path(path)

@@ -43,10 +43,7 @@ class Capsule(Shape):
 
 @dataclass(frozen=True)
 class Box(Shape):
-    """A rectangular block of the given ``size`` [m] about ``center`` [m], its sides along the body's axes.
-
-    To turn it, turn the body, or put it in a ``Placed``.
-    """
+    """A block of the given ``size`` [m] about ``center`` [m], its sides along the body's axes; ``Placed`` turns it."""
 
     size: tuple[float, float, float]
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
