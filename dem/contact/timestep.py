@@ -7,7 +7,7 @@ the step of ``dem.contact.law`` linearised. With x the change of a contact's ove
 f its force, in units of m*, S_n and w = sqrt(S_n / m*); q = w dt, c the damping factor, N = z / 3:
     v' = v + q N f,  x' = x + q v',  (1 + q c / 2) f' = -x' - c (3/2 v' - v / 2 - q f / 2).
 An eigenvalue comes to -1 where N q^2 + 4 (N - 1) c q = 4. Alone (N = 1) a pair is stable up to q = 2 with any damping,
-as its own force is solved for; what the neighbours do is seen half a step late, and that is what 4 (N - 1) c q says.
+as its own force is solved for; what the neighbours do is seen half a step late, which gives the term 4 (N - 1) c q.
 Where contacts stick, spins of one sense are stiffer: each contact slips at twice r times the spin, against S_t = K S_n
 and a dashpot that sees the half-step velocity. There 5/3 z (K q^2 + 2 c sqrt(K) q) = 4, K = 2 (1 - nu) / (2 - nu).
 """

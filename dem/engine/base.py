@@ -5,8 +5,6 @@ state, checkpoints, stresses and energies read them (``dem.engine.core`` is what
 """
 
 import math
-from dataclasses import asdict
-from typing import Self
 
 import numpy as np
 import taichi as ti
@@ -82,10 +80,6 @@ class BedBase:
         )
         self.engine.grain_pair[None] = pair_row(stuff, tensile=settings.tensile)
         self.engine.write("body_turn", np.tile([1.0, 0.0, 0.0, 0.0], (MOST_BODIES, 1)))
-
-    def alike(self, settings: BedSettings, radii: np.ndarray) -> Self:
-        """Another bed of the same class, precision, architecture and threads, without grains in it yet."""
-        return type(self)(settings, radii, **asdict(self.runtime))
 
     def let_sleep(self, rules: Sleep | None = None) -> None:
         """From here on grains at rest far from the bodies are not computed; ``dem.engine.sleep`` has the rules.
@@ -188,10 +182,10 @@ class BedBase:
         while done < steps:
             most = steps - done
             if sleeper is not None:
-                forced = sleeper.look()
+                forced = sleeper.check()
                 if forced:  # new lists in the step to come, as if a grain had moved far
                     e.moved[None] = 1
-                most = min(most, sleeper.steps_to_look())
+                most = min(most, sleeper.rules.every - self.steps % sleeper.rules.every)
             advanced, halted = e.launch(most, self.time_step, limit, self.gravity, keep)
             done += advanced
             self._count(advanced)
@@ -219,7 +213,7 @@ class BedBase:
             self.sleeper.slept += steps * self.sleeper.mass
 
     def adapt_skin(self) -> None:
-        """Towards the skin at which lists cost as much to make as their extra pairs cost to look at."""
+        """Towards the skin at which lists cost as much to make as their extra pairs cost to check."""
         steps = max(1, self.steps_since_lists)
         ratio = math.sqrt(_REBUILD_STEPS / (_SKIN_COST * self.skin / self.mean_diameter * steps))
         skin = self.skin * min(1.4, max(0.7, ratio))

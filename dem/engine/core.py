@@ -5,7 +5,6 @@ The modules of dem.engine, dem.measure and dem.prepare are written against ``Bed
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -17,7 +16,7 @@ from dem.shapes.basic import Plane
 
 from .base import FLOOR, check_array
 from .dissipation import PARTS, TURNED, Balance
-from .state import BedState, adopt, laid_end_to_end
+from .state import BedState, laid_end_to_end
 from .stress import find_contacts
 from .values import BedSettings, Grains, State
 
@@ -187,17 +186,13 @@ class BedCore(BedState):
         keep = ~np.asarray(remove, dtype=bool)
         if not keep.any():
             raise ValueError("no grain would be left")
-        values = self.state()
-        radii = values["position"][np.argsort(values["id"]), 3][keep].astype(float)
-        bed = self.alike(replace(self.settings, gravity=self.gravity), radii)
-        adopt(bed, values, keep=keep)
-        return bed
+        return self.successor(self.state(), keep=keep)
 
     def repeated(self, times: int, *, height: float | None = None) -> Self:
         """A bed `times` as long: this one laid end to end along x, where it is periodic, with its contacts' history.
 
         So it is as much at rest as this one, and has the same surface and packing fraction. Copy k of grain i has id
-        i + k grain_count. Its clock begins at 0; sleepers wake, and sums of losses are not gone on with.
+        i + k grain_count. Its clock begins at 0; sleepers wake, and sums of losses start anew.
 
         Args:
             times: how often [1]; with 1 it is a copy.
@@ -216,17 +211,13 @@ class BedCore(BedState):
         if bodies:
             raise ValueError(f"{bodies} bodies beside the floor: a bed is repeated without them, each is in one place")
         self.wake()
-        values = laid_end_to_end(self.state(), times, period=self.size[0])
-        settings = replace(
-            self.settings,
+        bed = self.successor(
+            laid_end_to_end(self.state(), times, period=self.size[0]),
             size=(times * self.size[0], *self.size[1:]),
-            gravity=self.gravity,
             time_step=self.time_step,
             max_overlap=self.overlap_limit,
             height=max(self.height, height or 0.0),
         )
-        bed = self.alike(settings, values["position"][:, 3].astype(float))
-        adopt(bed, values)
         bed.steps = 0
         bed.material = self.material
         bed.recipe = self.recipe | {"repeats": times} if self.recipe else {}
@@ -264,7 +255,8 @@ class BedCore(BedState):
         against tangential forces, and against rolling and twisting torques; it is lost but for what their springs hold
         more than at the start (``dem.engine.energy.bed_energies``). Raises ValueError: it is not tracked.
         """
-        return dict(zip(PARTS, self._balance().sums().tolist(), strict=True))
+        sums = self._balance().sums()
+        return {part: float(sums[part]) for part in PARTS}
 
     def _balance(self) -> Balance:
         if not self.engine.balance.on:
@@ -288,13 +280,13 @@ class BedCore(BedState):
 
         Raises ValueError: it is not tracked.
         """
-        balance = self._balance()
+        sums = self._balance().sums()
         x, v, w, f, t = self.awake_rows("position", "velocity", "spin", "force", "torque")
         radius, mass = x[:, 3], v[:, 3]
         momentum = mass[:, None] * v[:, :3] + self.time_step * f
         own = (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * t
         total = np.cross(x[:, :3], momentum).sum(axis=0) + own.sum(axis=0)
-        return {"grains": total, **dict(zip(TURNED, balance.turns(), strict=True))}
+        return {"grains": total, **{part: sums[part] for part in TURNED}}
 
 
 def _height(height: float | None, positions: np.ndarray, radii: np.ndarray) -> float:

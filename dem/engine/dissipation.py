@@ -14,6 +14,8 @@ to them, and what falling asleep takes). Leapfrog's x_n x m v_(n+1/2) changes by
 A bed without a balance has ``ABSENT`` for a table, and its kernels are compiled without all this.
 """
 
+import itertools
+
 import numpy as np
 import taichi as ti
 
@@ -53,13 +55,10 @@ class Balance:
         for field in (self.last, self.near_last, self.taken, self.turned):
             field.fill(0)
 
-    def sums(self) -> np.ndarray:
-        """Over all chunks, in their order, shape [3] [J]."""
-        return np.asarray(np.cumsum(self.taken.to_numpy(), axis=0)[-1])
-
-    def turns(self) -> np.ndarray:
-        """Angular impulses over all chunks, in their order: a row each of ``TURNED`` [N m s], shape [3, 3]."""
-        return np.asarray(np.cumsum(self.turned.to_numpy(), axis=0)[-1])
+    def sums(self) -> dict[str, np.ndarray]:
+        """Over all chunks, in their order: work by ``PARTS`` [J], and angular impulses by ``TURNED`` [N m s], [3]."""
+        found = (np.cumsum(field.to_numpy(), axis=0)[-1] for field in (self.taken, self.turned))
+        return dict(zip(PARTS + TURNED, itertools.chain(*found), strict=True))
 
     @staticmethod
     def rows(pairs: np.ndarray, near: np.ndarray) -> dict[str, Rows]:

@@ -287,10 +287,6 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         rows, near, chunks = self.pair.shape[0], self.near_grain.shape[0], self.overlap.shape[0]
         return Balance(rows=rows, near=near, chunks=chunks, real=self.real)
 
-    def close_balance(self) -> None:
-        """The kernels are those that sum nothing."""
-        self.balance = ABSENT
-
     def read(self, name: str) -> np.ndarray:
         """A field as a numpy array: the rows of the grains or chunks there are, or all of them."""
         array = getattr(self, name).to_numpy()

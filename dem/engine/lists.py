@@ -21,7 +21,7 @@ BUILT = 2  # place of a number of ``dem.engine.sleep.Rest.news``: the other stor
 SCAN_BLOCKS = 64  # in which cells are added up
 MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
 
-# A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign says "touching".
+# A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign means "touching".
 INDEX_BITS = 26
 INDEX_MASK = (1 << INDEX_BITS) - 1
 SAME_IMAGE = 1 + 3 * 1  # (0 + 1) + 3 * (0 + 1)
@@ -98,7 +98,7 @@ class Lists(EnginePart):
     def nearest(self, b, x, reach, shapes: ti.template(), deep: ti.template()):
         """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point.
 
-        Of bodies farther than ``reach`` the distance may be 1e30. ``deep``: also tell how deep a point far inside is.
+        Of bodies farther than ``reach`` the distance may be 1e30. ``deep``: also find how deep a point far inside is.
         """
         d = self.from_body(b, x)
         q = self.body_turn[b]

@@ -24,8 +24,8 @@ def take_rows(field: Any, rows: Rows, *, part: int | None = None) -> np.ndarray:
     width = () if isinstance(field, ti.ScalarField) else (field.n,)
     values = np.zeros((len(rows), *(width or (1,))), dtype=to_numpy_type(field.dtype))
     if len(rows):
-        whole = (0 if part is None else part, part is not None)
-        _take(field, np.ascontiguousarray(rows, dtype=np.int32), values, bool(width), *whole)
+        which = (0 if part is None else part, part is not None)
+        _take(field, np.ascontiguousarray(rows, dtype=np.int32), values, bool(width), *which)
     return values.reshape(len(rows), *width)
 
 
@@ -43,7 +43,7 @@ def read_fields(table: Any, rows: Mapping[str, Rows], prefix: str) -> dict[str, 
 
 
 def write_fields(table: Any, rows: Mapping[str, Rows], prefix: str, state: Mapping[str, np.ndarray]) -> None:
-    """Put back what ``read_fields`` gave; all other rows become zero."""
+    """Put back what ``read_fields`` returned; all other rows become zero."""
     for name, where in rows.items():
         put_rows(getattr(table, name), state[prefix + name], where)
 

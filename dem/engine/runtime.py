@@ -12,12 +12,10 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 __all__ = ["Runtime", "generation", "start"]
 
 ARCHITECTURES = ("cpu", "cuda")
-PRECISIONS = {"float64": np.float64, "float32": np.float32}
+PRECISIONS = ("float64", "float32")
 
 
 @dataclass(frozen=True)
@@ -27,11 +25,6 @@ class Runtime:
     arch: str
     threads: int
     precision: str
-
-    @property
-    def dtype(self):
-        """The numpy type of the grains' numbers."""
-        return PRECISIONS[self.precision]
 
 
 _current: Runtime | None = None

@@ -76,7 +76,7 @@ class ShapeTable:
     def distance_to(self, k, kind, row: ti.template(), p, reach, deep: ti.template()):
         """Signed distance, outward unit normal and curvature of shape k at a point of the body's frame.
 
-        Of a mesh that is farther than ``reach`` the distance may be FAR. With ``deep`` it is told for points that lie
+        Of a mesh that is farther than ``reach`` the distance may be FAR. With ``deep`` it is given for points that lie
         deeper inside a mesh than that as well.
         """
         place = self.place[k]
@@ -229,7 +229,7 @@ class Shapes(EnginePart):
         }
 
     def restore_shapes(self, state: dict[str, np.ndarray]) -> None:
-        """Bring the shapes to what ``shape_state`` gave."""
+        """Bring the shapes to what ``shape_state`` returned."""
         if "primitive_place" not in state:
             self.clear_shapes()
             return

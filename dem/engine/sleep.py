@@ -2,20 +2,20 @@
 
 The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g gravity, all of the bed:
 
-* A grain falls asleep when its speed and its surface's turning have been below ``speed`` sqrt(g d) at every look for
+* A grain falls asleep when its speed and its surface's turning have been below ``speed`` sqrt(g d) at every check for
   ``calm`` sqrt(d / g), no grain that it touches moves faster, and no body but the floor is within ``reach`` d.
 * Asleep it stands still, an unmovable grain to those awake, and its contacts with other sleepers keep their springs.
 * It wakes when a body comes within ``reach`` d; when the spring force of a contact with a grain awake has changed by
   ``force`` m g, and by ``share`` of what it was, since the two last were alike, be it that the contact opens or closes;
   when a grain awake that is listed with it moves faster than ``waking_speed`` sqrt(g d). For the last two all sleepers
-  in its cell of the grid and the 26 around it wake with it. Looked at every ``every`` steps, and when lists are made.
+  in its cell of the grid and the 26 around it wake with it. Checked every ``every`` steps, and when lists are made.
 
-Whether a packing that bears F yields under a change of F goes by their ratio, for friction has no force of its own;
+Whether a packing that carries F yields under a change of F goes by their ratio, for friction has no force of its own;
 hence ``share``. ``force`` is for contacts that carry next to nothing.
 
 In memory those awake come first, in the order of the curve, and chunks, lists and loops are theirs alone; that is all
 that the step knows of sleep. Who sleeps changes when lists are made, on steps that do not depend on how a run is cut,
-by flags that are raised and never lowered within a look: the same bits on any number of threads.
+by flags that are raised and never lowered within a check: the same bits on any number of threads.
 
 What a sleeper would have passed on is held by nobody but the floor: ``Bed.reaction`` of the floor has their weight, the
 force of those awake on them, and the momentum that falling asleep took.
@@ -35,9 +35,9 @@ from .values import BedFailure, State
 
 __all__ = ["Sleep", "Sleeper"]
 
-# A look for grains at rest is worth new lists when this share of those awake can fall asleep.
+# A check for grains at rest is worth new lists when this share of those awake can fall asleep.
 _WORTH = 0.02
-_LOOKS_OF_CALM = 4
+_CALM_CHECKS = 4
 
 
 class SleepyBed(Protocol):
@@ -63,7 +63,7 @@ class Sleep:
     share: float = 0.5  # the least of it over the force itself [1]; both must be reached
     waking_speed: float = 5e-2  # Speed of a neighbour that wakes [sqrt(g d)]
     every: int = 50
-    """Steps between two looks: what wakes makes new lists, and those cost as much as four steps of all grains."""
+    """Steps between two checks: what wakes makes new lists, and those cost as much as four steps of all grains."""
 
     def __post_init__(self):
         for name, value in asdict(self).items():
@@ -79,7 +79,7 @@ class Sleep:
 
 
 class Sleeper:
-    """What a bed needs to let its grains sleep: the rules in its own units, the looks, and its part of the state."""
+    """What a bed needs to let its grains sleep: the rules in its own units, the checks, and its part of the state."""
 
     def __init__(self, bed: SleepyBed, rules: Sleep):
         self.bed, self.rules = bed, rules
@@ -91,27 +91,23 @@ class Sleeper:
         weight = g * total / bed.grain_count
         self.limit, self.reach = rules.force * weight, rules.reach * d
         self.fast, self.slow = (share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed))
-        looks = rules.calm * math.sqrt(d / g) / bed.time_step / rules.every / _LOOKS_OF_CALM
-        self.rest_every = max(1, round(looks)) * rules.every
+        checks = rules.calm * math.sqrt(d / g) / bed.time_step / rules.every / _CALM_CHECKS
+        self.rest_every = max(1, round(checks)) * rules.every
         self.awake = bed.grain_count
         self.mass = 0.0
         self.slept = 0.0  # Mass asleep, summed over the steps of the last advance [kg]
         self.leaving = False
 
-    def steps_to_look(self) -> int:
-        """Until the next look."""
-        return self.rules.every - self.bed.steps % self.rules.every
-
-    def look(self) -> bool:
-        """The look of this step, if one is due: whether lists are to be made for it."""
+    def check(self) -> bool:
+        """The check of this step, if one is due: whether lists are to be made for it."""
         e, rest, steps = self.bed.engine, self.bed.engine.rest, self.bed.steps
         if steps % self.rules.every:
             return False
         if self.awake < self.bed.grain_count:
-            e.look(self.limit, self.rules.share, self.fast, rest)
+            e.check_contacts(self.limit, self.rules.share, self.fast, rest)
         self.leaving = False
         if steps % self.rest_every == 0:
-            e.look_for_rest(self.slow, _LOOKS_OF_CALM, self.reach, rest, e.shapes)
+            e.find_calm(self.slow, _CALM_CHECKS, self.reach, rest, e.shapes)
         news = rest.news.to_numpy()
         self.leaving = steps % self.rest_every == 0 and int(news[LEAVING]) > _WORTH * self.awake
         return bool(news[WOKEN]) or self.leaving
@@ -122,7 +118,7 @@ class Sleeper:
         if all_awake:
             rest.woken.fill(1)
         elif self.awake < self.bed.grain_count:
-            e.look(self.limit, self.rules.share, self.fast, rest)
+            e.check_contacts(self.limit, self.rules.share, self.fast, rest)
         e.stir(self.bed.time_step, self.reach, int(self.leaving), rest, e.shapes, e.balance)
         rest.news.fill(0)
         if self.leaving:
@@ -191,7 +187,7 @@ class Sleeper:
         }
 
     def restore(self, state: State, rows: np.ndarray) -> None:
-        """Go back to what ``state`` gave; the lists are already as they were."""
+        """Go back to what ``state`` returned; the lists are already as they were."""
         e, rest, n = self.bed.engine, self.bed.engine.rest, self.bed.grain_count
         write_fields(rest, self._rows(rows), "sleep_", state)
         owner = state["sleep_store_owner"]

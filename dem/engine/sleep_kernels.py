@@ -19,7 +19,7 @@ _BEHIND = 2
 _BLOCK = 32
 # Places of the numbers in Rest.near: where bodies are along x, and how far to both sides; below them.
 _MIDDLE, _HALF, _BELOW = range(3)
-# Places of what a look found, in Rest.news.
+# Places of what a check found, in Rest.news.
 WOKEN, LEAVING, FULL = 0, 1, 3  # and lists.BUILT
 
 
@@ -32,7 +32,7 @@ class Rest:
 
     def __init__(self, *, grains: int, cells: int, chunks: int, rows: int, real):
         F = ti.Vector.field
-        # ``was``: before the lists were last made. ``quiet``: looks in a row at which it was slow.
+        # ``was``: before the lists were last made. ``quiet``: checks in a row at which it was slow.
         self.asleep, self.was, self.woken, self.leaves, self.quiet, self.busy = (
             ti.field(ti.i32, grains) for _ in range(6)
         )
@@ -69,7 +69,7 @@ class Rest:
 
     @ti.func
     def before(self, awake, grains):
-        """Where sleepers begin that had no rows when as many as ``awake`` says were."""
+        """Where sleepers begin that had no rows when as many as ``awake`` were awake."""
         return ti.select(self.whole[None] == 1, grains, awake[None])
 
     @ti.func
@@ -116,7 +116,7 @@ class Sleepers(EnginePart):
         return found
 
     @ti.kernel
-    def look(self, limit: float, share: float, fast: float, rest: ti.template()):
+    def check_contacts(self, limit: float, share: float, fast: float, rest: ti.template()):
         """Raise the flags of sleepers that are to wake: a contact's force changed by ``limit`` [N] and this share of
         it, a ``fast`` [m/s] neighbour."""
         for i in range(self.count[self.AWAKE]):
@@ -135,7 +135,7 @@ class Sleepers(EnginePart):
                         rest.news[WOKEN] = 1
 
     @ti.kernel
-    def look_for_rest(self, slow: float, patience: int, reach: float, rest: ti.template(), shapes: ti.template()):
+    def find_calm(self, slow: float, patience: int, reach: float, rest: ti.template(), shapes: ti.template()):
         """Mark who may fall asleep, and count them."""
         for _ in range(1):
             rest.news[LEAVING] = 0

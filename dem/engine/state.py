@@ -9,7 +9,7 @@ import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -20,7 +20,7 @@ from dem.grains.materials import Material
 
 from .bodies import BedBodies
 from .engine import Engine
-from .lists import INDEX_BITS, INDEX_MASK
+from .lists import ABSENT, INDEX_BITS, INDEX_MASK
 from .rows import read_fields, row_numbers, take_rows, write_fields
 from .sleep import Sleep, Sleeper
 from .values import BedSettings, State
@@ -107,7 +107,7 @@ class BedState(BedBodies):
                 f"this state has {len(values['id'])} grains in {len(values['near_count'])} chunks, the bed "
                 f"{self.grain_count} in {e.chunk_count}; it belongs to another bed"
             )
-        if values["position"].dtype != self.runtime.dtype:
+        if values["position"].dtype != self.runtime.precision:
             raise ValueError(f"this state is in {values['position'].dtype}, the bed in {self.runtime.precision}")
         for name in (*GRAIN_FIELDS, *BODY_FIELDS):
             e.write(name, values[name])
@@ -127,7 +127,7 @@ class BedState(BedBodies):
         for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
             e.write(name, values[name], at)
         near = _write_near(e, values["near_count"], values)
-        e.close_balance()
+        e.balance = ABSENT
         if "ledger_taken" in values:
             x, y, z = (float(v) for v in values["reals"][2:5])
             e.open_balance((x, y, z))
@@ -146,6 +146,14 @@ class BedState(BedBodies):
             e.count[e.AWAKE], e.count[e.CHUNKS] = int(awake), int(chunks)
             self.sleeper = Sleeper(self, Sleep(*values["sleep_rules"][:-1], every=int(values["sleep_rules"][-1])))
             self.sleeper.restore(values, rows)
+
+    def successor(self, values: State, *, keep: np.ndarray | None = None, **changes: Any) -> Self:
+        """Another bed, of the grains of a state or those to ``keep``, by id; ``changes`` are to the settings."""
+        radii = values["position"][np.argsort(values["id"]), 3].astype(float)
+        settings = replace(self.settings, gravity=self.gravity, **changes)
+        bed = type(self)(settings, radii if keep is None else radii[keep], **asdict(self.runtime))
+        adopt(bed, values, keep=keep)
+        return bed
 
     def checkpoint(self) -> Checkpoint:
         """Keep what the next steps depend on for ``rollback``, in the memory of the device: on a GPU nothing is read.
@@ -256,19 +264,20 @@ def read_file(path: Path) -> tuple[BedSettings, State, str]:
     if found == STATE_FORMATS[0] and "material_numbers" in stored:
         stored["material_numbers"] = np.append(stored["material_numbers"], 0.0)
         stored["cohesion"] = np.array("none")
-    lacking = [key for key in (*ABOUT, *(f"state.{name}" for name in NAMES)) if key not in stored]
-    if lacking:
-        raise ValueError(f"{path} is not a whole bed saved by hedgebed: it lacks {', '.join(lacking)}")
+    missing = [key for key in (*ABOUT, *(f"state.{name}" for name in NAMES)) if key not in stored]
+    if missing:
+        raise ValueError(f"{path} is not a whole bed saved by hedgebed: it lacks {', '.join(missing)}")
     numbers: Any = dict(zip(MATERIAL_NUMBERS, map(float, stored["material_numbers"]), strict=True))
     state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
     if found != STATE_FORMAT:
         for key in ("slide", "near_slide"):  # 0: as of a contact that has just begun
             state[key] = np.pad(state[key], ((0, 0), (0, 1)))
     seed = int(stored["seed"])
+    (x, y, z), (gx, gy, gz) = map(float, stored["size"]), map(float, state["reals"][2:5])
     settings = BedSettings(
         material=Material(str(stored["material"]), cohesion=str(stored["cohesion"]), **numbers),
-        size=_three(stored["size"]),
-        gravity=_three(state["reals"][2:5]),
+        size=(x, y, z),
+        gravity=(gx, gy, gz),
         time_step=float(state["reals"][0]),
         max_overlap=float(state["reals"][7]),
         height=float(stored["height"]),
@@ -276,11 +285,6 @@ def read_file(path: Path) -> tuple[BedSettings, State, str]:
         seed=None if seed < 0 else seed,
     )
     return settings, state, str(stored["precision"])
-
-
-def _three(values: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return x, y, z
 
 
 def adopt(bed: BedBodies, state: State, *, keep: np.ndarray | None = None) -> None:
@@ -320,7 +324,7 @@ def adopt(bed: BedBodies, state: State, *, keep: np.ndarray | None = None) -> No
     bed.steps = int(state["numbers"][0])
     bed.make_lists()
     bed.compute_forces()
-    # Computed anew they would lack what dashpots know of the step before: only where a contact has gone.
+    # Computed anew they are without what dashpots know of the step before: only where a contact has gone.
     lost, apart = np.zeros(len(ids), dtype=bool), stay[first] != stay[second]
     lost[first[apart]] = lost[second[apart]] = True
     row = np.empty(bed.grain_count, dtype=np.int64)

@@ -80,10 +80,7 @@ class Steps(EnginePart):
         base = c * self.count[self.CHUNK_ROOM]
         last = base
         rows = base
-        if ti.static(rest.on):
-            if end > start:
-                rows = self.pair_end[end - 1]
-        else:
+        if end > start:  # with sleepers a chunk may be empty
             rows = self.pair_end[end - 1]
         for s in range(base, rows):
             code = self.pair[s]

@@ -34,13 +34,7 @@ class BedFailure(RuntimeError):  # noqa: N818 - the name in the architecture
 
 @dataclass(frozen=True)
 class BedSettings:
-    """What a bed is made with.
-
-    Attributes:
-        material: of the (softened) grains. size: lateral periods and nominal depth (x, y, z) [m].
-        gravity: vector at the start [m/s2]. time_step: [s]. max_overlap: bound on overlap over diameter [1].
-        height: top of the box [m]. tensile: whether damping may pull at the end of a contact. seed: None: not drawn.
-    """
+    """What a bed is made with: the arguments of ``BedCore.from_grains``, chosen where they were left open; SI units."""
 
     material: Material
     size: tuple[float, float, float]

@@ -5,7 +5,7 @@ down to a depth, and from there on ``growth`` metres more for each metre away, u
 through large ones where they fit between them. Three spheres of diameter D that touch leave a throat of
 2 / sqrt(3) - 1 = 0.155 D, below which a grain falls through a dense packing by its own weight (Savage & Lun 1988,
 J. Fluid Mech. 189:311); four in a square leave sqrt(2) - 1 = 0.414 D. So that no grain passes even those, the field
-rises no faster than ``steepest`` says. Rings of five and more leave wider ones; docs/bed.md has how much goes through.
+rises no faster than ``steepest``. Rings of five and more leave wider ones; docs/bed.md has how much goes through.
 """
 
 import math

@@ -193,7 +193,7 @@ PRESETS = Path(__file__).parents[1] / "presets"
 def read_material(path: str | Path) -> Material:
     """The material in a file of the form that this module's docstring gives.
 
-    Raises ValueError: a file that cannot be read or is not of this form, a key that there is not or that lacks, a value
+    Raises ValueError: a file that cannot be read or is not of this form, an unknown or a missing key, a value
     of the wrong kind or that no material can have, the name of a material that ships with other numbers.
     """
     stuff = _read(Path(path))
@@ -289,6 +289,6 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
 
 
 def caveat(stuff: Material) -> str | None:
-    """A sentence for the warnings of a run: what ``CAVEATS`` says of the material; None where there is nothing."""
-    said = CAVEATS.get(stuff.name)
-    return said and f"the grains are {stuff.name!r}: {said} (docs/materials.md)"
+    """A sentence for the warnings of a run: what ``CAVEATS`` has on the material; None where there is nothing."""
+    known = CAVEATS.get(stuff.name)
+    return known and f"the grains are {stuff.name!r}: {known} (docs/materials.md)"

@@ -22,7 +22,7 @@ from .repose import COLUMN, Flank, from_middle, measure_flanks, thickness_profil
 __all__ = ["FALLEN_SHARE", "LEAST", "MOST", "VerticalCut", "check_width", "cohesion_of", "cut_and_load"]
 
 LEAST, MOST = 0.1, 4.0
-"""Gravities between which a face is tried if nothing else is said, over the bed's own [1]; the grains of a bed may be
+"""Gravities between which a face is tried if nothing else is given, over the bed's own [1]; the grains of a bed may be
 too soft beyond (see ``dem.measure.shearing.MOST_PRESSURE``), which its overlaps show."""
 STEP = math.sqrt(2.0)  # Gravity rises by this factor; where a face has fallen the middle is tried as well
 # Slope of the wedge that is watched behind a face: tan(45 - 30/2 degrees), Rankine's for a friction angle of 30.

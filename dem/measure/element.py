@@ -1,6 +1,6 @@
 """A sample without weight between two rough walls, pressed and sheared: strength as a function of the grains alone.
 
-Gravity is off, so that every layer bears the same stresses and no weight feigns a cohesion (docs/bed.md, Strength); the
+Gravity is off, so that every layer carries the same stresses and weight is not taken for cohesion (docs/bed.md); the
 sample is periodic sideways, floor and lid are planes on which grains neither slide nor roll, as in
 ``dem.measure.shearing``. Nothing in it has a length but the grains: stresses scale with the pressure, and with cohesion
 the strength depends on surface energy over pressure times diameter.
@@ -41,14 +41,14 @@ _SITES = 1.06
 # Packing that the height is reckoned with.
 _PACKING = 0.58
 # Speeds over sqrt(pressure / density): of the lid on its way to the grains, and of its servo per share of pressure that
-# lacks; steps between two looks of the servo, and in how many units of time what still lacks is taken into its speed
-# while the sample is sheared: one that dilates steadily needs a lid that rises steadily.
+# is missing; steps between two checks of the servo, and in how many units of time what is missing is taken into its
+# speed while the sample is sheared: one that dilates steadily needs a lid that rises steadily.
 _APPROACH, _SERVO, _STEPS, _REMEMBERS = 0.3, 0.06, 20, 4.0
 # The servo's bound for stiff samples. Their modulus M goes as young^2/3 pressure^1/3: the lid gains on its pressure at
 # the rate servo M / pressure / height, which sound brings back to it after height / sqrt(M / density). The product of
 # the two, servo (young / pressure)^1/3, must stay near 1 or below: at 1.25 samples came to rest, at 1.4 none of three.
 _STABLE = 0.8
-# Time constants of the drag while the grains are brought together (a shorter one would bear the lid in their stead: at
+# Time constants of the drag while the grains are brought together (a shorter one would carry the lid instead: at
 # a tenth of sqrt(pressure / density) a layer of ten diameters takes 6 % of the pressure) and while they come to rest;
 # how long pressure and rest must hold, when it gives up [units of time].
 _THIN, _DRAG, _HOLDS, _LONGEST = 10.0, 1.0, 3.0, 600.0
@@ -56,8 +56,8 @@ _THIN, _DRAG, _HOLDS, _LONGEST = 10.0, 1.0, 3.0, 600.0
 _NEAR, _CALM = 0.02, 1e-5
 # Layers next to floor and lid that are left out of the stress and the packing [mean diameters].
 _MARGIN = 2.0
-# Strain between two looks at the stress inside.
-_LOOK = 0.02
+# Strain between two samples of the stress inside.
+_SAMPLE = 0.02
 # The grains are made for this many times the pressure: chains of force under shear are stronger than at rest.
 _SPARE = 1.5
 # The worst of thousands of contacts over a long shear goes past what a bed is softened for; the bound is this many
@@ -108,12 +108,12 @@ class _Wall:
         return float(self.bed.body_position(self.body)[2])
 
     def press(self, drag_time: float) -> float:
-        """A few steps towards the pressure; the share of it that lacks [1]."""
+        """A few steps towards the pressure; the missing share of it [1]."""
         self.bed.advance(_STEPS, drag_time=drag_time)
-        lacking = 1 - float(self.bed.reaction(self.body)[0][2]) / (self.pressure * self.area)
-        down = _APPROACH if lacking > 0.6 else self._servo * max(-1.0, lacking)
+        missing = 1 - float(self.bed.reaction(self.body)[0][2]) / (self.pressure * self.area)
+        down = _APPROACH if missing > 0.6 else self._servo * max(-1.0, missing)
         self.bed.move_body(self.body, velocity=(0.0, 0.0, -down * self.speed))
-        return lacking
+        return missing
 
     def shear(self, sideways: float) -> np.ndarray:
         """A few steps on its way sideways [m/s]; what the grains pushed it with meanwhile [N], shape [3]."""
@@ -208,16 +208,16 @@ def _touch(bed: BedCore, body: int, *, friction: float | None = None, adhesive: 
 
 
 def _rest(bed: BedCore, wall: _Wall, grain: float) -> None:
-    held, began, energy, lacking = 0.0, bed.time, math.inf, 1.0
+    held, began, energy, missing = 0.0, bed.time, math.inf, 1.0
     while held < _HOLDS * wall.unit:
-        drag = _THIN if lacking > 0.2 else _DRAG
-        lacking = wall.press(max(2.01 * bed.time_step, drag * wall.unit))
-        if near := abs(lacking) < _NEAR:
+        drag = _THIN if missing > 0.2 else _DRAG
+        missing = wall.press(max(2.01 * bed.time_step, drag * wall.unit))
+        if near := abs(missing) < _NEAR:
             energy = bed.kinetic_energy / bed.grain_count / (wall.pressure * grain**3)
         held = held + _STEPS * bed.time_step if near and energy < _CALM else 0.0
         if bed.time - began > _LONGEST * wall.unit:
             raise BedFailure(
-                f"the sample did not come to rest under its lid: of {wall.pressure:.4g} Pa {100 * lacking:.3g} % lack, "
+                f"the sample did not come to rest under its lid: of {wall.pressure:.4g} Pa {100 * missing:.3g} % lack, "
                 f"{energy:.1e} p d^3 of kinetic energy a grain ({_CALM:g} was wanted)"
             )
 
@@ -248,14 +248,14 @@ def shear_element(
     before, start = wall.height, float(bed.body_position(body)[0])
     speed = inertial_number * before / wall.unit
     bed.max_overlap = 0.0
-    rows, looks = [], [_look(bed, 0.0, before, grain)]
+    rows, samples = [], [_sample(bed, 0.0, before, grain)]
     while (gone := (float(bed.body_position(body)[0]) - start) / before) < strain:
         force = wall.shear(speed)
         rows.append((gone, wall.height, -force[0] / wall.area, force[2] / wall.area))
-        if gone >= looks[-1][0] + _LOOK:
-            looks.append(_look(bed, gone, wall.height, grain))
+        if gone >= samples[-1][0] + _SAMPLE:
+            samples.append(_sample(bed, gone, wall.height, grain))
             tell(0.1 + 0.9 * min(1.0, gone / strain))
-    inside_strain, packing, stress = (np.array(values) for values in zip(*looks, strict=True))
+    inside_strain, packing, stress = (np.array(values) for values in zip(*samples, strict=True))
     return ElementShear(
         *np.array(rows).T,
         inside_strain=inside_strain,
@@ -263,14 +263,14 @@ def shear_element(
         stress=stress,
         pressure=pressure,
         inertial_number=inertial_number,
-        packing_before=looks[0][1],
+        packing_before=samples[0][1],
         young=bed.material.young,
         grain_count=bed.grain_count,
         max_overlap=bed.max_overlap,
     )
 
 
-def _look(bed: BedCore, strain: float, height: float, grain: float) -> tuple[float, float, np.ndarray]:
+def _sample(bed: BedCore, strain: float, height: float, grain: float) -> tuple[float, float, np.ndarray]:
     edges = np.array([_MARGIN * grain, height - _MARGIN * grain])
     grains = bed.grains()
     packing = packing_profile(grains.position[:, 2], grains.radius, bed.size[0] * bed.size[1], edges)

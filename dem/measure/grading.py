@@ -19,7 +19,7 @@ _SCATTER = 1.0
 _FINENESS = 8  # squares of half a fine diameter over this measure the zones
 _LEAST = 30.0  # a zone of fewer of its grains' cubes has no packing fraction to speak of
 MOST_STRAYED, MOST_DRAINED = 0.02, 1e-4
-"""Shares of the solid volume; with more astray, or fit to fall through, the grading did not hold [1]."""
+"""Shares of the solid volume; with more out of place, or small enough to fall through, the grading did not hold [1]."""
 
 
 @dataclass(frozen=True)

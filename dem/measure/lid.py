@@ -14,7 +14,7 @@ __all__ = ["ROUGH", "Lid", "Tell", "add_lid", "refuse_not_positive", "refuse_til
 Tell = Callable[[float], None]  # Called with the share done, 0 to 1
 ROUGH = 10.0
 """Friction and rolling friction of a grain on a rough wall [1]: ten times what any grain has."""
-# Steps between two looks of the servo at the force; its fastest speed over sqrt(g d); and how long the pressure must
+# Steps between two checks of the servo; its fastest speed over sqrt(g d); and how long the pressure must
 # hold, over the time that a grain takes to fall the bed's depth.
 _STEPS, _SPEED, _HOLDS = 10, 0.1, 0.3
 # The pressure is there when it is met within this share and the grains' energy is below so many m g d.
@@ -77,7 +77,7 @@ class Lid:
 
         Args:
             pressure: wanted [Pa].
-            stay: it stays on, pressing; ``notes["lifting"]`` says that the pressure is there.
+            stay: it stays on, pressing; ``notes["lifting"]`` is then 1 once the pressure is there.
 
         Raises BedFailure: the pressure is not met in time.
         """
@@ -88,14 +88,19 @@ class Lid:
             if notes["lifting"]:
                 bed.move_body(notes["body"], velocity=(0.0, 0.0, self.speed))
                 bed.advance(_STEPS, drag_time=self._drag_time)
-                if self._force == 0.0:
-                    self._take_off()
-                    return True
-                continue
+                if self._force != 0.0:
+                    continue
+                # It touches nothing any more: out of the bed with it, whose last body it is.
+                bed.engine.body_count[None] = notes["body"]
+                bed.make_lists()
+                bed.compute_forces()
+                for key in ("body", "began", "held", "lifting"):
+                    del notes[key]
+                return True
             bed.advance(_STEPS, drag_time=self._drag_time)
-            lacking = (target - self._force) / target
-            bed.move_body(notes["body"], velocity=(0.0, 0.0, -self.speed * max(-1.0, min(1.0, lacking))))
-            calm = abs(lacking) < _NEAR and bed.kinetic_energy / bed.weight / self._grain < _CALM
+            missing = (target - self._force) / target
+            bed.move_body(notes["body"], velocity=(0.0, 0.0, -self.speed * max(-1.0, min(1.0, missing))))
+            calm = abs(missing) < _NEAR and bed.kinetic_energy / bed.weight / self._grain < _CALM
             notes["held"] = notes["held"] + _STEPS * bed.time_step if calm else 0.0
             if notes["held"] > _HOLDS * self._fall_time:
                 bed.measure_surface()
@@ -109,12 +114,3 @@ class Lid:
                 f"{target:.3g} N wanted"
             )
         return False
-
-    def _take_off(self) -> None:
-        """Take the lid, which touches nothing any more, out of the bed; it is its last body."""
-        bed = self.bed
-        bed.engine.body_count[None] = self.notes["body"]
-        bed.make_lists()
-        bed.compute_forces()
-        for key in ("body", "began", "held", "lifting"):
-            del self.notes[key]

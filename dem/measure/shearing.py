@@ -18,8 +18,8 @@ from .lid import ROUGH, Lid, Tell, refuse_not_positive
 
 __all__ = ["MOST_PRESSURE", "Shearing", "shear_bed"]
 
-# Steps between two looks of the servo; and over the time in which a grain falls the bed's depth, how long it takes what
-# still lacks into its speed: a bed that dilates steadily needs a lid that rises steadily.
+# Steps between two checks of the servo; over the time in which a grain falls the depth of the bed, how long it takes
+# what is still missing into its speed: a bed that dilates steadily needs a lid that rises steadily.
 _STEPS, _REMEMBERS = 20, 0.2
 # A lid may press this many times what lies on the floor: more makes overlaps grow past their bound at the rough walls.
 MOST_PRESSURE = 4.0
@@ -84,9 +84,9 @@ def shear_bed(
     while (gone := float(bed.body_position(body)[0] - start[0])) < way:
         bed.advance(_STEPS)
         force = bed.reaction(body)[0]
-        lacking = max(-1.0, min(1.0, (pressure * area - force[2]) / (pressure * area)))
-        bed.move_body(body, velocity=(speed, 0.0, -servo * lacking - steady))
-        steady += servo * lacking * _STEPS * bed.time_step / (_REMEMBERS * fall)
+        missing = max(-1.0, min(1.0, (pressure * area - force[2]) / (pressure * area)))
+        bed.move_body(body, velocity=(speed, 0.0, -servo * missing - steady))
+        steady += servo * missing * _STEPS * bed.time_step / (_REMEMBERS * fall)
         rows.append((gone, float(bed.body_position(body)[2] - height), -force[0] / area, force[2] / area))
         if len(rows) % 20 == 0:
             tell(min(1.0, gone / way))

@@ -4,7 +4,7 @@ import json
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from dem.contact.timestep import time_step_for
 from dem.engine.base import FLOOR
-from dem.engine.state import adopt
 from dem.engine.values import BedFailure
 from dem.grains.graded import Graded
 from dem.grains.materials import Facing, Material
@@ -184,7 +183,7 @@ class Laboratory(Preparation[B]):
     def _to_packing(self, stage: Stage) -> Json:
         assert stage.value is not None
         self._reach(stage.value, self.notes)
-        return self._said()
+        return self._results()
 
     def _compact(self, stage: Stage) -> Json:
         found, wanted = self.bed.packing_fraction, stage.value
@@ -198,9 +197,9 @@ class Laboratory(Preparation[B]):
             self._press_to(wanted)
         else:
             self._tap_to(wanted, self.notes)
-        return self._said()
+        return self._results()
 
-    def _said(self) -> Json:
+    def _results(self) -> Json:
         return {key: self.notes[key] for key in ("taps", "pressure", "packing_under_it", "trace") if key in self.notes}
 
     def _press_to(self, packing: float) -> None:
@@ -293,11 +292,9 @@ def touching_as(bed: B, material: Material, floor: Facing | None = None) -> B:
         )
     bed.wake()
     values = bed.state()
-    radii = values["position"][values["id"].argsort(), 3].astype(float)
-    step = time_step_for(material, diameter=2 * float(radii.min()), max_overlap=bed.settings.max_overlap)
-    settings = replace(bed.settings, material=material, gravity=bed.gravity, time_step=min(bed.time_step, step))
-    new = bed.alike(settings, radii)
-    adopt(new, values)
+    smallest = 2 * float(values["position"][:, 3].min())
+    step = time_step_for(material, diameter=smallest, max_overlap=bed.settings.max_overlap)
+    new = bed.successor(values, material=material, time_step=min(bed.time_step, step))
     new.overlap_limit, new.recipe = bed.overlap_limit, bed.recipe
     if new.has_floor:
         new.set_facing(FLOOR, floor or Facing())
