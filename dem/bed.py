@@ -44,7 +44,7 @@ class Bed(BedCore):
 
     @classmethod
     def load_prepared(cls, path: str | Path, *, arch: str = "cpu", threads: int | None = None) -> Prepared[Self]:
-        """A bed from a file, with its recipe and reports."""
+        """A bed from a file, with its recipe and reports. Raises ValueError: as ``Bed.load``."""
         return load_prepared(path, arch=arch, threads=threads, make=cls)
 
     hold = renamed("hold", "checkpoint")

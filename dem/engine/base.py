@@ -82,7 +82,7 @@ class BedBase:
         self.engine.write("body_turn", np.tile([1.0, 0.0, 0.0, 0.0], (MOST_BODIES, 1)))
 
     def let_sleep(self, rules: Sleep | None = None) -> None:
-        """From here on grains at rest far from the bodies are not computed; ``dem.engine.sleep`` has the rules.
+        """Stop computing grains at rest far from the bodies; ``dem.engine.sleep`` has the rules.
 
         What is read of the bed counts sleepers in, with no speed and no force. The floor's reaction has what they would
         have passed on to it. Raises ValueError: a bed on a GPU, without floor or gravity, or whose grains cohere by
@@ -100,7 +100,7 @@ class BedBase:
         self.sleeper = Sleeper(self, rules or Sleep())
 
     def wake(self) -> None:
-        """All grains are awake and stay so."""
+        """Wake all grains, which then stay awake."""
         self.check_valid()
         if self.sleeper is not None:
             self.make_lists(all_awake=True)
@@ -110,7 +110,7 @@ class BedBase:
 
     @property
     def awake_count(self) -> int:
-        """Grains that are computed."""
+        """Number of grains that are computed: all that do not sleep."""
         return self.grain_count if self.sleeper is None else self.sleeper.awake
 
     @property
@@ -213,7 +213,7 @@ class BedBase:
             self.sleeper.slept += steps * self.sleeper.mass
 
     def adapt_skin(self) -> None:
-        """Towards the skin at which lists cost as much to make as their extra pairs cost to check."""
+        """Move the skin towards that at which lists cost as much to make as their extra pairs cost to check."""
         steps = max(1, self.steps_since_lists)
         ratio = math.sqrt(_REBUILD_STEPS / (_SKIN_COST * self.skin / self.mean_diameter * steps))
         skin = self.skin * min(1.4, max(0.7, ratio))
@@ -253,7 +253,7 @@ class BedBase:
         return f"the lists have room for {room} {what} a chunk and {value} are needed; the grains overlap too much"
 
     def compute_forces(self, elapsed: float = 0.0) -> None:
-        """Forces where the grains are; ``elapsed`` is the time by which contacts have slid since they were computed."""
+        """Compute the forces where the grains are; ``elapsed``: the time by which contacts have slid since then."""
         self.tallied = None
         e = self.engine
         e.push_all(elapsed, e.shapes, e.rest, e.balance)
@@ -263,7 +263,7 @@ class BedBase:
         self.engine.shift_velocities(part * self.time_step)
 
     def measure_surface(self) -> None:
-        """Take ``surface`` and ``packing_fraction`` anew from where the grains are now."""
+        """Measure ``surface`` and ``packing_fraction`` anew from where the grains are now."""
         position = self.engine.read("position").astype(float)
         area = self.size[0] * self.size[1]
         self.packing_fraction = bulk_packing(position[:, 2], position[:, 3], area)
@@ -289,12 +289,14 @@ class BedBase:
         e.write("near_end", np.arange(e.chunk_count) * e.near_room)
 
     def check_valid(self) -> None:
+        """Raise RuntimeError where Taichi was started anew since the bed was made."""
         if self._generation != runtime.generation():
             raise RuntimeError(
                 "this bed is no longer valid: Taichi was started anew with another precision, arch or number of threads"
             )
 
     def check_body(self, body: int) -> None:
+        """Raise ValueError for a number that no body of the bed has."""
         self.check_valid()
         if not 0 <= body < int(self.engine.body_count[None]):
             raise ValueError(f"body = {body}: there is no such body in the bed")

@@ -119,7 +119,7 @@ class BedBodies(BedBase):
     def move_bodies(
         self, bodies: Sequence[int], *, positions: Array, velocities: Array, turns: Array, spins: Array
     ) -> None:
-        """Several bodies at once, as ``move_body`` does one: quicker, where a platform has many.
+        """Set the pose and motion of several bodies at once: faster than ``move_body``, where a platform has many.
 
         Args:
             bodies: their numbers. positions, velocities, spins: [m], [m/s], [rad/s], each of shape [body, 3].
@@ -138,12 +138,12 @@ class BedBodies(BedBase):
         self.engine.place_bodies(np.array(bodies, dtype=np.int32), np.hstack(list(given.values())).astype(float))
 
     def body_position(self, body: int) -> np.ndarray:
-        """Where a body's origin is [m], shape [3]."""
+        """Position of a body's origin [m], shape [3]."""
         self.check_body(body)
         return np.array(self.engine.body_position[body], dtype=float)
 
     def body_turn(self, body: int) -> np.ndarray:
-        """How a body is turned: a unit quaternion, scalar first, shape [4]."""
+        """Rotation of a body: a unit quaternion, scalar first, shape [4]."""
         self.check_body(body)
         return np.array(self.engine.body_turn[body], dtype=float)
 
@@ -154,7 +154,7 @@ class BedBodies(BedBase):
         return row[:3], row[3:]
 
     def reactions(self) -> np.ndarray:
-        """What ``reaction`` gives, of every body there may be: force and torque in a row of six, shape [body, 6]."""
+        """Force [N] and torque [N m] as ``reaction`` has them, of every body there may be, shape [body, 6]."""
         if self.tallied is None:
             self.tallied = self.tally()[0]
         total = self.tallied

@@ -145,7 +145,7 @@ class BedCore(BedState):
 
     @property
     def kinetic_energy(self) -> float:
-        """Translation and rotation [J]."""
+        """Kinetic energy of the grains [J], of translation and rotation."""
         g = self.grains(contacts=False)
         moving = 0.5 * g.mass @ (g.velocity**2).sum(axis=1)
         return float(moving + 0.2 * (g.mass * g.radius**2) @ (g.spin**2).sum(axis=1))
@@ -157,17 +157,17 @@ class BedCore(BedState):
 
     @property
     def floor_force(self) -> float:
-        """What the grains press the floor with [N], mean over the last ``advance``."""
+        """Force of the grains on the floor [N], mean over the last ``advance``."""
         if not self.has_floor:
             return 0.0
         return float(-self.reaction(FLOOR)[0][2])
 
     def mark_origin(self) -> None:
-        """Count displacements from here."""
+        """Count the displacements of the grains from here on."""
         self.engine.mark_origin()
 
     def set_gravity(self, gravity: float | Sequence[float]) -> None:
-        """Change gravity [m/s2]: downwards, or a vector."""
+        """Change gravity [m/s2]: downwards, or a vector. Raises ValueError: not finite, or upwards as a number."""
         self.wake()
         self.shift_velocities(0.5)
         self.gravity = _vector(gravity)
@@ -264,12 +264,12 @@ class BedCore(BedState):
         return self.engine.balance
 
     def momentum(self) -> np.ndarray:
-        """Of the grains [N s], shape [3], with the velocities half a step ahead, where the forces so far bring them."""
+        """Momentum of the grains [N s], shape [3], with the velocities half a step ahead, as the forces bring them."""
         v, f = self.awake_rows("velocity", "force")
         return np.asarray((v[:, 3:] * v[:, :3] + self.time_step * f).sum(axis=0))
 
     def angular_momentum(self) -> State:
-        """Of the grains about the bed's origin, and its changes since ``track_contact_work`` [N m s], shape [3] each.
+        """Angular momentum about the bed's origin, and changes since ``track_contact_work`` [N m s], shape [3] each.
 
         Returns:
             grains: sum of x x m v and of their spins' with the velocities half a step ahead, to which the forces so far

@@ -153,12 +153,9 @@ class ShapeTable:
 
         Ericson 2005 (Real-Time Collision Detection, section 5.1.5): by the Voronoi regions of corners, edges and face.
         """
-        a = self.corner[t]
-        ab = self.side_ab[t]
-        ac = self.side_ac[t]
+        a, ab, ac = self.corner[t], self.side_ab[t], self.side_ac[t]
         ap = p - a
-        bp = ap - ab
-        cp = ap - ac
+        bp, cp = ap - ab, ap - ac
         d1, d2 = ab.dot(ap), ac.dot(ap)
         d3, d4 = ab.dot(bp), ac.dot(bp)
         d5, d6 = ab.dot(cp), ac.dot(cp)

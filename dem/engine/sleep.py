@@ -54,7 +54,7 @@ class SleepyBed(Protocol):
 
 @dataclass(frozen=True)
 class Sleep:
-    """When grains sleep and wake; see the module for what the numbers are shares of."""
+    """When grains sleep and wake; the module has what the numbers are shares of. Raises ValueError: not above 0."""
 
     speed: float = 5e-3  # A grain slower than this may fall asleep [sqrt(g d)]
     calm: float = 1.0  # For how long it must be [sqrt(d / g)]

@@ -27,11 +27,8 @@ class Steps(EnginePart):
         start, end = self.chunk_range(c)
         far = 0
         for i in range(start, end):
-            x = self.position[i]
-            v = self.velocity[i]
-            f = self.force[i]
-            w = self.spin[i]
-            t = self.torque[i]
+            x, v, w = self.position[i], self.velocity[i], self.spin[i]
+            f, t = self.force[i], self.torque[i]
             inverse = dt / v.w
             v.xyz = keep * v.xyz + f * inverse
             w.xyz = keep * w.xyz + t * (2.5 * inverse / (x.w * x.w))
@@ -113,12 +110,9 @@ class Steps(EnginePart):
             i = self.first[s]
             bits = ~self.pair[s]
             j = bits & INDEX_MASK
-            x_i = self.position[i]
-            x_j = self.position[j]
-            v_i = self.velocity[i]
-            v_j = self.velocity[j]
-            w_i = self.spin[i]
-            w_j = self.spin[j]
+            x_i, x_j = self.position[i], self.position[j]
+            v_i, v_j = self.velocity[i], self.velocity[j]
+            w_i, w_j = self.spin[i], self.spin[j]
             d = self.apart(x_i, x_j, bits)
             length = d.norm()
             sum_r = x_i.w + x_j.w

@@ -40,7 +40,7 @@ class _About:
 
 @dataclass(frozen=True)
 class Uniform(_About):
-    """By number, uniform within mean (1 +- spread). ``mean`` [m], ``spread`` [1], at most 0.5."""
+    """Sizes by number, uniform within mean (1 +- spread). ``mean`` [m], ``spread`` [1], at most 0.5."""
 
     spread: float = 0.15
 
@@ -86,7 +86,7 @@ class _Cut(_About):
 
 @dataclass(frozen=True)
 class Normal(_Cut):
-    """By number, normal about ``mean`` [m] and cut off on both sides.
+    """Sizes by number, normal about ``mean`` [m] and cut off on both sides.
 
     Attributes:
         deviation: standard deviation before the cut over the mean [1].
@@ -118,7 +118,7 @@ class Normal(_Cut):
 
 @dataclass(frozen=True)
 class LogNormal(_Cut):
-    """By number, log-normal with the mean diameter ``mean`` [m] and cut off on both sides.
+    """Sizes by number, log-normal with the mean diameter ``mean`` [m] and cut off on both sides.
 
     Attributes:
         deviation: standard deviation of ln(diameter) before the cut [1].
@@ -154,7 +154,7 @@ class LogNormal(_Cut):
 
 @dataclass(frozen=True)
 class Sieve:
-    """By mass, from a sieve table; the grading curve is straight over ln(diameter) between two sieves.
+    """Sizes by mass, from a sieve table; the grading curve is straight over ln(diameter) between two sieves.
 
     Attributes:
         openings: of the sieves [m], ascending, two at least.

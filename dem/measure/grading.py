@@ -80,7 +80,7 @@ class Grading:
 
 
 def measure_grading(bed: BedCore, graded: Graded) -> Grading:
-    """How the grains of a bed lie beside the field that they were drawn from."""
+    """Measure how the grains of a bed lie, beside the field of sizes that they were drawn from."""
     grains = bed.grains()
     position, d = grains.position, 2 * grains.radius
     x, z, size = position[:, 0], position[:, 2], bed.size

@@ -22,7 +22,7 @@ B = TypeVar("B", bound=BedCore)
 
 @dataclass(frozen=True)
 class StageReport:
-    """What one stage left. SI units, ratios without one; profiles from the floor up, a value for each layer.
+    """The bed at the end of a stage. SI units, ratios without; profiles from the floor up, a value for each layer.
 
     Attributes:
         stage: as it is written.

@@ -35,7 +35,7 @@ def refuse_point(kind: str, **points: tuple[float, ...]) -> None:
 
 
 class Shape:
-    """What every shape has, in the frame of its body."""
+    """What every shape has, in the frame of its body; numbers that no shape can have raise ValueError."""
 
     kind: int
 
@@ -81,7 +81,7 @@ class Plane(Shape):
 
 @dataclass(frozen=True)
 class Ball(Shape):
-    """A sphere. ``center`` in the body's frame [m], ``radius`` [m]."""
+    """A sphere of a ``radius`` [m] about its ``center`` [m] in the body's frame."""
 
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
     radius: float = 0.0

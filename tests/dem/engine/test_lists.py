@@ -12,14 +12,14 @@ from dem import Bed
 from dem.contact.law import damping_factor
 
 STEPS = 30
-LAYOUTS = ("one chunk", "seven chunks", "a chunk a grain")
+LAYOUTS = ("one chunk", "seven chunks", "grain chunks")
 
 
 @pytest.fixture(params=LAYOUTS)
 def layout(request, engines, monkeypatch):
     if request.param == "seven chunks":
         monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 9)
-    elif request.param == "a chunk a grain":
+    elif request.param == "grain chunks":
         engines.overrides = {"gpu": True, "neighbours_per_grain": 30}
     return request.param
 
@@ -61,7 +61,7 @@ def reference():
 def test_forces_and_motion_are_those_of_a_plain_double_loop(layout, reference):
     """Forces of the first instant, and everything after thirty steps, to round-off; the reaction on the ball too."""
     bed = cloud.make(ball=True)
-    assert bed.engine.chunk_count == {"one chunk": 1, "seven chunks": 7, "a chunk a grain": 64}[layout]
+    assert bed.engine.chunk_count == {"one chunk": 1, "seven chunks": 7, "grain chunks": 64}[layout]
     assert bed.engine.nx == 3
     assert bed.coordination_number > 3
     agrees(bed, reference)
