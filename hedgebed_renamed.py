@@ -23,8 +23,7 @@ _MODULES = {
     "dem": {
         "dem.contact": "cohesion timestep",
         "dem.engine": (
-            "energy holding=state ledger=dissipation lists rows runtime shape_table sleep sleep_kernels "
-            "state stress"
+            "energy holding=state ledger=dissipation lists rows runtime shape_table sleep sleep_kernels state stress"
         ),
         "dem.grains": "graded materials packing sizes",
         "dem.measure": "cutting element grading lid penetrometer repose shearing",

@@ -60,11 +60,9 @@ class BedCore(BedState):
 
         Args:
             material: a name or a Material.
-            positions: centres [m], shape [grain_count, 3].
-            radii: [m], shape [grain_count].
+            positions: centres [m], shape [grain_count, 3]. radii: [m], shape [grain_count].
             size: lateral periods and nominal depth (x, y, z) [m].
-            velocities: [m/s], shape [grain_count, 3]; at rest when None.
-            spins: angular velocities [rad/s], shape [grain_count, 3].
+            velocities [m/s], spins [rad/s]: angular velocities; shape [grain_count, 3], at rest when None.
             height: top of the box [m]; a grain above it is lost. Twice the highest grain when None.
             gravity: downwards [m/s2], or a vector.
             young: Young's modulus of the (softened) grains [Pa]; the material's own when None.
