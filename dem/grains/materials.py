@@ -229,20 +229,17 @@ def _read(path: Path) -> Material:
 
 
 def _of_its_kind(path: Path, key: str, value: Any) -> Any:
-    if key == "sources":
-        if not isinstance(value, dict) or not all(isinstance(text, str) for text in value.values()):
-            raise ValueError(f"{path}: sources = {value!r} must be a table of texts, one for each number")
-        return value
-    if key in ("name", "cohesion"):
-        if not isinstance(value, str):
-            raise ValueError(f"{path}: {key} = {value!r} must be a text")
-        if key == "name" and not _NAME.fullmatch(value):
-            allowed = "small letters, digits, '.', '_', '+', '-'"
-            raise ValueError(f"{path}: name = {value!r} cannot name a material: {allowed}")
-        return value
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{path}: {key} = {value!r} must be a number")
-    return float(value)
+    """The value of a key of a file, a number as a float. Raises ValueError where it is of another kind."""
+    texts, numbers = (str, "a text"), (int | float, "a number")
+    kinds = {"name": texts, "cohesion": texts, "sources": (dict, "a table of texts, one for each number")}
+    kind, wanted = kinds.get(key, numbers)
+    fits = isinstance(value, kind) and not isinstance(value, bool)
+    if not fits or (kind is dict and not all(isinstance(text, str) for text in value.values())):
+        raise ValueError(f"{path}: {key} = {value!r} must be {wanted}")
+    if key == "name" and not _NAME.fullmatch(value):
+        allowed = "small letters, digits, '.', '_', '+', '-'"
+        raise ValueError(f"{path}: name = {value!r} cannot name a material: {allowed}")
+    return value if key in kinds else float(value)
 
 
 MATERIALS = {SAND.name: SAND} | {

@@ -49,9 +49,8 @@ def prepare_as(
     """A bed that went through these stages, at rest after each of them, or the same one from the cache.
 
     Args:
-        material: as for ``prepare_bed``.
+        material, make: as for ``prepare_bed``.
         stages: as ``dem.prepare.recipe.parse_stage`` reads them: ``["rain", "fluff", "level", "compact:0.6"]``.
-        make: the class of the bed; ``dem.Bed.prepare_as`` passes its own.
         keep: a file (.npz; a .json comes beside it) where unfinished work is kept every minute and after every stage;
             the next call with it continues from there, bitwise reproducibly.
         cache: whether to look in the cache of ``prepare_bed``, and to leave the bed there, finished or not.
