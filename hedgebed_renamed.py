@@ -85,7 +85,7 @@ _MODULES = {
         "experiments.check": "lags=tumbles unit_factors=words",
         "experiments.diagnose.core": (
             "deciding diagnosis effect_equations=effect_texts effect_words=effect_texts equivalence=rivals next_steps "
-            "outcome own_ways=deciding pairs prediction=rivals renoised scatter_gap search sizes "
+            "outcome own_ways=deciding pairs prediction=rivals renoised scatter_gap search "
             "tumble_advice=effect_texts"
         ),
         "experiments.diagnose.fit": (
@@ -98,7 +98,7 @@ _MODULES = {
             "penetration_data=data penetration_depth=depth penetration_drive=drive penetration_forms=forms "
             "penetration_law=law penetration_problem=problem penetration_remarks=remarks penetration_zeros=zeros"
         ),
-        "experiments.diagnose.report": "candidates document summary telling",
+        "experiments.diagnose.report": "candidates document sizes=document summary telling",
         "experiments.diagnose.tumble": (
             "tumble_checks=checks tumble_data=data tumble_fit=fit tumble_follow=latent tumble_forms=forms "
             "tumble_forward=forward tumble_guess=guess tumble_latent=latent tumble_problem=problem "

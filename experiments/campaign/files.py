@@ -13,8 +13,9 @@ import shutil
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -37,8 +38,10 @@ from .tables import (
 __all__ = [
     "Campaign",
     "MODEL_COPY",
+    "TEMPLATES",
     "check_target",
     "keep_model",
+    "new_campaign",
     "place_campaign",
     "read_campaign",
     "read_model",
@@ -46,17 +49,17 @@ __all__ = [
     "write_model",
 ]
 
+MODEL_COPY = "model.toml"
+"""The model that was run, in the run's folder; effects of one's own are beside it."""
+TEMPLATES = Path(__file__).resolve().parent.parent / "examples"
 _CAMPAIGNS: dict[str, type[BaseModel]] = {"tumble": TumbleCampaign, "penetration": PenetrationCampaign}
-_ALL = frozenset(("pose", "imu", "wheel", "depth", "force", "accel"))
 _MODELS: dict[str, type[BaseModel]] = {"tumble": TumbleModel, "penetration": PenetrationModel}
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Measured trials: the tables of campaign.toml, and the recordings by (id of the trial, sensor).
-
-    The sensors of a tumble are ``pose``, ``imu`` and ``wheel``; that of a penetration is ``data``.
-    """
+    """Measured trials: the tables of campaign.toml, and the recordings by (id of the trial, sensor). The sensors of a
+    tumble are ``pose``, ``imu`` and ``wheel``; that of a penetration is ``data``."""
 
     tables: TumbleCampaign | PenetrationCampaign
     recordings: Mapping[tuple[str, str], Recording] = field(repr=False)
@@ -70,12 +73,8 @@ class Campaign:
 
 
 def read_campaign(folder: str | Path) -> Campaign:
-    """Read the campaign in `folder`.
-
-    Raises ValueError, one sentence a line, naming the file, the line or key, what was found and what was expected, for
-    whatever is wrong, in the tables and in every file that can be found: all at once (see `experiments.campaign.tables`
-    and `experiments.campaign.recording`).
-    """
+    """Read the campaign in `folder`. Raises ValueError, one sentence a line, naming the file, the line or key, what was
+    found and what was expected, for all that is wrong, in the tables and in every file that can be found, at once."""
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"{str(folder)!r} is no folder: one with campaign.toml was expected")
@@ -85,11 +84,10 @@ def read_campaign(folder: str | Path) -> Campaign:
     table = _read_toml(path, _CAMPAIGNS)
     tables, faults = _make_tables(path, table, _CAMPAIGNS)
     if tables is None:
-        trials = _trials_that_stand(table)
+        trials = _valid_trials(table)
         sensors = table.get("sensors")
-        faults += [
-            f"{path}: {fault}" for fault in trial_faults(trials, set(sensors) if isinstance(sensors, dict) else _ALL)
-        ]
+        named = sensors if isinstance(sensors, dict) else {key for _, trial in trials for key in trial.needed}
+        faults += [f"{path}: {fault}" for fault in trial_faults(trials, set(named))]
     else:
         assert isinstance(tables, TumbleCampaign | PenetrationCampaign)
         trials = list(enumerate(tables.trial, 1))
@@ -106,13 +104,10 @@ def read_campaign(folder: str | Path) -> Campaign:
 
 
 def write_campaign(folder: str | Path, campaign: Campaign) -> Path:
-    """Write a campaign into `folder`, which must be new or empty, and return it.
-
-    Raises ValueError where the folder is in use or a file that a trial names has no recording.
-    """
+    """Write a campaign into `folder`, which must be new or empty, and return it. Raises ValueError where the folder is
+    in use or a file that a trial names has no recording."""
     folder = Path(folder)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ValueError(f"{str(folder)!r} is in use: a folder that is empty or does not exist yet was expected")
+    _refuse_used(folder)
     for trial in campaign.tables.trial:
         for sensor, name in trial.files.items():
             recording = campaign.recordings.get((trial.id, sensor))
@@ -123,10 +118,36 @@ def write_campaign(folder: str | Path, campaign: Campaign) -> Path:
     return folder
 
 
+def _used(path: Path) -> bool:
+    return path.exists() and (not path.is_dir() or any(path.iterdir()))
+
+
+def _refuse_used(folder: Path) -> None:
+    if _used(folder):
+        raise ValueError(f"{str(folder)!r} is in use: a folder that is empty or does not exist yet was expected")
+
+
+def new_campaign(folder: str | Path, *, kind: Literal["tumble", "penetration"]) -> Path:
+    """Write the template of a campaign of this kind into `folder`, and return it: annotated tables, short recordings.
+
+    These are synthetic, from the base model, so that it can be checked and diagnosed as it is. Raises ValueError for an
+    unknown kind, and where the folder is in use or cannot be written.
+    """
+    folder = Path(folder)
+    if kind not in _CAMPAIGNS:
+        raise ValueError(f"kind = {kind!r}: {' or '.join(map(repr, _CAMPAIGNS))} was expected")
+    _refuse_used(folder)
+    try:
+        shutil.copytree(TEMPLATES / f"template-{kind}", folder, dirs_exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"{str(folder)!r} cannot be written ({error}): a folder that can be was expected") from error
+    return folder
+
+
 def check_target(target: str | Path, *, keep_out: Path | None = None) -> Path:
     """The folder to write a campaign into. Raises ValueError where it is in use, or is, or lies around, `keep_out`."""
     path = Path(target)
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+    if _used(path):
         raise ValueError(f"campaign = {str(path)!r} is in use: a folder that is empty or does not exist yet would do")
     if keep_out is not None and keep_out.resolve().is_relative_to(path.resolve()):
         raise ValueError(
@@ -138,15 +159,13 @@ def check_target(target: str | Path, *, keep_out: Path | None = None) -> Path:
 
 def place_campaign(target: str | Path, campaign: Campaign, *, keep_out: Path | None = None) -> Path:
     """Write `campaign` to `target`, unless just that is there already (of a run that is resumed); return the folder.
-
-    Raises ValueError as `check_target` does, where something else is there.
-    """
+    Raises ValueError as `check_target` does, where something else is there."""
     path = Path(target)
     try:
-        there: Campaign | None = read_campaign(path)
+        same = _same(read_campaign(path), campaign)
     except ValueError:
-        there = None
-    if there is None or not _same(there, campaign):
+        same = False
+    if not same:
         write_campaign(check_target(path, keep_out=keep_out), campaign)
     return path
 
@@ -162,7 +181,9 @@ def _same(one: Campaign, other: Campaign) -> bool:
 
 def read_model(path: str | Path) -> TumbleModel | PenetrationModel:
     """Read a model.toml. Raises ValueError as `read_campaign` does."""
-    model = _read_tables(Path(path), _MODELS)
+    model, faults = _make_tables(Path(path), _read_toml(Path(path), _MODELS), _MODELS)
+    if model is None:
+        raise ValueError("\n".join(faults))
     assert isinstance(model, TumbleModel | PenetrationModel)
     return model
 
@@ -170,10 +191,6 @@ def read_model(path: str | Path) -> TumbleModel | PenetrationModel:
 def write_model(path: str | Path, model: TumbleModel | PenetrationModel) -> None:
     """Write a model.toml, which reads back as the same."""
     write_text(Path(path), _tables_toml(model))
-
-
-MODEL_COPY = "model.toml"
-"""The model that was run, in the run's folder; effects of one's own lie beside it."""
 
 
 def keep_model(model: str | Path | None, folder: Path) -> Path | None:
@@ -189,13 +206,6 @@ def keep_model(model: str | Path | None, folder: Path) -> Path | None:
                 shutil.copyfile(source.parent / effect.file, target)
         shutil.copyfile(source, copy)
     return copy
-
-
-def _read_tables(path: Path, kinds: Mapping[str, type[BaseModel]]) -> BaseModel:
-    tables, faults = _make_tables(path, _read_toml(path, kinds), kinds)
-    if tables is None:
-        raise ValueError("\n".join(faults))
-    return tables
 
 
 def _read_toml(path: Path, kinds: Mapping[str, type[BaseModel]]) -> dict[str, Any]:
@@ -226,11 +236,11 @@ def _make_tables(
     except ValidationError as error:
         # Trials that are all refused leave pydantic with none: that there are none is not what is wrong.
         found = [detail for detail in error.errors() if not (detail["loc"] == ("trial",) and table.get("trial"))]
-        said = [line for detail in found for line in _sentence(tables, detail, table).splitlines()]
-        return None, [f"{path}: {line}" for line in dict.fromkeys(said)]
+        lines = [line for detail in found for line in _sentence(tables, detail, table).splitlines()]
+        return None, [f"{path}: {line}" for line in dict.fromkeys(lines)]
 
 
-def _trials_that_stand(table: Mapping[str, Any]) -> list[tuple[int, Any]]:
+def _valid_trials(table: Mapping[str, Any]) -> list[tuple[int, Any]]:
     """Of tables with faults, the trials that have none of their own: (number in the file, trial)."""
     trial_class = TumbleTrial if table["kind"] == "tumble" else PenetrationTrial
     listed = table.get("trial")
@@ -239,7 +249,7 @@ def _trials_that_stand(table: Mapping[str, Any]) -> list[tuple[int, Any]]:
         try:
             found.append((number, trial_class.model_validate(_tuples(raw))))
         except ValidationError:
-            continue  # said already
+            continue  # reported already
     return found
 
 
@@ -318,15 +328,14 @@ def _short(value: Any) -> str:
 def _tables_toml(tables: BaseModel) -> str:
     """The tables as TOML, each number with its meaning in a comment; what is not set is left out."""
     plain, nested, listed = [], [], []
-    for name, info in type(tables).model_fields.items():
-        value = getattr(tables, name)
+    for name, value in tables:
         if name == "notes":
             if value:
                 pairs = (f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items())
                 listed.append("\n".join(["[notes]", *pairs]))
         elif isinstance(value, BaseModel):
             nested += _table_toml(name, value)
-        elif isinstance(value, tuple) and _table_in(info.annotation) is not None:
+        elif name in ("trial", "effect"):
             listed += ["\n".join([f"[[{name}]]", *_lines(item)]) for item in value]
         elif value is not None:
             plain.append(f"{name} = {toml_value(value)}")
@@ -336,19 +345,14 @@ def _tables_toml(tables: BaseModel) -> str:
 def _table_toml(name: str, table: BaseModel) -> list[str]:
     """A table and those within it, each as a block."""
     lines = _lines(table)
-    blocks = ["\n".join([f"[{name}]", *lines])] if lines else []
-    for key in type(table).model_fields:
-        inner = getattr(table, key)
-        if isinstance(inner, BaseModel):
-            blocks += _table_toml(f"{name}.{key}", inner)
-    return blocks
+    inner = [_table_toml(f"{name}.{key}", value) for key, value in table if isinstance(value, BaseModel)]
+    return [*(["\n".join([f"[{name}]", *lines])] if lines else []), *chain(*inner)]
 
 
 def _lines(table: BaseModel) -> list[str]:
-    lines = []
-    for key, info in type(table).model_fields.items():
-        value = getattr(table, key)
-        if value is None or isinstance(value, BaseModel) or (isinstance(value, dict) and not value):
-            continue
-        lines.append(f"{key} = {toml_value(value)}  # {info.description}")
-    return lines
+    fields = type(table).model_fields
+    return [
+        f"{key} = {toml_value(value)}  # {fields[key].description}"
+        for key, value in table
+        if value is not None and not isinstance(value, BaseModel) and value != {}
+    ]

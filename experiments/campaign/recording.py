@@ -12,7 +12,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +21,9 @@ from experiments.runs.folder import write_series
 __all__ = ["Recording", "read_recording", "write_recording"]
 
 _DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
-_MOST_SAID = 5
-"""Faults of one kind that are said of one file; of the rest the number."""
+_MOST_REPORTED = 5  # faults of one kind of one file; of the rest the number
+
+Conversion = Callable[[float], float]
 
 
 def _thousandth(value: float) -> float:
@@ -31,7 +31,7 @@ def _thousandth(value: float) -> float:
 
 
 #: Unit of the format -> unit in a file -> conversion.
-_UNITS: dict[str, dict[str, Callable[[float], float]]] = {
+_UNITS: dict[str, dict[str, Conversion]] = {
     "s": {"s": float, "ms": _thousandth},
     "m": {"m": float, "mm": _thousandth},
     "rad": {"rad": float, "deg": math.radians},
@@ -44,9 +44,7 @@ _UNITS: dict[str, dict[str, Callable[[float], float]]] = {
 @dataclass(frozen=True)
 class Recording:
     """What one file holds: ``x_m`` -> array of shape [row_count] in the format's units, NaN in a gap; ``t_s`` first.
-
-    `extra` holds the columns that nobody asked for, as text.
-    """
+    `extra`: the columns that are not asked for, as text."""
 
     columns: Mapping[str, NDArray[np.float64]]
     extra: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -74,19 +72,12 @@ def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     header, rows = _read_cells(path)
     faults = _other_csv(path, header, rows) or _header_faults(path, header)
     if faults:
-        _refuse(faults)
-    chosen: list[tuple[int, Callable[[float], float]]] = []
-    for name, unit in wanted:
-        found = _find_column(path, header, name, unit)
-        if isinstance(found, str):
-            faults.append(found)
-        else:
-            chosen.append(found)
-    long = [
-        f"{path}, line {line}: found {len(row)} cells, expected {len(header)} as in the header"
-        for line, row in rows
-        if len(row) != len(header)
-    ]
+        raise ValueError("\n".join(faults))
+    columns_found = [_find_column(path, header, name, unit) for name, unit in wanted]
+    faults += [found for found in columns_found if isinstance(found, str)]
+    chosen = [found for found in columns_found if not isinstance(found, str)]
+    expected = f"cells, expected {len(header)} as in the header"
+    long = [f"{path}, line {line}: found {len(row)} {expected}" for line, row in rows if len(row) != len(header)]
     faults += _cut(path, long)
     rows = [(line, row) for line, row in rows if len(row) == len(header)]
     odd: list[str] = []
@@ -96,7 +87,7 @@ def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     ]
     faults += _cut(path, odd)
     if len(chosen) < len(wanted):
-        _refuse(faults)
+        raise ValueError("\n".join(faults))
     numbers = np.array(parsed, dtype=float).reshape(len(wanted), len(rows))
     kept = np.flatnonzero(~np.isnan(numbers).all(axis=0))
     if not len(kept) and not faults:
@@ -105,23 +96,16 @@ def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     if not odd:
         faults += _time_faults(path, header[chosen[0][0]], [line for line, _ in rows], numbers[0])
     if faults:
-        _refuse(faults)
+        raise ValueError("\n".join(faults))
     columns = {f"{name}_{unit}": values for (name, unit), values in zip(wanted, numbers, strict=True)}
-    asked = {index for index, _ in chosen}
-    extra = {
-        name: tuple(row[index] for _, row in rows) for index, name in enumerate(header) if index not in asked and name
-    }
-    return Recording(columns, extra)
-
-
-def _refuse(faults: Sequence[str]) -> NoReturn:
-    raise ValueError("\n".join(faults))
+    others = {name: k for k, name in enumerate(header) if name and k not in dict(chosen)}
+    return Recording(columns, {name: tuple(row[k] for _, row in rows) for name, k in others.items()})
 
 
 def _cut(path: Path, faults: Sequence[str]) -> list[str]:
     """The first of these faults, and how many more there are."""
-    more = len(faults) - _MOST_SAID
-    return [*faults[:_MOST_SAID], *([f"{path}: and {more} more lines of that kind"] if more > 0 else [])]
+    more = len(faults) - _MOST_REPORTED
+    return [*faults[:_MOST_REPORTED], *([f"{path}: and {more} more lines of that kind"] if more > 0 else [])]
 
 
 def _read_cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -172,7 +156,7 @@ def _header_faults(path: Path, header: list[str]) -> list[str]:
     ]
 
 
-def _find_column(path: Path, header: list[str], name: str, unit: str) -> tuple[int, Callable[[float], float]] | str:
+def _find_column(path: Path, header: list[str], name: str, unit: str) -> tuple[int, Conversion] | str:
     """Where a quantity stands and what converts it, or what is wrong."""
     known = {f"{name}_{there}": convert for there, convert in _UNITS[unit].items()}
     found = [column for column in header if column in known]
@@ -184,7 +168,7 @@ def _find_column(path: Path, header: list[str], name: str, unit: str) -> tuple[i
     return header.index(found[0]), known[found[0]]
 
 
-def _number(path: Path, line: int, name: str, cell: str, convert: Callable[[float], float], faults: list[str]) -> float:
+def _number(path: Path, line: int, name: str, cell: str, convert: Conversion, faults: list[str]) -> float:
     """The number in a cell, NaN for a gap; what is no number goes to `faults`."""
     text = cell.strip()
     if not text:
@@ -201,11 +185,9 @@ def _number(path: Path, line: int, name: str, cell: str, convert: Callable[[floa
 
 
 def _time_faults(path: Path, name: str, lines: list[int], times: NDArray[np.float64]) -> list[str]:
-    missing = [
-        f"{path}, line {lines[index]}: {name} is missing, a number was expected"
-        for index in np.flatnonzero(np.isnan(times))
-    ]
-    there = np.flatnonzero(~np.isnan(times))
+    """A time that is missing in a row with numbers, or runs backwards."""
+    gaps, there = np.flatnonzero(np.isnan(times)), np.flatnonzero(~np.isnan(times))
+    missing = [f"{path}, line {lines[index]}: {name} is missing, a number was expected" for index in gaps]
     known = times[there]
     back = [
         f"{path}, line {lines[there[k + 1]]}: {name} runs backwards, from {known[k]:.10g} s to {known[k + 1]:.10g} s; "

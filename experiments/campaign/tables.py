@@ -228,19 +228,15 @@ def _check_trials(tables: Any) -> Any:
 def trial_faults(
     trials: Sequence[tuple[int, Any]], sensors: Set[str], odd: Callable[[Any], str | None] = lambda trial: None
 ) -> list[str]:
-    """What is wrong with trials (number in the file, trial): an id twice, no file, a sensor without its noise.
-
-    `sensors` are those that [sensors] has; `odd` says what else is wrong with a trial, None where nothing is.
-    """
+    """What is wrong with trials (number in the file, trial): an id twice, no file, a sensor without its noise. `sensors`
+    are those that [sensors] has; `odd` states what else is wrong with a trial, None where nothing is."""
     seen: dict[str, int] = {}
     faults = []
     for number, trial in trials:
         where = f"[[trial]] {number} (id {trial.id!r}): "
-        if trial.id in seen:
-            faults.append(
-                f"{where}id = {trial.id!r} is that of [[trial]] {seen[trial.id]} too: each id once was expected"
-            )
-        seen.setdefault(trial.id, number)
+        first = seen.setdefault(trial.id, number)
+        if first != number:
+            faults.append(f"{where}id = {trial.id!r} is that of [[trial]] {first} too: each id once was expected")
         if not trial.files:
             faults.append(f"{where}it names no file: at least one of {', '.join(trial.sensor_names)} was expected")
         faults += [
@@ -248,9 +244,8 @@ def trial_faults(
             for sensor, key in trial.needed.items()
             if sensor not in sensors
         ]
-        said = odd(trial)
-        if said:
-            faults.append(where + said)
+        if fault := odd(trial):
+            faults.append(where + fault)
     return faults
 
 

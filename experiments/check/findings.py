@@ -32,10 +32,8 @@ def find_implausible(campaign: Campaign) -> list[Finding]:
 
 
 def without_companions(campaign: Campaign, found: Sequence[Finding]) -> list[Finding]:
-    """`found` without what follows from a unit that is named: a marker "lost", a zero "off", a noisier sensor.
-
-    A column in degrees under a heading in radians jumps and scatters 57 times as much as is stated: reported once.
-    """
+    """`found` without what follows from a unit that is named: a marker "lost", a zero "off", a noisier sensor. A column
+    in degrees under a heading in radians jumps and scatters 57 times as much as is stated: reported once."""
     named = [f for f in _each_implausible(campaign) if f.channel and any(words in f.what for words in _NAMED)]
 
     def follows(finding: Finding) -> bool:
@@ -98,11 +96,9 @@ def said_once(found: Sequence[Finding]) -> list[Finding]:
 
 
 def loud_sensors(campaign: Campaign) -> list[Finding]:
-    """Sensors whose readings scatter from row to row by far more, or far less, than the noise that is stated.
-
-    Fourth differences, of which a smooth motion leaves little; the median of a trial, so that touches do not count; the
-    median over the trials. A bed whose grains jam and give way makes the force do the same, and the sentence says so.
-    """
+    """Sensors whose readings scatter from row to row by far more, or far less, than the noise that is stated: by fourth
+    differences, of which a smooth motion leaves little; the median of a trial, so that touches do not count; the median
+    over the trials. Grains that jam and yield make the force do the same."""
     tables = campaign.tables
     ratios: dict[tuple[str, str], list[float]] = {}
     stated: dict[tuple[str, str], float] = {}

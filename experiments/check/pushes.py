@@ -226,10 +226,8 @@ def _meaning(onset: float) -> str:
 
 def _force_onset(data: Recording, std: float) -> tuple[float, float] | None:
     """The depth at which a push begins to feel a force, and the uncertainty of that [m]; None where it is unknown:
-    there is no force, or a sizeable one from the first row on. `std`: the force's noise [N].
-
-    By averages of `_ROWS` rows; the force's own zero is that of the first rows, where they are alike.
-    """
+    there is no force, or a sizeable one from the first row on. `std`: the force's noise [N]. By averages of `_ROWS`
+    rows; the force's own zero is that of the first rows, where they are alike."""
     pushed = down(data, fewest=6 * _ROWS)
     if pushed is None:
         return None

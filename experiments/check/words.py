@@ -94,9 +94,7 @@ def std_of(sensor: DepthSensor | None) -> float:
 
 def factor_words(channel: str, own: Array, others: Sequence[Array]) -> str:
     """What to add to "at odds" where `own` is its replicates' curve, times a factor between two units; else nothing.
-
-    Curves at the same places, shape [n], NaN where there is nothing.
-    """
+    Curves at the same places, shape [n], NaN in gaps."""
     usual = np.median(np.stack(list(others)), axis=0)
     good = np.isfinite(own) & np.isfinite(usual)
     a, b = own[good], usual[good]

@@ -215,7 +215,7 @@ def _campaign_new(
     kind: Annotated[Literal["tumble", "penetration"], Parameter(help="What kind of trials.", show_default=False)],
 ) -> int:
     """Write an annotated template: campaign.toml with every key explained, and short recordings to be replaced."""
-    from experiments.campaign.templates import new_campaign
+    from experiments.campaign.files import new_campaign
 
     with refusing():
         new_campaign(folder, kind=kind)

@@ -11,7 +11,7 @@ from experiments.diagnose.fit.bounds import is_strained
 from experiments.diagnose.fit.evidence import Hypothesis, excess, held_out_fit, signature_matrix
 from experiments.diagnose.fit.fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from experiments.diagnose.fit.gate import Verdict, held_out_gate, open_gate
-from experiments.diagnose.fit.problem import Finding, Problem
+from experiments.diagnose.fit.problem import Array, Finding, Problem
 from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.diverging import diverging_trials, most_diverging
 from experiments.diagnose.noise.jitter import Jitter
@@ -61,10 +61,7 @@ def diagnose(
     problem: Problem, *, thorough: bool = False, seed: int = 0, tell: Tell | None = None, gates: Path | None = None
 ) -> Diagnosis:
     """Diagnose a campaign; the same campaign gives the same answer. `tell(what, share done)` reports progress.
-
-    `thorough`: nulls by full refits, which takes long; they are kept in the folder `gates`, if given, for the next
-    campaign of the same design.
-    """
+    `thorough`: nulls by full refits, which takes long; they are kept in the folder `gates`, if given."""
     return _Course(problem, _Asked(thorough, seed, tell or (lambda what, done: None), gates)).run()
 
 
@@ -136,7 +133,7 @@ class _Course:
         ):  # fmt: skip
             choice = step(choice)
         if asked.thorough and choice.best.effects:
-            choice = replace(choice, left=self._thorough_gate(choice.best.fit))
+            choice = replace(choice, left=self._gate(choice.best.fit, "making the null of what is left"))
         strained, least = is_strained(self.base), choice.left.threshold + _MARGIN
         if not choice.best.effects and not strained and choice.left.score < least:
             return self._nothing(choice.left)
@@ -199,11 +196,14 @@ class _Course:
 
     def _gate_of_base(self) -> Verdict:
         columns, _ = signature_matrix(self.base, self.problem.forms)
+        return self._gate(self.base, "making the gate's null", columns)
+
+    def _gate(self, found: Fit, what: str, signatures: Array | None = None) -> Verdict:
+        """The gate on a fit, by full refits where these were asked for."""
         asked = self.asked
         return open_gate(
-            self.base, signatures=columns, seed=asked.seed, refit=asked.thorough,
-            draws=_REFITS if asked.thorough else _DRAWS, folder=asked.gates,
-            tell=lambda done: self.tell("making the gate's null", done),
+            found, signatures=signatures, seed=asked.seed, refit=asked.thorough, folder=asked.gates,
+            draws=_REFITS if asked.thorough else _DRAWS, tell=lambda done: self.tell(what, done),
         )[1]  # fmt: skip
 
     def _recoloured(self, found: Fit) -> Fit:
@@ -392,12 +392,6 @@ class _Course:
         left = open_gate(best, seed=self.asked.seed)[1]
         base = replace(choice.base, fit=self.base)
         return replace(choice, base=base, best=replace(choice.best, fit=best), left=left)
-
-    def _thorough_gate(self, best: Fit) -> Verdict:
-        return open_gate(
-            best, seed=self.asked.seed, refit=True, draws=_REFITS, folder=self.asked.gates,
-            tell=lambda done: self.tell("making the null of what is left", done),
-        )[1]  # fmt: skip
 
     def _decided(self, choice: Choice) -> Diagnosis:
         """Named, ambiguous or unknown, after trials that diverge and replicates that wander have been considered."""

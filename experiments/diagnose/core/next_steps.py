@@ -1,8 +1,7 @@
-"""What to do next where something is missing that has no name: repeat the worst trial, or, where its replicates are
-there already, ask what the missing force goes with.
+"""What to do next where something unknown is missing: repeat the worst trial, or, where it has replicates, follow up
+what the missing force correlates with.
 
-Replicates answer by themselves what a repeated trial would: what is left of one and comes back in the others is in the
-body or in what it stands on; what does not is each trial's own.
+What is left of one replicate and comes back in the others is in the body or its ground; the rest is each trial's own.
 """
 
 import math
@@ -20,20 +19,18 @@ __all__ = ["after_unknown", "common_share"]
 say = Sentences(__package__)
 
 _SHARES = np.linspace(0.0, 1.0, 401)  # places along a trial at which replicates are compared
-_COMMON, _IN_PART = 0.5, 0.25
-"""Shares of what is left from which on it comes back, or does in part."""
-_AS_BAD = 0.3  # share of the worst trial's misfit from which on one that has replicates is asked in its place
+_COMMON, _IN_PART = 0.5, 0.25  # shares of what is left from which on it comes back, or does in part
+_AS_BAD = 0.3  # share of the worst trial's misfit from which on one that has replicates replaces it
 _MAINLY = 0.5  # share of it from which on a phase holds it
-_GOES_WITH = 0.1  # share of the latent force that a column must explain to be followed up
+_CORRELATES = 0.1  # share of the latent force that a column must explain to be followed up
 
 
 def after_unknown(
     problem: Problem, values: Values, forms: Sequence[Form], worst: Sequence[Place], shares: Mapping[str, float],
     *, beside: Sequence[str] = (), is_scatter: bool = False,
 ) -> str:  # fmt: skip
-    """The next experiment, a sentence or two. `worst`: where the model that was found fails; `shares`: what the latent
-    force goes with (`localise.depends_on`); `beside`: names that the model has already; `is_scatter`: what replicates
-    differ by is all that the model leaves."""
+    """The next experiment, a sentence or two. `worst`: where the best model fails; `shares`: what the latent force
+    correlates with; `beside`: effects of the model; `is_scatter`: whether it leaves no more than scatter."""
     sums: dict[str, float] = {}
     for place in worst:
         sums[place.trial] = sums.get(place.trial, 0.0) + place.excess
@@ -41,7 +38,7 @@ def after_unknown(
     trial = max(sums, key=lambda name: sums[name]) if sums else problem.trials[0].id
     groups = groups_of(problem.trials)
     repeated = [id for id in sums if len(groups[known[id].condition]) > 1 and sums[id] > _AS_BAD * sums[trial]]
-    trial = max(repeated, key=lambda name: sums[name]) if repeated else trial
+    trial = max(repeated, key=lambda name: sums[name], default=trial)
     alike = [id for id in groups[known[trial].condition] if id != trial]
     if not alike:
         which = f"trial {trial}, the one with the largest gap," if sums else f"trial {trial}"
@@ -73,15 +70,13 @@ def _follow(worst: Sequence[Place], shares: Mapping[str, float]) -> str:
             return f"since most of it is in phase {phase}, {say(f'phase_{phase}')}"
     known = [(share, name) for name, share in shares.items() if f"follow_{name}" in say.templates]
     share, name = max(known, default=(0.0, ""))
-    return say("another_sensor") if share < _GOES_WITH else say(f"follow_{name}")
+    return say("another_sensor") if share < _CORRELATES else say(f"follow_{name}")
 
 
 def common_share(problem: Problem, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> float:
-    """Share of what a model leaves of replicates, beyond the sensors, that all of them have in common (0 to 1).
-
-    Residuals over the noise, channel by channel at the same shares of the trials' time; the mean of the products of two
-    different trials over the mean of the squares.
-    """
+    """Share of what a model leaves of replicates, beyond the sensors, that all of them have in common (0 to 1): by the
+    residuals over the noise, channel by channel at the same shares of the trials' time, the mean of the products of two
+    different trials over the mean of the squares."""
     curves: dict[str, list[Array]] = {}
     for trial in trials:
         samples = problem.samples(trial)
@@ -94,11 +89,8 @@ def common_share(problem: Problem, values: Values, forms: Sequence[Form], trials
                 span = max(float(np.ptp(time)), 1e-300)
                 curves.setdefault(name, []).append(np.interp(_SHARES, (time - time[0]) / span, rest[good]))
     both = whole = 0.0
-    for own in curves.values():
-        if len(own) < 2:
-            continue
-        together = np.stack(own)
-        count = len(own)
+    for own in [own for own in curves.values() if len(own) > 1]:
+        together, count = np.stack(own), len(own)
         total = float((together**2).sum(axis=0).mean())
         products = float((together.sum(axis=0) ** 2).mean()) - total  # of every pair twice
         both += products / (count - 1)

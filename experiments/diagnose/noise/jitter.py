@@ -1,9 +1,9 @@
-"""Times that jitter: readings that are taken a little before or after the moment that the recording says.
+"""Times that jitter: readings taken a little before or after the moment that the recording states.
 
 An error e of a row's time makes an error dy/dt e in each of its readings: white from row to row, which a misfit is not,
-and as large as the signal is steep, which noise that is only loud is not. Both are looked for in second differences of
-the residuals (weights b = 1, -2, 1, in which motion leaves little): their variance is
-a^2 sum b^2 + sigma^2 sum (b dy/dt)^2, the loudness a free in each channel, sigma one number for all sensors on a clock.
+and as large as the signal is steep, which other noise is not. Both are found from second differences of the residuals
+(weights b = 1, -2, 1, in which motion leaves little): their variance is
+a^2 sum b^2 + sigma^2 sum (b dy/dt)^2, the noise a free in each channel, sigma one number for all sensors on a clock.
 Fourth differences, in which motion leaves next to nothing, must show the same sigma.
 In the likelihood a row's readings then have the covariance s s' + their noise's, s = sigma dy/dt over the noise, which
 a recording whose readings share rows sees as one error, not as several.
@@ -11,6 +11,7 @@ a recording whose readings share rows sees as one error, not as several.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -25,30 +26,28 @@ from experiments.diagnose.fit.problem import Array, Finding, Form, Problem, Valu
 __all__ = ["Jitter", "Shaken", "find_jitter", "steepness"]
 
 _FOURTH, _SECOND = np.array([1.0, -4.0, 6.0, -4.0, 1.0]), np.array([1.0, -2.0, 1.0])
-_NEAR = 0.5  # of a row's interval: how far from its time the slope is looked for
-_MOST = 9.0
-"""Squared standard deviations that one difference counts for at most: a touch that a model misses is no noise."""
-_FEWEST = 100  # differences from which on a clock is asked
+_NEAR = 0.5  # of a row's interval: how far from its time the slope is taken
+_MOST = 9.0  # squared standard deviations that one difference counts at most: a touch that a model misses is no noise
+_FEWEST = 100  # differences from which on a clock is examined
 _SURE = 20.0
 """Twice the log likelihood that one more number must gain: chance 8e-6 under white noise. Of a misfit of 78 a sample,
 where nothing jitters, it was 11."""
-_SLOPES = 3.0  # the same of one trial, were the jitter there: less, and its slopes are too small to tell
-_SHARE = 0.75  # of the trials with slopes that must show it
-_ALIKE = 1.4
-"""Factor by which the jitter of second and of fourth differences may differ: of a misfit these hold far less."""
+_SLOPES = 3.0  # the same of one trial, were the jitter there: with less, its slopes are too small
+_SHARE = 0.75  # of the trials with such slopes that must show it
+_ALIKE = 1.4  # factor by which second and fourth differences may disagree: of a misfit these hold far less
 _FAR = 3.0  # standard deviations of a time within which a jump of the model makes a reading doubtful
 
 
 @dataclass(frozen=True)
 class Jitter:
-    """What is found of one clock."""
+    """The jitter of one clock."""
 
     channels: tuple[str, ...]
     std: float  # [s]
 
     @property
     def finding(self) -> Finding:
-        """In plain words."""
+        """In words."""
         names = " and ".join(part for part in (", ".join(self.channels[:-1]), self.channels[-1]) if part)
         what = f"the times of {names} jitter by {1e3 * self.std:.2g} ms (std): taken into account"
         return Finding(trial="", channel=self.channels[0] if len(self.channels) == 1 else None, what=what)
@@ -130,12 +129,11 @@ def _windows(found: Fit, clock: tuple[str, ...], weights: Array) -> tuple[list[_
     problem, forms = found.model.problem, found.model.forms
     width, windows = len(weights), []
     usual: dict[tuple[str, str], float] = {}
-    for trial in found.model.trials:
+    for trial, name in itertools.product(found.model.trials, clock):
         samples = problem.samples(trial)
-        for name in clock:
-            time = samples.time[samples.channel == name]
-            if len(time) > 2 * width:
-                usual[trial, name] = float(np.median(np.diff(time)))
+        time = samples.time[samples.channel == name]
+        if len(time) > 2 * width:
+            usual[trial, name] = float(np.median(np.diff(time)))
     if not usual:
         return [], 0.0
     step = _NEAR * float(np.median(list(usual.values())))
@@ -173,18 +171,20 @@ def _likeliest(windows: Sequence[_Windows], weights: Array, longest: float, *, s
         return (np.log(variance) + np.minimum(square / variance, _MOST)) / repeat
 
     def variances(numbers: Array) -> Array:
-        loud: Array = np.exp(np.clip(numbers[:count], -20, 20))[channel]
-        return loud + (slope * np.exp(2 * numbers[count]) if len(numbers) > count else 0.0)
+        noise: Array = np.exp(np.clip(numbers[:count], -20, 20))[channel]
+        return noise + (slope * np.exp(2 * numbers[count]) if len(numbers) > count else 0.0)
+
+    def total(numbers: Array) -> float:
+        return float(cost(variances(numbers)).sum())
 
     level = [np.log(max(float(np.median(square[channel == k])) / 0.455, 1e-6)) if (channel == k).any() else 0.0
              for k in range(count)]  # fmt: skip
-    without = minimize(lambda p: float(cost(variances(p)).sum()), level, method="Nelder-Mead")
+    without = minimize(total, level, method="Nelder-Mead")
     steep = float(np.quantile(slope, 0.9))
     if steep <= 0:
         return None
     begun = [*without.x, 0.5 * np.log(np.exp(np.mean(without.x)) / steep)]
-    best = minimize(lambda p: float(cost(variances(p)).sum()), begun, method="Nelder-Mead",
-                    options={"maxiter": 1000})  # fmt: skip
+    best = minimize(total, begun, method="Nelder-Mead", options={"maxiter": 1000})
     std = float(np.exp(best.x[count]))
     if without.fun - best.fun < sure or std > longest:
         return None
@@ -193,8 +193,8 @@ def _likeliest(windows: Sequence[_Windows], weights: Array, longest: float, *, s
         gain = cost(plain) - cost(shaken)
         expected = (np.log(plain / shaken) + shaken / plain - 1) / repeat
         owner = np.concatenate([np.full(len(w.square), w.trial) for w in windows])
-        told = [float(gain[owner == trial].sum()) for trial in dict.fromkeys(owner.tolist())
-                if float(expected[owner == trial].sum()) > _SLOPES]  # fmt: skip
-        if not told or np.mean(np.array(told) > 0) < _SHARE:
+        gains = [float(gain[owner == trial].sum()) for trial in dict.fromkeys(owner.tolist())
+                 if float(expected[owner == trial].sum()) > _SLOPES]  # fmt: skip
+        if not gains or np.mean(np.array(gains) > 0) < _SHARE:
             return None
     return std

@@ -40,10 +40,8 @@ def groups_of(trials: Sequence[TrialInfo]) -> dict[tuple[object, ...], list[str]
 
 def parted(trials: Sequence[TrialInfo], sizes: Mapping[str, Sequence[float]]) -> tuple[TrialInfo, ...]:
     """The trials, those of one condition separated where they go half as deep, last half as long or do not come back:
-    then they are no replicates.
-
-    `sizes`: id -> what was measured of a trial (its depth, its duration), above 0, as many numbers for all trials of a
-    condition. Sorted, they are cut where one exceeds the one before by more than a tenth.
+    then they are no replicates. `sizes`: id -> what was measured of a trial (its depth, its duration), above 0, as many
+    numbers for all trials of a condition. Sorted, they are cut where one exceeds the one before by more than a tenth.
     """
     found = {trial.id: trial for trial in trials}
     for ids in groups_of(trials).values():
@@ -57,11 +55,9 @@ def parted(trials: Sequence[TrialInfo], sizes: Mapping[str, Sequence[float]]) ->
 
 
 def split_trials(trials: Sequence[TrialInfo]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Trials to fit and trials held out: a quarter of them, rounded up, none below four, spread over the conditions.
-
-    A condition gives up one of its replicates before another loses its only trial, and of conditions with one trial
-    those go first whose settings others share.
-    """
+    """Trials to fit and trials held out: a quarter of them, rounded up, none below four, spread over the conditions. A
+    condition gives up one of its replicates before another loses its only trial, and of conditions with one trial those
+    go first whose settings others share."""
     if len(trials) < 4:
         return tuple(trial.id for trial in trials), ()
     wanted = math.ceil(len(trials) / 4)
@@ -174,10 +170,7 @@ class Scatter:
 
 def trends(scatter: Scatter, trials: Sequence[TrialInfo]) -> list[Finding]:
     """Kinds of scatter that grow or fall from trial to trial, as where beds settle, sensors drift and tips wear: these
-    are not random.
-
-    Replicates are compared with one another only, as conditions differ by more than time.
-    """
+    are not random. Replicates are compared with one another only, as conditions differ by more than time."""
     found = []
     place = {trial.id: k for k, trial in enumerate(trials)}
     for kind in scatter.model_std:
@@ -280,10 +273,8 @@ def _mean(values: Array, errors: Array) -> float:
 
 
 def likeliest_scatter(pairs: Sequence[Array]) -> float:
-    """The most likely std between replicates, beside the errors of their numbers, the groups' means unknown.
-
-    `pairs`: of each group values and errors, shape [trial_count, 2].
-    """
+    """The most likely std between replicates, beside the errors of their numbers, the groups' means unknown. `pairs`: of
+    each group values and errors, shape [trial_count, 2]."""
 
     def log_likelihood(scatter: float) -> float:
         total = 0.0

@@ -2,14 +2,14 @@
 
 Method: residuals over the noise, channel by channel and trial by trial, tapered (Hann) against the slow misfit, give
 Lomb's periodogram (Lomb 1976, Astrophys. Space Sci. 39:447; Scargle 1982, ApJ 263:835). What is left beside a line has
-a colour of its own, so each power is taken over what its neighbours in frequency let expect (a power law, fitted to
-their logarithms). Such ratios are summed over trials and channels, for a line has one frequency but no common phase,
-and judged by their own spread over all frequencies, so that a misfit that is loud everywhere makes no line.
+a colour of its own, so each power is divided by the one that its neighbours in frequency predict (a power law, fitted
+to their logarithms). Such ratios are summed over trials and channels, as a line has one frequency but no common phase,
+and compared with their own spread over all frequencies, so that a misfit that is large everywhere makes no line.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -23,25 +23,21 @@ from experiments.diagnose.fit.problem import Array, Form, Problem, Values
 __all__ = ["Line", "Part", "Piece", "line_rows", "line_sentence", "lines_of", "spectral_lines"]
 
 _CYCLES = 1.5  # periods that a recording must hold for a frequency to count as a neighbour: slower is a misfit
-_OF_RATE = 0.49
-_HIGHEST = 150.0  # share of a channel's rate, and frequency [Hz], up to which is looked
+_OF_RATE, _HIGHEST = 0.49, 150.0  # share of a channel's rate, and frequency [Hz], that are the upper ends
 _PER_WIDTH = 3  # frequencies a resolution of the longest recording
 _NEIGHBOURS, _LOBE, _BESIDE = 9.0, 2.5, 4.0
-"""Resolutions on either side from which the background is taken; those next to a line that are not: Hann's lobe; and
-how many there must be on each side: a background from one side is guessed."""
+"""Resolutions on either side from which the background is taken; those next to a line that are not (Hann's lobe); and
+how many there must be on each side."""
 _MEAN_LOG = 0.5772  # of an exponential law's logarithm, below that of its mean
 _CHANCE = 1e-3  # probability, over all frequencies, below which a line is one
-_IN_CHANNEL, _IN_TRIALS = 4.0, 0.5
-"""Mean ratio to the background from which a channel has the line, and share of the trials that must show it."""
+_IN_CHANNEL, _IN_TRIALS = 4.0, 0.5  # mean ratio from which a channel has the line; share of the trials that show it
 _ODD = 5.0  # robust standard deviations at which residuals are cut: a touch at another moment is no line
-_MOST, _SHOWN, _FEWEST = 3, 3, 60
-"""Lines that are looked for, channels that are said of each; rows below which a recording tells nothing."""
+_MOST, _SHOWN, _FEWEST = 3, 3, 60  # lines, channels reported of each, rows that a recording must have
 
 
 @dataclass(frozen=True)
 class Part:
-    """A line in one channel: amplitude, its error (in the channel's unit), and the amplitude by phase where the model
-    stays in it for two periods."""
+    """A line in one channel: amplitude and its error in the channel's unit; by phase where that lasts two periods."""
 
     channel: str
     amplitude: float
@@ -72,24 +68,34 @@ class Piece:
 
     @property
     def span(self) -> float:
+        """Seconds from the first row to the last."""
         return float(np.ptp(self.time))
+
+    @property
+    def highest(self) -> float:
+        """The highest frequency that its rows resolve [Hz]."""
+        return _OF_RATE * (len(self.time) - 1) / self.span
+
+    @property
+    def taper(self) -> Array:
+        """Hann's window."""
+        return np.sin(math.pi * (self.time - self.time[0]) / self.span) ** 2
 
 
 def lines_of(problem: Problem, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> list[Line]:
     """Lines in what the model of these numbers and forms leaves of `trials`, the plainest first; mostly none."""
-    return spectral_lines([piece for trial in trials for piece in _pieces(problem, values, forms, trial)])
-
-
-def _pieces(problem: Problem, values: Values, forms: Sequence[Form], trial: str) -> list[Piece]:
-    samples, found = problem.samples(trial), []
-    phases = phases_of(problem, values, forms, trial)
-    for channel, shown in problem.compare(values, forms, trial).items():
-        mine = samples.channel == channel
-        if len(shown["t_s"]) != int(mine.sum()):
-            continue
-        rest = (shown["measured"] - shown["model"]) / samples.std[mine]
-        found.append(Piece(trial, channel, shown["t_s"], rest, float(np.median(samples.std[mine])), phases[mine]))
-    return found
+    pieces = []
+    for trial in trials:
+        samples, phases = problem.samples(trial), phases_of(problem, values, forms, trial)
+        for channel, shown in problem.compare(values, forms, trial).items():
+            mine = samples.channel == channel
+            if len(shown["t_s"]) == int(mine.sum()):
+                rest, unit = (
+                    (shown["measured"] - shown["model"]) / samples.std[mine],
+                    float(np.median(samples.std[mine])),
+                )
+                pieces.append(Piece(trial, channel, shown["t_s"], rest, unit, phases[mine]))
+    return spectral_lines(pieces)
 
 
 def spectral_lines(pieces: Sequence[Piece]) -> list[Line]:
@@ -99,11 +105,11 @@ def spectral_lines(pieces: Sequence[Piece]) -> list[Line]:
         return []
     longest = max(piece.span for piece in kept)
     lowest = min(_CYCLES / piece.span for piece in kept)
-    highest = min(max(_OF_RATE * _rate(piece) for piece in kept), _HIGHEST)
+    highest = min(max(piece.highest for piece in kept), _HIGHEST)
     grid = np.arange(lowest, highest, 1 / (_PER_WIDTH * longest))
     if len(grid) < 4 * _NEIGHBOURS * _PER_WIDTH:
         return []
-    ratio = np.stack([_ratio(piece, grid) for piece in kept])  # NaN where a piece says nothing
+    ratio = np.stack([_ratio(piece, grid) for piece in kept])  # NaN outside a piece's band
     if not np.isfinite(ratio).any():
         return []
     score = _scores(ratio)
@@ -132,35 +138,25 @@ def _cleaned(piece: Piece) -> Piece | None:
     size = 1.4826 * float(np.median(np.abs(rest)))
     if size == 0:
         return None
-    return Piece(piece.trial, piece.channel, time, np.clip(rest, -_ODD * size, _ODD * size), piece.unit,
-                  piece.phase[good])  # fmt: skip
-
-
-def _rate(piece: Piece) -> float:
-    return (len(piece.time) - 1) / piece.span
-
-
-def _taper(piece: Piece) -> Array:
-    return np.sin(math.pi * (piece.time - piece.time[0]) / piece.span) ** 2
+    return replace(piece, time=time, rest=np.clip(rest, -_ODD * size, _ODD * size), phase=piece.phase[good])
 
 
 def _ratio(piece: Piece, grid: Array) -> Array:
     """The piece's power over that of its neighbours in frequency, shape as `grid`; NaN outside its band."""
     found = np.full(len(grid), np.nan)
-    inside = np.flatnonzero((grid >= _CYCLES / piece.span) & (grid <= _OF_RATE * _rate(piece)))
+    inside = np.flatnonzero((grid >= _CYCLES / piece.span) & (grid <= piece.highest))
     if len(inside) < 4 * _NEIGHBOURS * _PER_WIDTH:
         return found
     here = grid[inside]
-    power = signal.lombscargle(piece.time, _taper(piece) * piece.rest, 2 * math.pi * here)
-    told, log_f = np.log(np.maximum(power, 1e-300)), np.log(here)
+    power = signal.lombscargle(piece.time, piece.taper * piece.rest, 2 * math.pi * here)
+    log_power, log_f = np.log(np.maximum(power, 1e-300)), np.log(here)
     edge = (_LOBE + _BESIDE) / piece.span
     for k, place in enumerate(inside):
         if here[k] - here[0] < edge or here[-1] - here[k] < edge:
             continue
         off = np.abs(here - here[k]) * piece.span
         near = (off > _LOBE) & (off <= _NEIGHBOURS)
-        x = log_f[near] - log_f[k]
-        _, level = np.polyfit(x, told[near], 1)
+        _, level = np.polyfit(log_f[near] - log_f[k], log_power[near], 1)
         found[place] = power[k] / math.exp(level + _MEAN_LOG)
     return found
 
@@ -205,11 +201,12 @@ def _line(pieces: Sequence[Piece], ratio: Array, grid: Array, at: int, chance: f
     for channel, own in having.items():
         square = [(pieces[k].unit ** 2) * (float(sizes[k][best]) ** 2 - 2 * noise[k] ** 2) for k in own]
         std = math.sqrt(float(np.mean([(pieces[k].unit * noise[k]) ** 2 for k in own])) / len(own))
-        told = [(name, size * pieces[k].unit, n) for k in own for name, size, n in _by_phase(pieces[k], fine[best])]
-        phases = {}
-        for phase in dict.fromkeys(name for name, _, _ in told):
-            mine = [(size, n) for name, size, n in told if name == phase]
-            phases[phase] = math.sqrt(sum(n * size * size for size, n in mine) / sum(n for _, n in mine))
+        by_phase: dict[str, list[tuple[float, int]]] = {}
+        for k in own:
+            for name, size, count in _by_phase(pieces[k], fine[best]):
+                by_phase.setdefault(name, []).append((size * pieces[k].unit, count))
+        phases = {name: math.sqrt(sum(n * size * size for size, n in mine) / sum(n for _, n in mine))
+                  for name, mine in by_phase.items()}  # fmt: skip
         plain = float(ratio[own, at].mean())
         parts.append((plain, Part(channel, math.sqrt(max(float(np.mean(square)), 0.0)), std, phases)))
     parts.sort(key=lambda pair: -pair[0])
@@ -218,9 +215,8 @@ def _line(pieces: Sequence[Piece], ratio: Array, grid: Array, at: int, chance: f
 
 def _amplitudes(piece: Piece, frequencies: Array) -> Array:
     """Of sines of these frequencies in the tapered piece."""
-    taper = _taper(piece)
     turned = np.exp(-2j * math.pi * frequencies[:, None] * piece.time)
-    return 2 * np.abs(turned @ (taper * piece.rest)) / taper.sum()
+    return 2 * np.abs(turned @ (piece.taper * piece.rest)) / piece.taper.sum()
 
 
 def _by_phase(piece: Piece, frequency: float) -> list[tuple[str, float, int]]:
@@ -239,30 +235,31 @@ def _by_phase(piece: Piece, frequency: float) -> list[tuple[str, float, int]]:
 
 
 def line_rows(lines: Sequence[Line]) -> list[dict[str, Any]]:
-    """``latent.lines`` of diagnosis.json, amplitudes in the units in which channels are told."""
-    rows = []
-    for line in lines:
-        channels = []
-        for part in line.parts:
-            unit, factor = unit_of(part.channel)
-            phases = {name: factor * size for name, size in part.phases.items()}
-            channels.append({"channel": part.channel, "amplitude": factor * part.amplitude, "std": factor * part.std,
-                             "unit": unit, "phases": phases})  # fmt: skip
-        rows.append({"frequency_hz": line.frequency, "std_hz": line.std, "chance": line.chance, "channels": channels})
-    return rows
+    """``latent.lines`` of diagnosis.json, amplitudes in the units that reports use."""
+
+    def row(part: Part) -> dict[str, Any]:
+        unit, factor = unit_of(part.channel)
+        phases = {name: factor * size for name, size in part.phases.items()}
+        return {"channel": part.channel, "amplitude": factor * part.amplitude, "std": factor * part.std, "unit": unit,
+                "phases": phases}  # fmt: skip
+
+    return [
+        {"frequency_hz": line.frequency, "std_hz": line.std, "chance": line.chance, "channels": [*map(row, line.parts)]}
+        for line in lines
+    ]
 
 
 def line_sentence(row: Mapping[str, Any]) -> str:
     """A row of ``latent.lines`` in words."""
     shown = row["channels"][:_SHOWN]
-    told = ", ".join(f"{p['channel']} {p['amplitude']:.2g} +- {p['std']:.1g} {p['unit']}".rstrip() for p in shown)
+    sizes = ", ".join(f"{p['channel']} {p['amplitude']:.2g} +- {p['std']:.1g} {p['unit']}".rstrip() for p in shown)
     more = len(row["channels"]) - len(shown)
     also = f" and in {more} more" if more else ""
-    loud = sorted(shown[0]["phases"].items(), key=lambda pair: -pair[1])
-    where = ", ".join(f"{size:.2g} in phase {name}" for name, size in loud) if len(loud) > 1 else ""
+    phases = sorted(shown[0]["phases"].items(), key=lambda pair: -pair[1])
+    where = ", ".join(f"{size:.2g} in phase {name}" for name, size in phases) if len(phases) > 1 else ""
     odds = "below 1e-6" if row["chance"] < 1e-6 else f"{row['chance']:.1g}"
     return (
-        f"Its spectrum has a line at {row['frequency_hz']:.4g} +- {row['std_hz']:.1g} Hz: amplitudes {told}{also}"
+        f"Its spectrum has a line at {row['frequency_hz']:.4g} +- {row['std_hz']:.1g} Hz: amplitudes {sizes}{also}"
         + (f" ({shown[0]['channel']}: {where})" if where else "")
         + f"; by chance, in noise of that colour, {odds}."
     )

@@ -1,4 +1,4 @@
-"""Readings that are stuck, or clip: a sensor that says the same number over and over where it otherwise never does."""
+"""Readings that are stuck or clipped: a sensor that repeats a number many times where it otherwise never does."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,13 +12,10 @@ from experiments.grains.spells import spells
 __all__ = ["Clipped", "clipped", "clipped_wheel", "cut_rows", "stuck_rows"]
 
 _LONG = 12  # equal readings in a row that noise does not make
-_USUAL = 0.05
-"""Share of equal neighbours elsewhere up to which a run of them is odd: coarse or held readings repeat all the time."""
-_AT_THE_END, _IN_A_ROW = 8, 4
-"""Readings at the very end of a channel's range, and those of them in a row, from which on it clips there."""
-_NEXT = 2  # readings at the value next to that: more, and it is a coarse channel that turns there
-_BESIDE, _SLIGHT = 7, 6.0
-"""Rows on either side of a zero that are looked at, and standard deviations up to which a reading may belong to it."""
+_USUAL = 0.05  # share of equal neighbours elsewhere up to which a run is odd: coarse or held readings repeat always
+_AT_THE_END, _IN_A_ROW = 8, 4  # readings at the end of a channel's range, and in a row, from which on it clips there
+_NEXT = 2  # readings at the value next to that: with more, it is a coarse channel that turns there
+_BESIDE, _SLIGHT = 7, 6.0  # rows on either side of a zero, and standard deviations, within which readings belong to it
 _NOISY = 0.2  # share of the stated noise that a wheel's speed must have below where it clips
 
 
@@ -41,10 +38,8 @@ class Clipped:
 
 
 def clipped(values: NDArray[np.float64]) -> list[Clipped]:
-    """The ends of a channel's range at which it clips; `values`: NaN in gaps, shape [n].
-
-    Zeros are let be: they are what a sensor says that is at rest, or cut off there (`cut_rows`).
-    """
+    """The ends of a channel's range at which it clips; `values`: NaN in gaps, shape [n]. Zeros do not count: a sensor
+    reads them at rest, or is cut off there (`cut_rows`)."""
     known = np.flatnonzero(np.isfinite(values))
     own = values[known]
     if len(own) < 3 * _AT_THE_END:
@@ -66,11 +61,9 @@ def clipped(values: NDArray[np.float64]) -> list[Clipped]:
 
 def clipped_wheel(values: NDArray[np.float64], std: float) -> list[Clipped]:
     """The same of a wheel's speed, noise `std` as stated [rad/s]: only its highest readings, and only where it is noisy
-    below them, for a wheel without a torque turns evenly in a simulation."""
+    below them, as a wheel without a torque turns evenly in a simulation."""
     found = [end for end in clipped(values) if end.highest]
-    if not found:
-        return []
-    below = np.delete(values, found[0].rows)
+    below = np.delete(values, found[0].rows) if found else values[:0]
     below = below[np.isfinite(below)]
     if len(below) < 3 * _AT_THE_END:
         return []
@@ -79,16 +72,12 @@ def clipped_wheel(values: NDArray[np.float64], std: float) -> list[Clipped]:
 
 def cut_rows(recordings: Sequence[NDArray[np.float64]], std: float) -> list[NDArray[np.int64]]:
     """Rows, recording by recording, at which one sensor is cut off at exactly 0: it never reads less in any of them,
-    although its noise `std` would. [n], NaN in gaps -> [m].
-
-    Rows beside a zero that read no more than the noise are counted among them: those that noise takes below 0 are
-    missing there, so that the others are too high on the mean.
-    """
+    although its noise `std` would. [n], NaN in gaps -> [m]. Rows beside a zero that read no more than the noise are
+    included: those that noise takes below 0 are missing there, so that the others are too high on the mean."""
     none = [np.zeros(0, dtype=np.int64) for _ in recordings]
     known = [values[np.isfinite(values)] for values in recordings]
     everything = np.concatenate(known) if known else np.zeros(0)
-    zeros = int((everything == 0).sum())
-    if zeros < _AT_THE_END or len(everything) < 3 * _AT_THE_END or everything.min() < 0:
+    if (everything == 0).sum() < _AT_THE_END or len(everything) < 3 * _AT_THE_END or everything.min() < 0:
         return none
     if np.mean([_repeats(own) for own in known if len(own)]) > _USUAL:  # held, or so coarse that 0 is a step of it
         return none
@@ -105,10 +94,8 @@ def _repeats(known: NDArray[np.float64]) -> float:
 
 
 def stuck_rows(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Rows after the first of every run of `_LONG` equal readings and more; NaN are passed over, shape [n] -> [m].
-
-    Zeros are let be: they are what a sensor says that is cut off there, or at rest.
-    """
+    """Rows after the first of every run of `_LONG` equal readings and more; NaN are skipped, shape [n] -> [m]. Zeros do
+    not count: a sensor reads them at rest, or where it is cut off."""
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < 3 * _LONG:
         return known[:0]

@@ -9,6 +9,7 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 ```
 """
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,11 @@ import numpy as np
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.outcome import Diagnosis
 from experiments.diagnose.core.scatter_gap import scatter_std
-from experiments.diagnose.core.sizes import effect_sizes
-from experiments.diagnose.fit.evidence import excess, inflation
-from experiments.diagnose.fit.fitting import Fit
+from experiments.diagnose.fit.evidence import excess, held_out_fit, inflation
+from experiments.diagnose.fit.fitting import Fit, fit
+from experiments.diagnose.fit.gaps import unit_of
 from experiments.diagnose.fit.localise import phases_of
+from experiments.diagnose.fit.problem import Form, Values
 from experiments.diagnose.noise.spectrum import line_rows
 from experiments.runs.folder import write_json, write_series, write_text
 
@@ -29,6 +31,9 @@ from .candidates import candidate_rows
 from .gaps import Gaps
 
 __all__ = ["document", "write_diagnosis"]
+
+_ROUNDS = 8  # of refits without one of the effects
+_SIGNALS = ("force", "accel", "ax", "ay")  # channels that read 0 where nothing pushes: a change is a share of these
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -61,7 +66,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
     said["at_bounds"] = {stage: [asdict(bound) for bound in met] for stage, met in bounds.items()}
     said["evidence"] = _evidence(found)
     said["evidence_base"] = _evidence_base(found)
-    said["sizes"] = effect_sizes(found)
+    said["sizes"] = _sizes(found)
     said["remarks"] = list(found.remarks)
     said["equations"] = equations_of(
         found.problem.kind, found.forms,
@@ -94,6 +99,54 @@ def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
             "what_would_tell": found.problem.next_experiment(first, form, found.best.values),
         })  # fmt: skip
     return rows
+
+
+def _sizes(found: Diagnosis) -> list[dict[str, Any]]:
+    """How large each effect is, the largest first: what the measured signal would miss without it, all else refitted.
+
+    The signature is the root mean square of the change over the sensors' noise, as the hidden suite has it
+    (docs/diagnose.md). Of the channel in which it is plainest: the change's root mean square and largest size in
+    `unit`, and its share of what the channel reads.
+    """
+    sizes = []
+    for effect in found.effects:
+        rest, values = tuple(form for form in found.forms if form.effect != effect), found.base_values
+        if rest:
+            model = found.best.model.with_forms(rest)
+            values = held_out_fit(model, found.held_out, fit(model, found.best.values, rounds=_ROUNDS).values)
+        sizes.append({"effect": effect, **_size(found, values, rest)})
+    return sorted(sizes, key=lambda size: -size["signature"])
+
+
+def _size(found: Diagnosis, values: Values, rest: tuple[Form, ...]) -> dict[str, Any]:
+    problem = found.problem
+    whole: dict[str, list[float]] = {}
+    for trial in (*found.fitted, *found.held_out):
+        before, after = problem.compare(values, rest, trial), problem.compare(found.best_values, found.forms, trial)
+        stds = problem.sensor_std(found.best_values, found.forms, trial)
+        for name, columns in after.items():
+            change = columns["model"] - before[name]["model"]
+            good = np.isfinite(change) & np.isfinite(stds[name])
+            if not good.any():
+                continue
+            sums = whole.setdefault(name, [0.0] * 5)
+            change = change[good]
+            sums[0] += len(change)
+            sums[1] += float(np.sum((change / stds[name][good]) ** 2))
+            sums[2] += float(np.sum(change**2))
+            sums[3] = max(sums[3], float(np.abs(change).max()))
+            sums[4] += float(np.sum(columns["measured"][good] ** 2))
+    if not whole:
+        return {"signature": 0.0, "channel": None, "unit": None, "rms": None, "most": None, "share": None}
+    channel = max(whole, key=lambda name: whole[name][1] / whole[name][0])
+    count, _, squares, most, signal = whole[channel]
+    unit, factor = unit_of(channel)
+    rms = math.sqrt(squares / count)
+    return {
+        "signature": math.sqrt(sum(own[1] for own in whole.values()) / sum(own[0] for own in whole.values())),
+        "channel": channel, "unit": unit, "rms": factor * rms, "most": factor * most,
+        "share": math.sqrt(squares / signal) if channel in _SIGNALS and signal > 0 else None,
+    }  # fmt: skip
 
 
 def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
@@ -151,11 +204,11 @@ def _noise(found: Diagnosis) -> dict[str, dict[str, float]]:
 def _base_values(found: Diagnosis) -> dict[str, Any]:
     """The base parameters before and after, with their standard errors."""
     result = {}
-    for stage, fit in (("before", found.base), ("after", found.best)):
-        variance = np.diag(fit.covariance(inflation=inflation(fit)))
-        names = [p.name for p in fit.model.parameters]
+    for stage, one in (("before", found.base), ("after", found.best)):
+        variance = np.diag(one.covariance(inflation=inflation(one)))
+        names = [p.name for p in one.model.parameters]
         result[stage] = {
-            p.name: {"value": fit.values[p.name], "std": float(np.sqrt(max(variance[names.index(p.name)], 0.0))),
+            p.name: {"value": one.values[p.name], "std": float(np.sqrt(max(variance[names.index(p.name)], 0.0))),
                      "unit": p.unit}
             for p in found.problem.base if p.trial is None and p.name in names
         }  # fmt: skip
@@ -178,9 +231,9 @@ def _evidence(found: Diagnosis) -> list[dict[str, Any]]:
     return sorted(seen.values(), key=lambda row: -row["score"])
 
 
-def _beyond_noise(fit: Fit) -> float:
+def _beyond_noise(found: Fit) -> float:
     """Chi-square a sample beyond the noise that a fit leaves of the fitted trials."""
-    return float(excess(fit) / fit.count)
+    return float(excess(found) / found.count)
 
 
 def _evidence_base(found: Diagnosis) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from penetration_campaigns import campaign_of, driven_trial, drop_trial
 
 from experiments.campaign import Campaign, Recording, read_campaign, write_campaign
 from experiments.campaign import tables as known
-from experiments.campaign.templates import new_campaign
+from experiments.campaign.files import new_campaign
 from experiments.cli.main import main
 from experiments.diagnose.inspection import find_faults
 from experiments.penetrate import beds

@@ -10,7 +10,7 @@ import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, drop_trial
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign, read_campaign
-from experiments.campaign.templates import TEMPLATES, new_campaign
+from experiments.campaign.files import TEMPLATES, new_campaign
 from experiments.check.pushes import depth_zeros
 from experiments.diagnose.inspection import find_faults, unnamed_files
 from experiments.diagnose.noise.stuck import clipped

@@ -9,7 +9,7 @@ import pytest
 from penetration_campaigns import DAMPING, FORCE_STD, STIFFNESS, campaign_of, driven_trial, drop_trial
 
 from experiments.campaign import Campaign, Recording, read_campaign
-from experiments.campaign.templates import TEMPLATES
+from experiments.campaign.files import TEMPLATES
 from experiments.check import find_implausible
 from experiments.check.pushes import force_units
 from experiments.diagnose.inspection import find_faults
