@@ -228,8 +228,8 @@ def _check_trials(tables: Any) -> Any:
 def trial_faults(
     trials: Sequence[tuple[int, Any]], sensors: Set[str], odd: Callable[[Any], str | None] = lambda trial: None
 ) -> list[str]:
-    """What is wrong with trials (number in the file, trial): an id twice, no file, a sensor without its noise. `sensors`
-    are those that [sensors] has; `odd` states what else is wrong with a trial, None where nothing is."""
+    """What is wrong with trials (number in the file, trial): an id twice, no file, a sensor without its noise.
+    `sensors`: those that [sensors] has; `odd` states what else is wrong with a trial, None where nothing is."""
     seen: dict[str, int] = {}
     faults = []
     for number, trial in trials:

@@ -74,8 +74,8 @@ def unscattered(found: Fit) -> dict[str, float]:
 
 
 def values_of_all(found: Fit, held_out: tuple[str, ...]) -> dict[str, float]:
-    """One set of numbers for all trials: the shared ones as fitted, the held-out trials' own nuisances refitted. The gap
-    is that of one mean bed: where scatter was fitted, the fitted trials' own nuisances are refitted without it."""
+    """One set of numbers for all trials: the shared ones as fitted, the held-out trials' own nuisances refitted. It
+    is the gap of one mean bed: where scatter was fitted, the fitted trials' own nuisances are refitted without it."""
     model, values = replace(found.model, scatter=()), unscattered(found)
     if found.model.scatter:
         values = held_out_fit(model, model.trials, values)

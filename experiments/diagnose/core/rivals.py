@@ -110,7 +110,7 @@ def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Riva
 
 
 def folds_of(trials: Sequence[TrialInfo]) -> list[tuple[str, ...]]:
-    """Trials to leave out together: one condition each, or neighbouring ones where there are more than four; empty where
+    """Trials to leave out together: one condition each, or neighbouring ones where there are more than four; none where
     all trials are of one condition."""
     groups = groups_of(trials)
     if len(groups) < 2:

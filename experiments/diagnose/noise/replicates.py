@@ -273,8 +273,8 @@ def _mean(values: Array, errors: Array) -> float:
 
 
 def likeliest_scatter(pairs: Sequence[Array]) -> float:
-    """The most likely std between replicates, beside the errors of their numbers, the groups' means unknown. `pairs`: of
-    each group values and errors, shape [trial_count, 2]."""
+    """The most likely std between replicates, beside the errors of their numbers, the groups' means unknown. `pairs`:
+    of each group values and errors, shape [trial_count, 2]."""
 
     def log_likelihood(scatter: float) -> float:
         total = 0.0
