@@ -6,14 +6,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from experiments.runs.folder import RunFolder
-from experiments.runs.progress import Progress
-from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
 
 from .test_settings import BedCutSettings
-from .tests import about, carry_out, check_bed, picked, quantity, table, write_frame
+from .tests import Tested, bed_test, check_bed, of_beds, picked, quantity, table
 
 __all__ = ["check", "resume", "run"]
 
@@ -29,48 +25,29 @@ def check(settings: BedCutSettings) -> None:
     check_width(settings.width, width=bed.size[0], height=bed.surface, grain=bed.grain)
 
 
-def _carry_out(settings: BedCutSettings, folder: RunFolder, progress: Progress) -> Result:
-    def test(bed: Any, name: str, tell: Callable[[float], None]) -> Json:
-        from dem.measure.cutting import cut_and_load
+def _test(settings: BedCutSettings, bed: Any, _about: Json, _: int, tell: Callable[[float], None]) -> Tested:
+    from dem.measure.cutting import cut_and_load
 
-        first = about(bed)
-        found = cut_and_load(bed, width=settings.width, most=settings.most, tell=tell)
-        columns = {"x_m": found.after[0], "thickness_m": found.after[1]}
-        if found.before is not None:
-            columns["thickness_standing_m"] = found.before[1]
-        series = folder.write_series(name, columns)
-        write_frame(folder, name, found.bed)
-        low, high = found.bounds
-        flanks = found.flanks
-        bounds = {"low": low, "high": high if math.isfinite(high) else None}
-        told = picked(found, "critical_height", "stood", "fell") | bounds
-        told |= picked(found, "height", "unit_weight", "trials", "flanks")
-        return (
-            first
-            | told
-            | {
-                "slumped_to": None if flanks is None else sum(flank.angle for flank in flanks) / 2,
-                "width": found.width,
-                "max_overlap": found.bed.max_overlap,
-                "series": series,
-                "frames": name,
-                "warnings": [],
-            }
-        )
-
-    def result(runs: list[Json]) -> Json:
-        return _result(runs, settings.friction_angle, settings.most)
-
-    return carry_out(
-        settings, folder, progress, test=test, result=result, report="vis.bed.tests:write_test_report",
-        bearing=1.0 + settings.most,
-    )  # fmt: skip
+    found = cut_and_load(bed, width=settings.width, most=settings.most, tell=tell)
+    columns = {"x_m": found.after[0], "thickness_m": found.after[1]}
+    if found.before is not None:
+        columns["thickness_standing_m"] = found.before[1]
+    (low, high), flanks = found.bounds, found.flanks
+    numbers = {
+        **picked(found, "critical_height", "stood", "fell"),
+        "low": low,
+        "high": high if math.isfinite(high) else None,
+        **picked(found, "height", "unit_weight", "trials", "flanks"),
+        "slumped_to": None if flanks is None else sum(flank.angle for flank in flanks) / 2,
+        "width": found.width,
+    }
+    return Tested(found.bed, columns, numbers, [])
 
 
-def _result(runs: list[Json], friction_angle: float | None, most: float) -> Json:
+def _result(settings: BedCutSettings, runs: list[Json]) -> Json:
     from dem.measure.cutting import LEAST, cohesion_of
 
-    of = partial(quantity, runs)
+    of, friction_angle, most = partial(quantity, runs), settings.friction_angle, settings.most
 
     def cohesion(run: Json, angle: float, key: str = "critical_height") -> float | None:
         return None if run[key] is None else cohesion_of(run[key], run["unit_weight"], angle)
@@ -89,10 +66,7 @@ def _result(runs: list[Json], friction_angle: float | None, most: float) -> Json
         "cohesion": of(lambda run: None if friction_angle is None else cohesion(run, friction_angle), "Pa", told),
         "slumped_to": of("slumped_to", "degrees", "slope of a fallen face, fitted as the angle of repose is"),
         "unit_weight": of("unit_weight", "N/m3", "bulk density times the bed's own gravity"),
-        "packing_fraction": of("packing_fraction", "1", "of the bed before"),
-        "grain_count": of("grain_count", "1", "grains before the cut"),
-        "max_overlap": of("max_overlap", "1", "over diameter"),
-    }
+    } | of_beds(runs, "grains before the cut")
     columns = {
         "run": lambda run: run["id"],
         "face [mm]": lambda run: f"{1e3 * run['height']:.3g}",
@@ -129,4 +103,6 @@ def _or_dash(value: float | None, scale: float, form: str) -> str:
     return "-" if value is None else format(scale * value, form)
 
 
-run, resume = whole_run("bed test cut", BedCutSettings, _carry_out, check=check)
+run, resume = bed_test(
+    "bed test cut", BedCutSettings, check=check, test=_test, result=_result, bearing=lambda settings: 1 + settings.most
+)

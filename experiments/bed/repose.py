@@ -4,14 +4,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from experiments.runs.folder import RunFolder
-from experiments.runs.progress import Progress
-from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
 
 from .test_settings import BedReposeSettings
-from .tests import about, carry_out, check_bed, picked, quantity, table, write_frame
+from .tests import Tested, bed_test, check_bed, of_beds, picked, quantity, table
 
 __all__ = ["BEARING", "check", "resume", "run"]
 
@@ -29,30 +25,17 @@ def check(settings: BedReposeSettings) -> None:
     check_width(bed.size[0], slot=settings.slot, grain=bed.grain, depth=bed.surface)
 
 
-def _carry_out(settings: BedReposeSettings, folder: RunFolder, progress: Progress) -> Result:
-    def test(bed: Any, name: str, tell: Callable[[float], None]) -> Json:
-        from dem.measure.repose import angle_of_repose
+def _test(settings: BedReposeSettings, bed: Any, about: Json, _: int, tell: Callable[[float], None]) -> Tested:
+    from dem.measure.repose import angle_of_repose
 
-        first = about(bed)
-        found = angle_of_repose(bed, slot=settings.slot, tell=tell)
-        series = folder.write_series(name, {"x_m": found.distance, "thickness_m": found.thickness})
-        write_frame(folder, name, found.bed)
-        grain, warnings = first["grain"], []
-        if min(flank.end - flank.start for flank in found.flanks) < _SHORT * grain:
-            warnings.append(
-                f"a slope was fitted over less than {_SHORT:g} diameters: a wider or a deeper bed tells it better"
-            )
-        told = picked(found, "angle", "error", "flanks", "drained", "crest", "slot", "plate")
-        kept = {"max_overlap": found.bed.max_overlap, "series": series, "frames": name, "warnings": warnings}
-        return first | told | kept
-
-    return carry_out(
-        settings, folder, progress, test=test, result=_result, report="vis.bed.tests:write_test_report",
-        bearing=BEARING,
-    )  # fmt: skip
+    found = angle_of_repose(bed, slot=settings.slot, tell=tell)
+    short = min(flank.end - flank.start for flank in found.flanks) < _SHORT * about["grain"]
+    said = f"a slope was fitted over less than {_SHORT:g} diameters: a wider or a deeper bed tells it better"
+    numbers = picked(found, "angle", "error", "flanks", "drained", "crest", "slot", "plate")
+    return Tested(found.bed, {"x_m": found.distance, "thickness_m": found.thickness}, numbers, [said] if short else [])
 
 
-def _result(runs: list[Json]) -> Json:
+def _result(_: BedReposeSettings, runs: list[Json]) -> Json:
     of = partial(quantity, runs)
 
     def slope(flank: Json) -> str:
@@ -63,10 +46,7 @@ def _result(runs: list[Json]) -> Json:
         "angle_of_repose": of("angle", "degrees", fitted, error="error"),
         "crest": of("crest", "m", "height of what stayed"),
         "drained": of("drained", "1", "grains that fell out"),
-        "packing_fraction": of("packing_fraction", "1", "of the bed before"),
-        "grain_count": of("grain_count", "1", "grains before"),
-        "max_overlap": of("max_overlap", "1", "over diameter"),
-    }
+    } | of_beds(runs, "grains before")
     columns = {
         "run": lambda run: run["id"],
         "angle [deg]": lambda run: f"{run['angle']:.1f}",
@@ -78,7 +58,9 @@ def _result(runs: list[Json]) -> Json:
         "drained": lambda run: f"{run['drained']} of {run['grain_count']}",
     }
     title = f"Angle of repose of {runs[0]['material']}"
-    return {"title": title, "quantities": quantities, "tables": [table("Run by run", runs, columns)], "warnings": []}
+    return {"title": title, "quantities": quantities, "tables": [table("Run by run", runs, columns)]}
 
 
-run, resume = whole_run("bed test repose", BedReposeSettings, _carry_out, check=check)
+run, resume = bed_test(
+    "bed test repose", BedReposeSettings, check=check, test=_test, result=_result, bearing=lambda settings: BEARING
+)

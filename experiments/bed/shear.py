@@ -34,6 +34,9 @@ _SMOOTH = 0.5
 """Way of the lid over which the peak's stress is averaged [mean diameters]."""
 _BAND = 3.0
 """How far below the lid it may shear [mean diameters]; a guess."""
+_COLUMNS = {"way": "way_m", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
+"""Of the series, by what a run calls them."""
+_NUMBERS = ("pressure", "speed", "inertial_number", "packing_fraction", "overburden")
 _PARTS = 5
 """Parts of the second half of the way, whose scatter gives the standard error."""
 
@@ -105,14 +108,16 @@ def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress
             bed = prepared.bed
             assert bed is not None
             grain = 2 * float(bed.grains().radius.mean())
-            if folder.is_done(name):
-                runs.append(_read(folder, name))
-                continue
-            runs.append(shear_bed(
-                bed, pressure=pressure * bed.weight / (bed.size[0] * bed.size[1]), way=settings.way * grain,
-                inertial_number=settings.inertial_number, grain=grain, tell=progress.update,
-            ))  # fmt: skip
-            _write(folder, name, runs[-1])
+            if not folder.is_done(name):
+                run = shear_bed(
+                    bed, pressure=pressure * bed.weight / (bed.size[0] * bed.size[1]), way=settings.way * grain,
+                    inertial_number=settings.inertial_number, grain=grain, tell=progress.update,
+                )  # fmt: skip
+                folder.write_series(name, {column: getattr(run, key) for key, column in _COLUMNS.items()})
+                folder.mark_done(name, picked(run, *_NUMBERS))
+            columns = folder.read_series(name)
+            kept: Json = {key: columns[column] for key, column in _COLUMNS.items()}
+            runs.append(Shearing(**kept, **folder.done_data(name)))
         result = _result(settings, runs, grain, prepared.recipe, bed)
         folder.write_result(result)
         progress.stage("report", total=1.0)
@@ -120,21 +125,6 @@ def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress
 
         write_shear_report(folder.path, progress=progress.update)
     return result
-
-
-_COLUMNS = {"way": "way_m", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
-_NUMBERS = ("pressure", "speed", "inertial_number", "packing_fraction", "overburden")
-
-
-def _write(folder: RunFolder, name: str, run: Shearing) -> None:
-    folder.write_series(name, {column: getattr(run, key) for key, column in _COLUMNS.items()})
-    folder.mark_done(name, picked(run, *_NUMBERS))
-
-
-def _read(folder: RunFolder, name: str) -> Shearing:
-    columns, numbers = folder.read_series(name), folder.done_data(name)
-    kept: Json = {key: columns[column] for key, column in _COLUMNS.items()}
-    return Shearing(**kept, **numbers)
 
 
 def _strengths(strengths: list[Strength], band: float, run: Shearing) -> Json:

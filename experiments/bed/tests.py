@@ -4,8 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from functools import partial
-from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,12 +18,14 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
+from experiments.runs.whole_runs import whole_run
 
 from .test_settings import BedTestSettings
 
-__all__ = ["Extent", "about", "check_bed", "carry_out", "picked", "quantity", "stiff_enough", "table", "write_frame"]
+__all__ = ["Tested", "bed_test", "check_bed", "of_beds", "picked", "quantity", "stiff_enough", "table", "write_frame"]
 
 Run = Json
+Settings = TypeVar("Settings", bound=BedTestSettings)
 _PACKING = 0.6  # about, to reckon what lies on the floor
 
 
@@ -62,11 +63,9 @@ def check_bed(settings: BedTestSettings) -> Extent:
 def stiff_enough(
     stuff: Material, *, depth: float, grain: float, spread: float, gravity: float, bearing: float
 ) -> float:
-    """Young's modulus of grains that bear the rain and ``bearing`` times what lies on the floor [Pa].
+    """Young's modulus [Pa] of grains that withstand the rain and ``bearing`` times what lies on the floor.
 
-    Args:
-        depth: of the bed [m]. grain, spread: mean diameter [m], and half the width of the sizes over it [1].
-        gravity: [m/s2].
+    Depth of the bed and mean diameter in m, spread of the diameters over their mean, gravity in m/s2.
     """
     from dem.contact.timestep import choose_young
     from dem.grains.packing import rain_column
@@ -116,61 +115,80 @@ def _beds(settings: BedTestSettings, bearing: float | None) -> Iterator[tuple[st
         yield f"seed{seed}", partial(prepared, seed)
 
 
-def carry_out(
-    settings: BedTestSettings,
-    folder: RunFolder,
-    progress: Progress,
+class Tested(NamedTuple):
+    """What the test of one bed found."""
+
+    bed: Any  # as it lies after the test
+    columns: Mapping[str, np.ndarray]  # of its series
+    numbers: Json
+    warnings: list[str]
+
+
+def bed_test(
+    command: str,
+    settings_class: type[Settings],
     *,
-    test: Callable[[Any, str, Callable[[float], None]], Run],
-    result: Callable[[list[Run]], Json],
-    report: str,
-    copies: int = 1,
-    bearing: float | None = None,
-) -> Result:
-    """Test every bed, or take what a stopped run has finished; write result and report.
+    check: Callable[[Settings], None],
+    test: Callable[[Settings, Any, Run, int, Callable[[float], None]], Tested],
+    result: Callable[[Settings, list[Run]], Json],
+    copies: Callable[[Settings], int] = lambda settings: 1,
+    bearing: Callable[[Settings], float | None] = lambda settings: None,
+) -> tuple[Callable[..., Result], Callable[..., Result]]:
+    """`run` and `resume` of a test of beds: every bed is tested, unless a stopped run has; then result and report.
 
     Args:
-        test: tests a bed; told the run's name and a function for the share done. What it returns is kept as JSON.
-        result: makes quantities, tables and warnings of all runs.
-        report: "module:function" in vis that writes the report.
+        test: tests a bed, from what is known of it before, the number of the copy, and a function for the share done.
+        result: title, quantities, tables and, where there are any, warnings of all runs.
         copies: tests of each bed, each of a fresh copy.
         bearing: pressure of the test over what lies on the floor [1], for which the grains of prepared beds are made
             stiff enough; None: stiff enough for a tip in half the bed's depth, as ``Bed.prepare`` has it.
     """
-    with folder.lock():
-        if settings.bed is None:
-            settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
-        names = [name for name, _ in _beds(settings, bearing)]
-        costs = {} if settings.bed is not None else {f"bed of {name.replace('seed', 'seed ')}": 2.0 for name in names}
-        progress.plan(costs | {f"test of {name}": float(copies) for name in names}, seconds={"report": 5.0})
-        runs: list[Run] = []
-        for name, make in _beds(settings, bearing):
-            for copy in range(copies):
-                which = name if copies == 1 else f"{name}-{copy + 1}"
-                if folder.is_done(which):
+
+    def carry_out(settings: Settings, folder: RunFolder, progress: Progress) -> Result:
+        with folder.lock():
+            if settings.bed is None:
+                settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
+            beds, count = dict(_beds(settings, bearing(settings))), copies(settings)
+            costs = (
+                {} if settings.bed is not None else {f"bed of {name.replace('seed', 'seed ')}": 2.0 for name in beds}
+            )
+            progress.plan(costs | {f"test of {name}": float(count) for name in beds}, seconds={"report": 5.0})
+            runs: list[Run] = []
+            for name, make in beds.items():
+                for copy in range(count):
+                    which = name if count == 1 else f"{name}-{copy + 1}"
+                    if not folder.is_done(which):
+                        bed = make(None if copy else progress)
+                        if not copy or progress.stage_name != f"test of {name}":
+                            progress.stage(f"test of {name}", total=float(count))
+                        tell = partial(lambda share, copy: progress.update(copy + share), copy=copy)
+                        folder.mark_done(which, {"id": which} | one_test(settings, bed, folder, which, copy, tell))
+                        bed = None  # its engine serves the next
                     runs.append(folder.done_data(which))
-                    continue
-                bed = make(None if copy else progress)
-                if not copy or progress.stage_name != f"test of {name}":
-                    progress.stage(f"test of {name}", total=float(copies))
-                try:
-                    found = test(bed, which, lambda share, copy=copy: progress.update(copy + share))  # type: ignore[misc]
-                except ValueError as error:  # a bed whose surface lies otherwise than its depth says
-                    raise RuntimeError(f"{which}: {error}") from error
-                if doubt := caveat(bed.material):
-                    found["warnings"] = [*found["warnings"], doubt]
-                bed = None  # its engine serves the next
-                folder.mark_done(which, {"id": which} | found)
-                runs.append(folder.done_data(which))
-        entries: Json = {"title": "", "status": "done"} | result(runs)
-        entries["runs"] = runs
-        entries["warnings"] = [*entries["warnings"], *dict.fromkeys(w for run in runs for w in run["warnings"])]
-        whole = Result.make(folder.command, **entries)
-        folder.write_result(whole)
-        progress.stage("report", total=1.0)
-        module, _, function = report.partition(":")
-        getattr(import_module(module), function)(folder.path, progress=progress.update)
-    return whole
+            entries: Json = {"warnings": []} | result(settings, runs)
+            own = [*entries.pop("warnings"), *dict.fromkeys(w for run in runs for w in run["warnings"])]
+            whole = Result.make(command, **entries, warnings=own, runs=runs)
+            folder.write_result(whole)
+            progress.stage("report", total=1.0)
+            from vis.bed.tests import write_test_report
+
+            write_test_report(folder.path, progress=progress.update)
+        return whole
+
+    def one_test(settings: Settings, bed: Any, folder: RunFolder, which: str, copy: int, tell: Any) -> Run:
+        about = _about(bed)
+        try:
+            found = test(settings, bed, about, copy, tell)
+        except ValueError as error:  # a bed whose surface lies otherwise than its depth says
+            raise RuntimeError(f"{which}: {error}") from error
+        series = folder.write_series(which, found.columns)
+        write_frame(folder, which, found.bed)
+        doubt = caveat(bed.material)
+        warnings = [*found.warnings, doubt] if doubt else found.warnings
+        kept = {"max_overlap": found.bed.max_overlap, "series": series, "frames": which, "warnings": warnings}
+        return about | found.numbers | kept
+
+    return whole_run(command, settings_class, carry_out, check=check)
 
 
 def picked(found: Any, *names: str) -> Run:
@@ -184,7 +202,7 @@ def picked(found: Any, *names: str) -> Run:
     return {name: plain(getattr(found, name)) for name in names}
 
 
-def about(bed: Any) -> Run:
+def _about(bed: Any) -> Run:
     """What every run says of its bed before the test."""
     return {
         "grain": 2 * float(bed.grains().radius.mean()),
@@ -218,6 +236,15 @@ def quantity(runs: Sequence[Run], of: Of, unit: str, note: str, *, error: Of | N
     elif error is not None and (std := number(runs[next(iter(known))], error)) is not None:
         note = f"{note}; std: error of the one run"
     return {"value": float(np.mean(values)), "std": std, "unit": unit, "note": note}
+
+
+def of_beds(runs: Sequence[Run], count: str) -> Json:
+    """The quantities that every test has last; `count`: which grains were counted."""
+    return {
+        "packing_fraction": quantity(runs, "packing_fraction", "1", "of the bed before"),
+        "grain_count": quantity(runs, "grain_count", "1", count),
+        "max_overlap": quantity(runs, "max_overlap", "1", "over diameter"),
+    }
 
 
 def table(title: str, rows: Iterable[Any], columns: Mapping[str, Callable[[Any], str]]) -> Json:
