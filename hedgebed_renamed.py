@@ -45,7 +45,7 @@ _MODULES = {
             "bed_commands benching cli_options=options cli_runs=runs doctor effects probes render_command=render"
         ),
         "experiments.compare": (
-            "compare_common=common compare_settings=settings compare_spatial=spatial compare_tumbles=tumbles"
+            "compare_common=experiment compare_settings=settings compare_spatial=spatial compare_tumbles=tumbles"
         ),
         "experiments.diagnose": "diagnose_settings=settings inspection",
         "experiments.grains": (
@@ -53,17 +53,18 @@ _MODULES = {
             "softening spells tracked_frames tumble_bed_settings=settings tumble_flight=flight where"
         ),
         "experiments.hop": (
-            "hop_numbers=numbers hop_on_surface=on_surface hop_search=search hop_settings=settings hop_words=words"
+            "hop_numbers=numbers hop_on_surface=on_surface hop_search=search hop_settings=settings hop_words=experiment"
         ),
         "experiments.paper": (
-            "paper_claims=claims paper_settings=settings paper_transitions=transitions paper_variants=variants"
+            "paper_claims=claims paper_settings=settings paper_transitions=transitions paper_variants=experiment"
         ),
         "experiments.penetrate": (
-            "amended amended_runs bed_given=given departures findings fit headline model_given=given "
-            "penetrate_plan=plan reference remarks run_campaign=recorded settings units"
+            "amended amended_runs=amended bed_given=given departures findings fit headline model_given=given "
+            "penetrate_plan=units reference remarks=result run_campaign=recorded settings units"
         ),
         "experiments.platform": (
-            "kept_platform lengths platform_settings=settings settled surfaces tips tumble_platform=numbers"
+            "kept_platform=numbers lengths=settled platform_settings=settings settled surfaces tips=numbers "
+            "tumble_platform=numbers"
         ),
         "experiments.runs": (
             "cli_streams=streams kept_results kernel_cache memory progress reading registry reporting "
@@ -72,7 +73,7 @@ _MODULES = {
         "experiments.spatial": (
             "spatial_frames=frames spatial_result=result spatial_settings=settings spatial_trial=trial"
         ),
-        "experiments.suite": "suite_commands=commands suite_cost=cost",
+        "experiments.suite": "suite_commands=commands suite_cost=cases",
         "experiments.tumble": (
             "campaign_settings footfalls sweep_ranges synthesis tumble_coupled=coupled tumble_grains=on_grains "
             "tumble_grains_frames=on_grains_frames tumble_grains_result=on_grains_result tumble_opening=opening "

@@ -1,7 +1,7 @@
 """Settings of `hedgebed bed make` and `hedgebed bed refine`."""
 
 from dataclasses import replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -9,39 +9,47 @@ from dem.grains.graded import Graded
 from dem.grains.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
 from dem.prepare.recipe import check_stages, parse_stage
 from experiments.grains.sizes import Distribution, Kept
-from experiments.penetrate.settings import MATERIAL, STANDARD_GRAVITY
-from experiments.runs.strict import StrictSettings
+from experiments.penetrate.settings import (
+    STANDARD_GRAVITY,
+    Arch,
+    BedSize,
+    Grain,
+    GrainMaterial,
+    MaxOverlap,
+    Precision,
+    Spread,
+    TimeStep,
+    Young,
+)
+from experiments.runs.strict import Positive, SeedNumber, StrictSettings, Threads
 from vis.page.sentences import Sentences
 
 __all__ = ["GRADED", "SPREAD_OUT", "BedRefineSettings", "BedSettings"]
 
 say = Sentences(__package__)
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
 GRADED = ("footprints", "fine_depth", "growth")
 """Settings that a graded bed alone has, beside ``coarse``."""
 SPREAD_OUT = ("deviation", "cut", "openings", "passing")
 """Settings of ``distribution``, each of some of them."""
 _OF = {"normal": ("deviation", "cut"), "log-normal": ("deviation", "cut"), "sieve": ("openings", "passing")}
 _NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the run's folder alone if not given."
+ShelfName = Annotated[str | None, Field(min_length=1, description=_NAME)]
 
 
 class BedSettings(StrictSettings):
     """A bed prepared as in a laboratory, stage by stage."""
 
-    material: str = Field("sand", description=MATERIAL)
+    material: GrainMaterial = "sand"
     stages: tuple[str, ...] = Field(
         ("rain", "level"),
         min_length=1,
         description="What is done, in this order: rain[:dry|:FRICTION], stick, level[:HEIGHT], fluff[:TIMES], "
         "compact:PACKING[@lid], compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES.",
     )
-    size: tuple[Positive, Positive, Positive] = Field(
-        (0.04, 0.04, 0.03), description="Bed: both widths (periodic) and depth of grains [m]."
-    )
-    grain: Positive = Field(0.004, description="Mean grain diameter [m].")
-    spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    size: BedSize = (0.04, 0.04, 0.03)
+    grain: Grain = 0.004
+    spread: Spread = 0.15
     distribution: Distribution = Field(
         "uniform",
         description="Of the diameters, about `grain`: uniform, normal or log-normal by number; sieve: a table by mass, "
@@ -78,15 +86,13 @@ class BedSettings(StrictSettings):
     )
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
     seed: SeedNumber = Field(1, description="Seed of sizes and positions.")
-    name: str | None = Field(None, min_length=1, description=_NAME)
-    max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")
-    young: Positive | None = Field(
-        None, description="Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
-    )
-    time_step: Positive | None = Field(None, description="Step of the grains [s]; from the contact time if not given.")
-    precision: Literal["float64", "float32"] = Field("float64", description="Arithmetic of the bed.")
-    arch: Literal["cpu", "cuda"] = Field("cpu", description="Where the bed is computed.")
-    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+    name: ShelfName = None
+    max_overlap: MaxOverlap = 0.05
+    young: Young = None
+    time_step: TimeStep = None
+    precision: Precision = "float64"
+    arch: Arch = "cpu"
+    threads: Threads = None
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:
@@ -159,5 +165,5 @@ class BedRefineSettings(StrictSettings):
         "(pull-off over weight), or the surface energy.",
     )
     seed: SeedNumber | None = Field(None, description="Seed of sizes and positions; the bed's own if not given.")
-    name: str | None = Field(None, min_length=1, description=_NAME)
-    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+    name: ShelfName = None
+    threads: Threads = None

@@ -1,20 +1,16 @@
 """Settings of `hedgebed bed test repose`, `cone`, `cut` and `shear`."""
 
-from typing import Annotated, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
-from experiments.penetrate.settings import MATERIAL, STANDARD_GRAVITY
-from experiments.runs.strict import StrictSettings
+from experiments.penetrate.settings import STANDARD_GRAVITY, BedSize, Grain, GrainMaterial, Seeds, Spread
+from experiments.runs.strict import Positive, StrictSettings, Threads
 
 from .settings import say
 
 __all__ = ["BedConeSettings", "BedCutSettings", "BedReposeSettings", "BedShearSettings", "BedTestSettings"]
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Size = tuple[Positive, Positive, Positive]
-SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
-_SIZE = "Bed: both widths (periodic) and depth of grains [m]."
 _OF_BED = ("material", "size", "grain", "spread", "packing", "gravity", "seeds")
 
 
@@ -27,16 +23,16 @@ class BedTestSettings(StrictSettings):
         description="The bed: a file, the folder of a run of bed make, or a name on the shelf. Decides material, size, "
         "grain, spread, packing, gravity and seed; beds are prepared, or taken from the cache, if not given.",
     )
-    material: str = Field("sand", description=MATERIAL)
-    size: Size = Field((0.16, 0.024, 0.04), description=_SIZE)
-    grain: Positive = Field(0.004, description="Mean grain diameter [m].")
-    spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    material: GrainMaterial = "sand"
+    size: BedSize = (0.16, 0.024, 0.04)
+    grain: Grain = 0.004
+    spread: Spread = 0.15
     packing: float | None = Field(
         None, gt=0.1, le=0.74, description="Packing fraction to prepare the bed to [1]; as it settles if not given."
     )
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
-    seeds: tuple[SeedNumber, ...] = Field((1, 2, 3), min_length=1, description="Seeds: one bed each.")
-    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+    seeds: Seeds = (1, 2, 3)
+    threads: Threads = None
 
     @model_validator(mode="after")
     def _one_or_the_other(self) -> Self:
@@ -58,7 +54,7 @@ class BedReposeSettings(BedTestSettings):
 class BedConeSettings(BedTestSettings):
     """A cone penetrometer: cone index against depth, and its gradient."""
 
-    size: Size = Field((0.064, 0.064, 0.048), description=_SIZE)
+    size: BedSize = (0.064, 0.064, 0.048)
     diameter: Positive = Field(0.016, description="Diameter of the cone's base [m].")
     angle: float = Field(60.0, ge=10, le=150, description="Full angle of the cone [degrees].")
     depth: Positive | None = Field(
@@ -86,7 +82,7 @@ class BedConeSettings(BedTestSettings):
 class BedCutSettings(BedTestSettings):
     """A vertical cut: gravity rises until a face falls; critical height and cohesion."""
 
-    size: Size = Field((0.128, 0.024, 0.04), description=_SIZE)
+    size: BedSize = (0.128, 0.024, 0.04)
     width: Positive | None = Field(None, description="Width of the cut [m]; the bed's height if not given.")
     most: float = Field(
         4.0, ge=0.2, le=100, description="Gravity to which it rises if no face falls [of the bed's own]."
@@ -114,7 +110,7 @@ class BedShearSettings(StrictSettings):
     inertial_number: Positive = Field(
         5e-3, le=0.05, description="Speed of the lid, as speed / height d sqrt(density / pressure) [1]."
     )
-    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+    threads: Threads = None
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:

@@ -3,23 +3,20 @@
 import math
 import re
 from dataclasses import dataclass, fields
-from typing import Annotated, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from dem.grains.materials import Material, material
-from experiments.penetrate.settings import STANDARD_GRAVITY
+from experiments.penetrate.settings import STANDARD_GRAVITY, Spread
 from experiments.runs.reading import nearest
-from experiments.runs.strict import StrictSettings
+from experiments.runs.strict import Positive, SeedNumber, StrictSettings, Threads
 from experiments.runs.types import Json
 from vis.page.sentences import Sentences
 
 __all__ = ["FIGURES", "FREE", "CalibrateSettings", "Figure", "Target", "material_at"]
 
 say = Sentences(__package__)
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
 
 
 @dataclass(frozen=True)
@@ -118,7 +115,7 @@ class CalibrateSettings(StrictSettings):
         "'origin', state = 'loose' or 'dense', fit = false to compare only.",
     )
     grain: Positive = Field(0.004, description="Mean grain diameter [m]; surface energies hold for it.")
-    spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    spread: Spread = 0.15
     max_overlap: float = Field(
         0.05,
         ge=0.005,
@@ -180,7 +177,7 @@ class CalibrateSettings(StrictSettings):
         description="Bed that is drained for an angle of repose: widths (periodic; slopes along the first) and depth "
         "[mean diameters].",
     )
-    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+    threads: Threads = None
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.platform.tips import tip_angles, tip_depth
+from experiments.platform.numbers import tip_angles, tip_depth
 from experiments.runs.folder import read_series
 from experiments.runs.result import quantities_of
 from experiments.runs.types import Json

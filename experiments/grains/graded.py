@@ -10,7 +10,7 @@ from coupling import CoupledTumble
 from dem.grains.graded import THROAT, Graded
 from dem.measure.grading import MOST_DRAINED, MOST_STRAYED
 from dem.prepare.report import Prepared
-from experiments.platform.tips import tip_angles, tip_depth
+from experiments.platform.numbers import tip_angles, tip_depth
 from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from experiments.platform.lengths import check_spike_length
 from experiments.platform.numbers import platform_numbers
 from experiments.platform.settled import (
     Number,
@@ -13,6 +12,7 @@ from experiments.platform.settled import (
     brake_words,
     check_actuation,
     check_body,
+    check_spike_length,
     defaults_said,
     of_other_spikes,
     settle_limits,

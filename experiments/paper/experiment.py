@@ -1,41 +1,41 @@
 """`hedgebed paper`: the trials of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) with our model.
 
 Every gravity, torque and surface, with friction as it is and at both ends of its band, by the located integrator and by
-the paper's fixed step; then what the paper does not give, varied (`experiments.paper.variants`). What the paper's text
-states is compared in `experiments.paper.claims`.
+the paper's fixed step; then `variants` of what the paper does not give. `experiments.paper.claims` compares them with
+what the paper's text states.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.platform.kept_platform import keep_platform
-from experiments.platform.numbers import PlatformNumbers, platform_numbers, torque_within_limit
+from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
 from experiments.runs.memory import cores_there
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result, quantity
+from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.tumble.result import trajectory_columns
 from experiments.tumble.settings import TumbleSettings
-from experiments.tumble.trial import plan_tumble, turns_of
-from rigid.model.trial import Trial
+from experiments.tumble.trial import SPIKES_PER_ROW, plan_tumble, turns_of
+from rigid.ground.laws import find_law
+from rigid.model.trial import Effect, Ground, Trial
 from rigid.planar.simulate import simulate
 
 from .claims import claims, first_lasting
 from .settings import PaperSettings
 from .transitions import HARD
-from .variants import variants
 
-__all__ = ["Job", "check", "plan_jobs", "resume", "run"]
+__all__ = ["FACTORS", "GRAINS", "Job", "SLIDING", "SWEPT", "Variant", "check", "plan_jobs", "resume", "run", "variants"]
 
 SAMPLE_INTERVAL = 5e-3
 """Between the rows that are kept [s]; numbers come from the integration itself."""
@@ -50,14 +50,14 @@ class Job:
     torque: float
     surface: str
     variant: str
-    """"nominal", "low" or "high" friction, "paper" (the fixed step), or the name of a `paper_variants.Variant`."""
+    """"nominal", "low" or "high" friction, "paper" (the fixed step), or the name of one of `variants`."""
     trial: Trial
     duration: float
     trusted: float
     max_wheel_speed: float = math.inf
     """Where a motor's torque ends [rad/s]; not known of a wheel with another inertia than the platform's."""
     kind: str = ""
-    varied: Mapping[str, Any] = field(default_factory=dict)  # as `paper_variants.Variant` has them
+    varied: Mapping[str, Any] = field(default_factory=dict)  # as `variants` has them
 
     @property
     def method(self) -> Any:
@@ -67,8 +67,7 @@ class Job:
 
 def check(settings: PaperSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
-    jobs = plan_jobs(settings)
-    for job in jobs:
+    for job in plan_jobs(settings):
         if job.variant == "paper":  # a step too long for the ground
             simulate(job.trial, duration=1e-3, method="paper")
 
@@ -76,13 +75,9 @@ def check(settings: PaperSettings) -> None:
 def plan_jobs(settings: PaperSettings, platform_file: Path | None = None) -> list[Job]:
     """Every integration, in order; `platform_file` stands in for ``settings.platform``, where that was copied."""
     platform = platform_numbers(settings.platform, file=platform_file)
-    jobs: list[Job] = []
     turns = turns_of(settings.motor_torques, settings.brake_torques, settings.brake_wheel_speed)
-    for rig in settings.rigs:
-        for turn in turns:
-            for surface in settings.surfaces:
-                jobs += _case_jobs(settings, rig, turn, surface, platform)
-    return jobs
+    places = product(settings.rigs, turns, settings.surfaces)
+    return [job for place in places for job in _case_jobs(settings, *place, platform)]
 
 
 def _case_jobs(
@@ -109,7 +104,7 @@ def _case_jobs(
         yield job(variant, replace(trial, mu_s=factor * trial.mu_s, mu_d=factor * trial.sliding_friction))
     yield job("paper", trial)
     for other in variants(settings, trial, surface=surface, first_rig=rig == settings.rigs[0]):
-        yield job(other.name, other.trial, other.kind, other.varied)
+        yield job(*other)
 
 
 def _integrate(job: Job) -> Json:
@@ -160,19 +155,13 @@ def _launch(trajectory: Any, states: Sequence[tuple[float, str, float]]) -> dict
     }  # fmt: skip
 
 
-def _all(jobs: Sequence[Job], workers: int, progress: Progress) -> list[Json]:
+def _all(jobs: Sequence[Job], workers: int) -> Iterator[Json]:
     """The results of the jobs, in their order."""
-    found = []
     if workers == 1:
-        for number, job in enumerate(jobs, 1):
-            found.append(_integrate(job))
-            progress.update(number)
-        return found
+        yield from map(_integrate, jobs)
+        return
     with ProcessPoolExecutor(workers, mp_context=get_context("fork")) as pool:
-        for number, result in enumerate(pool.map(_integrate, jobs, chunksize=4), 1):
-            found.append(result)
-            progress.update(number)
-    return found
+        yield from pool.map(_integrate, jobs, chunksize=4)
 
 
 def _compute(settings: PaperSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -181,7 +170,10 @@ def _compute(settings: PaperSettings, folder: RunFolder, progress: Progress) -> 
     progress.plan({"trials": float(len(jobs)), "report": 0.1 * len(jobs)})
     progress.stage("trials", total=float(len(jobs)))
     progress.message(f"{len(jobs)} integrations on {workers} process{'es' if workers > 1 else ''}")
-    found = _all(jobs, workers, progress)
+    found = []
+    for number, entry in enumerate(_all(jobs, workers), 1):
+        found.append(entry)
+        progress.update(number)
     for entry in found:
         rows = entry.pop("rows")
         if rows is not None and entry["surface"] in HARD:
@@ -193,14 +185,17 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
     cases = [entry for entry in found if entry["variant"] in ("nominal", "low", "high", "paper")]
 
     def of_kind(kind: str) -> list[Json]:
+        """Of these states only the first that lasts is kept, in place of all."""
         kept = [entry for entry in found if entry["kind"] == kind]
         return [
-            {**{key: entry[key] for key in entry if key != "transitions"}, "first_state": first_lasting(entry)}
+            {key: entry[key] for key in entry if key != "transitions"} | {"first_state": first_lasting(entry)}
             for entry in kept
         ]
 
     stated = claims(settings, found, jobs)
     met = [claim for claim in stated if claim["met"] is not None]
+    inside = {True: "yes", False: "no", None: "-"}
+    rows = [[claim["statement"], claim["ours"], inside[claim["met"]]] for claim in stated]
     guesses = sorted({job.surface for job in jobs if find_surface(job.surface).guess})
     warnings = [f"the numbers of {name} are a guess until they are calibrated" for name in guesses]
     platform = jobs[0].trial
@@ -212,19 +207,12 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
         brake_wheel_speed=settings.brake_wheel_speed,
         surfaces={name: asdict(find_surface(name)) for name in settings.surfaces},
         claims=stated,
-        tables=[_table(stated)],
+        tables=[{"title": "What the paper's text states", "head": ["statement", "ours", "inside"], "rows": rows}],
         integrations=len(jobs),
         cases=cases,
         **{kind: of_kind(kind) for kind in ("sweep", "sliding", "grains")},
         warnings=warnings,
     )
-
-
-def _table(stated: list[Json]) -> Json:
-    """What the text states beside what comes out, as the terminal shows it."""
-    inside = {True: "yes", False: "no", None: "-"}
-    rows = [[claim["statement"], claim["ours"], inside[claim["met"]]] for claim in stated]
-    return {"title": "What the paper's text states", "head": ["statement", "ours", "inside"], "rows": rows}
 
 
 def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
@@ -237,22 +225,94 @@ def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
         pairs = [(nominal[name][key], fixed[name][key]) for name in nominal if name in fixed]
         return max((abs(a - b) for a, b in pairs if a is not None and b is not None), default=0.0)
 
-    return {
-        "claims_met": quantity(
-            sum(1 for claim in met if claim["met"]), "1", f"of {len(met)} statements of the text that can be compared"
-        ),
-        "claims_compared": quantity(len(met), "1", f"{len(stated) - len(met)} more cannot be"),
-        "case_count": quantity(len(nominal), "1", "gravities x torques x surfaces"),
-        "step_angle_gap": quantity(
-            apart("trajectory_angle"), "rad", "largest change of a trajectory angle by the paper's fixed step"
-        ),
-        "step_speed_gap": quantity(
-            apart("max_speed"), "m/s", "largest change of a largest speed by the paper's fixed step"
-        ),
-        "energy_residual": quantity(
-            max(entry["energy_residual"] for entry in nominal.values()), "1", "largest of the located integrations"
-        ),
-    }
+    gap = "by the paper's fixed step"
+    residual = max(entry["energy_residual"] for entry in nominal.values())
+    return quantities_of(
+        {
+            "claims_met": (
+                sum(bool(claim["met"]) for claim in met),
+                "1",
+                f"of {len(met)} statements of the text that can be compared",
+            ),
+            "claims_compared": (len(met), "1", f"{len(stated) - len(met)} more cannot be"),
+            "case_count": (len(nominal), "1", "gravities x torques x surfaces"),
+            "step_angle_gap": (apart("trajectory_angle"), "rad", f"largest change of a trajectory angle {gap}"),
+            "step_speed_gap": (apart("max_speed"), "m/s", f"largest change of a largest speed {gap}"),
+            "energy_residual": (residual, "1", "largest of the located integrations"),
+        }
+    )
 
 
 run, resume = computed_run("paper", PaperSettings, _compute, check=check)
+
+
+GRAINS = ("sand", "jsc1a")
+SWEPT = ("inertia", "wheel_inertia", "stiffness", "damping", "wheel_speed_0")
+"""Numbers that the paper does not give, halved and doubled."""
+FACTORS = (0.5, 2.0)
+SLIDING = (0.6, 0.8, 1.0)
+"""mu_d / mu_s [1]; the paper gives no mu_d, and 0.5 stands where nothing is measured."""
+TORQUE_RISE, RISE = Path(__file__).parents[1] / "terms" / "torque_rise.py", 0.1
+"""A term, and its time constant [s]: what a step of the torque hides."""
+MEMORY_LAW, LITTLE = "katsuragi-durian", 0.05
+"""A law whose stiffness and rebound can be set apart, and its own rebound [1]: it gives back next to nothing."""
+HALF = 0.5
+"""The most that `rebound` can be."""
+OTHER_LAWS = ("bekker", "rft")
+"""Laws of grains with a stiffness of their own, at the same rebound."""
+
+
+Variant = tuple[str, Trial, str, Mapping[str, Any]]
+"""A trial beside the nominal one: name; trial; its list in result.json, "sweep", "sliding" or "grains" ("" where it serves
+a claim only); what was varied: key and factor; ratio; or law, stiffness (of a row, N/m) and rebound."""
+
+
+def variants(settings: PaperSettings, trial: Trial, *, surface: str, first_rig: bool) -> Iterator[Variant]:
+    """Those of one gravity, torque and surface. `first_rig`: whether the gravity is that of Figures 5 and 6."""
+    brake = trial.actuator == "brake"
+    if surface in GRAINS and brake:
+        yield from _grains(trial, whole=settings.sweep)
+    if surface == "steel" and first_rig and trial.torque == min(settings.motor_torques):
+        rising = Effect(id="torque-rise", parameters={"rise": RISE}, file=TORQUE_RISE)
+        yield f"torque rise {RISE:g} s", replace(trial, effects=(rising,)), "", {}
+    if not settings.sweep:
+        return
+    if surface in HARD and first_rig:
+        for key in SWEPT:
+            value = getattr(trial, key)
+            for factor in FACTORS if value else ():
+                varied = replace(trial, **{key: factor * value})
+                yield f"{key} x{factor:g}", varied, "sweep", {"key": key, "factor": factor}
+    if (surface in HARD and first_rig) or (surface in GRAINS and brake):
+        for ratio in SLIDING:
+            yield f"mu_d {ratio:g} mu_s", replace(trial, mu_d=ratio * trial.mu_s), "sliding", {"ratio": ratio}
+
+
+def _grains(trial: Trial, *, whole: bool) -> Iterator[Variant]:
+    """Stiffness by rebound: the surface's own stiffness at little rebound first, the rest where `whole`."""
+    law = find_law(MEMORY_LAW)
+    default = SPIKES_PER_ROW * law.values({})["stiffness"]
+    own = trial.stiffness
+
+    def remembers(stiffness: float, rebound: float) -> Variant:
+        parameters = {"stiffness": stiffness / SPIKES_PER_ROW, "rebound": rebound}
+        ground = Ground(name=MEMORY_LAW, parameters=parameters, spikes_per_row=SPIKES_PER_ROW)
+        varied = {"law": MEMORY_LAW, "stiffness": stiffness, "rebound": rebound}
+        name = f"{MEMORY_LAW} {stiffness:.4g} N per m rebound {rebound:g}"
+        return name, replace(trial, ground=ground), "grains", varied
+
+    yield remembers(own, LITTLE)
+    if not whole:
+        return
+    for stiffness in sorted({default, own, *(find_surface(name).stiffness for name in GRAINS)}):
+        # No damper: it gives back all that it took.
+        spring = replace(trial, stiffness=stiffness, damping=0.0)
+        varied = {"law": "spring-damper", "stiffness": stiffness, "rebound": 1.0}
+        yield f"spring {stiffness:.4g} N per m", spring, "grains", varied
+        for rebound in (HALF, LITTLE):
+            if (stiffness, rebound) != (own, LITTLE):
+                yield remembers(stiffness, rebound)
+    for name in OTHER_LAWS:
+        ground = Ground(name=name, parameters={"rebound": LITTLE}, spikes_per_row=SPIKES_PER_ROW)
+        varied = {"law": name, "stiffness": None, "rebound": LITTLE}
+        yield name, replace(trial, ground=ground), "grains", varied

@@ -4,11 +4,14 @@ Driven spikes follow the path that they are given; drops are integrated with the
 (`experiments.diagnose.push.law`); what is set down is stepped on the law as a ground. The numbers of an effect
 are those of the model's diameter: on another one forces on a section go with its square, forces on a shaft with it, and
 what belongs to the spring with the K that the model gives.
+
+With a bed, every run of it is made on the law as well. Without one (``--ground spring-damper``), the runs of one seed
+are made on the model's own K and C alone, and on the law.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -17,24 +20,33 @@ from numpy.typing import ArrayLike, NDArray
 
 from coupling import Penetration
 from experiments.campaign import PenetrationModel, read_model
+from experiments.campaign.files import MODEL_COPY, keep_model
 from experiments.campaign.tables import EffectTable
 from experiments.diagnose.fit.own import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, push, slot_places, slot_table
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
+from experiments.runs.version import __version__
+from experiments.runs.whole_runs import publish
 from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
+from .findings import mean_of, returned_work
 from .settings import PenetrateSettings, say
-from .units import Unit, make_run
+from .units import Unit, make_run, make_spike, plan_units
 
-__all__ = ["AmendedGround", "AmendedLaw", "read_law"]
+__all__ = ["AmendedGround", "AmendedLaw", "kept_law", "read_law", "run_beside", "run_without_bed"]
 
 Array = NDArray[np.float64]
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
 _POWERS = {"area": 2, "drag": 2, "perimeter": 1, "viscous": 1}
 """With which power of the diameter a number goes, by how it enters the law."""
+_SPEED = 1.1
+"""Factor beyond the speeds that a model was fitted to from which on it is extrapolated."""
 _CREEP = 1e-4
 """Below this share of a set-down's lowering speed the direction of the motion is not certain."""
 
@@ -49,7 +61,9 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
     model = read_model(path)
     if not isinstance(model, PenetrationModel):
         raise ValueError(f"{path}: kind = {model.kind!r}: 'penetration' was expected")
-    known = _hows()
+    forms = push_forms(retreats=True, speeds_differ=True)
+    numbers = [form.numbers for form in forms] + [bend.numbers for form in forms for bend in form.bends]
+    known = {number.name: number.how for several in numbers for number in several}  # how each scales with the diameter
     own: list[OwnEffect] = []
     slots: dict[str, float] = {}
     size = 1.0 if model.spike.diameter is None else settings.tip_diameter / model.spike.diameter
@@ -73,13 +87,6 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
     return replace(law, slots={name: value * factors[name] for name, value in slots.items()})
 
 
-def _hows() -> dict[str, str]:
-    """Slot of the law -> how it goes with the diameter, of every form in the library."""
-    forms = push_forms(retreats=True, speeds_differ=True)
-    numbers = [form.numbers for form in forms] + [bend.numbers for form in forms for bend in form.bends]
-    return {number.name: number.how for several in numbers for number in several}
-
-
 def _own(path: Path, number: int, effect: EffectTable) -> OwnEffect:
     own = load_own(path.parent / str(effect.file))
     needed = () if own.push is not None else own.term.parameters
@@ -88,10 +95,6 @@ def _own(path: Path, number: int, effect: EffectTable) -> OwnEffect:
         what = f"{missing[0]} is missing" if missing else f"its file is of {own.id!r}"
         raise ValueError(f"{path}: [[effect]] {number} (id {effect.id!r}): {what}")
     return own
-
-
-_SPEED = 1.1
-"""Factor beyond the speeds that a model was fitted to from which on it is extrapolated."""
 
 
 def _range(speeds: Sequence[float]) -> str:
@@ -142,7 +145,18 @@ class AmendedLaw:
         drops = (*own.drop_speeds, *own.other_drop_speeds)
         if drops and spike.mass is not None and not math.isclose(spike.mass, own.mass, rel_tol=1e-3):
             said.append(say("other_mass", spike=spike, own=own))
-        return [*said, *self._extrapolated()]
+        driven, dropped, by_hand = self._speeds
+        if by_hand or not (driven or dropped):
+            return said
+        # A drop has every speed below its own.
+        least, most = 0.0 if dropped else min(driven), max(driven + dropped)
+        pushes = {*own.speeds, *own.other_speeds, *([own.retreat_speed] if own.speeds or own.other_speeds else [])}
+        far = sorted(v for v in pushes | {*drops} if not least / _SPEED <= v <= most * _SPEED)
+        if far:
+            said.append(say("extrapolated", s=self, far=", ".join(f"{v:g}" for v in far)))
+        if drops and not dropped:
+            said.append("the model was fitted to pushes alone: what it says of drops is extrapolated")
+        return said
 
     @property
     def fitted_to(self) -> str:
@@ -159,22 +173,6 @@ class AmendedLaw:
         driven = [trial.speed for trial in self.model.trial if trial.mode == "driven"]
         dropped = [trial.speed for trial in self.model.trial if trial.mode == "drop" and trial.speed is not None]
         return [speed for speed in driven if speed], dropped, None in driven or 0.0 in driven
-
-    def _extrapolated(self) -> list[str]:
-        """Speeds of these runs beyond those of the model's trials; a drop has every speed below its own."""
-        own, (driven, dropped, by_hand) = self.settings, self._speeds
-        drops = {*own.drop_speeds, *own.other_drop_speeds}
-        if by_hand or not (driven or dropped):
-            return []
-        least, most = 0.0 if dropped else min(driven), max(driven + dropped)
-        pushes = {*own.speeds, *own.other_speeds, *([own.retreat_speed] if own.speeds or own.other_speeds else [])}
-        far = sorted(v for v in pushes | drops if not least / _SPEED <= v <= most * _SPEED)
-        said = []
-        if far:
-            said.append(say("extrapolated", s=self, far=", ".join(f"{v:g}" for v in far)))
-        if drops and not dropped:
-            said.append("the model was fitted to pushes alone: what it says of drops is extrapolated")
-        return said
 
     def plain(self, time_step: float) -> SpringDamper:
         """The spring-damper of the model without its effects, as a ground."""
@@ -204,34 +202,25 @@ class AmendedLaw:
 
     def run(self, unit: Unit, like: Penetration) -> Penetration:
         """The run of `unit` on the law, at the times of `like` (the same run on another ground) and from its start."""
+        lane, path = np.zeros(1, np.int32), np.array([0, len(like.time)], dtype=np.int32)
         if unit.kind == "driven":
-            return self._driven(like)
+            numbers = self.numbers(speed=float(np.abs(like.velocity).max()))
+            (force,) = push(numbers, lane, path, like.depth, like.velocity, self.own)
+            return replace(like, force=force)
         if unit.kind == "drop":
-            return self._dropped(unit, like)
+            numbers = self.numbers(speed=unit.speed)
+            (motion,) = fall(numbers, lane, path, like.time, np.array([unit.speed]), self.own)
+            depth, velocity, acceleration, phase = motion.T
+            carried = like.time < 0  # before the surface it goes at its speed
+            return replace(
+                like,
+                depth=np.where(carried, like.depth, depth),
+                velocity=np.where(carried, like.velocity, velocity),
+                force=np.where(carried, 0.0, self.settings.weight - self.settings.mass * acceleration),
+                phase=np.where(carried, "free", np.array(PHASES)[np.clip(phase.astype(int), 0, 3)]),
+            )
         ground = AmendedGround(self, time_step=like.macro_step / self.settings.substeps, speed=unit.speed)
         return make_run(self.settings, unit, ground, start_depth=like.settings.get("start_depth")).run()
-
-    def _driven(self, like: Penetration) -> Penetration:
-        numbers = self.numbers(speed=float(np.abs(like.velocity).max()))
-        path = np.array([0, len(like.time)], dtype=np.int32)
-        (force,) = push(numbers, np.zeros(1, np.int32), path, like.depth, like.velocity, self.own)
-        return replace(like, force=force)
-
-    def _dropped(self, unit: Unit, like: Penetration) -> Penetration:
-        path = np.array([0, len(like.time)], dtype=np.int32)
-        (motion,) = fall(
-            self.numbers(speed=unit.speed), np.zeros(1, np.int32), path, like.time, np.array([unit.speed]), self.own
-        )
-        depth, velocity, acceleration, phase = motion.T
-        carried = like.time < 0  # before the surface it goes at its speed
-        force = self.settings.weight - self.settings.mass * acceleration
-        return replace(
-            like,
-            depth=np.where(carried, like.depth, depth),
-            velocity=np.where(carried, like.velocity, velocity),
-            force=np.where(carried, 0.0, force),
-            phase=np.where(carried, "free", np.array(PHASES)[np.clip(phase.astype(int), 0, 3)]),
-        )
 
 
 class AmendedGround:
@@ -241,14 +230,9 @@ class AmendedGround:
     """
 
     name = "spring-damper, amended"
-    surface = 0.0
-    """Height of the surface [m]."""
+    surface, clearance, depth_limit = 0.0, 0.0, math.inf  # the surface is flat, without a floor [m]
     centre = (0.0, 0.0)
     """Where a body is put [m]: the surface is the same everywhere."""
-    clearance = 0.0
-    """The surface is flat [m]."""
-    depth_limit = math.inf
-    """There is no floor [m]."""
 
     def __init__(self, law: AmendedLaw, *, time_step: float, speed: float) -> None:
         self.time_step = time_step
@@ -281,3 +265,123 @@ class AmendedGround:
     def restore(self, state: Json) -> None:
         """Take back what `state` gave."""
         self._top, self._ever = float(state["top"]), float(state["ever"])
+
+
+_ROWS = 400
+"""Macro steps in which the fastest run passes the driven depth, where no bed says how long a step is."""
+
+Runs = Mapping[str, Penetration]
+
+
+def kept_law(settings: PenetrateSettings, folder: Path) -> AmendedLaw | None:
+    """The law of the model that the folder keeps; None where there is none."""
+    return None if settings.model is None else read_law(folder / MODEL_COPY, settings)
+
+
+def run_beside(
+    law: AmendedLaw, units: Sequence[Unit], beds: Runs, models: Runs, folder: RunFolder
+) -> tuple[dict[str, Json], list[str], dict[str, Json]]:
+    """Make every run of the bed on the law and keep its series: quantities, sentences and, by id, each run's numbers.
+
+    `models` are the same runs on the spring-damper that was fitted to the bed.
+    """
+    runs = {unit.id: law.run(unit, beds[unit.id] if unit.kind == "driven" else models[unit.id]) for unit in units}
+    for name, series in runs.items():
+        folder.write_series(f"{name}.amended", series.columns())
+    driven = [unit.id for unit in units if unit.kind == "driven"]
+    plain, amended = (_gap(driven, beds, others) for others in (models, runs))
+    note = "rms difference over the bed's rms force, driven runs, in, at rest and out"
+    quantities: dict[str, tuple[float | None, str, str]] = {
+        "force_gap_spring_damper": (plain, "1", note),
+        "force_gap_amended": (amended, "1", f"the same with {law.words}"),
+        "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
+        "work_returned_amended": (_returned(driven, runs), "1", "work of the way out over work in, driven"),
+    }
+    known = plain is not None and amended is not None
+    sentences = [say("off_by", law=law, amended=100 * amended, plain=100 * plain)] if known else []  # type: ignore[operator]
+    return quantities_of(quantities, std=None), sentences, {name: _amended(run) for name, run in runs.items()}
+
+
+def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
+    """The runs of the first seed on the model's K and C, and on the law; write and return the result."""
+    with folder.lock():
+        keep_model(settings.model, folder.path)
+        law = kept_law(settings, folder.path)
+        assert law is not None  # the settings see to it
+        units = plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]}))
+        progress.stage("spring-damper", total=float(len(units)))
+        plain, runs = {}, {}
+        fastest = max(*settings.speeds, *settings.drop_speeds, settings.retreat_speed)
+        step = settings.time_step or settings.depth / fastest / _ROWS / settings.substeps
+        for done, unit in enumerate(units, 1):
+            plain[unit.id] = make_run(settings, unit, law.plain(step)).run()
+            runs[unit.id] = law.run(unit, plain[unit.id])
+            folder.write_series(unit.id, plain[unit.id].columns())
+            folder.write_series(f"{unit.id}.amended", runs[unit.id].columns())
+            progress.update(done)
+        driven = [unit.id for unit in units if unit.kind == "driven"]
+        stiffness, damping = law.pair
+        found: dict[str, tuple[float | None, str, str]] = {
+            "stiffness": (stiffness, "N/m", "of the model"),
+            "damping": (damping, "N s/m", "of the model"),
+            "load": (settings.weight, "N", "on the spike, set down and dropped"),
+            "sinkage_spring_damper": (_rest(units, plain), "m", "depth at rest under the load"),
+            "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
+            "work_returned_spring_damper": (_returned(driven, plain), "1", "work out over work in, driven"),
+            "work_returned_amended": (_returned(driven, runs), "1", f"the same with {law.words}"),
+        }
+        falls = f"; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N" if settings.drop_speeds else ""
+        spike = say("model_spike", s=settings, tip_mm=1e3 * settings.tip_diameter, falls=falls)
+        fitted = [f"The model was fitted to {law.fitted_to}."] if law.fitted_to else []
+        made = Result.make(
+            "penetrate",
+            ground=settings.ground,
+            version=__version__,
+            title=f"A {1e3 * settings.tip_diameter:g} mm spike on the spring-damper, and with {law.words}",
+            quantities=quantities_of(found, std=None),
+            runs=[
+                {
+                    "id": unit.id,
+                    "kind": unit.kind,
+                    "seed": None,
+                    "speed": unit.speed,
+                    "model_series": f"series/{unit.id}.csv",
+                    "amended_series": f"series/{unit.id}.amended.csv",
+                    "ended": runs[unit.id].ended,
+                    "quantities": {f"model_{name}": value for name, value in plain[unit.id].quantities().items()}
+                    | _amended(runs[unit.id]),
+                }
+                for unit in units
+            ],
+            spike=asdict(make_spike(settings)) | {"load": settings.weight},
+            model={"file": settings.model, "effects": list(law.effects)},
+            departures={"sentences": [spike, *fitted]},
+            warnings=law.warnings(),
+        )
+        return publish(folder, made, progress)
+
+
+def _amended(run: Penetration) -> Json:
+    """The numbers of a run on the law, by their names in result.json."""
+    return {f"amended_{name}": value for name, value in run.quantities().items()}
+
+
+def _rest(units: Sequence[Unit], runs: Runs) -> float | None:
+    return mean_of([runs[unit.id].resting_depth for unit in units if unit.kind == "set_down"])
+
+
+def _returned(driven: Sequence[str], runs: Runs) -> float | None:
+    return mean_of([returned_work(runs[name]) for name in driven])
+
+
+def _gap(driven: Sequence[str], beds: Runs, others: Runs) -> float | None:
+    """Rms difference over the bed's rms force, rows below the surface, every run weighing the same."""
+    square = drag = 0.0
+    for name in driven:
+        bed, other = beds[name], others[name]
+        rows = bed.depth > 0
+        if rows.any():
+            force = np.interp(bed.time, other.time, other.force)  # steps of other seeds' beds differ in the sixth digit
+            square += float(np.mean((force[rows] - bed.force[rows]) ** 2))
+            drag += float(np.mean(bed.force[rows] ** 2))
+    return float(np.sqrt(square / drag)) if drag > 0 else None

@@ -8,9 +8,8 @@ from experiments.grains.softening import Softening, bearing_gradient, drop_depth
 from experiments.runs.progress import Progress
 from experiments.runs.stopping import held_back
 
-from .plan import RAIN
 from .settings import PenetrateSettings
-from .units import deepest
+from .units import RAIN, deepest
 
 __all__ = ["bed_step", "choose_softness", "expected_stiffness", "find_material", "fingerprint", "prepare_bed"]
 

@@ -12,6 +12,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
+
 from coupling import BedGround, Run
 from experiments.campaign.files import keep_model, place_campaign
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
@@ -24,19 +26,16 @@ from experiments.runs.stopping import held_back
 from experiments.runs.whole_runs import draw_report, whole_run
 
 from . import beds
-from .amended_runs import run_without_bed
+from .amended import run_without_bed
 from .beds import fingerprint
 from .findings import BedFacts
-from .frames import Frames
-from .plan import PenetratePlan
 from .recorded import campaign_of, sensors_of
 from .refusals import check
-from .remarks import softening_note
-from .result import conclude
+from .result import conclude, softening_note
 from .settings import PenetrateSettings, say
-from .units import Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
+from .units import PenetratePlan, Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
 
-__all__ = ["check", "fingerprint", "resume", "run"]
+__all__ = ["Frames", "check", "fingerprint", "resume", "run"]
 
 
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -173,3 +172,56 @@ run, resume = whole_run(
     code=lambda: beds.fingerprint(),
     as_given=False,
 )
+
+
+class Frames:
+    """Writes the frames of one run."""
+
+    def __init__(
+        self,
+        settings: PenetrateSettings,
+        unit: Unit,
+        stepper: Run,
+        folder: RunFolder,
+        *,
+        expected: float,
+        resumed: bool,
+    ) -> None:
+        """`expected`: how long the run may well last [s]; `resumed`: it goes on from a checkpoint."""
+        from vis.pictures.frames import GRAIN_FIELDS, FrameWriter
+        from vis.pictures.meshes import spike_mesh
+
+        wanted = expected / max(1, settings.frame_count)
+        self.interval = max(wanted, stepper.macro_step) if settings.frame_count else None
+        self.limit = 2 * max(1, settings.frame_count)
+        self.fields = tuple(GRAIN_FIELDS)
+        if resumed:
+            # The frame of the very step of the checkpoint was written after it, if at all: it comes again.
+            half = 0.5 * stepper.macro_step
+            self.writer = FrameWriter(folder.path, name=unit.id, resume=True, keep_until=stepper.time - half)
+        else:
+            self.writer = FrameWriter(folder.path, name=unit.id)
+        spike = stepper.spike
+        self.points, self.triangles = spike_mesh(
+            spike.tip, diameter=spike.diameter, length=spike.length, shaft_diameter=spike.shaft,
+            cone_angle=spike.cone_angle,
+        )  # fmt: skip
+
+    def write(self, stepper: Run) -> None:
+        """One frame of what the stepper is doing now; of a run far longer than expected, ever fewer.
+
+        Past the limit every second is kept, past twice that every fourth and so on; the deepest point and the last
+        state always are.
+        """
+        late = max(0, stepper.frames_taken - 1)
+        if late % (1 << (late // self.limit).bit_length()) and not (stepper.done or stepper.at_bottom):
+            return
+        ground = stepper.ground
+        assert isinstance(ground, BedGround)
+        grains = ground.bed.grains().as_dict()
+        self.writer.write(
+            stepper.time,
+            {name: grains[name] for name in ("position", *self.fields)},
+            {"spike": (self.points + np.array(stepper.position), self.triangles)},
+            values={"depth": stepper.depth, "velocity": stepper.velocity, "force": stepper.last_force},
+        )

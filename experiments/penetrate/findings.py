@@ -4,7 +4,7 @@ Spread between seeds is that of the runs which every seed has (same kind, same s
 value is fitted to all runs of all seeds. A quantity that no second seed has gets the std null, one that is exact 0.
 
 Grains stick out of the surface, depth 0, so that some of them carry a spike before it: neither the fit nor the law
-include that, and `experiments.penetrate.remarks` reports how much it is.
+include that, and `experiments.penetrate.result` reports how much it is.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ from .fit import Fit, drag_gap, fit_spring_damper, moments_of, spread
 from .settings import STANDARD_GRAVITY, PenetrateSettings, say
 from .units import Unit, make_run
 
-__all__ = ["BedFacts", "Findings", "bed_entry", "bed_quantities", "drop_note", "model_run"]
+__all__ = ["BedFacts", "Findings", "bed_entry", "bed_quantities", "drop_note", "mean_of", "model_run", "returned_work"]
 
 Runs = Mapping[str, Penetration]
 
@@ -98,9 +98,9 @@ class Findings:
         """The headline numbers: name -> value, std between seeds, unit, note."""
         fits, load, drops = list(self.seed_fits.values()), self.settings.weight, self.of("drop")
         sunk, model_sunk = self.sinkages(self.beds), self.sinkages(self.models)
-        shared_runs = self.shared_conditions()
+        shared_runs, driven = self.shared_conditions(), [unit for unit in self.units if unit.kind == "driven"]
         gaps = [
-            drag_gap([run for unit, run in self._runs("driven", seed) if unit.condition in shared_runs], self.fit)
+            drag_gap([self.beds[u.id] for u in driven if u.seed == seed and u.condition in shared_runs], self.fit)
             for seed in self.seeds
         ]
         law_sinkages = [load / fit.stiffness if fit.stiffness > 0 else None for fit in fits]
@@ -110,8 +110,8 @@ class Findings:
             "damping": _quantity(self.fit.damping, spread([fit.damping for fit in fits]), "N s/m", shared),
             "stiffness_error": _quantity(self.fit.stiffness_error, None, "N/m", error),
             "damping_error": _quantity(self.fit.damping_error, None, "N s/m", error),
-            "sinkage_dem": _quantity(_mean(sunk), spread(sunk), "m", "depth at rest under the load"),
-            "sinkage_spring_damper": _quantity(_mean(model_sunk), spread(law_sinkages), "m", "the same on the law"),
+            "sinkage_dem": _quantity(mean_of(sunk), spread(sunk), "m", "depth at rest under the load"),
+            "sinkage_spring_damper": _quantity(mean_of(model_sunk), spread(law_sinkages), "m", "the same on the law"),
             "drag_gap": _quantity(drag_gap(self.of("driven"), self.fit), spread(gaps), "1", say("drag_gap")),
             **self._work_returned,
             "load": _quantity(load, 0.0, "N", "on the spike, set down and dropped; (m + m_b) g_sim / 4 unless set"),
@@ -123,7 +123,7 @@ class Findings:
     def standing_stiffness(self) -> dict[str, Json]:
         """The stiffness that gives the sinkage at rest, load / sinkage: for a foot that stands."""
         depths = self.sinkages(self.beds)
-        own, sunk = [self.settings.weight / depth if depth and depth > 0 else None for depth in depths], _mean(depths)
+        own, sunk = [self.settings.weight / depth if depth and depth > 0 else None for depth in depths], mean_of(depths)
         if sunk is None or sunk <= 0:
             return {}
         note = "load over sinkage at rest: the K for a foot that stands under this load"
@@ -131,18 +131,19 @@ class Findings:
 
     def at_surface(self) -> dict[str, Json]:
         """How far grains stick out under the tip, and what the bed pushes back with at depth 0."""
-        forces, heights = [], []
+        forces, heights, reach = [], [], 0.1 * self.settings.grain
         for seed in self.seeds:
             runs = self.of("driven", seed)
-            forces.append(_mean([force_at_surface(run, 0.1 * self.settings.grain) for run in runs]))
+            # The last tenth of a grain above depth 0 on the way in.
+            near = [(run, (run.depth <= 0) & (run.depth >= -reach) & (run.velocity > 0)) for run in runs]
+            forces.append(mean_of([float(run.force[rows].mean()) for run, rows in near if rows.any()]))
             starts = [run.settings.get("start_depth") for run in runs]
-            heights.append(_mean([-start for start in starts if start is not None]))
-        found = {}
-        notes = {"surface_force": say("surface_force"), "surface_roughness": say("surface_roughness")}
-        for name, values, unit in (("surface_force", forces, "N"), ("surface_roughness", heights, "m")):
-            if (mean := _mean(values)) is not None:
-                found[name] = _quantity(mean, spread(values), unit, notes[name])
-        return found
+            heights.append(mean_of([-start for start in starts if start is not None]))
+        return {
+            name: _quantity(mean, spread(values), unit, say(name))
+            for name, values, unit in (("surface_force", forces, "N"), ("surface_roughness", heights, "m"))
+            if (mean := mean_of(values)) is not None
+        }
 
     def deepest(self) -> float:
         """How deep the runs went that were fitted [m]."""
@@ -151,9 +152,6 @@ class Findings:
     def sinkages(self, runs: Runs) -> list[float | None]:
         """Depth at rest of every set-down [m]; None where it did not come to rest."""
         return [runs[unit.id].resting_depth for unit in self.units if unit.kind == "set_down"]
-
-    def _runs(self, kind: str, seed: int) -> list[tuple[Unit, Penetration]]:
-        return [(unit, self.beds[unit.id]) for unit in self.units if (unit.kind, unit.seed) == (kind, seed)]
 
     @cached_property
     def _work_returned(self) -> dict[str, Json]:
@@ -164,12 +162,12 @@ class Findings:
         """
         driven = [unit for unit in self.units if unit.kind == "driven"]
         alike = {unit.condition for unit in driven} <= self.shared_conditions()
-        own = [_mean([_returned(run) for run in self.of("driven", seed)]) for seed in self.seeds]
+        own = [mean_of([returned_work(run) for run in self.of("driven", seed)]) for seed in self.seeds]
         laws = [
-            _mean([_returned(model_run(self.settings, u, self.beds[u.id], fit, self.time_step)) for u in driven])
+            mean_of([returned_work(model_run(self.settings, u, self.beds[u.id], fit, self.time_step)) for u in driven])
             for fit in self.seed_fits.values()
         ]
-        bed, law = (_mean([_returned(runs[unit.id]) for unit in driven]) for runs in (self.beds, self.models))
+        bed, law = (mean_of([returned_work(runs[unit.id]) for unit in driven]) for runs in (self.beds, self.models))
         note = "work of the way out over work in, driven runs"
         return {
             "work_returned_dem": _quantity(bed, spread(own) if alike else None, "1", note),
@@ -202,15 +200,9 @@ class Findings:
         ]
 
 
-def _returned(run: Penetration) -> float | None:
-    """Share of the work put in that the way out gives back."""
+def returned_work(run: Penetration) -> float | None:
+    """Share of the work put in that the way out returns [1]; None where none was put in."""
     return run.work_out / run.work_in if run.work_in > 0 else None
-
-
-def force_at_surface(run: Penetration, reach: float) -> float | None:
-    """Mean force of the last `reach` [m] above depth 0 on the way in [N]; None where no row is there."""
-    rows = (run.depth <= 0) & (run.depth >= -reach) & (run.velocity > 0)
-    return float(run.force[rows].mean()) if rows.any() else None
 
 
 def model_run(settings: PenetrateSettings, unit: Unit, bed: Penetration, fit: Fit, time_step: float) -> Penetration:
@@ -246,14 +238,11 @@ def bed_quantities(facts: Sequence[BedFacts], overlap: float | None) -> dict[str
         values = [float(getattr(entry, name)) for entry in facts]
         alike = all(value == values[0] for value in values)
         mean = values[0] if alike else float(np.mean(values))
-        found[name] = _quantity(mean, 0.0 if alike and name in _CHOSEN else spread(values), unit, note)
+        # Young's modulus is set, and so exact; of the rest one bed does not show how much beds differ.
+        found[name] = _quantity(mean, 0.0 if alike and name == "young" else spread(values), unit, note)
     if overlap is not None:
         found["max_overlap"] = _quantity(overlap, None, "1", "largest overlap of grains in any run, of a diameter")
     return found
-
-
-_CHOSEN = ("young",)
-"""What is set, and so exact; of the rest one bed does not tell how much it differs from bed to bed."""
 
 
 def _quantity(value: float | None, std: float | None, unit: str, note: str = "") -> Json:
@@ -261,6 +250,7 @@ def _quantity(value: float | None, std: float | None, unit: str, note: str = "")
     return entry | {"note": note} if note else entry
 
 
-def _mean(values: Sequence[float | None]) -> float | None:
+def mean_of(values: Sequence[float | None]) -> float | None:
+    """Mean of the values that are known; None where none is."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known else None

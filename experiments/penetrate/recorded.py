@@ -11,7 +11,7 @@ between samples, as a sensor's filter gives them; the depth is that of the momen
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from experiments.campaign.tables import (
     SpikeTable,
 )
 from experiments.runs.folder import RunFolder, read_series
-from experiments.runs.strict import StrictSettings
+from experiments.runs.strict import Positive, SeedNumber, StrictSettings
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
 
@@ -37,7 +37,6 @@ from .settings import PenetrateSettings, say
 __all__ = ["SpikeSensors", "campaign_of", "campaign_of_run", "sensors_of", "write_run_campaign"]
 
 Array = NDArray[np.float64]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 UNKNOWN = 2.0
 """[uncertainty] of K and C: 1 or more is not known beforehand, so that a diagnosis fits them freely."""
@@ -52,7 +51,7 @@ class SpikeSensors(StrictSettings):
     depth_std: Positive = Field(5e-5, description="Noise of the depth [m].")
     force_std: Positive = Field(0.02, description="Noise of the force of driven spikes [N].")
     accel_std: Positive = Field(0.2, description="Noise of the acceleration of dropped spikes [m/s2].")
-    seed: Annotated[int, Field(ge=0, lt=2**31)] = Field(1, description="Seed of the noise.")
+    seed: SeedNumber = Field(1, description="Seed of the noise.")
 
 
 def sensors_of(settings: PenetrateSettings) -> SpikeSensors:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.runs.strict import StrictSettings
+from experiments.runs.strict import NotNegative, Positive, SeedNumber, StrictSettings, Threads
 from vis.page.sentences import Sentences
 
 __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
@@ -19,13 +19,23 @@ say = Sentences(__package__)
 STANDARD_GRAVITY = 9.80665
 """Unit of `rig` [m/s2]."""
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
-MATERIAL = (
-    "Grain material: sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a "
-    "material.toml."
+_MATERIALS = (
+    "sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml."
 )
+_SOFTENED = "Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
+_STEP = "Step of the grains [s]; from the contact time if not given."
+GrainMaterial = Annotated[str, Field(description=f"Grain material: {_MATERIALS}")]
+Grain = Annotated[Positive, Field(description="Mean grain diameter [m].")]
+Spread = Annotated[float, Field(ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")]
+BedSize = Annotated[
+    tuple[Positive, Positive, Positive], Field(description="Bed: both widths (periodic) and depth of grains [m].")
+]
+Seeds = Annotated[tuple[SeedNumber, ...], Field(min_length=1, description="Seeds: one bed each.")]
+MaxOverlap = Annotated[float, Field(gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")]
+Young = Annotated[Positive | None, Field(description=_SOFTENED)]
+TimeStep = Annotated[Positive | None, Field(description=_STEP)]
+Precision = Annotated[Literal["float64", "float32"], Field(description="Arithmetic of the bed.")]
+Arch = Annotated[Literal["cpu", "cuda"], Field(description="Where the bed is computed.")]
 
 
 class PenetrateSettings(StrictSettings):
@@ -38,17 +48,15 @@ class PenetrateSettings(StrictSettings):
         description="A bed of `hedgebed bed make`: its file, its run's folder, or its name on the shelf. Decides "
         "material, bed_size, grain, spread, gravity, seeds and softness; a bed is prepared if not given.",
     )
-    material: str = Field("sand", description=MATERIAL)
-    bed_size: tuple[Positive, Positive, Positive] = Field(
-        (0.072, 0.072, 0.0508), description="Bed: both widths (periodic) and depth of grains [m]."
-    )
-    grain: Positive = Field(0.0024, description="Mean grain diameter [m].")
-    spread: float = Field(0.15, ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")
+    material: GrainMaterial = "sand"
+    bed_size: BedSize = (0.072, 0.072, 0.0508)
+    grain: Grain = 0.0024
+    spread: Spread = 0.15
     packing: float | None = Field(
         None, gt=0.5, le=0.64, description="Packing fraction to prepare the bed to [1]; as it settles if not given."
     )
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2]; 1 g even in the rig.")
-    seeds: tuple[SeedNumber, ...] = Field((1, 2, 3), min_length=1, description="Seeds: one bed each.")
+    seeds: Seeds = (1, 2, 3)
 
     # The spike
     tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip.")
@@ -119,15 +127,13 @@ class PenetrateSettings(StrictSettings):
     campaign_seed: SeedNumber = Field(1, description="Seed of the campaign's noise.")
 
     # How it is computed
-    max_overlap: float = Field(0.05, gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")
-    young: Positive | None = Field(
-        None, description="Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
-    )
-    time_step: Positive | None = Field(None, description="Step of the grains [s]; from the contact time if not given.")
+    max_overlap: MaxOverlap = 0.05
+    young: Young = None
+    time_step: TimeStep = None
     substeps: int = Field(10, ge=1, le=1000, description="Steps of the grains in one macro step of the spike [1].")
-    precision: Literal["float64", "float32"] = Field("float64", description="Arithmetic of the bed.")
-    arch: Literal["cpu", "cuda"] = Field("cpu", description="Where the bed is computed.")
-    threads: int | None = Field(None, ge=1, le=1024, description="CPU threads; all there are if not given.")
+    precision: Precision = "float64"
+    arch: Arch = "cpu"
+    threads: Threads = None
     allow_coarse: bool = Field(False, description="Take a tip of less than five grains across, for a quick look.")
     cache: bool = Field(True, description="Keep prepared beds and use those kept.")
 
@@ -142,31 +148,17 @@ class PenetrateSettings(StrictSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _bed_decides(cls, given: Any) -> Any:
-        """A bed that is there already has a size, grains and a gravity."""
-        if isinstance(given, dict) and isinstance(given.get("bed"), str) and given["bed"]:
-            from .given import settings_of_bed
+    def _files_decide(cls, given: Any) -> Any:
+        """Fill in what the file of a bed decides, or without a bed that of a model; no drops are none on every seed."""
+        from .given import settings_of_bed, settings_of_model
 
-            return settings_of_bed(given)
-        return given
-
-    @model_validator(mode="before")
-    @classmethod
-    def _model_decides(cls, given: Any) -> Any:
-        """Without a bed nothing but the model says what the spike is."""
-        if isinstance(given, dict) and given.get("ground") == "spring-damper" and given.get("model"):
-            from .given import settings_of_model
-
-            return settings_of_model(given)
-        return given
-
-    @model_validator(mode="before")
-    @classmethod
-    def _no_drops_are_none(cls, given: Any) -> Any:
-        """Who leaves the drops out leaves them out on every seed."""
-        if isinstance(given, dict) and given.get("drop_speeds", True) in ((), []):
-            return {"other_drop_speeds": ()} | given
-        return given
+        if not isinstance(given, dict):
+            return given
+        if given.get("drop_speeds", True) in ((), []):
+            given = {"other_drop_speeds": ()} | given
+        if given.get("ground") == "spring-damper" and given.get("model"):
+            given = settings_of_model(given)
+        return settings_of_bed(given) if isinstance(given.get("bed"), str) and given["bed"] else given
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

@@ -5,13 +5,18 @@ wheel comes to it gives no more torque.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from experiments.runs.folder import write_text
+from rigid.model.mechanics import contact_arms
 from rigid.model.trial import Trial
+from rigid.planar.dynamics import System
 from rigid.planar.simulate import simulate
 from rigid.planar.trajectory import Trajectory
 from rigid.platform.files import find_platform
@@ -19,7 +24,16 @@ from rigid.platform.platform import Platform
 
 from . import say
 
-__all__ = ["PlatformNumbers", "platform_numbers", "torque_within_limit"]
+__all__ = [
+    "PLATFORM_COPY",
+    "PlatformNumbers",
+    "ball_radius",
+    "keep_platform",
+    "platform_numbers",
+    "tip_angles",
+    "tip_depth",
+    "torque_within_limit",
+]
 
 SPIKE_LENGTHS = {"hedgehog": 0.2}
 """l [m] where the paper gives it: its octagon is 0.4 m across, and the edge of 0.153 m is rounded."""
@@ -131,3 +145,56 @@ def _when(run: Trajectory, speed: float) -> float:
             return edge + float(left)
         left -= span
     return float(run.time[last])
+
+
+Array = NDArray[np.float64]
+
+
+def tip_angles(count: int, theta: Array) -> Array:
+    """Angle of each of `count` rows' spikes from straight down, clockwise [rad], shape [step, row]; theta as [step]."""
+    half = math.pi / count
+    return np.asarray(theta[:, None] + half + 2 * half * np.arange(count))
+
+
+def tip_depth(theta: Array, y: Array, *, count: int, length: float, radius: float = 0.0) -> Array:
+    """Depth of each row's lowest point below the undisturbed surface [m], negative above it, shape [step, row].
+
+    The model's own (`rigid.model.mechanics`), on a slope too, whose y is normal to the surface. theta [rad] and y
+    [m] have shape [step]; `radius` [m] is that of balls which spikes of `length` end in, 0 where they end in points.
+    """
+    angles = tip_angles(count, theta)
+    height, _ = contact_arms(np.cos(angles), np.sin(angles), length, radius)
+    return np.asarray(height - y[:, None])
+
+
+def ball_radius(trial: Trial) -> float:
+    """Radius of the balls that its effects put on the tips [m]; 0 without."""
+    return float(System(trial).radius)
+
+
+PLATFORM_COPY = "platform.toml"
+"""The copy's name in the run's folder."""
+
+
+def keep_platform(name: str, folder: Path, message: Callable[[str], object] | None = None) -> Path | None:
+    """The copy in ``folder`` of the platform's file ``name``, made if it lacks; None for a platform that ships.
+
+    ``message`` is called where the file differs by now from the copy. Raises ValueError for a file that will not do,
+    unless the copy is there.
+    """
+    if Path(name).suffix != ".toml":
+        return None
+    kept = folder / PLATFORM_COPY
+    if not kept.exists():
+        find_platform(name)
+        write_text(kept, Path(name).read_text(encoding="utf-8"))
+    elif message is not None and not _same(Path(name), kept):
+        message(say("changed", name=name, kept=kept))
+    return kept
+
+
+def _same(file: Path, kept: Path) -> bool:
+    try:
+        return file.read_text(encoding="utf-8") == kept.read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return False

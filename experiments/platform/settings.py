@@ -8,14 +8,11 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from experiments.runs.strict import StrictSettings
+from experiments.runs.strict import NotNegative, Positive, StrictSettings
 
 from . import say
 
 __all__ = ["NotNegative", "PlatformSettings", "Positive"]
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class PlatformSettings(StrictSettings):

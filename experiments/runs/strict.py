@@ -4,10 +4,15 @@ from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from annotated_types import MinLen
-from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
-__all__ = ["StrictSettings", "may_be_empty", "plain_kinds"]
+__all__ = ["NotNegative", "Positive", "SeedNumber", "StrictSettings", "Threads", "may_be_empty", "plain_kinds"]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
+Threads = Annotated[int | None, Field(ge=1, le=1024, description="CPU threads; all there are if not given.")]
 
 
 class StrictSettings(BaseModel):

@@ -5,7 +5,7 @@ and how deep the bed must reach, and stands beside the result.
 """
 
 from experiments.grains.on_bed import finish_run
-from experiments.platform.kept_platform import keep_platform
+from experiments.platform.numbers import keep_platform
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result

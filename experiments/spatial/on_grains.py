@@ -12,7 +12,7 @@ from coupling.members import Member
 from dem import Bed
 from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
 from experiments.grains.softening import PUSHED, Softening
-from experiments.platform.lengths import check_lengths
+from experiments.platform.settled import check_lengths
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.platform.lengths import check_spike_length
-from experiments.platform.settled import Number, defaults_said, of_earth, of_other_spikes, rig_fault
+from experiments.platform.settled import Number, check_spike_length, defaults_said, of_earth, of_other_spikes, rig_fault
 from experiments.platform.surfaces import DEFAULT_SURFACE, find_surface
 from rigid.platform.actuation import TorqueHistory
 from rigid.platform.files import find_platform

@@ -10,7 +10,7 @@ import numpy as np
 
 from coupling import CoupledTumble, LawGround
 from experiments.grains.bed_result import unsettled_warning
-from experiments.platform.tips import tip_depth
+from experiments.platform.numbers import tip_depth
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import quantities_of

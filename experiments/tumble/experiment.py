@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from experiments.campaign.files import keep_model
-from experiments.platform.kept_platform import keep_platform
-from experiments.platform.numbers import PlatformNumbers, platform_numbers, torque_within_limit
+from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result

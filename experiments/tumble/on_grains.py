@@ -19,11 +19,9 @@ from experiments.grains.graded import graded_under
 from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
 from experiments.grains.softening import PUSHED, Softening
 from experiments.grains.staged import check_bed_stages, packing_warning
-from experiments.platform.kept_platform import keep_platform
-from experiments.platform.lengths import check_lengths
-from experiments.platform.numbers import platform_numbers, torque_within_limit
+from experiments.platform.numbers import keep_platform, platform_numbers, tip_angles, tip_depth, torque_within_limit
+from experiments.platform.settled import check_lengths
 from experiments.platform.surfaces import find_surface
-from experiments.platform.tips import tip_angles, tip_depth
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result

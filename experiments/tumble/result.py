@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.platform.tips import ball_radius, tip_depth
+from experiments.platform.numbers import ball_radius, tip_depth
 from experiments.runs.result import quantity
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory

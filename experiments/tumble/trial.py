@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from experiments.campaign import TumbleModel, read_model
-from experiments.platform.lengths import check_spike_length
 from experiments.platform.numbers import PlatformNumbers, platform_numbers
 from experiments.platform.settled import (
     Number,
     Settled,
     check_actuation,
     check_body,
+    check_spike_length,
     defaults_said,
     of_earth,
     of_other_spikes,

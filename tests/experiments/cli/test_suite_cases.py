@@ -12,8 +12,7 @@ from experiments.runs.reading import find_case
 from experiments.runs.registry import CASES
 from experiments.suite import cases as suite
 from experiments.suite import commands as suite_commands
-from experiments.suite.cases import keep
-from experiments.suite.cost import Cost, cost_of_tumble
+from experiments.suite.cases import Cost, cost_of_tumble, keep
 
 
 def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():

@@ -10,7 +10,7 @@ import pytest
 from spatial_runs import CUBE, small_bed
 
 from experiments.cli.main import main
-from experiments.compare.common import numbers_until
+from experiments.compare.experiment import numbers_until
 from experiments.compare.spatial import _never_down, read_moved
 from experiments.runs.folder import read_series, write_series
 from experiments.spatial import experiment as spatial

@@ -9,7 +9,7 @@ from golden import golden
 from experiments.grains.softening import Softening
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
-from experiments.penetrate.remarks import overlap_warning, softening_note
+from experiments.penetrate.result import overlap_warning, softening_note
 from experiments.penetrate.settings import PenetrateSettings
 
 SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)

@@ -3,9 +3,8 @@
 import pytest
 
 from experiments.penetrate import beds
-from experiments.penetrate.plan import PenetratePlan
 from experiments.penetrate.settings import PenetrateSettings
-from experiments.penetrate.units import plan_units, share_done
+from experiments.penetrate.units import PenetratePlan, plan_units, share_done
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import PictureCosts
 

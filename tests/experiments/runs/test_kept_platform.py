@@ -7,7 +7,7 @@ import pytest
 from spatial_runs import CUBE
 
 from experiments.cli.main import main
-from experiments.platform.kept_platform import PLATFORM_COPY, keep_platform
+from experiments.platform.numbers import PLATFORM_COPY, keep_platform
 from experiments.spatial import experiment as spatial
 from experiments.spatial.settings import SpatialSettings
 from experiments.tumble import experiment as tumble
