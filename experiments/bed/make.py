@@ -12,7 +12,7 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
 from .settings import GRADED, SPREAD_OUT, BedSettings
-from .work import check_memory, check_name, finish_bed, prepared_in
+from .work import check_name, check_room, finish_bed, prepared_in
 
 __all__ = ["check", "fingerprint", "resume", "run"]
 
@@ -24,8 +24,7 @@ def check(settings: BedSettings) -> None:
     check_name(settings.name)
     check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
     graded, local = settings.graded, settings.local
-    share = 1.0 if graded is None else graded.share(settings.size)
-    check_memory(settings.size, settings.grain, 0.0, share=share * settings.grain**3 / local.mean_cube)
+    check_room(settings.size, settings.grain, local, graded)
     sizes = local if graded is None else graded
     stuff = material_of(settings, settings.material)
     young = settings.young or soft_enough(
@@ -58,24 +57,18 @@ def _carry_out(settings: BedSettings, folder: RunFolder, progress: Progress) -> 
         prepared = prepared_in(folder, progress, options, name=settings.name)
         assert prepared.bed is not None
         if graded is not None:
-            told = grading_told(prepared)
+            told: Json = grading_told(prepared)
         else:
             told = {"tables": [sizes_table(prepared.bed.grains().radius, settings.local)]}
         own = material(name)
         if own.cohesion != "none":
-            _add_adhesion(told, settings, own, prepared.bed.material)
+            now, at = prepared.bed.material, {"diameter": settings.grain, "gravity": settings.gravity}
+            bond = quantity(bond_number(now, **at), "1", "pull-off of two grains over one's weight", std=None)
+            told.setdefault("quantities", {})["bond_number"] = bond
+            if own.grain != settings.grain:
+                told.setdefault("warnings", []).append(scaling_told(own, now, **at, keep=settings.keep))
         title = f"A bed of {prepared.recipe['material']['name']}: {' '.join(settings.stages)}"
         return finish_bed(folder, prepared, progress, title=title, name=settings.name, told=told)
-
-
-def _add_adhesion(told: Json, settings: BedSettings, own: Material, now: Material) -> None:
-    """Put into `told` the grains' Bond number, and what was kept of `own`, of grains of another size."""
-    bond = bond_number(now, diameter=settings.grain, gravity=settings.gravity)
-    about = "pull-off of two grains over one's weight"
-    told.setdefault("quantities", {})["bond_number"] = quantity(bond, "1", about, std=None)
-    if own.grain != settings.grain:
-        said = scaling_told(own, now, diameter=settings.grain, gravity=settings.gravity, keep=settings.keep)
-        told.setdefault("warnings", []).append(said)
 
 
 run, resume = whole_run("bed make", BedSettings, _carry_out, check=check, material_copy=MATERIAL_COPY)

@@ -19,7 +19,7 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import whole_run
 
 from .settings import BedRefineSettings, say
-from .work import check_memory, check_name, finish_bed, prepared_in
+from .work import check_name, check_room, finish_bed, prepared_in
 
 __all__ = ["check", "refined_options", "resume", "run"]
 
@@ -92,12 +92,10 @@ def check(settings: BedRefineSettings) -> None:
     options, _ = refined_options(settings)
     sizes: Sizes | Graded = options["grain"]
     check_options(options["size"], sizes.mean, options["gravity"], options["seed"], options["max_overlap"])
-    share = 1.0
-    if isinstance(sizes, Graded):
-        sizes.check(options["size"])
-        share = sizes.share(options["size"])
-    local = sizes.local if isinstance(sizes, Graded) else sizes
-    check_memory(options["size"], sizes.mean, 0.0, share=share * sizes.mean**3 / local.mean_cube)
+    graded, local = (sizes, sizes.local) if isinstance(sizes, Graded) else (None, sizes)
+    if graded is not None:
+        graded.check(options["size"])
+    check_room(options["size"], sizes.mean, local, graded)
     check_stages(
         [parse_stage(stage) for stage in options["stages"]], size=options["size"], grain=sizes.mean, sizes=local,
         cohesive=options["material"].cohesion != "none",
@@ -121,15 +119,14 @@ def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progres
             )
         ]
         table = {"title": "Beside the bed it was made from", "head": ["", "before", "now", "change"], "rows": rows}
-        stuff = options["material"]
-        said = []
-        if stuff.cohesion != "none":
-            kept, _ = KEPT[settings.keep]
-            said.append(f"the grains' {kept} is kept: surface_energy = {stuff.surface_energy:.4g} J/m2")
-        graded = isinstance(options["grain"], Graded)
-        told = grading_told(prepared) if graded else {}
+        stuff, (kept, _) = options["material"], KEPT[settings.keep]
+        said = [f"the grains' {kept} is kept: surface_energy = {stuff.surface_energy:.4g} J/m2"]
+        told = grading_told(prepared) if isinstance(options["grain"], Graded) else {}
         title = f"{settings.bed} with grains of {1e3 * options['grain'].mean:.4g} mm"
-        told |= {"tables": [table, *told.get("tables", [])], "warnings": [*said, *told.get("warnings", [])]}
+        told |= {
+            "tables": [table, *told.get("tables", [])],
+            "warnings": [*(said if stuff.cohesion != "none" else []), *told.get("warnings", [])],
+        }
         return finish_bed(folder, prepared, progress, title=title, name=settings.name, told=told)
 
 

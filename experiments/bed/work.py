@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from dem import Bed
+from dem.grains.graded import Graded
 from dem.grains.materials import caveat
+from dem.grains.sizes import Sizes
 from dem.prepare.bedfile import load_prepared, save_prepared, shelf_path
 from dem.prepare.prepare import prepare_as
 from dem.prepare.report import Prepared, StageReport
 from experiments.grains.bed_progress import Stages
 from experiments.grains.box import expected_grain_count
+from experiments.grains.where import check_memory
 from experiments.runs.folder import RunFolder
-from experiments.runs.memory import memory_there
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantities_of
 from experiments.runs.stopping import held_back
@@ -23,21 +25,16 @@ from experiments.runs.types import Json
 from .settings import say
 from .tests import table, write_frame
 
-__all__ = ["check_memory", "check_name", "finish_bed", "prepared_in"]
+__all__ = ["check_name", "check_room", "finish_bed", "prepared_in"]
 
-BYTES_PER_GRAIN = 4000
-"""Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
 _COSTS = {"rain": 3.0, "level": 1.0, "fluff": 3.0, "compact": 6.0, "packing": 6.0, "cut": 2.0, "tilt": 2.0}
 """What a stage costs beside others; guesses, for the time that is shown."""
 
 
-def check_memory(size: tuple[float, float, float], grain: float, spread: float, *, share: float = 1.0) -> None:
-    """Raise ValueError for more grains than there is memory for; ``share``: of those of a bed with one size, graded."""
-    count = 1.2 * share * expected_grain_count(size, grain, spread)
-    need, there = count * BYTES_PER_GRAIN, memory_there().free
-    if need > 0.8 * there:
-        least = grain * (need / (0.8 * there)) ** (1 / 3)
-        raise ValueError(say("memory", grain=grain, count=count, need=need / 1e9, free=there / 1e9, least=least))
+def check_room(size: tuple[float, float, float], grain: float, local: Sizes, graded: Graded | None) -> None:
+    """Raise ValueError for more grains, of the sizes `local` or by place where `graded`, than there is memory for."""
+    share = (1.0 if graded is None else graded.share(size)) * grain**3 / local.mean_cube
+    check_memory(1.2 * share * expected_grain_count(size, grain, 0.0), grain, "size")
 
 
 def check_name(name: str | None) -> None:
@@ -86,8 +83,8 @@ def finish_bed(
     """
     bed, last = prepared.bed, prepared.reports[-1]
     assert bed is not None
-    entries = []
-    for k, report in enumerate(prepared.reports, start=1):
+    entries, reports = [], prepared.reports
+    for k, report in enumerate(reports, start=1):
         safe = f"{k}-{report.stage.replace(':', '-').replace('@', '-')}"
         columns = {f"{key}_{_UNITS[key]}" if _UNITS[key] else key: np.array(v) for key, v in report.profile.items()}
         entry = {key: value for key, value in asdict(report).items() if key != "profile"}
@@ -97,7 +94,6 @@ def finish_bed(
             what = {"pass": np.arange(len(trace)), "packing": trace}
             entries[-1]["trace_series"] = folder.write_series(f"{safe}.passes", what)
     write_frame(folder, "bed", bed)
-    reports = prepared.reports
     own = {
         "packing_fraction": (last.packing_fraction, "1", "between two diameters above the floor and two below"),
         "coordination_number": (last.coordination_number, "1", "contacts of a grain, the floor's included"),
@@ -118,7 +114,7 @@ def finish_bed(
         title=title,
         quantities=quantities_of(own, std=None) | told.get("quantities", {}),
         stages=entries,
-        tables=[_stage_table(prepared.reports), *told.get("tables", [])],
+        tables=[table("Stage by stage", reports, _STAGE), *told.get("tables", [])],
         bed={"file": "bed.npz", "name": name, "surface": {"value": bed.surface, "unit": "m"}, **prepared.recipe},
         warnings=[*told.get("warnings", []), *_warnings(prepared)],
     )
@@ -131,20 +127,17 @@ def finish_bed(
 
 
 _UNITS = {"height": "m", "packing": "", "stress_zz": "Pa", "stress_xx": "Pa", "stress_yy": "Pa", "stress_xz": "Pa"}
-
-
-def _stage_table(reports: list[StageReport]) -> Json:
-    columns: dict[str, Callable[[StageReport], str]] = {
-        "stage": lambda report: report.stage,
-        "packing": lambda report: f"{report.packing_fraction:.4f}",
-        "contacts": lambda report: f"{report.coordination_number:.2f}",
-        "K": lambda report: "-" if report.pressure_ratio is None else f"{report.pressure_ratio:.2f}",
-        "surface [mm]": lambda report: f"{1e3 * report.surface:.4g}",
-        "grains": lambda report: str(report.grain_count),
-        "energy [m g d]": lambda report: f"{report.kinetic_energy:.1e}",
-        "floor / weight": lambda report: f"{report.floor_share:.4f}",
-    }
-    return table("Stage by stage", reports, columns)
+_STAGE: dict[str, Callable[[StageReport], str]] = {
+    "stage": lambda report: report.stage,
+    "packing": lambda report: f"{report.packing_fraction:.4f}",
+    "contacts": lambda report: f"{report.coordination_number:.2f}",
+    "K": lambda report: "-" if report.pressure_ratio is None else f"{report.pressure_ratio:.2f}",
+    "surface [mm]": lambda report: f"{1e3 * report.surface:.4g}",
+    "grains": lambda report: str(report.grain_count),
+    "energy [m g d]": lambda report: f"{report.kinetic_energy:.1e}",
+    "floor / weight": lambda report: f"{report.floor_share:.4f}",
+}
+"""What the table of stages says of each."""
 
 
 def _warnings(prepared: Prepared) -> list[str]:

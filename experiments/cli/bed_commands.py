@@ -2,6 +2,7 @@
 
 import json as json_module
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -43,9 +44,8 @@ def _list(
     if json:
         print(json_module.dumps(beds, indent=2))
         return 0
-    table = Table(title=f"Beds in {where}", title_justify="left", box=None, pad_edge=False)
-    for heading in ("name", "material", "size [mm]", "grain [mm]", "grains", "packing", "g [m/s2]", "stages"):
-        table.add_column(heading)
+    headings = ("name", "material", "size [mm]", "grain [mm]", "grains", "packing", "g [m/s2]", "stages")
+    table = Table(*headings, title=f"Beds in {where}", title_justify="left", box=None, pad_edge=False)
     for bed in beds:
         table.add_row(*(_cells(bed) if "problem" not in bed else (bed["name"], *[""] * 6, bed["problem"])))
     Console(file=sys.stdout, highlight=False).print(table, markup=False)
@@ -78,11 +78,8 @@ def _show(bed: _Bed, /, *, json: _Json = False) -> int:
         if "problem" in entry:
             raise ValueError(entry["problem"])
     if json:
-        from dataclasses import asdict
-
-        print(
-            json_module.dumps(entry | {"recipe": about.recipe, "reports": [asdict(r) for r in about.reports]}, indent=2)
-        )
+        entry |= {"recipe": about.recipe, "reports": [asdict(report) for report in about.reports]}
+        print(json_module.dumps(entry, indent=2))
         return 0
     console = Console(file=sys.stdout, highlight=False)
     table = Table(title=str(path), title_justify="left", box=None, pad_edge=False, show_header=False)
@@ -94,19 +91,11 @@ def _show(bed: _Bed, /, *, json: _Json = False) -> int:
             table.add_row(key, f"{about.recipe[key]}")
     console.print(table, markup=False)
     if about.reports:
-        stages = Table(box=None, pad_edge=False)
-        for heading in ("stage", "packing", "contacts", "K", "surface [mm]", "settled"):
-            stages.add_column(heading)
+        stages = Table("stage", "packing", "contacts", "K", "surface [mm]", "settled", box=None, pad_edge=False)
         for report in about.reports:
             ratio = "-" if report.pressure_ratio is None else f"{report.pressure_ratio:.2f}"
-            stages.add_row(
-                report.stage,
-                f"{report.packing_fraction:.4f}",
-                f"{report.coordination_number:.2f}",
-                ratio,
-                f"{1e3 * report.surface:.4g}",
-                report.criterion,
-            )
+            packing, contacts = f"{report.packing_fraction:.4f}", f"{report.coordination_number:.2f}"
+            stages.add_row(report.stage, packing, contacts, ratio, f"{1e3 * report.surface:.4g}", report.criterion)
         console.print(stages, markup=False)
     return 0
 

@@ -47,15 +47,12 @@ def benchmark_options(run: Callable[..., dict[str, Any]], given: Mapping[str, st
     found: dict[str, Any] = {}
     for name, text in given.items():
         if name not in known:
-            raise ValueError(
-                f"--{name} is no option here; {nearest(name, sorted(known)) if known else 'there is none'}"
-            )
-        if isinstance(known[name], int):
-            if not text.isdigit():
-                raise ValueError(f"{name} = {text!r}: a whole number was expected")
-            found[name] = int(text)
-        else:
-            found[name] = text
+            there = nearest(name, sorted(known)) if known else "there is none"
+            raise ValueError(f"--{name} is no option here; {there}")
+        whole = isinstance(known[name], int)
+        if whole and not text.isdigit():
+            raise ValueError(f"{name} = {text!r}: a whole number was expected")
+        found[name] = int(text) if whole else text
     return found
 
 

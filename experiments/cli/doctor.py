@@ -65,15 +65,10 @@ def probe(*arguments: str, timeout: float = 90.0) -> dict[str, Any]:
 
 
 def _python() -> Finding:
-    version = sys.version_info[:2]
-    between = f"{PYTHONS[0][0]}.{PYTHONS[0][1]} to {PYTHONS[1][0]}.{PYTHONS[1][1]}"
-    return Finding(
-        "Python",
-        PYTHONS[0] <= version <= PYTHONS[1],
-        f"{platform.python_version()} (Taichi has wheels for {between})",
-        f"use Python {between}",
-        required=True,
-    )
+    between = " to ".join(".".join(map(str, version)) for version in PYTHONS)
+    fits = PYTHONS[0] <= sys.version_info[:2] <= PYTHONS[1]
+    detail = f"{platform.python_version()} (Taichi has wheels for {between})"
+    return Finding("Python", fits, detail, f"use Python {between}", required=True)
 
 
 def _taichi(arch: str, answer: dict[str, Any]) -> Finding:
@@ -109,9 +104,8 @@ def _cache() -> Finding:
 
 
 def _opengl(answer: dict[str, Any]) -> Finding:
-    detail = (
-        f"a picture off screen ({answer.get('renderer') or 'renderer unknown'})" if answer["ok"] else answer["reason"]
-    )
+    drawn = f"a picture off screen ({answer.get('renderer') or 'renderer unknown'})"
+    detail = drawn if answer["ok"] else answer["reason"]
     remedy = "apt install libegl1 libgl1-mesa-dri (runs work without it; plots stand in for the pictures)"
     return Finding("OpenGL", answer["ok"], detail, remedy)
 
@@ -144,10 +138,8 @@ def examine() -> list[Finding]:
 def show(findings: Sequence[Finding], *, as_json: bool = False) -> None:
     """Print the findings on stdout: a table, or JSON."""
     if as_json:
-        ok = all(finding.ok for finding in findings if finding.required)
-        print(
-            json.dumps({"format": "hedgebed-doctor/1", "ok": ok, "findings": [asdict(f) for f in findings]}, indent=2)
-        )
+        ok, entries = all(finding.ok for finding in findings if finding.required), [asdict(f) for f in findings]
+        print(json.dumps({"format": "hedgebed-doctor/1", "ok": ok, "findings": entries}, indent=2))
         return
     table = Table(box=None, pad_edge=False, show_header=False)
     for finding in findings:

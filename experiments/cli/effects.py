@@ -3,12 +3,13 @@
 import math
 import sys
 from collections.abc import Sequence
+from functools import partial
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from experiments.runs.reading import nearest
-from rigid.terms import EFFECTS, Parameter, Term
+from rigid.terms import EFFECTS, Term
 
 __all__ = ["show_effects"]
 
@@ -23,10 +24,8 @@ def show_effects(names: Sequence[str] = ()) -> None:
         for name in dict.fromkeys(names):
             _show_one(console, EFFECTS[name])
         return
-    table = Table(box=None, pad_edge=False)
-    table.add_column("effect", no_wrap=True)
-    table.add_column("what it is")
-    table.add_column("give (unit)", no_wrap=True)
+    whole = partial(Column, no_wrap=True)
+    table = Table(whole("effect"), "what it is", whole("give (unit)"), box=None, pad_edge=False)
     for term in EFFECTS.values():
         given = "\n".join(f"{term.id}.{p.name}" + ("" if p.unit == "1" else f" ({p.unit})") for p in term.parameters)
         table.add_row(term.id, term.summary + (" (rig only)" if term.needs_rig else ""), given)
@@ -41,11 +40,7 @@ def _show_one(console: Console, term: Term) -> None:
         console.print(f"  {heading}: {words}", markup=False)
     if term.needs_rig:
         console.print("  only in the rig", markup=False)
-    for parameter in term.parameters:
-        console.print(f"  --effects {term.id}.{parameter.name}=...  {_about(parameter)}", markup=False)
-
-
-def _about(parameter: Parameter) -> str:
-    off = "infinite" if math.isinf(parameter.default) else f"{parameter.default:g}"
-    unit = "" if parameter.unit == "1" else f"[{parameter.unit}] "
-    return f"{unit}{parameter.summary} ({off} if not given)"
+    for p in term.parameters:
+        off = "infinite" if math.isinf(p.default) else f"{p.default:g}"
+        about = ("" if p.unit == "1" else f"[{p.unit}] ") + f"{p.summary} ({off} if not given)"
+        console.print(f"  --effects {term.id}.{p.name}=...  {about}", markup=False)

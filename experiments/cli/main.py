@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin
 
 from cyclopts import App, CycloptsError, Parameter
-from pydantic import BaseModel
 
 from experiments.cli.options import as_typed, option_of, reserved_option
 from experiments.cli.runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, redraw_old_report, show_folder
@@ -67,10 +66,9 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
 
     Only what was typed arrives in `given`, so that a case file can lie between the defaults and the command line.
     """
-    settings_class = experiment.settings_class()
-    presets = experiment.presets
-
-    pair = bool(experiment.subject) and get_origin(settings_class.model_fields[experiment.subject].annotation) is tuple
+    settings_class, presets = experiment.settings_class(), experiment.presets
+    fields = settings_class.model_fields
+    pair = bool(experiment.subject) and get_origin(fields[experiment.subject].annotation) is tuple
 
     def command(
         case: Path | None = None,
@@ -88,10 +86,12 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
             elif experiment.subject and case is not None and (not case.is_file() or case.suffix == ".npz"):
                 case, given[experiment.subject] = None, str(case)
             if case is not None and is_number(str(case)):
-                raise ValueError(_stray(str(case), settings_class))
+                # As the second of ``--mu-s 0.4 0.5``.
+                several = "; to try several values, --sweep KEY=FROM:TO:STEP" if "sweep" in fields else ""
+                raise ValueError(f"{case} belongs to no option: an option that describes one number takes one{several}")
             layers = [read_case(registry.CASES / preset.case) for preset in presets if given.pop(preset.option, False)]
             layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
-            typed = Layer(None, as_typed(given, settings_class.model_fields))
+            typed = Layer(None, as_typed(given, fields))
             settings = settings_from(settings_class, [*layers, typed])
             with stdout_to_stderr():
                 experiment.check(settings)
@@ -112,7 +112,6 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         )
         for preset in presets
     ]
-    fields = settings_class.model_fields
     first = reserved_option("case")
     if experiment.subject:
         about = Parameter(help=fields[experiment.subject].description, negative="", show_default=False)
@@ -124,16 +123,8 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     parameters += [option_of(name, field) for name, field in fields.items() if name != experiment.subject]
     parameters += [*flags, *map(reserved_option, ("out", "json", "quiet"))]
     parameters += [reserved_option("verbose")] if experiment.headline else []
-    command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
-    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     command.__name__ = experiment.name.replace(" ", "_")
-    return command
-
-
-def _stray(word: str, settings_class: type[BaseModel]) -> str:
-    """What to do about a number that belongs to no option, as the second of ``--mu-s 0.4 0.5``."""
-    several = "; to try several values, --sweep KEY=FROM:TO:STEP" if "sweep" in settings_class.model_fields else ""
-    return f"{word} belongs to no option: an option that describes one number takes one{several}"
+    return _with_parameters(command, parameters)
 
 
 _Json = Annotated[bool, Parameter(help="Print the result as JSON on stdout and nothing else.", negative="")]
@@ -194,12 +185,10 @@ def _bench(
         try:
             with make_progress(quiet=quiet) as progress:
                 result = run(out, progress=progress, **settings)
-        except RuntimeError as error:
-            say(f"failed: {error}")
-            return FAILED
-        except ValueError as error:  # a setting that cannot be, in an option or in the environment
-            say(str(error))
-            return BAD_INPUT
+        except (RuntimeError, ValueError) as error:
+            failed = isinstance(error, RuntimeError)  # else a setting that cannot be, in an option or the environment
+            say(f"failed: {error}" if failed else str(error))
+            return FAILED if failed else BAD_INPUT
         write_json(out / "bench.json", result)
     if json:
         print((out / "bench.json").read_text(encoding="utf-8"), end="")
@@ -246,16 +235,15 @@ def _campaign_from_run() -> Callable[..., int]:
                 of_what = "a tumble" if tumbled else "a spike"
                 raise ValueError(f"{option(stray[0])} is given, and {str(run)!r} is a run of {of_what}: without it")
             typed = as_typed(given, fields)
+            of_spike = {name: value for name, value in typed.items() if name == "seed" or not tumbled}
+            sensors = settings_from(SpikeSensors, [Layer(None, of_spike)])
+            assert isinstance(sensors, SpikeSensors)
             if tumbled:
-                own = Layer(None, {name: value for name, value in typed.items() if name in of_tumbles})
-                recording = settings_from(TumbleRecording, [own])
+                own = {name: value for name, value in typed.items() if name in of_tumbles}
+                recording = settings_from(TumbleRecording, [Layer(None, own)])
                 assert isinstance(recording, TumbleRecording)
-                seed = settings_from(SpikeSensors, [Layer(None, {k: v for k, v in typed.items() if k == "seed"})])
-                assert isinstance(seed, SpikeSensors)
-                campaign = write_tumbles_campaign(run, folder, recording=recording, seed=seed.seed)
+                campaign = write_tumbles_campaign(run, folder, recording=recording, seed=sensors.seed)
             else:
-                sensors = settings_from(SpikeSensors, [Layer(None, typed)])
-                assert isinstance(sensors, SpikeSensors)
                 campaign = write_run_campaign(run, folder, sensors=sensors)
         print(f"campaign: {folder / 'campaign.toml'}")
         say(f"{len(campaign.tables.trial)} trials; `hedgebed diagnose {folder}` says what the spring-damper lacks")
@@ -270,7 +258,12 @@ def _campaign_from_run() -> Callable[..., int]:
             name, inspect.Parameter.POSITIONAL_ONLY, annotation=Annotated[Path, Parameter(help=text, negative="")]
         )
         for name, text in places.items()
-    ] + [option_of(name, field) for name, field in fields.items()]
+    ]
+    return _with_parameters(command, [*parameters, *(option_of(name, field) for name, field in fields.items())])
+
+
+def _with_parameters(command: Callable[..., int], parameters: list[inspect.Parameter]) -> Callable[..., int]:
+    """`command`, which takes ``**given``, as a function with these parameters."""
     command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return command

@@ -28,12 +28,7 @@ DONE, FAILED, BAD_INPUT, STOPPED = 0, 1, 2, 3
 
 
 def carry_out(
-    folder: RunFolder,
-    work: Callable[[Progress], Result],
-    *,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool = False,
+    folder: RunFolder, work: Callable[[Progress], Result], *, as_json: bool, quiet: bool, verbose: bool = False
 ) -> int:
     """Do the `work` of a run whose folder is there; keep its status; show what came out."""
     say(f"run folder {folder.path}")
@@ -64,7 +59,8 @@ def carry_out(
             return FAILED
         except ValueError as error:
             if fresh and not folder.has_work:  # refused before any work: leave nothing behind
-                _discard(folder)
+                if {item.name for item in folder.path.iterdir()} <= {"run.toml", "status.json", "lock"}:
+                    shutil.rmtree(folder.path)
                 raise RefusedError(str(error)) from error
             write_text(folder.path / "traceback.txt", traceback.format_exc())
             say(f"failed: {error}")
@@ -93,20 +89,26 @@ def redraw_old_report(folder: RunFolder, *, quiet: bool) -> None:
 def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> int:
     """Show the result of a finished run on stdout, as JSON or as a table; return the exit status.
 
-    The table is short where the experiment has a short one, unless `verbose`.
+    The table, with findings, warnings and where the report is, is short where the experiment has a short one, unless
+    `verbose`.
     """
     if as_json:
         print((folder.path / "result.json").read_text(encoding="utf-8"), end="")
+        return DONE
+    result, report = folder.read_result(), folder.path / "report.html"
+    console = Console(file=sys.stdout, highlight=False)
+    console.print(result.get("title", ""), markup=False, style="italic")
+    experiment = registry.EXPERIMENTS.get(folder.command)
+    headline = experiment.headline_of(result) if experiment is not None and not verbose else None
+    if headline is not None:
+        _show_headline(headline, console)
     else:
-        _show_result(folder, verbose=verbose)
+        _show_all(result, console)
+    if headline is not None and headline.left:
+        rest = "in the report, or with" if report.exists() else "with"
+        print(f"{headline.left} more findings and all numbers: {rest} `hedgebed resume {folder.path} --verbose`")
+    print(f"report: {report}" if report.exists() else f"folder: {folder.path}")
     return DONE
-
-
-def _discard(folder: RunFolder) -> None:
-    """Remove a folder that holds nothing but what `RunFolder.create` has written."""
-    ours = {"run.toml", "status.json", "lock"}
-    if {item.name for item in folder.path.iterdir()} <= ours:
-        shutil.rmtree(folder.path)
 
 
 def _number(value: Any, std: Any = 0.0) -> str:
@@ -126,35 +128,11 @@ _NARROW = 24
 """Characters of a first column that is not broken into lines."""
 
 
-def _spread(quantity: Any) -> bool:
-    """Whether several runs tell how much a quantity varies: 0 stands for what is exact, or was computed once."""
-    std = quantity.get("std")
-    return isinstance(std, float) and math.isfinite(std) and std > 0
-
-
 def _unit(unit: str, value: Any) -> str:
     """The unit; beside an angle in radians the same in degrees."""
     if unit == "rad" and isinstance(value, int | float) and math.isfinite(value):
         return f"rad   {math.degrees(value):.4g} degrees"
     return "" if unit == "1" or value is None else unit
-
-
-def _show_result(folder: RunFolder, *, verbose: bool) -> None:
-    """The numbers of result.json in a table on stdout, findings and warnings, and where the report is."""
-    result = folder.read_result()
-    console = Console(file=sys.stdout, highlight=False)
-    console.print(result.get("title", ""), markup=False, style="italic")
-    experiment = registry.EXPERIMENTS.get(folder.command)
-    headline = experiment.headline_of(result) if experiment is not None and not verbose else None
-    if headline is not None:
-        _show_headline(headline, console)
-    else:
-        _show_all(result, console)
-    report = folder.path / "report.html"
-    if headline is not None and headline.left:
-        rest = "in the report, or with" if report.exists() else "with"
-        print(f"{headline.left} more findings and all numbers: {rest} `hedgebed resume {folder.path} --verbose`")
-    print(f"{'report' if report.exists() else 'folder'}: {report if report.exists() else folder.path}")
 
 
 def _show_headline(headline: Headline, console: Console) -> None:
@@ -179,7 +157,8 @@ def _show_all(result: Mapping[str, Any], console: Console) -> None:
     table.add_column("quantity")
     table.add_column("value", justify="right")
     quantities = result.get("quantities", {})
-    spreads = any(_spread(quantity) for quantity in quantities.values())
+    stds = [quantity.get("std") for quantity in quantities.values()]  # 0: exact, or computed once
+    spreads = any(isinstance(std, float) and math.isfinite(std) and std > 0 for std in stds)
     if spreads:
         fitted = result.get("experiment") == "diagnose"
         table.add_column("standard error" if fitted else "spread (std)", justify="right")

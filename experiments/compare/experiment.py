@@ -32,7 +32,7 @@ from .settings import CompareSettings, say
 from .spatial import QUATERNION, MovedInSpace
 from .tumbles import Moved
 
-__all__ = ["ALIKE", "TIMELESS", "check", "common_time", "numbers_until", "resume", "run", "sinkage_of"]
+__all__ = ["ALIKE", "TIMELESS", "check", "numbers_until", "resume", "run", "sinkage_of"]
 
 IN_THE_PLANE, IN_SPACE = "tumble", "tumble spatial"
 KINDS = (IN_THE_PLANE, IN_SPACE, "penetrate")
@@ -90,11 +90,15 @@ def _compute(settings: CompareSettings, folder: RunFolder, progress: Progress) -
         _add_motion(result, (first, second), results, labels, folder)
     else:
         result["compared"] = _compared(results)
-    result["tables"] = [
-        *_numbers(result, labels),
-        *([_row_sinkage(result["rows"], labels)] if result.get("rows") else []),
-        *([_differing(labels, result["differs"])] if result["differs"] else []),
-    ]
+    result["tables"] = _numbers(result, labels)
+    if rows := result.get("rows"):
+        shown = [[str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))] for row in rows]
+        title = "Sinkage of each row of spikes while both last, deepest [mm]"
+        result["tables"].append({"title": title, "head": ["row", *labels], "rows": shown})
+    if result["differs"]:
+        shown = [list(row.values()) for row in result["differs"]]
+        head = ["key", *labels, "unit"]
+        result["tables"].append({"title": "Settings and numbers that differ", "head": head, "rows": shown})
     return Result.make("compare", **result)
 
 
@@ -126,7 +130,17 @@ def _add_motion(
     """series/compared.csv, the gaps between both as quantities, and sentences."""
     module: Any = compare_spatial if result["kind"] == IN_SPACE else compare_tumbles
     moved = [module.read_moved(one.path, found) for one, found in zip(runs, results, strict=True)]
-    _compare_numbers(result, runs, results, moved)
+    whole = [one["quantities"] for one in results]
+    if result["kind"] == IN_THE_PLANE:
+        whole = [sinkage_of(one) | own for one, own in zip(moved, whole, strict=True)]
+    named = [one | {"quantities": own} for one, own in zip(results, whole, strict=True)]
+    lasts, parts = [float(one.time[-1]) for one in moved], None
+    longer = abs(lasts[0] - lasts[1]) > ALIKE
+    if longer:  # compared over the time that both last
+        end = min(lasts)
+        parts = [numbers_until(end, one, own, run.path) for one, own, run in zip(moved, named, runs, strict=True)]
+        result["compared_over"], result["lasts"] = end, lasts
+    result["compared"] = _compared(named, parts)
     columns = module.compared_columns(*moved)
     folder.write_series("compared", columns)
     result["series"] = "series/compared.csv"
@@ -137,33 +151,17 @@ def _add_motion(
         result["rows"] = compare_tumbles.row_sinkage(columns, result["spike_count"])
     result["weights"] = [one.weight for one in moved]
     result["quantities"] = module.gaps(columns)
-    result["departures"]["sentences"] = module.told_apart(columns, labels, moved)
+    said = module.told_apart(columns, labels)
+    result["departures"]["sentences"] = [*said, say("lasting", lasts=lasts)] if longer else said
     result["warnings"] += _whose(labels, [one.notes for one in moved])
-
-
-def _compare_numbers(result: Json, runs: tuple[RunFolder, RunFolder], results: list[Json], moved: list[Any]) -> None:
-    """`compared`, over the time that both last where one lasts longer, and how long that is: `compared_over` [s]."""
-    whole = [one["quantities"] for one in results]
-    if result["kind"] == IN_THE_PLANE:
-        whole = [sinkage_of(one) | own for one, own in zip(moved, whole, strict=True)]
-    named = [one | {"quantities": own} for one, own in zip(results, whole, strict=True)]
-    end = common_time(moved)
-    if end is None:
-        result["compared"] = _compared(named)
-        return
-    parts = [numbers_until(end, one, own, run.path) for one, own, run in zip(moved, named, runs, strict=True)]
-    result["compared_over"], result["lasts"] = end, [float(one.time[-1]) for one in moved]
-    result["compared"] = _compared(named, parts)
 
 
 def _labels(folders: tuple[RunFolder, RunFolder], results: list[Json]) -> tuple[str, str]:
     """What to call the two: by their ground where that differs, else by their folders."""
-    words = [_ground(one) for one in results]
-    if words[0] == words[1]:
-        words = [one.path.name or str(one.path) for one in folders]
-    if words[0] == words[1]:
-        words = [str(one.path) for one in folders]
-    return words[0], words[1]
+    by_ground, paths = [_ground(one) for one in results], [str(one.path) for one in folders]
+    choices = (by_ground, [one.path.name or str(one.path) for one in folders], paths)
+    first, second = next((words for words in choices if words[0] != words[1]), paths)
+    return first, second
 
 
 def _ground(result: Mapping[str, Any]) -> str:
@@ -190,8 +188,7 @@ def _compared(results: list[Json], parts: list[dict[str, float | None]] | None =
         row = {
             "name": name, "unit": one.get("unit", other.get("unit", "")), "first": values[0], "second": values[1],
             "difference": values[1] - values[0] if both else None,
-            "relative": _relative(*values) if both else None,
-            "first_std": spreads[0], "second_std": spreads[1],
+            "relative": _relative(*values) if both else None, "first_std": spreads[0], "second_std": spreads[1],
         }  # fmt: skip
         if parts is not None:
             over = "shared time" if shared or name in TIMELESS else "whole runs"
@@ -252,13 +249,6 @@ def _numbers(result: Json, labels: tuple[str, str]) -> list[Json]:
     ]
 
 
-def _row_sinkage(rows: list[Json], labels: tuple[str, str]) -> Json:
-    shown = [[str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))] for row in rows]
-    return {
-        "title": "Sinkage of each row of spikes while both last, deepest [mm]", "head": ["row", *labels], "rows": shown,
-    }  # fmt: skip
-
-
 def _table(title: str, labels: tuple[str, str], rows: list[Json], *, differences: bool = True) -> Json:
     """For the terminal: angles in degrees."""
     shown = []
@@ -271,22 +261,13 @@ def _table(title: str, labels: tuple[str, str], rows: list[Json], *, differences
             relative = f"{100 * row['relative']:+.3g} %" if row["relative"] is not None else ""
             numbers += [_number(row["difference"], scale, True), relative]
         shown.append([row["name"], *numbers, unit])
-    return {
-        "title": title,
-        "head": ["quantity", *labels, *(["less", ""] if differences else []), "unit"],
-        "rows": shown,
-    }
+    return {"title": title, "head": ["quantity", *labels, *["less", ""] * differences, "unit"], "rows": shown}
 
 
 def _number(value: Any, scale: float, signed: bool) -> str:
     if not isinstance(value, int | float) or not math.isfinite(value):
         return "-"
     return f"{scale * value:+.4g}" if signed and value else f"{scale * value:.4g}"
-
-
-def _differing(labels: tuple[str, str], rows: list[Json]) -> Json:
-    shown = [[row["key"], row["first"], row["second"], row["unit"]] for row in rows]
-    return {"title": "Settings and numbers that differ", "head": ["key", *labels, "unit"], "rows": shown}
 
 
 run, resume = computed_run("compare", CompareSettings, _compute, check=check)
@@ -307,12 +288,6 @@ class _Numbers:
     largest: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     final: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     events: dict[str, float | None] = field(default_factory=dict)
-
-
-def common_time(moved: list[Moved] | list[MovedInSpace]) -> float | None:
-    """How long both runs last [s]; None where they last equally long."""
-    ends = [float(one.time[-1]) for one in moved]
-    return min(ends) if abs(ends[0] - ends[1]) > ALIKE else None
 
 
 def numbers_until(

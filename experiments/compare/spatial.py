@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.runs.folder import read_series
-from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.spatial.quaternions import angle_between
 
 from .settings import say
-from .tumbles import ENERGIES, deepest, gap_entries, lasting, mean_over, on_one_grid, same_state
+from .tumbles import ENERGIES, all_gaps, deepest, gap_entries, mean_over, on_one_grid
 
 __all__ = ["MovedInSpace", "compared_columns", "gaps", "read_moved", "told_apart"]
 
@@ -115,10 +114,7 @@ def gaps(columns: Mapping[str, Any]) -> dict[str, Json]:
         at = int(np.argmax(values))
         found[f"gap_{name}"] = (float(values[at]), unit, f"{note}, largest over time, at {time[at]:.4g} s")
         found[f"gap_{name}_end"] = (float(values[-1]), unit, f"likewise at {time[-1]:.4g} s")
-    found["same_state"] = same_state(columns)
-    depths = [deepest(columns, number) for number in (1, 2)]
-    found["gap_sinkage"] = (depths[1] - depths[0], "m", say("spike_gap"))
-    return quantities_of(found)
+    return all_gaps(columns, found, say("spike_gap"))
 
 
 def _distance(columns: Mapping[str, Any], names: tuple[str, ...], *, from_start: bool = False) -> Array:
@@ -131,12 +127,10 @@ def _distance(columns: Mapping[str, Any], names: tuple[str, ...], *, from_start:
 def _never_down(columns: Mapping[str, Any], labels: tuple[str, str]) -> list[str]:
     """That one of the two never touches what it is over, while the other does."""
     down = [bool(np.any(columns[f"lift_N_{number}"])) for number in (1, 2)]
-    if down[0] == down[1]:
-        return []
-    return [say("never_down", label=labels[down.index(False)])]
+    return [] if down[0] == down[1] else [say("never_down", label=labels[down.index(False)])]
 
 
-def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[MovedInSpace]) -> list[str]:
+def told_apart(columns: Mapping[str, Any], labels: tuple[str, str]) -> list[str]:
     """What a reader wants to hear of the two."""
     found = {name: float(entry["value"]) for name, entry in gaps(columns).items()}
     height, turns = found["gap_z_end"], [math.degrees(columns[f"turn_rad_{number}"][-1]) for number in (1, 2)]
@@ -153,5 +147,4 @@ def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[
         ),
         say("deepest_spike", first=first, second=second, labels=labels),
         *_never_down(columns, labels),
-        *lasting([one.time for one in moved]),
     ]  # fmt: skip

@@ -17,8 +17,8 @@ from experiments.runs.types import Json
 from .settings import say
 
 __all__ = [
-    "ENERGIES", "Moved", "compared_columns", "deepest", "gap_entries", "gaps", "lasting", "mean_over",
-    "on_one_grid", "read_moved", "row_sinkage", "same_state", "told_apart",
+    "ENERGIES", "Entries", "Moved", "all_gaps", "compared_columns", "deepest", "gap_entries", "gaps", "mean_over",
+    "on_one_grid", "read_moved", "row_sinkage", "told_apart",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -63,9 +63,10 @@ def read_moved(folder: Path, result: Mapping[str, Any]) -> Moved:
     path = folder / "series" / "feet.csv"
     feet = read_series(path) if path.exists() else None
     angle = tip_angles(count, series["theta_rad"])
-    depth = tip_depth(
-        series["theta_rad"], series["y_m"], count=count, length=trial["spike_length"], radius=_ball_radius(result)
-    )
+    # A result of before `tip_radius` was written has it among its effects.
+    of_effects = (effect["parameters"]["radius"] for effect in result["effects"] if effect["id"] == "tip-radius")
+    radius, length = float(result.get("tip_radius", next(of_effects, 0.0))), trial["spike_length"]
+    depth = tip_depth(series["theta_rad"], series["y_m"], count=count, length=length, radius=radius)
     sinkage, load = np.maximum(depth, 0.0), None
     notes = []
     effects = bool(result["effects"])
@@ -74,7 +75,7 @@ def read_moved(folder: Path, result: Mapping[str, Any]) -> Moved:
         load = np.column_stack([feet[f"normal_{row}_N"] for row in range(count)])
     elif result["ground"] == "spring-damper" and not effects:
         # docs/planar.md: K delta + C max(0, rate of delta), of a tip at the end of each row
-        rate = -series["vy_m_s"][:, None] - trial["spike_length"] * np.sin(angle) * series["omega_rad_s"][:, None]
+        rate = -series["vy_m_s"][:, None] - length * np.sin(angle) * series["omega_rad_s"][:, None]
         load = np.where(depth > 0, trial["stiffness"] * depth + trial["damping"] * np.maximum(rate, 0.0), 0.0)
     else:
         notes.append(say("no_load"))
@@ -85,12 +86,6 @@ def read_moved(folder: Path, result: Mapping[str, Any]) -> Moved:
         lift = (trial["mass"] + trial["counterweight"]) * motion["ay_m_s2"] + trial["weight"]
         push = trial["mass"] * motion["ax_m_s2"]
     return Moved(series, motion, count, sinkage, load, lift, push, trial["weight"], notes)
-
-
-def _ball_radius(result: Mapping[str, Any]) -> float:
-    """Of its tips [m]; a result before `tip_radius` was written has it among its effects."""
-    of_effects = (effect["parameters"]["radius"] for effect in result["effects"] if effect["id"] == "tip-radius")
-    return float(result.get("tip_radius", next(of_effects, 0.0)))
 
 
 def compared_columns(first: Moved, second: Moved) -> Json:
@@ -133,11 +128,7 @@ def mean_over(at: Array, time: Array, values: Array) -> Array:
 
 def gaps(columns: Mapping[str, Any]) -> dict[str, Json]:
     """How far the two went apart, as quantities of a result."""
-    found = gap_entries(columns, (("x", "m"), ("y", "m"), ("theta", "rad")))
-    found["same_state"] = same_state(columns)
-    depths = [deepest(columns, number) for number in (1, 2)]
-    found["gap_sinkage"] = (depths[1] - depths[0], "m", say("row_gap"))
-    return quantities_of(found)
+    return all_gaps(columns, gap_entries(columns, (("x", "m"), ("y", "m"), ("theta", "rad"))), say("row_gap"))
 
 
 Entries = dict[str, tuple[float, str, str]]
@@ -149,24 +140,21 @@ def gap_entries(columns: Mapping[str, Any], channels: Sequence[tuple[str, str]])
     time = columns["t_s"]
     found: Entries = {}
     for name, unit in channels:
-        away = _away(columns, name, unit)
+        # Second less first; of the path, each from its own start: a body sinks before its torque begins.
+        one, other = (np.asarray(columns[f"{name}_{unit}_{number}"]) for number in (1, 2))
+        away = other - one - (other[0] - one[0] if unit == "m" else 0.0)
         at = int(np.argmax(np.abs(away)))
         found[f"gap_{name}"] = (float(np.abs(away[at])), unit, f"largest over time, at {time[at]:.4g} s")
         found[f"gap_{name}_end"] = (float(away[-1]), unit, f"second less first at {time[-1]:.4g} s")
     return found
 
 
-def same_state(columns: Mapping[str, Any]) -> tuple[float, str, str]:
-    """Share of the time in which both are in the same state."""
+def all_gaps(columns: Mapping[str, Any], found: Entries, of_sinkage: str) -> dict[str, Json]:
+    """As quantities: these, the share of time in which both are in the same state, the gap of the deepest sinkage."""
     same = np.asarray(columns["state_1"]) == np.asarray(columns["state_2"])
-    return float(same.mean()), "1", "share of the time in which both are in the same state"
-
-
-def _away(columns: Mapping[str, Any], name: str, unit: str) -> Array:
-    """Second less first; of the path, each from its own start: a body sinks before its torque begins."""
-    one, other = (np.asarray(columns[f"{name}_{unit}_{number}"]) for number in (1, 2))
-    start = other[0] - one[0] if unit == "m" else 0.0
-    return other - one - start
+    found["same_state"] = float(same.mean()), "1", "share of the time in which both are in the same state"
+    found["gap_sinkage"] = deepest(columns, 2) - deepest(columns, 1), "m", of_sinkage
+    return quantities_of(found)
 
 
 def deepest(columns: Mapping[str, Any], number: int) -> float:
@@ -185,7 +173,7 @@ def row_sinkage(columns: Mapping[str, Any], count: int) -> list[Json]:
     return found
 
 
-def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[Moved]) -> list[str]:
+def told_apart(columns: Mapping[str, Any], labels: tuple[str, str]) -> list[str]:
     """What a reader wants to hear of the two."""
     found = {name: float(entry["value"]) for name, entry in gaps(columns).items()}
     ahead, up, turned = 1e3 * found["gap_x_end"], 1e3 * found["gap_y_end"], math.degrees(found["gap_theta_end"])
@@ -201,13 +189,4 @@ def told_apart(columns: Mapping[str, Any], labels: tuple[str, str], moved: list[
             same=100 * found["same_state"],
         ),
         say("deepest_row", first=first, second=second, labels=labels),
-        *lasting([one.time for one in moved]),
     ]  # fmt: skip
-
-
-def lasting(times: Sequence[Array]) -> list[str]:
-    """That one lasts longer, where it does."""
-    lasts = [float(time[-1]) for time in times]
-    if abs(lasts[0] - lasts[1]) <= 2e-3:
-        return []
-    return [say("lasting", lasts=lasts)]

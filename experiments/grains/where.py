@@ -1,10 +1,23 @@
-"""Where a bed is computed: on as many cores as there are, or on a GPU that is there."""
+"""Where a bed is computed: in the memory and on as many cores as there are, or on a GPU that is there."""
 
-from experiments.runs.memory import cores_there
+from experiments.runs.memory import cores_there, memory_there
 
 from .sentences import say
 
-__all__ = ["check_where"]
+__all__ = ["check_memory", "check_where"]
+
+BYTES_PER_GRAIN = 4000
+"""Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
+
+
+def check_memory(count: float, grain: float, key: str) -> None:
+    """Raise ValueError for more grains, of a mean diameter [m], than there is memory for; `key`: the bed's size."""
+    need, there = count * BYTES_PER_GRAIN, memory_there().free
+    if need > 0.8 * there:
+        least = grain * (need / (0.8 * there)) ** (1 / 3)
+        raise ValueError(
+            say("memory", grain=grain, count=count, need=need / 1e9, free=there / 1e9, least=least, key=key)
+        )
 
 
 def check_where(*, arch: str, threads: int | None, precision: str = "float64") -> None:

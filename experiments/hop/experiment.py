@@ -6,11 +6,12 @@ then does the same hop from ground that gives (`experiments.hop.on_surface`): bo
 """
 
 import math
+from dataclasses import asdict
 
 from experiments.platform.numbers import keep_platform
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
-from experiments.runs.result import Result, quantity
+from experiments.runs.result import Result, quantities_of, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.tumble.result import trajectory_columns
@@ -39,33 +40,21 @@ def _compute(settings: HopSettings, folder: RunFolder, progress: Progress) -> Re
     for sentence in plan.sentences():
         progress.message(sentence)
     progress.stage("hop", total=1.0)
-    given, wanted = _on_surface(settings, plan, hop)
+    given, sought, trial = None, None, _trial(settings, plan, hop)
+    if trial is not None:  # the same hop by the planar model, and the braked wheel's speed for the distance there
+        longest, radius = longest_flight(plan, hop.launch), settings.body_radius
+        given = hop_on_surface(trial, expected_time=hop.launch.time, longest=longest, radius=radius)
+        if settings.actuator == "brake" and plan.distance is not None:
+            sought = wheel_speed_on_surface(
+                trial, given, distance=plan.distance, max_speed=plan.wheel.max_speed, longest=longest, radius=radius
+            )
     progress.update(1.0)
     _write_series(settings, folder, hop, given)
-    return _result(settings, plan, hop, given, wanted)
+    return _result(settings, plan, hop, given, sought)
 
 
 def _trial(settings: HopSettings, plan: HopPlan, hop: Hop) -> Trial | None:
     return hop_trial(plan, torque=hop.torque, wheel_speed=hop.effort if settings.actuator == "brake" else None)
-
-
-def _on_surface(settings: HopSettings, plan: HopPlan, hop: Hop) -> tuple[SurfaceHop | None, float | None]:
-    """The same hop by the planar model, and the braked wheel's speed that would go the distance there.
-
-    None for a platform that the model does not take; None for a motor, where no distance is asked for, and where no
-    wheel speed does.
-    """
-    trial = _trial(settings, plan, hop)
-    if trial is None:
-        return None, None
-    longest, radius = longest_flight(plan, hop.launch), settings.body_radius
-    given = hop_on_surface(trial, expected_time=hop.launch.time, longest=longest, radius=radius)
-    if settings.actuator == "motor" or plan.distance is None:
-        return given, None
-    most = plan.wheel.max_speed
-    return given, wheel_speed_on_surface(
-        trial, given, distance=plan.distance, max_speed=most, longest=longest, radius=radius
-    )
 
 
 def _write_series(settings: HopSettings, folder: RunFolder, hop: Hop, given: SurfaceHop | None) -> None:
@@ -95,9 +84,12 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
     driven = min(left.time, wheel.inertia * speed / torque)
     lands = "" if flown is not None else "it escapes"
     when = "before the brake" if by_brake else "reached when it leaves"
+    note = say("not_sought" if not by_brake else "none_goes" if sought is None else "sought", plan=plan)
+    if plan.distance is None or given is None:
+        note = "no distance was asked for" if plan.distance is None else say("not_sought_here")
     quantities = {
         "wheel_speed": quantity(speed, "rad/s", say("of_wheel", when=when)),
-        "model_wheel_speed": quantity(sought, "rad/s", _model_speed_note(plan, given, sought, by_brake=by_brake)),
+        "model_wheel_speed": quantity(sought, "rad/s", note),
         "wheel_speed_impulsive": quantity(wanted / sudden.speed if wanted else None, "rad/s", lands or say("closed")),
         "torque": quantity(torque, "N m", "on the platform, constant"),
         "torque_time": quantity(driven, "s", say("of_torque_time")),
@@ -113,15 +105,18 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "escape_ratio": quantity(left.speed / escape if escape else None, "1", say("of_escape")),
     } | _model_quantities(plan, left, flown, given, escape)
     said = sentences(plan, left, flown, given, torque=torque, speed=speed, by_brake=by_brake, sought=sought)
+    asked = {"distance": f"of {plan.distance or 0:g} m", "wheel_speed": f"from {settings.wheel_speed_0 or 0:g} rad/s"}
+    asked["torque"] = f"by {settings.torque or 0:g} N m"
+    answer = ""
+    if by_brake and plan.distance is not None:  # on either ground: the speed of rigid ground alone is no plan for a hop
+        answer = f", by a wheel at {speed:.4g} rad/s from rigid ground"
+        if given is not None:
+            answer += f", none from {plan.surface}" if sought is None else f", {sought:.4g} from {plan.surface}"
     return Result.make(
         "hop",
-        title=f"{plan.platform.name}: a hop {_asked(settings, plan)} at {settings.gravity:g} m/s2"
-        + (_wheel_words(plan, given, speed, sought) if by_brake and plan.distance is not None else ""),
+        title=f"{plan.platform.name}: a hop {asked[settings.asks_for]} at {settings.gravity:g} m/s2{answer}",
         quantities=quantities,
-        numbers={
-            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
-            for name, number in plan.numbers.items()
-        },
+        numbers={name: asdict(number) for name, number in plan.numbers.items()},
         actuator=settings.actuator,
         asks_for=settings.asks_for,
         surface=plan.surface,
@@ -140,32 +135,6 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
     )
 
 
-def _asked(settings: HopSettings, plan: HopPlan) -> str:
-    if plan.distance is not None:
-        return f"of {plan.distance:g} m"
-    if settings.wheel_speed_0 is not None:
-        return f"from {settings.wheel_speed_0:g} rad/s"
-    return f"by {settings.torque:g} N m"
-
-
-def _wheel_words(plan: HopPlan, given: SurfaceHop | None, speed: float, sought: float | None) -> str:
-    """The answer for a distance, on either ground: the one of rigid ground alone is no plan for a hop."""
-    said = f", by a wheel at {speed:.4g} rad/s from rigid ground"
-    if given is None:
-        return said
-    return said + (f", {sought:.4g} from {plan.surface}" if sought is not None else f", none from {plan.surface}")
-
-
-def _model_speed_note(plan: HopPlan, given: SurfaceHop | None, sought: float | None, *, by_brake: bool) -> str:
-    if plan.distance is None:
-        return "no distance was asked for"
-    if given is None:
-        return say("not_sought_here")
-    if not by_brake:
-        return say("not_sought", plan=plan)
-    return say("sought" if sought is not None else "none_goes", plan=plan)
-
-
 def _model_quantities(
     plan: HopPlan, left: Launch, flown: Flight | None, given: SurfaceHop | None, escape: float | None
 ) -> dict[str, Json]:
@@ -177,16 +146,20 @@ def _model_quantities(
     where = f"planar model, on {plan.surface}" + (f": {no}" if no else "")
     further = flight_of.distance / flown.distance if flight_of and flown else None
     near = other.speed / escape if other and escape else None
-    return {
-        "model_launch_speed": quantity(other.speed if other else None, "m/s", where),
-        "model_launch_angle": quantity(other.angle if other else None, "rad", where),
-        "model_flight_time": quantity(flight_of.time if flight_of else None, "s", where),
-        "model_peak_height": quantity(flight_of.height if flight_of else None, "m", where),
-        "model_distance": quantity(flight_of.distance if flight_of else None, "m", where),
-        "speed_factor": quantity(other.speed / left.speed if other else None, "1", say("of_speed_factor")),
-        "distance_factor": quantity(further, "1", say("of_distance_factor")),
-        "model_escape_ratio": quantity(near, "1", say("of_model_escape")),
-    }
+    launch = (other.speed, other.angle) if other else (None, None)
+    flown_there = (flight_of.time, flight_of.height, flight_of.distance) if flight_of else (None, None, None)
+    return quantities_of(
+        {
+            "model_launch_speed": (launch[0], "m/s", where),
+            "model_launch_angle": (launch[1], "rad", where),
+            "model_flight_time": (flown_there[0], "s", where),
+            "model_peak_height": (flown_there[1], "m", where),
+            "model_distance": (flown_there[2], "m", where),
+            "speed_factor": (other.speed / left.speed if other else None, "1", say("of_speed_factor")),
+            "distance_factor": (further, "1", say("of_distance_factor")),
+            "model_escape_ratio": (near, "1", say("of_model_escape")),
+        }
+    )
 
 
 run, resume = computed_run("hop", HopSettings, _compute, check=check)

@@ -61,8 +61,7 @@ class HopPlan:
 def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPlan:
     """The numbers that `settings` stand for; `platform_file` stands in for ``settings.platform``, where copied.
 
-    Raises ValueError, naming the setting, for a platform or a surface there is not, a torque beyond the motor, a wheel
-    speed beyond the wheel's, and numbers that cannot be.
+    Raises ValueError, naming the setting, for a platform or surface there is not, and numbers that cannot be.
     """
     platform = find_platform(platform_file or settings.platform)
     of_platform = platform_numbers(settings.platform, file=platform_file, in_plane=False)
@@ -90,7 +89,9 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
         own, inertia=numbers.value("wheel_inertia"), max_speed=numbers.value("max_wheel_speed"),
         motor_torque=numbers.value("max_motor_torque"),
     )  # fmt: skip
-    _check(settings, numbers)
+    body = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d")
+    own_numbers: Json = {name: numbers.value(name) for name in body}
+    Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own_numbers)  # refuses what no body can have
     warnings += check_actuation(settings.actuator, of_platform, numbers) + check_body(numbers, of_platform)
     tumbler = Tumbler(
         mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
@@ -107,10 +108,3 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
         distance=numbers.value("distance") if settings.asks_for == "distance" else None, numbers=numbers,
         choices=choices, warnings=tuple(warnings),
     )  # fmt: skip
-
-
-def _check(settings: HopSettings, numbers: Settled) -> None:
-    """Refuse numbers that no body can have, as a tumble does."""
-    body = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d")
-    own: Json = {name: numbers.value(name) for name in body}
-    Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own)

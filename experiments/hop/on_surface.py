@@ -43,11 +43,9 @@ def hop_trial(plan: HopPlan, *, torque: float, wheel_speed: float | None) -> Tri
     if plan.spike_count is None:
         return None
     t, wheel = plan.tumbler, plan.wheel
-    actuation: dict[str, float | str] = (
-        {"actuator": "motor", "torque_until": wheel.inertia * wheel.max_speed / torque}
-        if wheel_speed is None
-        else {"actuator": "brake", "wheel_speed_0": wheel_speed}
-    )
+    actuation: dict[str, float | str] = {"actuator": "brake", "wheel_speed_0": wheel_speed or 0.0}
+    if wheel_speed is None:
+        actuation = {"actuator": "motor", "torque_until": wheel.inertia * wheel.max_speed / torque}
     return Trial(
         mass=t.mass, inertia=t.inertia, spike_length=t.spike_length, spike_count=plan.spike_count,
         stiffness=plan.stiffness, damping=plan.damping, mu_s=t.mu_s, mu_d=t.sliding_friction, gravity_sim=t.gravity,
@@ -58,15 +56,8 @@ def hop_trial(plan: HopPlan, *, torque: float, wheel_speed: float | None) -> Tri
 def hop_on_surface(trial: Trial, *, expected_time: float, longest: float, radius: float | None) -> SurfaceHop:
     """Integrate `trial` until the platform is clear of the ground, or for `longest` [s], and follow its longest hop.
 
-    Args:
-        trial: the platform on its ground.
-        expected_time: when rigid ground would have been left [s].
-        longest: when to give up [s].
-        radius: of the body [m]; None: flat ground.
-
-    Raises:
-        ValueError: a platform that cannot stand on this ground.
-        RuntimeError: the motion is no longer finite.
+    `expected_time`: when rigid ground would have been left [s]; `radius`: of the body [m], None for flat ground. Raises
+    ValueError for a platform that cannot stand on this ground, RuntimeError where the motion is no longer finite.
     """
     duration = min(2 * expected_time + 0.5, longest)
     while True:

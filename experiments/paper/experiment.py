@@ -263,8 +263,8 @@ OTHER_LAWS = ("bekker", "rft")
 
 
 Variant = tuple[str, Trial, str, Mapping[str, Any]]
-"""A trial beside the nominal one: name; trial; its list in result.json, "sweep", "sliding" or "grains" ("" where it serves
-a claim only); what was varied: key and factor; ratio; or law, stiffness (of a row, N/m) and rebound."""
+"""A trial beside the nominal one: name; trial; its list in result.json, "sweep", "sliding" or "grains" ("": of a claim
+only); what was varied: key and factor; ratio; or law, stiffness (of a row, N/m) and rebound."""
 
 
 def variants(settings: PaperSettings, trial: Trial, *, surface: str, first_rig: bool) -> Iterator[Variant]:

@@ -16,27 +16,31 @@ __all__ = ["penetrate_headline"]
 _SAID, _OF_FINDINGS = 4, 2
 """Sentences shown, warnings first; but all warnings, and at least so many findings."""
 
-Pair = tuple[str, str]
-
 
 def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
-    """The short form of the result of `penetrate`; None where it has no bed beside a spring-damper."""
+    """The short form of a result; None where it has no bed beside a spring-damper."""
     numbers = result.get("quantities", {})
     if "sinkage_dem" not in numbers or "stiffness" not in numbers:
         return None
     load = f" under {quote(numbers['load']['value'], unit='N')}" if "load" in numbers else ""
-    rows = [(f"sinkage at rest{load}", *_both(numbers["sinkage_dem"], numbers["sinkage_spring_damper"]))]
+    rows = [(f"sinkage at rest{load}", *(_quoted(numbers[f"sinkage_{side}"]) for side in ("dem", "spring_damper")))]
     rows += _drag(result.get("departures", {}).get("table", []))
     rows += _fastest_drop(result.get("runs", []))
     given, back = (numbers.get(f"work_returned_{side}") for side in ("dem", "spring_damper"))
     if given and back and given["value"] is not None:
-        rows.append(("work given back, pulled out", *_both(given, back, "%")))
+        rows.append(("work given back, pulled out", _quoted(given, "%"), _quoted(back, "%")))
     for name, words in (("stiffness", "stiffness K, fitted"), ("damping", "damping C, fitted")):
         rows.append((words, "", _quoted(numbers[name])))
     if "drag_gap" in numbers:
         rows.append(("its drag is off by (rms, way in)", "", _quoted(numbers["drag_gap"], "%")))
     warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
-    moved = _moved(result.get("reference", {}).get("moved", {}))
+    changes = result.get("reference", {}).get("moved", {})
+    parts = [
+        f"{words} {100 * changes[name]['change']:+.0f} %"
+        for name, words in (("stiffness", "K"), ("damping", "C"), ("sinkage_dem", "the sinkage"))
+        if changes.get(name, {}).get("change") is not None
+    ]
+    moved = [f"Against the reference, {', '.join(parts)}."] if parts else []
     # Of a finding that goes on, as to how far beds differ, the first sentence.
     own = [re.split(r"(?<=\.)\s+(?=[A-Z])", text)[0] for text in said if not text.startswith("Against the reference")]
     shown = [*own[: max(_OF_FINDINGS, _SAID - len(warnings)) - len(moved)], *moved]
@@ -44,16 +48,6 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
         ("", "bed", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
         tuple(map(foldable, warnings)), tuple(map(foldable, shown)), len(said) - len(shown),
     )  # fmt: skip
-
-
-def _moved(moved: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """How far K, C and sinkage are from those of the reference, in one sentence; none without one."""
-    parts = [
-        f"{words} {100 * moved[name]['change']:+.0f} %"
-        for name, words in (("stiffness", "K"), ("damping", "C"), ("sinkage_dem", "the sinkage"))
-        if moved.get(name, {}).get("change") is not None
-    ]
-    return [f"Against the reference, {', '.join(parts)}."] if parts else []
 
 
 def _drag(table: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
@@ -90,10 +84,6 @@ def _fastest_drop(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str
             sides.append(_quoted({"value": mean, "std": std, "unit": unit}))
         rows.append((f"{words}, dropped at {speed:g} m/s", sides[0], sides[1]))
     return rows
-
-
-def _both(bed: Mapping[str, Any], law: Mapping[str, Any], unit: str = "") -> Pair:
-    return _quoted(bed, unit), _quoted(law, unit)
 
 
 def _quoted(entry: Mapping[str, Any], unit: str = "") -> str:

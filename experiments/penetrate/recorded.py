@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, write_campaign
@@ -36,7 +35,6 @@ from .settings import PenetrateSettings, say
 
 __all__ = ["SpikeSensors", "campaign_of", "campaign_of_run", "sensors_of", "write_run_campaign"]
 
-Array = NDArray[np.float64]
 
 UNKNOWN = 2.0
 """[uncertainty] of K and C: 1 or more is not known beforehand, so that a diagnosis fits them freely."""
@@ -56,17 +54,11 @@ class SpikeSensors(StrictSettings):
 
 def sensors_of(settings: PenetrateSettings) -> SpikeSensors:
     """The sensors of a run's own campaign."""
-    return SpikeSensors(
-        rate=settings.campaign_rate, depth_std=settings.campaign_depth_std, force_std=settings.campaign_force_std,
-        accel_std=settings.campaign_accel_std, seed=settings.campaign_seed,
-    )  # fmt: skip
+    return SpikeSensors(**{name: getattr(settings, f"campaign_{name}") for name in SpikeSensors.model_fields})
 
 
 def write_run_campaign(run: str | Path, target: str | Path, *, sensors: SpikeSensors | None = None) -> Campaign:
-    """Write the finished run in the folder `run` as a campaign into `target`, and return it.
-
-    Raises ValueError as `campaign_of_run` and `check_target` do.
-    """
+    """Write a run as a campaign into `target`, and return it. Raises ValueError as `campaign_of_run` does."""
     check_target(target)
     campaign = campaign_of_run(run, sensors=sensors)
     write_campaign(target, campaign)
@@ -74,9 +66,7 @@ def write_run_campaign(run: str | Path, target: str | Path, *, sensors: SpikeSen
 
 
 def campaign_of_run(run: str | Path, *, sensors: SpikeSensors | None = None) -> Campaign:
-    """The finished penetration run in the folder `run` as a campaign.
-
-    K and C of [surface] are those that the run has fitted, not known beforehand ([uncertainty] 2).
+    """The finished penetration run in the folder `run` as a campaign; K and C of [surface] are those that it fitted.
 
     Raises ValueError where `run` is no folder of `hedgebed penetrate`, is not finished, or is too short for the rate.
     """
@@ -98,14 +88,11 @@ def campaign_of(
 ) -> Campaign:
     """The runs of a bed in `folder`, whose result is `result`, as a campaign. Raises ValueError for too low a rate."""
     runs: Sequence[Json] = result["runs"]
-    trials, recordings = [], {}
-    for number, entry in enumerate(runs):
-        trial = _trial(settings, entry)
-        random = np.random.default_rng([sensors.seed, number])
-        recordings[trial.id, "data"] = _record(
-            settings, entry, read_series(folder.path / entry["series"]), sensors, random
-        )
-        trials.append(trial)
+    trials = tuple(_trial(settings, entry) for entry in runs)
+    recordings = {
+        (trial.id, "data"): _record(settings, entry, read_series(folder.path / entry["series"]), sensors, number)
+        for number, (trial, entry) in enumerate(zip(trials, runs, strict=True))
+    }
     kinds = {trial.mode for trial in trials}
     material = str(result["bed"]["material"])
     fitted = {name: float(result["quantities"][name]["value"]) for name in ("stiffness", "damping")}
@@ -132,7 +119,7 @@ def campaign_of(
             "noise_seed": sensors.seed,
             "averaged": "force and acceleration are means over the interval between samples",
         },
-        trial=tuple(trials),
+        trial=trials,
     )
     return Campaign(tables, recordings)
 
@@ -149,14 +136,10 @@ def _trial(settings: PenetrateSettings, entry: Json) -> PenetrationTrial:
 
 
 def _record(
-    settings: PenetrateSettings,
-    entry: Json,
-    series: dict[str, np.ndarray],
-    sensors: SpikeSensors,
-    random: np.random.Generator,
+    settings: PenetrateSettings, entry: Json, series: dict[str, np.ndarray], sensors: SpikeSensors, number: int
 ) -> Recording:
-    """The samples of one run; see the module's text."""
-    dropped = entry["kind"] == "drop"
+    """The samples of one run, the `number`-th; see the module's text."""
+    random, dropped = np.random.default_rng([sensors.seed, number]), entry["kind"] == "drop"
     rows = series["t_s"] > 0 if dropped else np.ones(len(series["t_s"]), dtype=bool)
     time, depth, force = (series[name][rows] for name in ("t_s", "depth_m", "force_N"))
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
@@ -164,21 +147,12 @@ def _record(
     count = len(time) // each
     if count < _FEWEST:
         raise ValueError(say("slow_rate", sensors=sensors, count=count, id=entry["id"], rows=len(time), fewest=_FEWEST))
-    kept = slice(0, count * each)
-    middle = _mean(time[kept], each)
-    columns = {
-        "t_s": middle,
-        "depth_m": np.interp(middle, time, depth) + sensors.depth_std * random.standard_normal(count),
-    }
-    push = _mean(force[kept], each)
+    middle, push = (np.asarray(rows[: count * each].reshape(-1, each).mean(axis=1)) for rows in (time, force))
+    depths = np.interp(middle, time, depth) + sensors.depth_std * random.standard_normal(count)
+    columns = {"t_s": middle, "depth_m": depths}
     if dropped:
-        columns["accel_m_s2"] = (settings.weight - push) / settings.mass + sensors.accel_std * random.standard_normal(
-            count
-        )
+        freely = (settings.weight - push) / settings.mass
+        columns["accel_m_s2"] = freely + sensors.accel_std * random.standard_normal(count)
     else:
         columns["force_N"] = push + sensors.force_std * random.standard_normal(count)
     return Recording(columns)
-
-
-def _mean(values: Array, each: int) -> Array:
-    return np.asarray(values.reshape(-1, each).mean(axis=1), dtype=float)

@@ -48,9 +48,8 @@ class _Side:
     """What is known of the runs of one result."""
 
     conditions: Counter[Condition]  # how often each kind and speed was run, set-downs left out
-    moments: dict[str, tuple[Condition, Moments]]  # by id, of the runs that can be fitted
+    moments: dict[str, tuple[Condition, Moments]]  # by id, of the runs that can be fitted; none before version 0.1
     quantities: Mapping[str, Any]
-    whole: bool  # whether every run that can be fitted tells its moments: results of versions before 0.1 do not
 
 
 def _side(result: Mapping[str, Any]) -> _Side:
@@ -65,7 +64,7 @@ def _side(result: Mapping[str, Any]) -> _Side:
         kept = run.get("moments")
         if isinstance(kept, Mapping) and all(isinstance(kept.get(name), int | float) for name in names):
             moments[str(run.get("id"))] = condition, Moments(*(float(kept[name]) for name in names))
-    return _Side(conditions, moments, result["quantities"], bool(moments))
+    return _Side(conditions, moments, result["quantities"])
 
 
 def _refitted(side: _Side, weights: Mapping[Condition, float]) -> dict[str, Number]:
@@ -90,9 +89,7 @@ def _refitted(side: _Side, weights: Mapping[Condition, float]) -> dict[str, Numb
 
 def _number(quantities: Mapping[str, Any], name: str) -> Number:
     entry = quantities.get(name)
-    if not isinstance(entry, Mapping):
-        return None, None
-    return entry.get("value"), entry.get("std")
+    return (entry.get("value"), entry.get("std")) if isinstance(entry, Mapping) else (None, None)
 
 
 def compare_with(other: Mapping[str, Any], result: Mapping[str, Any]) -> tuple[Json, list[str]]:
@@ -108,7 +105,7 @@ def compare_with(other: Mapping[str, Any], result: Mapping[str, Any]) -> tuple[J
     missing = sorted(there.conditions.keys() - here.conditions.keys())
     before, now = ({"sinkage_dem": _number(side.quantities, "sinkage_dem")} for side in (there, here))
     now |= _refitted(here, {c: there.conditions[c] / here.conditions[c] for c in common})
-    if there.whole:
+    if there.moments:
         before |= _refitted(there, dict.fromkeys(common, 1.0))
     elif not missing:
         before |= {name: _number(there.quantities, name) for name in _FITTED}
@@ -124,7 +121,8 @@ def compare_with(other: Mapping[str, Any], result: Mapping[str, Any]) -> tuple[J
             "before": old, "before_std": old_std, "now": new, "now_std": new_std, "change": change, "unit": unit,
         }  # fmt: skip
         percent = f" ({100 * change:+.3g} %)" if change is not None else ""
-        said.append(f"{name} moves from {_words(old, old_std, unit)} to {_words(new, new_std, unit)}{percent}.")
+        was, now_is = (foldable(quote(*pair, unit, significant=3)) for pair in ((old, old_std), (new, new_std)))
+        said.append(f"{name} moves from {was} to {now_is}{percent}.")
     if moved and common:
         said.append(f"K and C are fitted, on both sides, to what both have: {_listed(common)}.")
     if common and "stiffness" not in moved:
@@ -142,10 +140,6 @@ def _listed(conditions: Sequence[Condition]) -> str:
     return ", ".join(f"{kind} at {speed:g} m/s" for kind, speed in conditions)
 
 
-def _words(value: float, std: float | None, unit: str) -> str:
-    return foldable(quote(value, std, unit, significant=3))
-
-
 def _differences(other: Mapping[str, Any], result: Mapping[str, Any]) -> list[str]:
     """What was set otherwise there than here, as ``grain 0.0024 m there, 0.0012 m here``."""
     found = []
@@ -155,9 +149,8 @@ def _differences(other: Mapping[str, Any], result: Mapping[str, Any]) -> list[st
         ("spike", "diameter", "m"), ("spike", "shaft_diameter", "m"), ("spike", "cone_angle", "degrees"),
         ("spike", "mass", "kg"), ("spike", "friction", ""), ("spike", "restitution", ""), ("spike", "load", "N"),
     ):  # fmt: skip
-        before, now = (
-            source[part].get(name) if isinstance(source.get(part), Mapping) else None for source in (other, result)
-        )
+        parts = (source.get(part) for source in (other, result))
+        before, now = (values.get(name) if isinstance(values, Mapping) else None for values in parts)
         if before is None or now is None or before == now:
             continue
         shown = [f"{value:.4g}" if isinstance(value, float) else str(value) for value in (before, now)]

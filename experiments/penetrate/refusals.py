@@ -5,8 +5,7 @@ import math
 from experiments.campaign.files import check_target
 from experiments.grains.box import expected_grain_count
 from experiments.grains.softening import check_young, drop_depth
-from experiments.grains.where import check_where
-from experiments.runs.memory import memory_there
+from experiments.grains.where import check_memory, check_where
 
 from . import beds
 from .amended import read_law
@@ -16,8 +15,6 @@ from .units import deepest, expected_time, plan_units
 
 __all__ = ["check"]
 
-BYTES_PER_GRAIN = 4000
-"""Memory of one grain with its lists and contact history, float64, measured generously [bytes]."""
 MOST_GRAINS = 2**26
 """More are refused."""
 MOST_STEPS = 1e9
@@ -36,42 +33,26 @@ def check(settings: PenetrateSettings) -> None:
     for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
         if seeds and not speeds:
             raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
-    _check_grain_count(settings)
+    count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    check_memory(count, settings.grain, "bed_size")
+    if count > MOST_GRAINS:
+        least = settings.grain * (count / MOST_GRAINS) ** (1 / 3)
+        raise ValueError(say("grain_count", s=settings, count=count, most=MOST_GRAINS, least=least))
     check_where(arch=settings.arch, threads=settings.threads, precision=settings.precision)
-    _check_young(settings)
+    if settings.young is not None:
+        most = beds.find_material(settings).young
+        if settings.young > most:
+            young, whose = settings.young, settings.material
+            raise ValueError(f"young = {young:g} Pa is more than {whose} itself has: at most {most:g} Pa would do")
+        chosen = beds.choose_softness(settings.model_copy(update={"young": None})).young
+        check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
     _check_reach(settings)
     step = beds.bed_step(settings, beds.choose_softness(settings).young)
-    found = settings.crossing(step, beds.find_material(settings).young)
-    if found:
+    if found := settings.crossing(step, beds.find_material(settings).young):
         raise ValueError(found)
     _check_step_count(settings, step)
     if settings.reference not in (None, "shipped"):
         read_reference(str(settings.reference))
-
-
-def _check_grain_count(settings: PenetrateSettings) -> None:
-    count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
-    need, there = count * BYTES_PER_GRAIN, memory_there().free
-    if need > 0.8 * there:
-        least = settings.grain * (need / (0.8 * there)) ** (1 / 3)
-        raise ValueError(say("memory", s=settings, count=count, need=need / 1e9, free=there / 1e9, least=least))
-    if count > MOST_GRAINS:
-        raise ValueError(say(
-            "grain_count", s=settings, count=count, most=MOST_GRAINS,
-            least=settings.grain * (count / MOST_GRAINS) ** (1 / 3),
-        ))  # fmt: skip
-
-
-def _check_young(settings: PenetrateSettings) -> None:
-    if settings.young is None:
-        return
-    most = beds.find_material(settings).young
-    chosen = beds.choose_softness(settings.model_copy(update={"young": None})).young
-    if settings.young > most:
-        raise ValueError(
-            f"young = {settings.young:g} Pa is more than {settings.material} itself has: at most {most:g} Pa would do"
-        )
-    check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
 
 
 def _check_reach(settings: PenetrateSettings) -> None:

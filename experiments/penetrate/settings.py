@@ -19,12 +19,10 @@ say = Sentences(__package__)
 STANDARD_GRAVITY = 9.80665
 """Unit of `rig` [m/s2]."""
 
-_MATERIALS = (
-    "sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml."
-)
+_MATERIALS = "sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml"
 _SOFTENED = "Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
 _STEP = "Step of the grains [s]; from the contact time if not given."
-GrainMaterial = Annotated[str, Field(description=f"Grain material: {_MATERIALS}")]
+GrainMaterial = Annotated[str, Field(description=f"Grain material: {_MATERIALS}.")]
 Grain = Annotated[Positive, Field(description="Mean grain diameter [m].")]
 Spread = Annotated[float, Field(ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")]
 BedSize = Annotated[
@@ -162,8 +160,7 @@ class PenetrateSettings(StrictSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        bed = None if self.ground == "spring-damper" else self._bed()  # there is none then
-        for finding in (self._spike(), bed, self._runs(), self._beside()):
+        for finding in (self._spike(), self._bed(), self._runs(), self._beside()):
             if finding:
                 raise ValueError(finding + self._perhaps_millimetres())
         return self
@@ -172,23 +169,23 @@ class PenetrateSettings(StrictSettings):
         """What to ask of a length above a metre; empty where there is none."""
         for key in ("tip_diameter", "shaft_diameter", "shaft_length", "grain", "depth", "bed_size"):
             value = getattr(self, key)
-            for length in value if isinstance(value, tuple) else (value,):
-                if length is not None and length > 1:
+            for length in value if isinstance(value, tuple) else (value or 0.0,):
+                if length > 1:
                     shown = _plain(value) if isinstance(value, tuple) else f"{value:g}"
                     return say("millimetres", key=key, value=shown, length=length, metres=1e-3 * length)
         return ""
 
     def _spike(self) -> str | None:
-        if self.ground == "spring-damper":  # which has no grains, and no floor
-            return self._shaft()
-        across = self.tip_diameter / self.grain
-        if across < 1:
+        on_grains, shaft, across = self.ground == "bed", self.shaft_diameter, self.tip_diameter / self.grain
+        if on_grains and across < 1:
             return say("tip_thin", s=self, least=5 * self.grain, most=self.tip_diameter / 5)
-        if across < 4.999 and not self.allow_coarse:
+        if on_grains and across < 4.999 and not self.allow_coarse:
             return say("tip_coarse", s=self, across=across, least=5 * self.grain, most=self.tip_diameter / 5)
-        shaft = self.shaft_diameter
-        if finding := self._shaft():
-            return finding
+        if shaft is not None and (shaft > self.tip_diameter or (self.tip == "flat" and shaft != self.tip_diameter)):
+            bound = "equal" if self.tip == "flat" else "be at most"
+            return f"shaft_diameter = {shaft:g} m must {bound} tip_diameter, {self.tip_diameter:g} m"
+        if not on_grains:  # no grains, and no floor
+            return None
         if shaft is not None and shaft < self.grain:
             return say("shaft_thin", shaft=shaft, s=self)
         if self.tip == "cone":
@@ -202,14 +199,9 @@ class PenetrateSettings(StrictSettings):
             return say("shaft_short", s=self, reach=reach, least=reach - self.tip_height)
         return None
 
-    def _shaft(self) -> str | None:
-        shaft = self.shaft_diameter
-        if shaft is not None and (shaft > self.tip_diameter or (self.tip == "flat" and shaft != self.tip_diameter)):
-            bound = "equal" if self.tip == "flat" else "be at most"
-            return f"shaft_diameter = {shaft:g} m must {bound} tip_diameter, {self.tip_diameter:g} m"
-        return None
-
     def _bed(self) -> str | None:
+        if self.ground == "spring-damper":  # there is none then
+            return None
         width, height = min(self.bed_size[:2]), self.bed_size[2]
         wide, deep = 4 * self.tip_diameter, self.depth + self.tip_diameter
         if width < wide * (1 - 1e-9):
@@ -259,9 +251,9 @@ class PenetrateSettings(StrictSettings):
     @property
     def fastest(self) -> tuple[str, float]:
         """The key and the value of the largest speed that is set [m/s]."""
-        keys = ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "retreat_speed", "lowering_speed")
-        listed = [(key, getattr(self, key)) for key in keys]
-        every = [(key, v) for key, value in listed for v in (value if isinstance(value, tuple) else (value,))]
+        keys = ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds")
+        every = [(key, speed) for key in keys for speed in getattr(self, key)]
+        every += [("retreat_speed", self.retreat_speed), ("lowering_speed", self.lowering_speed)]
         return max(every, key=lambda pair: pair[1])
 
     @property
@@ -275,17 +267,17 @@ class PenetrateSettings(StrictSettings):
 
     @property
     def weight(self) -> float:
-        """What rests on the spike [N]: `load`, or (m + m_b) g_sim / 4.
-
-        The counterweight that makes the pair fall at g_sim is m_b = m (g - g_sim) / (g + g_sim) (planar model, Atwood).
-        """
+        """What rests on the spike [N]: `load`, or (m + m_b) g_sim / 4."""
         if self.load is not None:
             return self.load
         return self.share * (self.rig * STANDARD_GRAVITY if self.rig else self.gravity)
 
     @property
     def share(self) -> float:
-        """The mass that a spike's quarter of the platform moves [kg]: (m + m_b) / 4, without a rig m / 4."""
+        """The mass that a spike's quarter of the platform moves [kg]: (m + m_b) / 4, without a rig m / 4.
+
+        The counterweight that makes the pair fall at g_sim is m_b = m (g - g_sim) / (g + g_sim) (planar model, Atwood).
+        """
         counterweight = self.platform_mass * (1 - self.rig) / (1 + self.rig) if self.rig else 0.0
         return (self.platform_mass + counterweight) / 4
 

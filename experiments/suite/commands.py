@@ -68,19 +68,14 @@ def _row(case: Case, results: Path, work: Path) -> Json:
     if isinstance(found, str):
         return row | {"standing": "done" if stands == "done" else "not yet", "why": found, "words": ["", "", ""]}
     if stands == "to do" and found.seconds > LONGEST:
-        row |= {
-            "standing": "too long",
-            "why": "too long: more than an hour by its estimate; done only where it is named",
-        }
+        why = "too long: more than an hour by its estimate; done only where it is named"
+        row |= {"standing": "too long", "why": why}
     numbers = {
         "grains": round(found.grains), "time_step": found.time_step, "grain_steps": found.grain_steps,
         "bed_seconds": found.bed_seconds, "run_seconds": found.run_seconds,
     }  # fmt: skip
-    return (
-        row
-        | numbers
-        | {"words": [f"{round(found.grains, -2):,.0f}", duration(found.bed_seconds), duration(found.run_seconds)]}
-    )
+    words = [f"{round(found.grains, -2):,.0f}", duration(found.bed_seconds), duration(found.run_seconds)]
+    return row | numbers | {"words": words}
 
 
 def _run(names: _Names = (), /, *, results: _Results = RESULTS, work: _Work = WORK) -> int:
