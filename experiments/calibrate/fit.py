@@ -109,26 +109,18 @@ Ranges = Mapping[str, Sequence[float]]
 
 @dataclass(frozen=True)
 class Fit:
-    """The parameters found. Arrays of shape [parameter_count], in the parameters' units.
+    """The parameters found. Arrays of shape [parameter_count], in the parameters' units."""
 
-    Attributes:
-        best: of the smallest chi^2. std: standard deviations, of tolerances and of what is not known of responses.
-        low, high: between these lie two thirds of the weight. correlation: shape [parameter_count, parameter_count].
-        chi2: at the best point. response, response_std: what is expected there of every observable.
-        at_edge: names of parameters whose best value lies at an end of their range, with which end.
-        vague: names of those about which the figures say next to nothing.
-    """
-
-    best: np.ndarray
-    std: np.ndarray
-    low: np.ndarray
+    best: np.ndarray  # of the smallest chi^2
+    std: np.ndarray  # standard deviations, of tolerances and of what is not known of responses
+    low: np.ndarray  # between this and `high` lie two thirds of the weight
     high: np.ndarray
-    correlation: np.ndarray
-    chi2: float
-    response: dict[str, float]
+    correlation: np.ndarray  # shape [parameter_count, parameter_count]
+    chi2: float  # at the best point
+    response: dict[str, float]  # what is expected there of every observable
     response_std: dict[str, float]
-    at_edge: dict[str, str]
-    vague: tuple[str, ...]
+    at_edge: dict[str, str]  # parameters whose best value lies at an end of their range, with which end
+    vague: tuple[str, ...]  # parameters about which the figures say next to nothing
 
 
 def design(ranges: Ranges, count: int, *, seed: int) -> np.ndarray:
@@ -157,15 +149,11 @@ def _weigh(
     return chi2, found
 
 
-def _box(width: int) -> np.ndarray:
-    return qmc.Sobol(width, scramble=False).random(_TRIES)
-
-
 def find_best(responses: Surfaces, wanted: Goals, ranges: Ranges) -> Fit:
     """The parameters whose expected figures come nearest to those wanted, and how well they are known."""
     names = list(ranges)
     low, high = np.array([tuple(pair) for pair in ranges.values()]).T
-    x = _box(len(names))
+    x = qmc.Sobol(len(names), scramble=False).random(_TRIES)
     chi2, _ = _weigh(responses, wanted, x)
     found = [
         optimize.minimize(
@@ -186,7 +174,8 @@ def find_best(responses: Surfaces, wanted: Goals, ranges: Ranges) -> Fit:
     cov = (off * weight[:, None]).T @ off
     std = np.sqrt(np.diag(cov))
     order = np.argsort(x, axis=0)
-    ends = np.array([_quantiles(x[order[:, k], k], weight[order[:, k]]) for k in range(len(names))])
+    shares = (np.cumsum(weight[order[:, k]]) for k in range(len(names)))
+    ends = np.array([np.interp([1 / 6, 5 / 6], share, x[order[:, k], k]) for k, share in enumerate(shares)])
     _, expected = _weigh(responses, wanted, at[None, :])
     return Fit(
         best=low + at * (high - low),
@@ -204,11 +193,6 @@ def find_best(responses: Surfaces, wanted: Goals, ranges: Ranges) -> Fit:
     )
 
 
-def _quantiles(x: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
-    share = np.cumsum(weight)
-    return float(np.interp(1 / 6, share, x)), float(np.interp(5 / 6, share, x))
-
-
 def next_point(
     responses: Surfaces, wanted: Goals, ranges: Ranges, done: np.ndarray, *, enough: float
 ) -> np.ndarray | None:
@@ -223,7 +207,7 @@ def next_point(
     fit = find_best(responses, wanted, ranges)
     if all(fit.response_std[name] < enough * one.tolerance for name, one in wanted.items()):
         return None
-    x = np.vstack([_box(len(low)), (fit.best - low) / (high - low)])
+    x = np.vstack([qmc.Sobol(len(low), scramble=False).random(_TRIES), (fit.best - low) / (high - low)])
     chi2, found = _weigh(responses, wanted, x)
     worst = np.max([found[name][1] / one.tolerance for name, one in wanted.items()], axis=0)
     gain = np.exp(-0.5 * (chi2 - chi2.min())) * worst

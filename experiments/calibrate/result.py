@@ -1,5 +1,6 @@
 """What a calibration says: result.json, the material's file, what could not be met."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 
@@ -28,18 +29,12 @@ _UNSOURCED = ("name", "cohesion", "grain")
 
 @dataclass(frozen=True)
 class Simulated:
-    """What a calibration has simulated.
+    """What a calibration has simulated."""
 
-    Attributes:
-        points: of exploring, parameter -> value. figures: of each, figure -> value and standard error.
-        tests: all of them, the check's as well.
-        measured: figure -> value and standard error at the parameters found; None where it could not be measured.
-    """
-
-    points: list[dict[str, float]]
-    figures: list[dict[str, tuple[float, float]]]
-    tests: list[Json]
-    measured: Mapping[str, Measured]
+    points: list[dict[str, float]]  # of exploring, parameter -> value
+    figures: list[dict[str, tuple[float, float]]]  # of each, figure -> value and standard error
+    tests: list[Json]  # the check's as well
+    measured: Mapping[str, Measured]  # at the parameters found, by figure
 
 
 def calibration_result(
@@ -79,7 +74,7 @@ def calibration_result(
         title=f"{settings.name}: grain parameters from bulk figures",
         quantities=quantities,
         figures=entries,
-        tables=[_figure_table(entries), _point_table(settings, done)],
+        tables=[table("Figure by figure", entries, _FIGURES) | {"words": True}, _point_table(settings, done)],
         points=_points(settings, done, responses, best),
         curves=_curves(settings, responses, best, folder),
         scatter={name: response.scatter for name, response in responses.items()},
@@ -95,6 +90,10 @@ def calibration_result(
 def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float] | None) -> Json:
     """What the result says of one figure: wanted, measured, and what the response surface expects."""
     got, error = found if found is not None else (None, None)
+    off = math.inf if got is None else abs(got - target.value)
+    verdict = "met within the tests' noise" if off <= target.tolerance + 2 * (error or 0.0) else "not met"
+    if got is None or off <= target.tolerance:
+        verdict = "not measured" if got is None else "met"
     return {
         **picked(target, "name", "figure", "unit"),
         "wanted": target.value,
@@ -107,17 +106,8 @@ def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float]
         "expected": fit.response.get(target.name),
         "expected_std": fit.response_std.get(target.name),
         "reach": reach,
-        "verdict": _verdict(target, got, error),
+        "verdict": verdict,
     }
-
-
-def _verdict(target: Target, value: float | None, error: float | None) -> str:
-    if value is None:
-        return "not measured"
-    off = abs(value - target.value)
-    if off <= target.tolerance:
-        return "met"
-    return "met within the tests' noise" if off <= target.tolerance + 2 * (error or 0.0) else "not met"
 
 
 def _unmet(target: Target, entry: Json) -> str:
@@ -166,7 +156,7 @@ def _points(settings: CalibrateSettings, done: Simulated, responses: Surfaces, b
     _, at = _box(settings, best)
     found = []
     for point, figures in zip(done.points, done.figures, strict=True):
-        _, x = _box(settings, point)
+        x = _box(settings, point)[1]
         moved: dict[str, dict[str, float]] = {}
         for k, key in enumerate(settings.free):
             there = at.copy()
@@ -191,25 +181,22 @@ def _curves(settings: CalibrateSettings, responses: Surfaces, best: Values, fold
     return files
 
 
-def _figure_table(entries: list[Json]) -> Json:
-    def measured(entry: Json) -> str:
-        error = "" if entry["error"] is None else f" +- {entry['error']:.2g}"
-        return "-" if entry["measured"] is None else f"{entry['measured']:.4g}{error}"
+def _measured(entry: Json) -> str:
+    error = "" if entry["error"] is None else f" +- {entry['error']:.2g}"
+    return "-" if entry["measured"] is None else f"{entry['measured']:.4g}{error}"
 
-    def expected(entry: Json) -> str:
-        return "-" if entry["expected"] is None else f"{entry['expected']:.4g} +- {entry['expected_std']:.2g}"
 
-    columns: dict[str, Callable[[Json], str]] = {
-        "figure": lambda entry: (
-            entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else "")
-        ),
-        "wanted": lambda entry: f"{entry['wanted']:g} +- {entry['tolerance']:g} {entry['unit']}",
-        "measured": measured,
-        "surface": expected,
-        "verdict": lambda entry: entry["verdict"],
-        "source": lambda entry: entry["source"],
-    }
-    return table("Figure by figure", entries, columns) | {"words": True}
+_FIGURES: dict[str, Callable[[Json], str]] = {
+    "figure": lambda entry: entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else ""),
+    "wanted": lambda entry: f"{entry['wanted']:g} +- {entry['tolerance']:g} {entry['unit']}",
+    "measured": _measured,
+    "surface": lambda entry: (
+        "-" if entry["expected"] is None else f"{entry['expected']:.4g} +- {entry['expected_std']:.2g}"
+    ),
+    "verdict": lambda entry: entry["verdict"],
+    "source": lambda entry: entry["source"],
+}
+"""What the table of figures says of each."""
 
 
 def _point_table(settings: CalibrateSettings, done: Simulated) -> Json:
@@ -241,14 +228,12 @@ def material_toml(stuff: Material, settings: CalibrateSettings, fit: Fit, figure
         *_pairs({"version": __version__, "grain": settings.grain} | stds),
     ]
     for entry in figures:
-        value, error = entry["measured"], entry["error"]
-        found = {"wanted": entry["wanted"], "tolerance": entry["tolerance"]}
-        found |= {} if value is None else {"measured": float(f"{value:.5g}")}
-        found |= {} if error is None else {"error": float(f"{error:.2g}")}
-        found |= {"verdict": entry["verdict"], "source": entry["source"]}
+        digits = {"measured": ".5g", "error": ".2g"}
+        rounded = {key: None if entry[key] is None else float(f"{entry[key]:{form}}") for key, form in digits.items()}
+        found = {key: (entry | rounded)[key] for key in ("wanted", "tolerance", *digits, "verdict", "source")}
         lines += ["", f"[calibration.{entry['name']}]", *_pairs(found)]
     return "\n".join(lines) + "\n"
 
 
 def _pairs(values: Json) -> list[str]:
-    return [f"{key} = {toml_value(value)}" for key, value in values.items()]
+    return [f"{key} = {toml_value(value)}" for key, value in values.items() if value is not None]

@@ -21,17 +21,13 @@ say = Sentences(__package__)
 
 @dataclass(frozen=True)
 class Figure:
-    """A bulk figure that can be a target.
-
-    Attributes:
-        unit: its unit. words: what it is.
-        state: in which a sample is sheared for it, "loose" or "dense"; "drained" for that of a bed which drains through
-            a slot; "" for one of a laboratory bed, which takes minutes and is compared at the end but not fitted.
-    """
+    """A bulk figure that can be a target."""
 
     unit: str
     state: str
-    words: str
+    """In which a sample is sheared for it, "loose" or "dense"; "drained" for that of a bed which drains through a slot;
+    "" for one of a laboratory bed, which takes minutes and is compared at the end but not fitted."""
+    words: str  # what it is
 
 
 FIGURES = {

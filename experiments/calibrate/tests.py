@@ -27,16 +27,7 @@ from experiments.runs.types import Json
 
 from .settings import CalibrateSettings, Target
 
-__all__ = [
-    "SampleTest",
-    "figures_of",
-    "laboratory_figure",
-    "mohr_circle",
-    "run_test",
-    "summary_of",
-    "tests_for",
-    "triaxial_angle",
-]
+__all__ = ["SampleTest", "figures_of", "laboratory_figure", "mohr_circle", "run_test", "summary_of", "tests_for"]
 
 Tell = Callable[[float], None]
 Kept = tuple[Json, dict[str, np.ndarray]]
@@ -87,11 +78,12 @@ def run_test(stuff: Material, test: SampleTest, settings: CalibrateSettings, *, 
     return summary_of(run, stuff.density), {column: getattr(run, key) for key, column in _COLUMNS.items()}
 
 
+@dataclass
 class _Preparing:
     """Shows the preparation of a bed as the first half of a test."""
 
-    def __init__(self, tell: Tell) -> None:
-        self.tell, self.part = tell, 0
+    tell: Tell
+    part: int = 0
 
     def stage(self, name: str, total: float | None = None) -> None:
         """The next part begins."""
@@ -198,11 +190,10 @@ def figures_of(
             found[target.name] = (float(np.mean(angles)), float(np.linalg.norm(errors)) / len(errors))
             continue
         key = "peak_" if target.figure.startswith("peak") else ""
-        normal = np.array([summary[f"{key}normal"] for summary in kept])
-        shear = np.array([summary[f"{key}shear"] for summary in kept])
+        names = (f"{key}normal", f"{key}shear", "error")
+        normal, shear, error = (np.array([summary[name] for summary in kept]) for name in names)
         if target.plane == "mohr":
             normal, shear = np.array([mohr_circle(summary[f"{key}tensor"]) for summary in kept]).T
-        error = np.array([summary["error"] for summary in kept])
         start, slope, start_error, slope_error = _line(normal, shear, error, origin=target.through == "origin")
         angle = math.degrees(math.atan(slope))
         angle_error = math.degrees(slope_error / (1 + slope**2))
@@ -248,14 +239,10 @@ def laboratory_figure(
     """
     from dem import Bed
 
-    stages, size = ["rain", "fluff"], settings.bed_size
-    if name.endswith("_dense"):
-        stages = ["rain", "compact:densest"]
+    stages = ["rain", "compact:densest" if name.endswith("_dense") else "fluff"]
     prepared = Bed.prepare_as(
-        stuff, stages=stages, size=size, grain=settings.grain, spread=settings.spread, gravity=settings.gravity,
-        seed=seed, threads=settings.threads, progress=progress,
+        stuff, stages=stages, size=settings.bed_size, grain=settings.grain, spread=settings.spread,
+        gravity=settings.gravity, seed=seed, threads=settings.threads, progress=progress,
     )  # fmt: skip
-    bed = prepared.bed
-    assert bed is not None
     packing = prepared.reports[-1].packing_fraction
     return (packing if name.startswith("packing") else packing * stuff.density), None

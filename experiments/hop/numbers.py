@@ -6,19 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from experiments.platform.numbers import platform_numbers
-from experiments.platform.settled import (
-    Number,
-    Settled,
-    brake_words,
-    check_actuation,
-    check_body,
-    check_spike_length,
-    defaults_said,
-    of_other_spikes,
-    settle_limits,
-    settle_platform,
-    settle_surface,
-)
+from experiments.platform.settled import Number, Settled, check_spike_length, defaults_said, of_other_spikes
 from experiments.runs.types import Json
 from rigid.hop import Tumbler
 from rigid.model.trial import Trial
@@ -73,16 +61,16 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
     for name in ("body_radius", "wheel_speed_0"):
         if getattr(settings, name) is not None:
             numbers.settle(name, math.nan, "given")
-    settle_platform(numbers, of_platform)
+    numbers.settle_platform(of_platform)
     check_spike_length(numbers)
     numbers.settle("lean", of_platform.lean, f"platform {of_platform.name}")
-    settle_limits(numbers, of_platform)
-    own, brake = platform.wheel(), brake_words(of_platform)
+    numbers.settle_limits(of_platform)
+    own, brake = platform.wheel(), of_platform.brake_words
     if settings.actuator == "brake":
         numbers.settle("torque", own.brake_torque, f"{brake} of platform {of_platform.name}, at its largest")
     elif settings.torque is not None:
         numbers.settle("torque", settings.torque, "given")
-    surface, warnings = settle_surface(numbers, settings.surface)
+    surface, warnings = numbers.settle_surface(settings.surface)
     whose = f"platform {of_platform.name}"
     warnings += of_other_spikes(numbers, surface, diameter=of_platform.spike_diameter, whose=whose)
     wheel = replace(
@@ -92,7 +80,7 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
     body = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d")
     own_numbers: Json = {name: numbers.value(name) for name in body}
     Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own_numbers)  # refuses what no body can have
-    warnings += check_actuation(settings.actuator, of_platform, numbers) + check_body(numbers, of_platform)
+    warnings += numbers.check_actuation(settings.actuator, of_platform) + numbers.check_body(of_platform)
     tumbler = Tumbler(
         mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
         lean=of_platform.lean, gravity=settings.gravity, mu_s=numbers.value("mu_s"), mu_d=numbers.value("mu_d"),

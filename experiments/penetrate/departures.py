@@ -40,12 +40,14 @@ def departures(
     `sinkage` the resting depth (bed, model) [m], each with its spread between seeds (None: unknown).
     """
     driven = [run for runs in by_bed for run in runs]
-    table = departure_table(driven, fit)
-    exponents = depth_exponent(driven)
-    rate = rate_change(by_bed, fit)
+    table, exponents, rate = departure_table(driven, fit), depth_exponent(driven), rate_change(by_bed, fit)
     pairs = [(beds[name], models[name]) for name in models]
-    ways_out = [(_returned(bed), _returned(model)) for bed, model in pairs if bed.kind == "driven"]
-    pull_out = [(mine, law) for mine, law in ways_out if mine is not None and law is not None]
+    # Of the work put in, what the way out returns [1].
+    pull_out = [
+        [run.work_out / run.work_in for run in pair]
+        for pair in pairs
+        if pair[0].kind == "driven" and all(run.work_in > 0 and (run.phase == "out").any() for run in pair)
+    ]
     returned = tuple(float(np.mean(values)) for values in zip(*pull_out, strict=True)) if pull_out else None
     drops = [(bed, model) for bed, model in pairs if bed.kind == "drop"]
     return {
@@ -73,25 +75,20 @@ def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS)
     table: list[dict[str, float | None]] = []
     for speed, runs in _by_speed(driven).items():
         for low, high in pairwise(edges):
-            drags = (_mean_drag(run, fit, low, high) for run in runs)
-            means = [drag for drag in drags if drag is not None]
+            means = [drag for run in runs if (drag := _mean_drag(run, fit, low, high)) is not None]
             if not means:
                 continue
             bed, model = (float(value) for value in np.mean(means, axis=0))
-            apart = spread([law - force for force, law in means])
-            table.append(
-                {
-                    "speed": speed,
-                    "depth_from": float(low),
-                    "depth_to": float(high),
-                    "bed_force": bed,
-                    "model_force": model,
-                    "gap": (model - bed) / bed if bed > 0 else None,
-                    "beds": len(means),
-                    "bed_std": spread([force for force, _ in means]),
-                    "gap_std": apart / bed if bed > 0 and apart is not None else None,
-                }
-            )
+            apart, known = spread([law - force for force, law in means]), bed > 0
+            row: dict[str, float | None] = {
+                "speed": speed,
+                "depth_from": float(low),
+                "depth_to": float(high),
+                "bed_force": bed,
+            }
+            row |= {"model_force": model, "gap": (model - bed) / bed if known else None, "beds": len(means)}
+            row |= {"bed_std": spread([force for force, _ in means])}
+            table.append(row | {"gap_std": apart / bed if known and apart is not None else None})
     return table
 
 
@@ -113,14 +110,8 @@ def rate_change(by_bed: Sequence[Sequence[Penetration]], fit: Fit) -> Json | Non
     both = [(found[slow], found[fast]) for found in means if slow in found and fast in found]
     own = [after[0] / before[0] - 1 for before, after in both]
     law = [after[1] / before[1] - 1 for before, after in both if before[1] > 0]
-    return {
-        "slow": slow,
-        "fast": fast,
-        "beds": len(own),
-        "bed": float(np.mean(own)),
-        "bed_std": spread(own),
-        "model": float(np.mean(law)) if law else None,
-    }
+    found = {"slow": slow, "fast": fast, "beds": len(own), "bed": float(np.mean(own)), "bed_std": spread(own)}
+    return found | {"model": float(np.mean(law)) if law else None}
 
 
 def _mean_drag(run: Penetration, fit: Fit, above: float = 0.0, to: float = np.inf) -> tuple[float, float] | None:
@@ -146,13 +137,10 @@ def depth_exponent(driven: Sequence[Penetration]) -> dict[float, tuple[float, fl
 
 
 def _exponent(run: Penetration) -> float | None:
-    depths, forces = [], []
-    rows = fit_rows(run)
-    for low, high in pairwise(np.linspace(0.25 * run.max_depth, run.max_depth, 13)):
-        band = rows & (run.depth > low) & (run.depth <= high)
-        if band.any() and run.force[band].mean() > 0:
-            depths.append(float(run.depth[band].mean()))
-            forces.append(float(run.force[band].mean()))
+    edges, rows = pairwise(np.linspace(0.25 * run.max_depth, run.max_depth, 13)), fit_rows(run)
+    bands = [rows & (run.depth > low) & (run.depth <= high) for low, high in edges]
+    pushing = [band for band in bands if band.any() and run.force[band].mean() > 0]
+    depths, forces = ([float(values[band].mean()) for band in pushing] for values in (run.depth, run.force))
     return float(np.polyfit(np.log(depths), np.log(forces), 1)[0]) if len(depths) >= 4 else None
 
 
@@ -201,27 +189,26 @@ def _of_drops(drops: Sequence[tuple[Penetration, Penetration]]) -> list[str]:
     stopped = [(bed, model) for bed, model in drops if bed.stop_time and model.stop_time]
     parts = []
     if peaks:
-        gap = _compared(float(np.mean(peaks)), "above the bed's", "below the bed's", "as high as the bed's")
+        gap = _of_peaks(peaks)
         step = 1e3 * max(bed.macro_step for bed, _ in drops)
         text = f"the spring-damper's peak force is {gap} (largest mean of one macro step, {step:.2g} ms"
         if len(peaks) > 1:
             text += f"; {_range(peaks)} in {len(peaks)} drops"
         parts.append(f"{text})")
     if stopped:
-        gap = _compared(
-            float(np.mean([model.max_depth / bed.max_depth - 1 for bed, model in stopped])),
-            "deeper", "less deep", "as deep as the bed's",
-        )  # fmt: skip
+        deeper = float(np.mean([model.max_depth / bed.max_depth - 1 for bed, model in stopped]))
+        gap = _compared(deeper, "deeper", "less deep", "as deep as the bed's")
         parts.append(f"{'its' if peaks else _WHOSE} deepest point is {gap}")
     said = [f"In drops {', and '.join(parts)}."] if parts else []
-    windows = [(bed, model, bed.stop_time / 10) for bed, model in stopped if bed.stop_time]
-    calmed = [(smoothed_peak(bed, window), smoothed_peak(model, window)) for bed, model, window in windows]
+    calmed = [[smoothed_peak(run, pair[0].stop_time / 10) for run in pair] for pair in stopped if pair[0].stop_time]
     calm = [law / bed - 1 for bed, law in calmed if bed > 0]
     if calm and peaks:
-        gap = _compared(float(np.mean(calm)), "above the bed's", "below the bed's", "as high as the bed's")
-        ranged = f" ({_range(calm)})" if len(calm) > 1 else ""
-        said.append(say("calm_peak", gap=gap, ranged=ranged))
+        said.append(say("calm_peak", gap=_of_peaks(calm), ranged=f" ({_range(calm)})" if len(calm) > 1 else ""))
     return said
+
+
+def _of_peaks(gaps: Sequence[float]) -> str:
+    return _compared(float(np.mean(gaps)), "above the bed's", "below the bed's", "as high as the bed's")
 
 
 def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -268,16 +255,9 @@ def _by_speed(driven: Sequence[Penetration]) -> dict[float, list[Penetration]]:
     return {speed: [run for run in driven if run.settings["speed"] == speed] for speed in speeds}
 
 
-def _returned(run: Penetration) -> float | None:
-    """Share of the work put in that the way out gives back [1]."""
-    return run.work_out / run.work_in if run.work_in > 0 and (run.phase == "out").any() else None
-
-
 def _compared(share: float, more: str, less: str, same: str) -> str:
     """``12 % deeper``, or `same` where the difference would be shown as nothing."""
-    if abs(share) < 0.0005:
-        return same
-    return f"{_percent(share)} {more if share > 0 else less}"
+    return same if abs(share) < 0.0005 else f"{_percent(share)} {more if share > 0 else less}"
 
 
 def _deeper(ratio: float) -> str:

@@ -20,18 +20,7 @@ from rigid import Spike
 
 from .settings import PenetrateSettings
 
-__all__ = [
-    "PenetratePlan",
-    "RAIN",
-    "Unit",
-    "deepest",
-    "expected_time",
-    "make_run",
-    "make_spike",
-    "plan_units",
-    "share_done",
-    "shown_units",
-]
+__all__ = ["RAIN", "PenetratePlan", "Unit", "deepest", "expected_time", "make_run", "make_spike", "plan_units"]
 
 _SOFTER = 0.41
 """K as fitted to the shipped case's runs over that of a flat plate in 3D-RFT: 38 of 92 N/m [1]."""
@@ -121,6 +110,11 @@ def make_run(
     return SetDown(spike, ground, lowering_speed=unit.speed, max_time=_set_down_time(settings, unit), **common)
 
 
+def _set_down_time(settings: PenetrateSettings, unit: Unit) -> float:
+    """When a set-down gives up [s]: thrice the time in which it would sink to where drops are stopped."""
+    return 3 * deepest(settings) / unit.speed + 10 * settings.rest_time
+
+
 def deepest(settings: PenetrateSettings) -> float:
     """Where a drop is stopped, one tip's diameter above the floor [m]."""
     return settings.bed_size[2] - settings.tip_diameter
@@ -149,11 +143,6 @@ def share_done(run: Run, expected: float, *, sure: bool = False) -> float:
         return run.fraction
     passed = max(0.0, run.time) / expected
     return min(1.0, passed) if sure else as_expected(passed)
-
-
-def _set_down_time(settings: PenetrateSettings, unit: Unit) -> float:
-    """When a set-down gives up [s]: thrice the time in which it would sink to where drops are stopped."""
-    return 3 * deepest(settings) / unit.speed + 10 * settings.rest_time
 
 
 RAIN = 2.5

@@ -24,16 +24,7 @@ from rigid.platform.platform import Platform
 
 from . import say
 
-__all__ = [
-    "PLATFORM_COPY",
-    "PlatformNumbers",
-    "ball_radius",
-    "keep_platform",
-    "platform_numbers",
-    "tip_angles",
-    "tip_depth",
-    "torque_within_limit",
-]
+__all__ = ["PLATFORM_COPY", "PlatformNumbers", "keep_platform", "platform_numbers", "tip_angles", "tip_depth"]
 
 SPIKE_LENGTHS = {"hedgehog": 0.2}
 """l [m] where the paper gives it: its octagon is 0.4 m across, and the edge of 0.153 m is rounded."""
@@ -60,6 +51,12 @@ class PlatformNumbers:
     def max_motor_torque(self) -> float:
         """What the motor gives at most [N m], by the name of the setting."""
         return self.motor_torque
+
+    @property
+    def brake_words(self) -> str:
+        """What slows the platform's wheel: a platform file without a brake_torque lets the motor do it."""
+        own = self.brake_torque > self.motor_torque or math.isinf(self.brake_torque)
+        return "the brake" if own else "the motor"
 
 
 def platform_numbers(name: str, *, file: Path | None = None, in_plane: bool = True) -> PlatformNumbers:

@@ -14,23 +14,7 @@ from . import say
 from .numbers import PlatformNumbers
 from .surfaces import DEFAULT_SURFACE, find_surface
 
-__all__ = [
-    "Number",
-    "Settled",
-    "UNITS",
-    "brake_words",
-    "check_actuation",
-    "check_body",
-    "check_lengths",
-    "check_spike_length",
-    "check_wheel_speed",
-    "defaults_said",
-    "of_other_spikes",
-    "rig_fault",
-    "settle_limits",
-    "settle_platform",
-    "settle_surface",
-]
+__all__ = ["Number", "Settled", "check_lengths", "check_spike_length", "defaults_said", "of_earth", "rig_fault"]
 
 OTHER_BODY = 0.2
 """A mass, inertia or spike length that is off the platform's by more than this share is another body's."""
@@ -48,7 +32,7 @@ _OF_UNIT = {
     "m/s2": ("gravity_sim", "gravity"),
     "s": ("torque_until",),
 }
-UNITS = {name: unit for unit, names in _OF_UNIT.items() for name in names}
+_UNITS = {name: unit for unit, names in _OF_UNIT.items() for name in names}
 
 
 @dataclass(frozen=True)
@@ -71,16 +55,93 @@ class Settled(dict[str, Number]):
         """Settle `name`: as the settings give it, else as the model has it, else `default` from `origin`."""
         given = getattr(self._settings, name, None)
         if given is not None:
-            self[name] = Number(float(given), UNITS[name], "given")
+            self[name] = Number(float(given), _UNITS[name], "given")
         elif in_model is not None:
-            self[name] = Number(in_model, UNITS[name], "model")
+            self[name] = Number(in_model, _UNITS[name], "model")
         else:
-            self[name] = Number(default, UNITS[name], origin)
+            self[name] = Number(default, _UNITS[name], origin)
         return self[name].value
 
     def value(self, name: str) -> float:
         """The number called `name`."""
         return self[name].value
+
+    def settle_platform(self, platform: PlatformNumbers, *, model: Any = None) -> None:
+        """Settle mass, inertia and spike length of the platform, and its wheel's inertia. `model`: a `TumbleModel`."""
+        origin = f"platform {platform.name}"
+        for name in ("mass", "inertia", "spike_length"):
+            in_model = getattr(model.platform, name) if model is not None else None
+            self.settle(name, getattr(platform, name), origin, in_model=in_model)
+        in_model = model.wheel.inertia if model is not None else None
+        self.settle("wheel_inertia", platform.wheel_inertia, origin, in_model=in_model)
+
+    def check_body(self, platform: PlatformNumbers) -> list[str]:
+        """A warning where a body of another size is given, and its other numbers are still the platform's."""
+        given = {name for name in ("mass", "inertia", "spike_length") if self[name].origin == "given"}
+        far = any(abs(self[name].value / getattr(platform, name) - 1) > OTHER_BODY for name in given)
+        if not far or platform.spike_count is None:
+            return []
+        names = [name for name in ("mass", "inertia", "spike_length") if name not in given]
+        kept = [*(f"{name} = {_said(name, self[name])}" for name in names), f"{platform.spike_count} rows of spikes"]
+        return [say("other_body", given=", ".join(sorted(given)), kept=", ".join(kept), platform=platform)]
+
+    def settle_limits(self, platform: PlatformNumbers, *, in_model: bool = False) -> None:
+        """Settle how fast the wheel may turn and what the motor gives at most: as given, else those of the platform.
+
+        They are limits of the platform's own wheel with its motor; of another one, or a model's, none is known (inf).
+        """
+        origin, known = f"platform {platform.name}", self.value("wheel_inertia") == platform.wheel_inertia
+        if in_model or not known:
+            other = f"wheel_inertia is given: not the wheel of {platform.name}"
+            origin, known = "a model says nothing of it" if in_model else other, False
+        for name in ("max_wheel_speed", "max_motor_torque"):
+            self.settle(name, getattr(platform, name) if known else math.inf, origin)
+
+    def settle_surface(self, surface: str | None, *, model: Any = None) -> tuple[str, list[str]]:
+        """Settle K, C and friction; return the material's name and what has to be said of it. `model`: a `TumbleModel`.
+
+        Raises ValueError for a surface there is not, and for more sliding than static friction.
+        """
+        material: Any
+        warnings: list[str] = []
+        if surface is None and model is not None:
+            material, name, origin = model.surface, model.surface.kind, "model"
+        else:
+            material = found = find_surface(surface or DEFAULT_SURFACE)
+            name, origin = found.name, f"surface {found.name}"
+            warnings = [say("guess", surface=found)] if found.guess else []
+        for key in ("stiffness", "damping", "mu_s"):
+            self.settle(key, getattr(material, key), origin)
+        if self["mu_s"].origin == "given":
+            self.settle("mu_d", 0.5 * self.value("mu_s"), "default: half of mu_s")
+        else:
+            sliding = material.mu_d if material.mu_d is not None else 0.5 * material.mu_s
+            self.settle("mu_d", sliding, origin)
+        mu_s, mu_d = self["mu_s"], self["mu_d"]
+        if mu_d.value > mu_s.value:
+            raise ValueError(say("sliding_above_static", mu_d=mu_d.value, mu_s=mu_s))
+        return name, warnings
+
+    def check_actuation(self, actuator: Literal["motor", "brake"], platform: PlatformNumbers) -> list[str]:
+        """Warnings about torque and wheel, of a tumble and of a hop, as far as they are settled.
+
+        A brake stronger than the platform's own gets a warning only: it is an impulse in the limit; of another wheel's
+        brake nothing is known. Raises ValueError, naming the setting, for a torque or first wheel speed beyond limits.
+        """
+        speed, fastest = self.get("wheel_speed_0"), self["max_wheel_speed"]
+        if speed is not None and speed.value > fastest.value:
+            raise ValueError(say("beyond_wheel", speed=speed.value, fastest=fastest))
+        if "torque" not in self:
+            return []
+        torque, strongest, wheel = self["torque"].value, self["max_motor_torque"], self["wheel_inertia"]
+        if actuator == "motor" and torque > strongest.value * (1 + 1e-9):
+            of_platform = f"the motor of platform = {platform.name!r}"
+            whose = of_platform if strongest.origin != "given" else "max_motor_torque (given)"
+            raise ValueError(say("beyond_motor", torque=torque, whose=whose, most=strongest.value))
+        own = wheel.origin != "model" and wheel.value == platform.wheel_inertia
+        if actuator == "brake" and own and torque > platform.brake_torque * (1 + 1e-9):
+            return [say("beyond_brake", torque=torque, brake=platform.brake_words, platform=platform)]
+        return []
 
 
 def defaults_said(choices: Mapping[str, str], numbers: Mapping[str, Number]) -> list[str]:
@@ -96,70 +157,6 @@ def _said(name: str, number: Number) -> str:
     if math.isinf(number.value):
         return "no end" if name == "torque_until" else "no limit known"
     return f"{number.value:.6g}" + ("" if number.unit == "1" else f" {number.unit}")
-
-
-def settle_platform(numbers: Settled, platform: PlatformNumbers, *, model: Any = None) -> None:
-    """Settle mass, inertia and spike length of the platform, and its wheel's inertia. `model`: a `TumbleModel`."""
-    origin = f"platform {platform.name}"
-    for name in ("mass", "inertia", "spike_length"):
-        in_model = getattr(model.platform, name) if model is not None else None
-        numbers.settle(name, getattr(platform, name), origin, in_model=in_model)
-    in_model = model.wheel.inertia if model is not None else None
-    numbers.settle("wheel_inertia", platform.wheel_inertia, origin, in_model=in_model)
-
-
-def check_body(numbers: Mapping[str, Number], platform: PlatformNumbers) -> list[str]:
-    """What has to be said where a body of another size is given, and its other numbers are still the platform's."""
-    given = {name for name in ("mass", "inertia", "spike_length") if numbers[name].origin == "given"}
-    far = any(abs(numbers[name].value / getattr(platform, name) - 1) > OTHER_BODY for name in given)
-    if not far or platform.spike_count is None:
-        return []
-    kept = [
-        f"{name} = {_said(name, numbers[name])}" for name in ("mass", "inertia", "spike_length") if name not in given
-    ]
-    kept = [*kept, f"{platform.spike_count} rows of spikes"]
-    return [say("other_body", given=", ".join(sorted(given)), kept=", ".join(kept), platform=platform)]
-
-
-def settle_limits(numbers: Settled, platform: PlatformNumbers, *, in_model: bool = False) -> None:
-    """Settle how fast the wheel may turn and what the motor gives at most: as given, else those of the platform.
-
-    They are limits of the platform's own wheel with its motor; of another wheel, or a model's, nothing is known (inf).
-    """
-    own = numbers.value("wheel_inertia") == platform.wheel_inertia
-    for name in ("max_wheel_speed", "max_motor_torque"):
-        if in_model:
-            numbers.settle(name, math.inf, "a model says nothing of it")
-        elif not own:
-            numbers.settle(name, math.inf, f"wheel_inertia is given: not the wheel of {platform.name}")
-        else:
-            numbers.settle(name, getattr(platform, name), f"platform {platform.name}")
-
-
-def settle_surface(numbers: Settled, surface: str | None, *, model: Any = None) -> tuple[str, list[str]]:
-    """Settle K, C and friction; return the material's name and what has to be said of it. `model`: a `TumbleModel`.
-
-    Raises ValueError for a surface there is not, and for more sliding than static friction.
-    """
-    material: Any
-    warnings: list[str] = []
-    if surface is None and model is not None:
-        material, name, origin = model.surface, model.surface.kind, "model"
-    else:
-        material = found = find_surface(surface or DEFAULT_SURFACE)
-        name, origin = found.name, f"surface {found.name}"
-        warnings = [say("guess", surface=found)] if found.guess else []
-    for key in ("stiffness", "damping", "mu_s"):
-        numbers.settle(key, getattr(material, key), origin)
-    if numbers["mu_s"].origin == "given":
-        numbers.settle("mu_d", 0.5 * numbers.value("mu_s"), "default: half of mu_s")
-    else:
-        sliding = material.mu_d if material.mu_d is not None else 0.5 * material.mu_s
-        numbers.settle("mu_d", sliding, origin)
-    mu_s, mu_d = numbers["mu_s"], numbers["mu_d"]
-    if mu_d.value > mu_s.value:
-        raise ValueError(say("sliding_above_static", mu_d=mu_d.value, mu_s=mu_s))
-    return name, warnings
 
 
 def of_other_spikes(numbers: Mapping[str, Number], surface: str, *, diameter: float, whose: str) -> list[str]:
@@ -194,44 +191,6 @@ def rig_fault(stated: float, local: float = STANDARD_GRAVITY) -> str | None:
     meant = stated / STANDARD_GRAVITY
     asked = f" ({stated:g} m/s2 are {meant:.3g} g)" if meant < here else ""
     return say("rig_too_heavy", stated=stated, here=here, asked=asked)
-
-
-def check_actuation(
-    actuator: Literal["motor", "brake"], platform: PlatformNumbers, numbers: Mapping[str, Number]
-) -> list[str]:
-    """What has to be said of torque and wheel, of a tumble and of a hop, as far as they are settled.
-
-    A brake beyond the platform's own is no more than said: it is an impulse in the limit; of another wheel's brake
-    nothing is known. Raises ValueError, naming the setting, for a torque beyond the motor, and for a wheel that starts
-    beyond its limit.
-    """
-    if "wheel_speed_0" in numbers:
-        check_wheel_speed(numbers["wheel_speed_0"].value, numbers)
-    if "torque" not in numbers:
-        return []
-    torque, strongest, wheel = numbers["torque"].value, numbers["max_motor_torque"], numbers["wheel_inertia"]
-    if actuator == "motor" and torque > strongest.value * (1 + 1e-9):
-        whose = (
-            f"the motor of platform = {platform.name!r}" if strongest.origin != "given" else "max_motor_torque (given)"
-        )
-        raise ValueError(say("beyond_motor", torque=torque, whose=whose, most=strongest.value))
-    own = wheel.origin != "model" and wheel.value == platform.wheel_inertia
-    if actuator == "brake" and own and torque > platform.brake_torque * (1 + 1e-9):
-        return [say("beyond_brake", torque=torque, brake=brake_words(platform), platform=platform)]
-    return []
-
-
-def brake_words(platform: PlatformNumbers) -> str:
-    """What slows the platform's wheel: a platform file without a brake_torque lets the motor do it."""
-    own = platform.brake_torque > platform.motor_torque or math.isinf(platform.brake_torque)
-    return "the brake" if own else "the motor"
-
-
-def check_wheel_speed(speed: float, numbers: Mapping[str, Number]) -> None:
-    """Raise ValueError for a wheel that starts beyond its limit [rad/s]."""
-    fastest = numbers["max_wheel_speed"]
-    if speed > fastest.value:
-        raise ValueError(say("beyond_wheel", speed=speed, fastest=fastest))
 
 
 LONGEST_SPIKE = 100.0

@@ -23,19 +23,7 @@ from experiments.runs.reading import read_case, settings_from
 from experiments.runs.registry import CASES
 from experiments.tumble.settings import TumbleSettings
 
-__all__ = [
-    "Case",
-    "Cost",
-    "EXPERIMENTS",
-    "KEPT",
-    "LONGEST",
-    "cases",
-    "cost_of_tumble",
-    "do_case",
-    "estimate",
-    "keep",
-    "standing",
-]
+__all__ = ["EXPERIMENTS", "KEPT", "LONGEST", "Case", "Cost", "cases", "cost_of_tumble", "do_case", "estimate", "keep"]
 
 RATES = ((2.8e3, 3.8e6), (2e4, 9.52e6), (1e5, 7.09e6))
 """Grain-steps a second, with rolling, by the count of grains computed: docs/performance.md, 2026-11-21, a quiet machine

@@ -14,16 +14,11 @@ from experiments.platform.numbers import PlatformNumbers, platform_numbers
 from experiments.platform.settled import (
     Number,
     Settled,
-    check_actuation,
-    check_body,
     check_spike_length,
     defaults_said,
     of_earth,
     of_other_spikes,
     rig_fault,
-    settle_limits,
-    settle_platform,
-    settle_surface,
 )
 from experiments.runs.types import Json
 from rigid.model.trial import Effect, Ground, Trial
@@ -102,9 +97,9 @@ def plan_tumble(
     model = _read(source) if source is not None else None
     numbers = Settled(settings)
     platform = platform_numbers(settings.platform) if platform is None else platform
-    settle_platform(numbers, platform, model=model)
+    numbers.settle_platform(platform, model=model)
     check_spike_length(numbers)
-    surface, warnings = settle_surface(numbers, settings.surface, model=model)
+    surface, warnings = numbers.settle_surface(settings.surface, model=model)
     _settle_gravity(settings, model, numbers)
     weak = platform.motor_torque < TORQUE
     torque, origin = (platform.motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
@@ -114,9 +109,9 @@ def plan_tumble(
     numbers.settle("torque_until", math.inf, "default: as long as the trial")
     numbers.settle("wheel_speed_0", 0.0, "default")
     values: Json = {name: number.value for name, number in numbers.items()}
-    settle_limits(numbers, platform, in_model=model is not None)
-    warnings += check_actuation(settings.actuator, platform, numbers)
-    warnings += check_body(numbers, platform) if model is None else []
+    numbers.settle_limits(platform, in_model=model is not None)
+    warnings += numbers.check_actuation(settings.actuator, platform)
+    warnings += numbers.check_body(platform) if model is None else []
     ground = _ground(settings)
     if ground is None:
         diameter = platform.spike_diameter if spikes is None else spikes.diameter
