@@ -116,51 +116,55 @@ def departures_in_words(findings: Findings) -> Json:
     pair = (sunk, law) if sunk[0] is not None and law[0] is not None else None
     by_bed = [runs for seed in findings.seeds if (runs := findings.of("driven", seed))]
     found = departures(by_bed, findings.models, findings.beds, findings.fit, sinkage=pair)
+    masses = [run.settings["mass"] for run in findings.of("set_down") if run.settings.get("mass")]
     remarks = {
         "which_stiffness": _which_stiffness(findings),
         "surface": _at_surface(findings),
-        "set_down": _set_down_note(findings),
+        "set_down": say("set_down", s=findings.settings, grams=1e3 * float(masses[0])) if masses else None,
         "drop": drop_note(findings.settings) if findings.of("drop") else None,
     }
     notes = {name: f"{text[:1].upper()}{text[1:]}." for name, text in remarks.items() if text}
     return found | notes | {"sentences": [*found["sentences"], *notes.values()]}
 
 
-def warnings_of(findings: Findings) -> list[str]:
+def warnings_of(findings: Findings) -> Iterator[str]:
     """What a reader has to know: runs that did not end as they should, a law that came out at its bound."""
-    said = list(_ended_early(findings))
     numbers, settings, fit = findings.quantities(), findings.settings, findings.fit
-    if numbers["sinkage_dem"]["value"] is None:
-        said.append("no set-down came to rest: there is no sinkage_dem")
-    if numbers["sinkage_spring_damper"]["value"] is None:
-        said.append("the spring-damper did not come to rest: there is no sinkage_spring_damper")
-    if shallow := _shallow(findings):
-        said.append(shallow)
-    bound = overdamped_below(settings.weight, settings.lowering_speed)
-    if findings.of("set_down") and fit.stiffness > bound:
-        said.append(say("overdamped", fit=fit, bound=bound))
-    said += [text for text in (_inseparable(findings), _traded(findings), _narrow(settings)) if text]
-    if fit.damping == 0:
-        said.append(say("damping_zero"))
-    if fit.stiffness == 0:
-        said.append("the stiffness fitted is 0, its bound: the law has no resting sinkage")
-    return said
-
-
-def _ended_early(findings: Findings) -> Iterator[str]:
-    """Runs that have no depth at rest, and why."""
-    bobbing = 0
-    for unit in findings.units:
-        ended = findings.beds[unit.id].ended
-        if ended == "max_time":
-            yield say("max_time", unit=unit)
-        elif ended == "max_depth":
-            yield say("near_floor", unit=unit)
+    ends = {unit: findings.beds[unit.id].ended for unit in findings.units}
+    for unit, ended in ends.items():
+        if ended in ("max_time", "max_depth"):
+            yield say("max_time" if ended == "max_time" else "near_floor", unit=unit)
         elif ended == "unfinished":
             yield f"{unit.title} is unfinished: it has no depth at rest"
-        bobbing += ended == "stopped"
-    if bobbing:
-        yield say("bobbing", count=bobbing, of=len(findings.of("drop")), s=findings.settings)
+    if bobbing := list(ends.values()).count("stopped"):
+        yield say("bobbing", count=bobbing, of=len(findings.of("drop")), s=settings)
+    sunk, grain = numbers["sinkage_dem"], settings.grain
+    if sunk["value"] is None:
+        yield "no set-down came to rest: there is no sinkage_dem"
+    if numbers["sinkage_spring_damper"]["value"] is None:
+        yield "the spring-damper did not come to rest: there is no sinkage_spring_damper"
+    if sunk["value"] is not None and sunk["value"] < 2 * grain:  # hardly more than a grain
+        several = sum(value is not None for value in findings.sinkages(findings.beds)) > 1
+        so = "its spread between seeds is part of the answer" if several else "another seed will give another"
+        yield say("shallow", shown=_words(sunk), grains=sunk["value"] / grain, so=so)
+    bound = overdamped_below(settings.weight, settings.lowering_speed)
+    if findings.of("set_down") and fit.stiffness > bound:
+        yield say("overdamped", fit=fit, bound=bound)
+    conditions = {unit.condition for unit in findings.units if unit.id in fit.runs}
+    if len(conditions) < LEAST_CONDITIONS or abs(fit.correlation or 0.0) > MOST_CORRELATED:
+        shown = "unknown" if fit.correlation is None else f"{fit.correlation:.2f}"
+        listed = ", ".join(f"{kind} at {v:g} m/s" for kind, v in sorted(conditions))
+        yield say("inseparable", shown=shown, listed=listed)
+    own = [one.correlation for one in findings.seed_fits.values() if one.correlation is not None]
+    if len(own) >= 2 and min(own) < -MOST_CORRELATED:  # the spreads of K and C go together
+        yield say("traded", least=min(own))
+    width, tip = min(settings.bed_size[:2]), settings.tip_diameter
+    if width < ENOUGH_TIPS * tip * (1 - 1e-9):  # the spike meets its own images
+        yield say("narrow", tips=width / tip, enough=ENOUGH_TIPS * tip, enough_tips=ENOUGH_TIPS)
+    if fit.damping == 0:
+        yield say("damping_zero")
+    if fit.stiffness == 0:
+        yield "the stiffness fitted is 0, its bound: the law has no resting sinkage"
 
 
 def softening_note(settings: PenetrateSettings, softening: Softening) -> str:
@@ -211,46 +215,6 @@ def _at_surface(findings: Findings) -> str | None:
     ratio = force["value"] / load
     share = f"{100 * ratio:.2g} % of the load" if ratio < 0.995 else f"{ratio:.2g} times the load"
     return say("at_surface", force=_words(force), share=share, grains=grains)
-
-
-def _shallow(findings: Findings) -> str | None:
-    """What to know of a sinkage that is hardly more than a grain."""
-    sunk, grain = findings.quantities()["sinkage_dem"], findings.settings.grain
-    if sunk["value"] is None or sunk["value"] >= 2 * grain:
-        return None
-    several = sum(value is not None for value in findings.sinkages(findings.beds)) > 1
-    so = "its spread between seeds is part of the answer" if several else "another seed will give another"
-    return say("shallow", shown=_words(sunk), grains=sunk["value"] / grain, so=so)
-
-
-def _set_down_note(findings: Findings) -> str | None:
-    """What a set-down is, and why a drop at the same speed goes deeper."""
-    sets = [run for run in findings.of("set_down") if run.settings.get("mass")]
-    return say("set_down", s=findings.settings, grams=1e3 * float(sets[0].settings["mass"])) if sets else None
-
-
-def _inseparable(findings: Findings) -> str | None:
-    """Where the runs fitted do not tell K from C."""
-    conditions = {unit.condition for unit in findings.units if unit.id in findings.fit.runs}
-    correlation = findings.fit.correlation
-    if len(conditions) >= LEAST_CONDITIONS and abs(correlation or 0.0) <= MOST_CORRELATED:
-        return None
-    shown = "unknown" if correlation is None else f"{correlation:.2f}"
-    return say("inseparable", shown=shown, listed=", ".join(f"{kind} at {v:g} m/s" for kind, v in sorted(conditions)))
-
-
-def _traded(findings: Findings) -> str | None:
-    """Where the beds' own fits do not tell K from C, so that the spreads of the two go together."""
-    own = [fit.correlation for fit in findings.seed_fits.values() if fit.correlation is not None]
-    return say("traded", least=min(own)) if len(own) >= 2 and min(own) < -MOST_CORRELATED else None
-
-
-def _narrow(settings: PenetrateSettings) -> str | None:
-    """A bed so narrow that the spike meets its own images, or so shallow that it feels the floor."""
-    width, tip = min(settings.bed_size[:2]), settings.tip_diameter
-    if width >= ENOUGH_TIPS * tip * (1 - 1e-9):
-        return None
-    return say("narrow", tips=width / tip, enough=ENOUGH_TIPS * tip, enough_tips=ENOUGH_TIPS)
 
 
 def _words(entry: Json) -> str:
