@@ -136,12 +136,10 @@ def bed_test(
 ) -> tuple[Callable[..., Result], Callable[..., Result]]:
     """`run` and `resume` of a test of beds: every bed is tested, unless a stopped run has; then result and report.
 
-    Args:
-        test: tests a bed, from what is known of it before, the number of the copy, and a function for the share done.
-        result: title, quantities, tables and, where there are any, warnings of all runs.
-        copies: tests of each bed, each of a fresh copy.
-        bearing: pressure of the test over what lies on the floor [1], for which the grains of prepared beds are made
-            stiff enough; None: stiff enough for a tip in half the bed's depth, as ``Bed.prepare`` has it.
+    `test` takes a bed, what is known of it, the number of the copy, and a function for the share done; `result` makes
+    title, quantities, tables and warnings of all runs. `copies`: tests of each bed, each of a fresh copy. `bearing`:
+    pressure of the test over what lies on the floor [1], for which the grains of prepared beds are made stiff enough;
+    None: stiff enough for a tip in half the bed's depth, as ``Bed.prepare`` has it.
     """
 
     def carry_out(settings: Settings, folder: RunFolder, progress: Progress) -> Result:

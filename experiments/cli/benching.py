@@ -19,10 +19,7 @@ __all__ = ["benchmark_options", "goes_on", "load_benchmark"]
 
 
 def load_benchmark(what: str, root: Path | None = None) -> Callable[..., dict[str, Any]]:
-    """The function `run` of benchmarks/`what`.py in the checkout `root` (by default the one this file is in).
-
-    Raises ValueError if this is not a checkout or there is no such benchmark.
-    """
+    """The function `run` of benchmarks/`what`.py in the checkout `root`. Raises ValueError where there is none."""
     root = Path(__file__).resolve().parents[2] if root is None else root
     folder = root / "benchmarks"
     if not (root / "pyproject.toml").is_file() or not folder.is_dir():

@@ -89,8 +89,7 @@ def redraw_old_report(folder: RunFolder, *, quiet: bool) -> None:
 def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> int:
     """Show the result of a finished run on stdout, as JSON or as a table; return the exit status.
 
-    The table, with findings, warnings and where the report is, is short where the experiment has a short one, unless
-    `verbose`.
+    The table, with findings and warnings, is short where the experiment has a short one, unless `verbose`.
     """
     if as_json:
         print((folder.path / "result.json").read_text(encoding="utf-8"), end="")

@@ -1,9 +1,8 @@
 """`hedgebed compare`: two finished runs in one report, their numbers with differences, what they did over time.
 
-Differences are the second less the first. Of tumbles, two in the plane or two in space, series/compared.csv holds both
-on one grid of time; what they stood on does not matter, nor does who stepped them. Where one lasts longer, numbers that
-go with that are compared over the time that both last; those of each whole run are beside. Of penetrations numbers are
-compared, and the drives both have.
+Differences are the second less the first. Of tumbles, two in the plane or two in space, on any ground and by any
+integrator, series/compared.csv holds both on one grid of time. Where one lasts longer, numbers that depend on that are
+compared over the time that both last; those of each whole run are beside. Of penetrations numbers are compared.
 """
 
 import math
@@ -173,8 +172,8 @@ def _ground(result: Mapping[str, Any]) -> str:
 def _compared(results: list[Json], parts: list[dict[str, float | None]] | None = None) -> list[Json]:
     """Every quantity of either, with the difference where both have a value.
 
-    `parts`: those that go with how long a run lasts, over the time that both last; they are compared in place of the
-    whole runs' own, which are kept as `first_whole` and `second_whole`.
+    `parts`: those that depend on how long a run lasts, over the time that both last, compared in place of the whole
+    runs' own, which are kept as `first_whole` and `second_whole`.
     """
     first, second = (result.get("quantities", {}) for result in results)
     rows = []

@@ -94,9 +94,9 @@ def wheel_speed_on_surface(
 ) -> float | None:
     """The speed [rad/s] of a braked wheel whose hop from this ground goes `distance` [m], to 1e-4 of it.
 
-    The launch speed of a short brake is as the wheel's, and the distance as its square: from the hop `start` that
-    `trial` makes, the wheel's speed is scaled by sqrt(distance / found) until it fits. None where that does not lead
-    there within `max_speed` [rad/s]: the platform leaves before a faster wheel has stopped, or not at all.
+    The launch speed of a short brake scales with the wheel's, the distance with its square: from the hop `start` that
+    `trial` makes, the wheel's speed is scaled by sqrt(distance / found) until it fits. None where that fails within
+    `max_speed` [rad/s]: the platform leaves before a faster wheel has stopped, or not at all.
     """
     speed, found = trial.wheel_speed_0, start
     for _ in range(20):

@@ -52,9 +52,7 @@ class _Means:
 
 
 def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[HopPlan, Hop]:
-    """The numbers, and the hop over the distance or by the means given.
-
-    `platform_file` stands in for ``settings.platform``, where that was copied.
+    """The numbers, and the hop over the distance or by the means given; `platform_file` as in `plan_hop`.
 
     Raises ValueError for numbers that cannot be, and for a distance or means with which there is no hop.
     """

@@ -134,8 +134,7 @@ def _integrate(job: Job) -> Json:
 def _launch(trajectory: Any, states: Sequence[tuple[float, str, float]]) -> dict[str, float | bool] | None:
     """Position and velocity at the first hop, from a row in that flight, which is a parabola; None without one.
 
-    `lasts` [s] goes to the end of the trial where the hop has not `landed` by then; `height` [m] is that of the
-    parabola's peak above the launch.
+    `lasts` [s]: to the end of the trial where the hop has not `landed` by then; `height` [m]: of the peak above launch.
     """
     start = next((time for time, state, _ in states if state == "hop"), None)
     if start is None:

@@ -1,9 +1,9 @@
-"""The spring-damper with what it lacked: penetration's model.toml, as `hedgebed diagnose` writes it, on any settings.
+"""The spring-damper with added effects: penetration's model.toml, as `hedgebed diagnose` writes it, on any settings.
 
 Driven spikes follow the path that they are given; drops are integrated with their touches and turns located
 (`experiments.diagnose.push.law`); what is set down is stepped on the law as a ground. The numbers of an effect
-are those of the model's diameter: on another one forces on a section go with its square, forces on a shaft with it, and
-what belongs to the spring with the K that the model gives.
+are those of the model's diameter: on another one forces on a section scale with its square, forces on a shaft with it,
+those of the spring with the K that the model gives.
 
 With a bed, every run of it is made on the law as well. Without one (``--ground spring-damper``), the runs of one seed
 are made on the model's own K and C alone, and on the law.
@@ -54,8 +54,7 @@ _CREEP = 1e-4
 def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
     """The law in the model.toml at `path`, for the spike of `settings`.
 
-    Raises ValueError, naming file and key, for a file that is no model of penetration, and for an effect or a
-    parameter that the law does not know.
+    Raises ValueError, naming file and key, for no model of penetration, and for an effect or parameter unknown here.
     """
     path = Path(path)
     model = read_model(path)

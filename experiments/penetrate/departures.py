@@ -1,7 +1,7 @@
 """Where the spring-damper departs from the bed: by depth and by speed, in numbers and in words.
 
-All from the way in of driven runs, in bands of depth; runs of one speed on several beds are averaged, and their
-standard deviation between beds is told: without it nobody sees what is the law's fault and what another bed would give.
+All from the loading of driven runs, in bands of depth; runs of one speed on several beds are averaged, and their
+standard deviation between beds is reported, which separates an error of the law from differences of beds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -65,8 +65,7 @@ def departures(
 def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS) -> list[dict[str, float | None]]:
     """Mean force of the bed and of the law per speed and band of depth [N]; gap = (law - bed) / bed [1].
 
-    "beds" is how many beds were driven into at that speed; "bed_std" [N] and "gap_std" [1] the standard deviations
-    between them, None where there is one only.
+    "beds" counts the beds driven into at that speed; "bed_std" [N] and "gap_std" [1]: between them, None for one.
     """
     if not driven:
         return []
@@ -93,11 +92,10 @@ def departure_table(driven: Sequence[Penetration], fit: Fit, bands: int = BANDS)
 
 
 def rate_change(by_bed: Sequence[Sequence[Penetration]], fit: Fit) -> Json | None:
-    """How the mean drag of the way in changes from the slowest to the fastest speed, in the beds that have both.
+    """How the mean drag of loading changes from the slowest to the fastest speed, in the beds that have both.
 
-    Mean over those beds, [1]: "bed" and its standard deviation "bed_std" (None for one bed), "model", "beds" how many;
-    "slow" and "fast" are the speeds [m/s]. Of beds with other speeds the widest pair counts. None where no bed was
-    driven at two speeds.
+    Mean over those beds, [1]: "bed", its standard deviation "bed_std" (None for one bed), "model"; "beds": how many;
+    "slow", "fast": the widest pair of speeds [m/s]. None where no bed was driven at two speeds.
     """
     means: list[dict[float, tuple[float, float]]] = []
     for bed in by_bed:

@@ -208,10 +208,9 @@ class Frames:
         )  # fmt: skip
 
     def write(self, stepper: Run) -> None:
-        """One frame of what the stepper is doing now; of a run far longer than expected, ever fewer.
+        """One frame of what the stepper is doing now; the deepest point and the last state are always kept.
 
-        Past the limit every second is kept, past twice that every fourth and so on; the deepest point and the last
-        state always are.
+        Of a run longer than expected every second frame is kept past the limit, every fourth past twice that, ...
         """
         late = max(0, stepper.frames_taken - 1)
         if late % (1 << (late // self.limit).bit_length()) and not (stepper.done or stepper.at_bottom):

@@ -155,10 +155,9 @@ class Findings:
 
     @cached_property
     def _work_returned(self) -> dict[str, Json]:
-        """Mean share of the work put in that driven runs give back, of the bed and of the law.
+        """Mean share of the work put in that driven runs return, of the bed and of the law.
 
-        Beds tell a spread where all were driven at the same speeds; the laws fitted to each bed always do: each makes
-        all the runs.
+        Beds have a spread where all were driven at the same speeds, the laws fitted to each bed always.
         """
         driven = [unit for unit in self.units if unit.kind == "driven"]
         alike = {unit.condition for unit in driven} <= self.shared_conditions()

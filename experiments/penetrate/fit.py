@@ -49,10 +49,7 @@ class Fit:
 
 
 def fit_rows(run: Penetration) -> NDArray[np.bool_]:
-    """Rows of a run that are fitted, shape [n]: the first way in; none of a set-down, nor of a drop that never stopped.
-
-    A drop ended at its largest depth was near the floor.
-    """
+    """Rows of a run that are fitted, shape [n]: its first loading; none of a set-down or a drop ended near the floor."""
     if run.kind == "set_down" or run.ended == "max_depth":
         return np.zeros(len(run.time), dtype=bool)
     return run.way_in & (run.depth > 0)

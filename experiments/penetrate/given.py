@@ -11,10 +11,9 @@ __all__ = ["settings_of_bed", "settings_of_model"]
 
 
 def settings_of_bed(given: Json) -> Json:
-    """`given` with what its ``bed`` says of material, size, grains, gravity, seed and softness.
+    """`given` with material, size, grains, gravity, seed and softness of its ``bed``.
 
-    Raises ValueError for what is no bed, a bed that is tilted or cut, a material that has no name here, and where
-    `given` contradicts the bed.
+    Raises ValueError for no bed, one that is tilted or cut, an unknown material, and where `given` contradicts it.
     """
     from dem.engine.state import read_file
     from dem.grains.materials import MATERIALS, material
@@ -62,11 +61,10 @@ def settings_of_bed(given: Json) -> Json:
 
 
 def settings_of_model(given: Json) -> Json:
-    """`given` with the spike of its ``model`` where it says nothing of one: tip, diameter, cone angle, mass, and the
-    load m g under which the model's drops moved it, where they all had one gravity.
+    """`given` with the spike of its ``model`` where it gives none: tip, diameter, cone angle, mass, and the load m g of
+    the model's drops, where they all had one gravity and no mass is given.
 
-    What was given stands; with a mass of its own the load is not the model's. A file that cannot be read, or is no
-    model of penetration, is left to those who need it.
+    A file that cannot be read, or is no model of penetration, is refused later.
     """
     try:
         model = read_model(Path(str(given["model"])))

@@ -95,10 +95,9 @@ def _number(quantities: Mapping[str, Any], name: str) -> Number:
 def compare_with(other: Mapping[str, Any], result: Mapping[str, Any]) -> tuple[Json, list[str]]:
     """How far the numbers of `result` moved from those of `other`: the entry "reference", and sentences.
 
-    Both are result.json's of penetrate runs. A number of the entry's "moved" has "before", "now", their standard
-    deviations (jackknife over the common runs for K, C and the law's sinkage; between seeds for sinkage_dem; null where
-    unknown), "change" [1] and "unit". K and C of a reference whose runs tell no moments, and which has runs that are
-    not made here, are left out: they would compare different runs.
+    A number of the entry's "moved" has "before", "now", their standard deviations (jackknife over the common runs for
+    K, C and the law's sinkage; between seeds for sinkage_dem; null where unknown), "change" [1] and "unit". K and C are
+    left out where they would compare different runs: of a reference without moments that has runs not made here.
     """
     there, here = _side(other), _side(result)
     common = sorted(there.conditions.keys() & here.conditions.keys())

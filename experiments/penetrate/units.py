@@ -123,9 +123,8 @@ def deepest(settings: PenetrateSettings) -> float:
 def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float) -> float:
     """About how long a run lasts on the bed's clock [s], `stiffness` [N/m] being a flat plate's in 3D-RFT.
 
-    A drop: down to the first stop of m z'' = W - K z with the speed v, at w t = pi - atan(v K / (W w)), w^2 = K / m,
-    and what it is followed for after that. A set-down is of first order, with the hand's c / K = W / (lowering_speed K)
-    for its time constant.
+    A drop: to the first stop of m z'' = W - K z with the speed v, at w t = pi - atan(v K / (W w)), w^2 = K / m, and
+    what follows. A set-down: of first order, with the placement's time constant c / K = W / (lowering_speed K).
     """
     own = _SOFTER * stiffness
     if unit.kind == "driven":

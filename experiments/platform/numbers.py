@@ -62,8 +62,7 @@ class PlatformNumbers:
 def platform_numbers(name: str, *, file: Path | None = None, in_plane: bool = True) -> PlatformNumbers:
     """The numbers of a platform that ships, by name, or of the TOML file `name`; `file` stands in for a copied one.
 
-    Raises ValueError for one there is not and, unless `in_plane` is false, for one that is no regular polygon seen from
-    the side.
+    Raises ValueError for none and, unless `in_plane` is false, for one that is no regular polygon seen from the side.
     """
     platform = find_platform(name if file is None else file)
     wheel, stance = platform.wheel(), platform.stance()
@@ -110,8 +109,8 @@ def torque_within_limit(
 ) -> tuple[Trial, float | None]:
     """`trial` with its torque ended where a motor's wheel comes to `max_wheel_speed` [rad/s], and when that is [s].
 
-    None, and the trial as it is, where the wheel does not come to it within `duration` [s]. The wheel only gains speed,
-    so that ending the torque at that moment is the same as a motor that has none left from then on.
+    None, and the trial as it is, where the wheel does not come to it within `duration` [s]. The wheel only gains speed:
+    to end the torque then equals a motor that has none left.
     """
     gain = trial.torque / trial.wheel_inertia
     if trial.actuator != "motor" or trial.wheel_speed_0 + gain * min(duration, trial.torque_until) <= max_wheel_speed:
@@ -174,10 +173,9 @@ PLATFORM_COPY = "platform.toml"
 
 
 def keep_platform(name: str, folder: Path, message: Callable[[str], object] | None = None) -> Path | None:
-    """The copy in ``folder`` of the platform's file ``name``, made if it lacks; None for a platform that ships.
+    """The copy in ``folder`` of the platform's file ``name``, made if missing; None for a platform that ships.
 
-    ``message`` is called where the file differs by now from the copy. Raises ValueError for a file that will not do,
-    unless the copy is there.
+    ``message`` is called where the file differs from the copy. Raises ValueError for a bad file without a copy.
     """
     if Path(name).suffix != ".toml":
         return None

@@ -1,7 +1,6 @@
 """Settings that every command about a platform on a surface shares: `hedgebed tumble`, `campaign` and `hop`.
 
-A number that is not given comes from the surface or the platform (`experiments.platform.settled`), and every run
-prints it.
+Numbers that are not given come from the surface or the platform (`experiments.platform.settled`); a run prints them.
 """
 
 from typing import Annotated, Self

@@ -73,10 +73,7 @@ class Cost:
 
 
 def cost_of_tumble(settings: TumbleSettings) -> Cost:
-    """The estimate for a tumble with ``ground = "bed"`` on two cores with nothing beside.
-
-    Raises ValueError for a bed that will not do, as the run itself would.
-    """
+    """The estimate for a tumble on a bed, on two idle cores. Raises ValueError where the run itself would."""
     from coupling.lowered_gravity import EFOLD, pace_under
     from coupling.platform_run import REST_TIME
     from dem.contact.timestep import time_step_for
@@ -159,10 +156,7 @@ class Case:
 
 
 def cases(names: Sequence[str] = ()) -> list[Case]:
-    """Those that ship, in order; or those of `names`, of which each is a case, or how several begin.
-
-    Raises ValueError for a name that no case has.
-    """
+    """Those that ship, in order, or whose names begin as one of `names`. Raises ValueError for a name of none."""
     found = []
     for path in sorted((CASES / "grains").glob("*.toml")):
         settings = settings_from(TumbleSettings, [read_case(path)])
@@ -224,8 +218,8 @@ def do_case(case: Case, results: Path, work: Path, *, say: Callable[[str], None]
 def keep(folder: Path, target: Path) -> None:
     """Put the settings and the numbers of a finished run where results are kept, and what it cost.
 
-    All or nothing: what is kept is put together beside `target` and renamed; result.json, by which a case is done, is
-    last where `target` is there already. cost.json has null for what an older run's status.json does not say.
+    All or nothing: it is put together beside `target` and renamed; where `target` is there already, result.json, by
+    which a case is done, comes last. cost.json has null for what an older run's status.json does not have.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as beside:
