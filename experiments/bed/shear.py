@@ -22,7 +22,7 @@ from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import computed_run
 
 from .settings import say
 from .test_settings import BedShearSettings
@@ -95,36 +95,28 @@ def check(settings: BedShearSettings) -> None:
         raise ValueError(f"bed = {settings.bed!r} is tilted: a level one would do")
 
 
-def _carry_out(settings: BedShearSettings, folder: RunFolder, progress: Progress) -> Result:
+def _compute(settings: BedShearSettings, folder: RunFolder, progress: Progress) -> Result:
     path = find_bed(settings.bed)
     runs: list[Shearing] = []
-    with folder.lock():
-        progress.plan({f"{p:g} times the weight": 1.0 for p in settings.pressures}, seconds={"report": 3.0})
-        grain = 0.0
-        for pressure in settings.pressures:
-            name = f"shear-{pressure:g}"
-            progress.stage(f"{pressure:g} times the weight", total=1.0)
-            prepared = Bed.load_prepared(path, threads=settings.threads)
-            bed = prepared.bed
-            assert bed is not None
-            grain = 2 * float(bed.grains().radius.mean())
-            if not folder.is_done(name):
-                run = shear_bed(
-                    bed, pressure=pressure * bed.weight / (bed.size[0] * bed.size[1]), way=settings.way * grain,
-                    inertial_number=settings.inertial_number, grain=grain, tell=progress.update,
-                )  # fmt: skip
-                folder.write_series(name, {column: getattr(run, key) for key, column in _COLUMNS.items()})
-                folder.mark_done(name, picked(run, *_NUMBERS))
-            columns = folder.read_series(name)
-            kept: Json = {key: columns[column] for key, column in _COLUMNS.items()}
-            runs.append(Shearing(**kept, **folder.done_data(name)))
-        result = _result(settings, runs, grain, prepared.recipe, bed)
-        folder.write_result(result)
-        progress.stage("report", total=1.0)
-        from vis.bed.tests import write_shear_report
-
-        write_shear_report(folder.path, progress=progress.update)
-    return result
+    progress.plan({f"{p:g} times the weight": 1.0 for p in settings.pressures}, seconds={"report": 3.0})
+    for pressure in settings.pressures:
+        name = f"shear-{pressure:g}"
+        progress.stage(f"{pressure:g} times the weight", total=1.0)
+        prepared = Bed.load_prepared(path, threads=settings.threads)
+        bed = prepared.bed
+        assert bed is not None
+        grain = 2 * float(bed.grains().radius.mean())
+        if not folder.is_done(name):
+            run = shear_bed(
+                bed, pressure=pressure * bed.weight / (bed.size[0] * bed.size[1]), way=settings.way * grain,
+                inertial_number=settings.inertial_number, grain=grain, tell=progress.update,
+            )  # fmt: skip
+            folder.write_series(name, {column: getattr(run, key) for key, column in _COLUMNS.items()})
+            folder.mark_done(name, picked(run, *_NUMBERS))
+        columns = folder.read_series(name)
+        kept: Json = {key: columns[column] for key, column in _COLUMNS.items()}
+        runs.append(Shearing(**kept, **folder.done_data(name)))
+    return _result(settings, runs, grain, prepared.recipe, bed)
 
 
 def _strengths(strengths: list[Strength], band: float, run: Shearing) -> Json:
@@ -184,4 +176,4 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
     )
 
 
-run, resume = whole_run("bed test shear", BedShearSettings, _carry_out, check=check)
+run, resume = computed_run("bed test shear", BedShearSettings, _compute, check=check)

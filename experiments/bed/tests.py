@@ -18,7 +18,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import computed_run
 
 from .test_settings import BedTestSettings
 
@@ -142,36 +142,27 @@ def bed_test(
     None: stiff enough for a tip in half the bed's depth, as ``Bed.prepare`` has it.
     """
 
-    def carry_out(settings: Settings, folder: RunFolder, progress: Progress) -> Result:
-        with folder.lock():
-            if settings.bed is None:
-                settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
-            beds, count = dict(_beds(settings, bearing(settings))), copies(settings)
-            costs = (
-                {} if settings.bed is not None else {f"bed of {name.replace('seed', 'seed ')}": 2.0 for name in beds}
-            )
-            progress.plan(costs | {f"test of {name}": float(count) for name in beds}, seconds={"report": 5.0})
-            runs: list[Run] = []
-            for name, make in beds.items():
-                for copy in range(count):
-                    which = name if count == 1 else f"{name}-{copy + 1}"
-                    if not folder.is_done(which):
-                        bed = make(None if copy else progress)
-                        if not copy or progress.stage_name != f"test of {name}":
-                            progress.stage(f"test of {name}", total=float(count))
-                        tell = partial(lambda share, copy: progress.update(copy + share), copy=copy)
-                        folder.mark_done(which, {"id": which} | one_test(settings, bed, folder, which, copy, tell))
-                        bed = None  # its engine serves the next
-                    runs.append(folder.done_data(which))
-            entries: Json = {"warnings": []} | result(settings, runs)
-            own = [*entries.pop("warnings"), *dict.fromkeys(w for run in runs for w in run["warnings"])]
-            whole = Result.make(command, **entries, warnings=own, runs=runs)
-            folder.write_result(whole)
-            progress.stage("report", total=1.0)
-            from vis.bed.tests import write_test_report
-
-            write_test_report(folder.path, progress=progress.update)
-        return whole
+    def compute(settings: Settings, folder: RunFolder, progress: Progress) -> Result:
+        if settings.bed is None:
+            settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
+        beds, count = dict(_beds(settings, bearing(settings))), copies(settings)
+        costs = {f"bed of {name.replace('seed', 'seed ')}": 2.0 for name in beds if settings.bed is None}
+        progress.plan(costs | {f"test of {name}": float(count) for name in beds}, seconds={"report": 5.0})
+        runs: list[Run] = []
+        for name, make in beds.items():
+            for copy in range(count):
+                which = name if count == 1 else f"{name}-{copy + 1}"
+                if not folder.is_done(which):
+                    bed = make(None if copy else progress)
+                    if not copy or progress.stage_name != f"test of {name}":
+                        progress.stage(f"test of {name}", total=float(count))
+                    tell = partial(lambda share, copy: progress.update(copy + share), copy=copy)
+                    folder.mark_done(which, {"id": which} | one_test(settings, bed, folder, which, copy, tell))
+                    bed = None  # its engine serves the next
+                runs.append(folder.done_data(which))
+        entries: Json = {"warnings": []} | result(settings, runs)
+        own = [*entries.pop("warnings"), *dict.fromkeys(w for run in runs for w in run["warnings"])]
+        return Result.make(command, **entries, warnings=own, runs=runs)
 
     def one_test(settings: Settings, bed: Any, folder: RunFolder, which: str, copy: int, tell: Any) -> Run:
         about = _about(bed)
@@ -186,7 +177,7 @@ def bed_test(
         kept = {"max_overlap": found.bed.max_overlap, "series": series, "frames": which, "warnings": warnings}
         return about | found.numbers | kept
 
-    return whole_run(command, settings_class, carry_out, check=check)
+    return computed_run(command, settings_class, compute, check=check)
 
 
 def picked(found: Any, *names: str) -> Run:

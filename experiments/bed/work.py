@@ -21,6 +21,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantities_of
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
+from experiments.runs.whole_runs import publish
 
 from .settings import say
 from .tests import table, write_frame
@@ -118,12 +119,7 @@ def finish_bed(
         bed={"file": "bed.npz", "name": name, "surface": {"value": bed.surface, "unit": "m"}, **prepared.recipe},
         warnings=[*told.get("warnings", []), *_warnings(prepared)],
     )
-    folder.write_result(result)
-    progress.stage("report", total=1.0)
-    from vis.bed.report import write_bed_report
-
-    write_bed_report(folder.path, progress=progress.update)
-    return result
+    return publish(folder, result, progress)
 
 
 _UNITS = {"height": "m", "packing": "", "stress_zz": "Pa", "stress_xx": "Pa", "stress_yy": "Pa", "stress_xz": "Pa"}

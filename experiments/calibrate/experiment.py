@@ -12,7 +12,7 @@ Why this and no optimiser of a library: docs/materials.md.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -26,8 +26,7 @@ from experiments.runs.folder import RunFolder, write_text
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
-from experiments.runs.types import Json
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import publish, whole_run
 
 from .fit import Response, Wanted, design, find_best, next_point
 from .result import Simulated, calibration_result, material_toml
@@ -63,9 +62,7 @@ class _Work:
     progress: Progress
     asked_to_stop: Callable[[], bool]
     targets: list[Target]
-    points: list[dict[str, float]] = field(default_factory=list)
-    figures: list[dict[str, tuple[float, float]]] = field(default_factory=list)
-    tests: list[Json] = field(default_factory=list)
+    done: Simulated = field(default_factory=Simulated)
 
     def tell(self, done: float) -> None:
         """`done` of the stage. Raises KeyboardInterrupt if asked to stop."""
@@ -92,18 +89,18 @@ class _Work:
                 self.folder.mark_done(name, kept)
             runs[test] = kept["summary"]
             about = {"test": name, "state": test.state, "pressure": test.pressure, "seed": test.seed}
-            self.tests.append(about | kept["summary"] | {"values": values, "series": f"series/{name}.csv"})
+            self.done.tests.append(about | kept["summary"] | {"values": values, "series": f"series/{name}.csv"})
         return figures_of(targets, runs)
 
     def explore(self, values: np.ndarray) -> None:
         """One more point."""
         at = {key: float(f"{value:.6g}") for key, value in zip(self.settings.free, values, strict=True)}
         fitted = [target for target in self.targets if target.fit]
-        k = len(self.points)
+        k = len(self.done.points)
         seed = self.settings.seed + _SEEDS * k
         found = self.simulate(f"point-{k + 1:02d}", at, fitted, seed=seed, begin=float(k))
-        self.points.append(at)
-        self.figures.append(found)
+        self.done.points.append(at)
+        self.done.figures.append(found)
         self.progress.message(f"{_said(at)}: " + ", ".join(f"{n} {v:.3g}" for n, (v, _) in found.items()))
 
     def check(self, turn: int, values: dict[str, float], targets: list[Target]) -> dict[str, tuple[float, float]]:
@@ -114,21 +111,21 @@ class _Work:
             for k, seed in enumerate(seeds)
         ]
         for found in checked:
-            self.points.append(values)
-            self.figures.append({target.name: found[target.name] for target in self.targets if target.fit})
+            self.done.points.append(values)
+            self.done.figures.append({target.name: found[target.name] for target in self.targets if target.fit})
         return {target.name: _mean([found[target.name] for found in checked]) for target in targets}
 
     @property
     def x(self) -> np.ndarray:
         """What was simulated, in units, shape [n, parameter_count]."""
-        return np.array([list(point.values()) for point in self.points])
+        return np.array([list(point.values()) for point in self.done.points])
 
     def responses(self) -> dict[str, Response]:
         """The surfaces through what is known."""
         low, high = np.array(list(self.settings.free.values())).T
         scaled = (self.x - low) / (high - low)
         fitted = [target.name for target in self.targets if target.fit]
-        known = {name: np.array([found[name] for found in self.figures]) for name in fitted}
+        known = {name: np.array([found[name] for found in self.done.figures]) for name in fitted}
         return {name: Response(scaled, *pairs.T.copy()) for name, pairs in known.items()}
 
 
@@ -154,7 +151,7 @@ def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progres
         progress.stage("explore", total=float(settings.most_points))
         for values in design(settings.free, settings.points, seed=settings.seed):
             work.explore(values)
-        while len(work.points) < settings.most_points:
+        while len(work.done.points) < settings.most_points:
             further = next_point(work.responses(), wanted, settings.free, work.x, enough=settings.enough)
             if further is None:
                 break
@@ -175,15 +172,10 @@ def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progres
         _, best, measured = min(rounds, key=lambda one: one[0])
         stuff = material_at(settings, best)
         measured |= {target.name: _of_bed(work, target, stuff) for target in beds}
-        done = Simulated(work.points, work.figures, work.tests, measured)
+        done = replace(work.done, measured=measured)
         result = calibration_result(settings, done, fit, responses, best, stuff, folder)
         write_text(folder.path / "material.toml", material_toml(stuff, settings, fit, result["figures"]))
-        folder.write_result(result)
-        progress.stage("report", total=1.0)
-        from vis.bed.calibrate import write_calibration_report
-
-        write_calibration_report(folder.path, progress=progress.update)
-    return result
+        return publish(folder, result, progress)
 
 
 def _mean(values: list[tuple[float, float]]) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -31,10 +31,10 @@ _UNSOURCED = ("name", "cohesion", "grain")
 class Simulated:
     """What a calibration has simulated."""
 
-    points: list[dict[str, float]]  # of exploring, parameter -> value
-    figures: list[dict[str, tuple[float, float]]]  # of each, figure -> value and standard error
-    tests: list[Json]  # the check's as well
-    measured: Mapping[str, Measured]  # at the parameters found, by figure
+    points: list[dict[str, float]] = field(default_factory=list)  # parameter -> value
+    figures: list[dict[str, tuple[float, float]]] = field(default_factory=list)  # of each, with standard errors
+    tests: list[Json] = field(default_factory=list)  # the check's as well
+    measured: Mapping[str, Measured] = field(default_factory=dict)  # at the parameters found, by figure
 
 
 def calibration_result(

@@ -49,7 +49,7 @@ class Fit:
 
 
 def fit_rows(run: Penetration) -> NDArray[np.bool_]:
-    """Rows of a run that are fitted, shape [n]: its first loading; none of a set-down or a drop ended near the floor."""
+    """Rows that are fitted, shape [n]: of the first loading; none of a set-down or a drop ended near the floor."""
     if run.kind == "set_down" or run.ended == "max_depth":
         return np.zeros(len(run.time), dtype=bool)
     return run.way_in & (run.depth > 0)
