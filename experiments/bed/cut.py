@@ -88,13 +88,11 @@ def _result(settings: BedCutSettings, runs: list[Json]) -> Json:
     warnings = []
     if not any(run["stood"] for run in runs):
         bound = max(cohesion_of(run["high"], run["unit_weight"], friction_angle or 30.0) for run in runs)
-        warnings.append(
-            f"no face stood at {LEAST:g} of the bed's gravity: its cohesion is less than {bound:.2g} Pa, or none"
-        )
+        what = f"its cohesion is less than {bound:.2g} Pa, or none"
+        warnings.append(f"no face stood at {LEAST:g} of the bed's gravity: {what}")
     elif any(run["fell"] is None for run in runs):
-        warnings.append(
-            f"not every face fell at {most:g} times the bed's gravity: more ('most') or a deeper bed would tell"
-        )
+        what = "more ('most') or a deeper bed would tell"
+        warnings.append(f"not every face fell at {most:g} times the bed's gravity: {what}")
     title = f"Vertical cut in {runs[0]['material']}"
     return {"title": title, "quantities": quantities, "tables": tables, "warnings": warnings}
 

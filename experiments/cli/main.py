@@ -103,11 +103,10 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
 
         return carry_out(folder, work, as_json=json, quiet=quiet, verbose=verbose)
 
+    quiet_flag = reserved_option("quiet")
     flags = [
-        inspect.Parameter(
-            preset.option,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=False,
+        quiet_flag.replace(
+            name=preset.option,
             annotation=Annotated[bool, Parameter(help=preset.summary, negative="", show_default=False)],
         )
         for preset in presets
@@ -237,11 +236,9 @@ def _campaign_from_run() -> Callable[..., int]:
             typed = as_typed(given, fields)
             of_spike = {name: value for name, value in typed.items() if name == "seed" or not tumbled}
             sensors = settings_from(SpikeSensors, [Layer(None, of_spike)])
-            assert isinstance(sensors, SpikeSensors)
             if tumbled:
                 own = {name: value for name, value in typed.items() if name in of_tumbles}
                 recording = settings_from(TumbleRecording, [Layer(None, own)])
-                assert isinstance(recording, TumbleRecording)
                 campaign = write_tumbles_campaign(run, folder, recording=recording, seed=sensors.seed)
             else:
                 campaign = write_run_campaign(run, folder, sensors=sensors)
@@ -249,16 +246,11 @@ def _campaign_from_run() -> Callable[..., int]:
         say(f"{len(campaign.tables.trial)} trials; `hedgebed diagnose {folder}` says what the spring-damper lacks")
         return DONE
 
-    places = {
-        "run": "Folder of a finished run of penetrate, or of tumble.",
-        "folder": "Where to write it; must be new or empty.",
-    }
-    parameters = [
-        inspect.Parameter(
-            name, inspect.Parameter.POSITIONAL_ONLY, annotation=Annotated[Path, Parameter(help=text, negative="")]
-        )
-        for name, text in places.items()
-    ]
+    places = {"run": "Folder of a finished run of penetrate, or of tumble."}
+    places["folder"] = "Where to write it; must be new or empty."
+    hints = {name: Annotated[Path, Parameter(help=text, negative="")] for name, text in places.items()}
+    kind = inspect.Parameter.POSITIONAL_ONLY
+    parameters = [inspect.Parameter(name, kind, annotation=hint) for name, hint in hints.items()]
     return _with_parameters(command, [*parameters, *(option_of(name, field) for name, field in fields.items())])
 
 

@@ -72,10 +72,8 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
             continue
         for name, value in effect.parameters.items():
             if name not in known and name != "reference":
-                place = {"path": path, "number": number, "id": effect.id}
-                raise ValueError(
-                    say("unknown_number", **place, name=name, value=value, allowed=", ".join(sorted(known)))
-                )
+                place = {"path": path, "number": number, "id": effect.id, "allowed": ", ".join(sorted(known))}
+                raise ValueError(say("unknown_number", **place, name=name, value=value))
             slots[name] = value
     law = AmendedLaw(settings, model, {}, tuple(own))
     stiffer = law.pair[0] / model.surface.stiffness if model.surface.stiffness > 0 else 1.0
@@ -136,9 +134,8 @@ class AmendedLaw:
         if spike.diameter is not None and not math.isclose(spike.diameter, own.tip_diameter, rel_tol=0.01):
             several = self.pair != (self.model.surface.stiffness, self.model.surface.damping)
             of_k = "K and C are those fitted to this diameter" if several else "K and C are that one's"
-            said.append(
-                say("other_tip", model_mm=1e3 * spike.diameter, own_mm=1e3 * own.tip_diameter, of_k=of_k, spike=spike)
-            )
+            sizes = {"model_mm": 1e3 * spike.diameter, "own_mm": 1e3 * own.tip_diameter}
+            said.append(say("other_tip", **sizes, of_k=of_k, spike=spike))
         if spike.tip != own.tip:
             said.append(f"the model is of a {spike.tip} tip, this one is a {own.tip}; --tip {spike.tip} is its own")
         drops = (*own.drop_speeds, *own.other_drop_speeds)

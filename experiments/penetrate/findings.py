@@ -76,8 +76,7 @@ class Findings:
 
     def shared_conditions(self) -> set[tuple[str, float]]:
         """Kinds and speeds that every seed has."""
-        per_seed = [{unit.condition for unit in self.units if unit.seed == seed} for seed in self.seeds]
-        return set.intersection(*per_seed)
+        return set.intersection(*({u.condition for u in self.units if u.seed == seed} for seed in self.seeds))
 
     @property
     def seeds(self) -> list[int]:
@@ -87,12 +86,9 @@ class Findings:
     def _fit_seeds(self) -> dict[int, Fit]:
         """Each seed by itself, on the runs that every seed has."""
         shared = self.shared_conditions()
-        fits = {}
-        for seed in self.seeds:
-            own = {u.id: self.beds[u.id] for u in self.units if u.seed == seed and u.condition in shared}
-            if any(run.kind != "set_down" for run in own.values()):
-                fits[seed] = fit_spring_damper(own)
-        return fits
+        own = {s: [u for u in self.units if u.seed == s and u.condition in shared] for s in self.seeds}
+        fitted = {s: units for s, units in own.items() if any(unit.kind != "set_down" for unit in units)}
+        return {s: fit_spring_damper({u.id: self.beds[u.id] for u in units}) for s, units in fitted.items()}
 
     def quantities(self) -> dict[str, Json]:
         """The headline numbers: name -> value, std between seeds, unit, note."""

@@ -22,23 +22,22 @@ def settings_of_bed(given: Json) -> Json:
     name = str(given["bed"])
     path = find_bed(name)
     settings, state, precision = read_file(path)
-    stages = [report.stage for report in read_preparation(path).reports]
+    preparation = read_preparation(path)
+    stages = [report.stage for report in preparation.reports]
     if settings.gravity[0] or settings.gravity[1] or any(s.startswith("cut") for s in stages):
         raise ValueError(f"bed = {name!r} was cut or tilted: a spike needs a level one, prepared without these stages")
     stuff = settings.material
     radii = state["position"][:, 3].astype(float)
     grain = _plain(2 * radii.mean())
     known = material(given["material"]) if "material" in given else MATERIALS.get(stuff.name)
-    if known is None or not _alike(known, stuff, read_preparation(path).recipe):
-        raise ValueError(
-            f"bed = {name!r} is of a material {stuff.name!r} whose numbers are not those of "
-            + (
-                f"material = {given['material']!r}: the file that the bed was made with would do"
-                if "material" in given
-                else f"one that ships ({', '.join(sorted(MATERIALS))}): give --material with the file that it was made "
-                "with"
-            )
-        )
+    kept = preparation.recipe.get("material", {}).get("grain")  # the size for which the bed was prepared
+    if known is not None and kept is not None:
+        known = known.for_grain(kept)
+    if known is None or known.softened(stuff.young) != stuff:
+        whose = f"one that ships ({', '.join(sorted(MATERIALS))}): give --material with the file that it was made with"
+        if "material" in given:
+            whose = f"material = {given['material']!r}: the file that the bed was made with would do"
+        raise ValueError(f"bed = {name!r} is of a material {stuff.name!r} whose numbers are not those of {whose}")
     said = {
         "material": given.get("material", stuff.name),
         "bed_size": settings.size,
@@ -54,9 +53,8 @@ def settings_of_bed(given: Json) -> Json:
     }
     for key, value in said.items():
         if key in given and not _same(given[key], value):
-            raise ValueError(
-                f"{key} = {given[key]!r} beside bed = {name!r}, whose own is {value!r}: leave {key} out, or the bed"
-            )
+            both = f"{key} = {given[key]!r} beside bed = {name!r}"
+            raise ValueError(f"{both}, whose own is {value!r}: leave {key} out, or the bed")
     return given | said
 
 
@@ -82,13 +80,6 @@ def settings_of_model(given: Json) -> Json:
         if gravities and math.isclose(min(gravities), max(gravities), rel_tol=1e-6):
             own["load"] = spike.mass * gravities[0]
     return {name: value for name, value in own.items() if value is not None} | given
-
-
-def _alike(known: Any, stuff: Any, recipe: Json) -> bool:
-    """Whether a bed's grains are of the material `known`, in the size for which the bed was prepared."""
-    kept = recipe.get("material", {}).get("grain")
-    known = known.softened(stuff.young) if kept is None else known.for_grain(kept).softened(stuff.young)
-    return bool(known == stuff)
 
 
 def _plain(value: float) -> float:

@@ -74,16 +74,16 @@ def _fastest_drop(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str
         return []
     speed = max(run["speed"] for run in drops)
     fastest = [run["quantities"] for run in drops if run["speed"] == speed]
-    rows = []
-    for name, words, unit in (("peak_force", "peak force", "N"), ("max_depth", "deepest", "m")):
-        sides = []
-        for key in (name, f"model_{name}"):
-            values = [numbers[key]["value"] for numbers in fastest if numbers.get(key, {}).get("value") is not None]
-            std = stdev(values) if len(values) > 1 else None
-            mean = fmean(values) if values else None
-            sides.append(_quoted({"value": mean, "std": std, "unit": unit}))
-        rows.append((f"{words}, dropped at {speed:g} m/s", sides[0], sides[1]))
-    return rows
+
+    def mean(key: str, unit: str) -> str:
+        values = [numbers[key]["value"] for numbers in fastest if numbers.get(key, {}).get("value") is not None]
+        std = stdev(values) if len(values) > 1 else None
+        return _quoted({"value": fmean(values) if values else None, "std": std, "unit": unit})
+
+    return [
+        (f"{words}, dropped at {speed:g} m/s", mean(name, unit), mean(f"model_{name}", unit))
+        for name, words, unit in (("peak_force", "peak force", "N"), ("max_depth", "deepest", "m"))
+    ]
 
 
 def _quoted(entry: Mapping[str, Any], unit: str = "") -> str:

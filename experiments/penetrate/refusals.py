@@ -72,9 +72,8 @@ def _check_reach(settings: PenetrateSettings) -> None:
             if depth > floor:
                 room = stiffness * floor**2 - 2 * settings.weight * floor
                 slower = f"at most {math.sqrt(room / settings.mass):.2g} m/s" if room > 0 else "a smaller load"
-                raise ValueError(
-                    say("drops_deep", key=key, speed=speed, s=settings, depth=depth, deeper=deeper, slower=slower)
-                )
+                how = {"key": key, "speed": speed, "depth": depth}
+                raise ValueError(say("drops_deep", **how, s=settings, deeper=deeper, slower=slower))
 
 
 def _check_step_count(settings: PenetrateSettings, step: float) -> None:
@@ -94,11 +93,8 @@ def _check_step_count(settings: PenetrateSettings, step: float) -> None:
         parts = {f"after_stop = {settings.after_stop:g} s": settings.after_stop, f"mass = {settings.mass:g} kg": 0.0}
     else:
         sinking = times[unit] - settings.rest_time
-        parts = {
-            f"lowering_speed = {unit.speed:g} m/s": sinking,
-            f"rest_time = {settings.rest_time:g} s": settings.rest_time,
-        }
+        parts = {f"lowering_speed = {unit.speed:g} m/s": sinking}
+        parts[f"rest_time = {settings.rest_time:g} s"] = settings.rest_time
     key = max(parts, key=lambda part: parts[part])
-    raise ValueError(
-        say("steps", key=key, own=times[unit] / step, step=step, count=count, most=MOST_STEPS, by=key.split()[0])
-    )
+    numbers = {"own": times[unit] / step, "step": step, "count": count, "most": MOST_STEPS}
+    raise ValueError(say("steps", key=key, by=key.split()[0], **numbers))

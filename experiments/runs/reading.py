@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -18,6 +18,8 @@ from experiments.runs.folder import RUN_FORMAT, settings_in
 from experiments.runs.strict import may_be_empty
 
 __all__ = ["Layer", "find_case", "nearest", "option", "read_case", "settings_from"]
+
+Settings = TypeVar("Settings", bound=BaseModel)
 
 _NEAR = 4
 """Names that are told at most of those that are spelt like one there is not."""
@@ -84,7 +86,7 @@ def read_case(path: Path) -> Layer:
     return Layer(str(path), table)
 
 
-def settings_from(settings_class: type[BaseModel], layers: Iterable[Layer]) -> BaseModel:
+def settings_from(settings_class: type[Settings], layers: Iterable[Layer]) -> Settings:
     """The settings that the `layers` give, later ones over earlier ones, over the defaults.
 
     Raises ValueError, one sentence a line, for a name there is not (with the nearest there is) and for a value that

@@ -157,11 +157,8 @@ class Case:
 
 def cases(names: Sequence[str] = ()) -> list[Case]:
     """Those that ship, in order, or whose names begin as one of `names`. Raises ValueError for a name of none."""
-    found = []
-    for path in sorted((CASES / "grains").glob("*.toml")):
-        settings = settings_from(TumbleSettings, [read_case(path)])
-        assert isinstance(settings, TumbleSettings)
-        found.append(Case(path.stem, path, settings))
+    paths = sorted((CASES / "grains").glob("*.toml"))
+    found = [Case(path.stem, path, settings_from(TumbleSettings, [read_case(path)])) for path in paths]
     for name in names:
         if not any(case.name.startswith(name) for case in found):
             raise ValueError(f"there is no case {name!r}: `hedgebed experiments list` names those there are")
@@ -200,10 +197,8 @@ def standing(case: Case, results: Path, work: Path) -> tuple[str, str]:
 def do_case(case: Case, results: Path, work: Path, *, say: Callable[[str], None]) -> int:
     """Run it, or go on with it, and keep its result; the exit status of the run."""
     folder = work / case.name
-    if (folder / "run.toml").exists():
-        arguments = ["resume", str(folder)]
-    else:
-        arguments = ["tumble", str(case.path), "--out", str(folder)]
+    begun = (folder / "run.toml").exists()
+    arguments = ["resume", str(folder)] if begun else ["tumble", str(case.path), "--out", str(folder)]
     say(f"{case.name}: hedgebed {' '.join(arguments)}")
     work.mkdir(parents=True, exist_ok=True)
     status = subprocess.run(
@@ -226,10 +221,10 @@ def keep(folder: Path, target: Path) -> None:
         made = Path(beside) / target.name
         made.mkdir()
         for name in KEPT:
-            if name == "trajectory.csv":
-                _keep_thinned(folder / name, made / name)
-            else:
-                shutil.copyfile(folder / name, made / name)
+            shutil.copyfile(folder / name, made / name)
+        head, *rows = (made / "trajectory.csv").read_text(encoding="utf-8").splitlines()
+        thinned = [head, *rows[:: max(1, -(-len(rows) // MOST_ROWS))]]
+        (made / "trajectory.csv").write_text("\n".join(thinned) + "\n", encoding="utf-8")
         read_json(made / "result.json")
         cost = read_json(folder / "status.json")
         write_json(made / "cost.json", {name: cost.get(name) for name in ("processor_time", "updated")})
@@ -239,10 +234,3 @@ def keep(folder: Path, target: Path) -> None:
         (target / "result.json").unlink(missing_ok=True)
         for path in sorted(made.iterdir(), key=lambda path: path.name == "result.json"):
             path.replace(target / path.name)
-
-
-def _keep_thinned(source: Path, target: Path) -> None:
-    """At most MOST_ROWS rows, evenly; the head stays."""
-    head, *rows = source.read_text(encoding="utf-8").splitlines()
-    every = max(1, -(-len(rows) // MOST_ROWS))
-    target.write_text("\n".join([head, *rows[::every]]) + "\n", encoding="utf-8")
