@@ -184,10 +184,8 @@ class CalibrateSettings(StrictSettings):
         wanted = self.wanted
         fitted = [name for name, target in wanted.items() if target.fit]
         if len(fitted) < len(self.free):
-            raise ValueError(say(
-                "few_figures", count=len(fitted), fitted=", ".join(fitted) or "none", wanted=len(self.free),
-                free=", ".join(self.free),
-            ))  # fmt: skip
+            names, free = ", ".join(fitted) or "none", ", ".join(self.free)
+            raise ValueError(say("few_figures", count=len(fitted), fitted=names, wanted=len(self.free), free=free))
         if base.cohesion != "none" and len(self.pressures) < 2:
             raise ValueError("pressures holds one value: with cohesion at least two would do, for a line through them")
         if base.cohesion == "none" and (lost := [n for n in fitted if "cohesion" in wanted[n].figure]):
@@ -257,9 +255,8 @@ def _target(name: str, given: Json) -> Target:
     planes = _PLANES if "friction_angle" in kind else ("shear", "mohr") if "cohesion" in kind else ()
     if "plane" in given and given["plane"] not in planes:
         raise ValueError(say("plane", called=called, plane=given["plane"]))
-    if given.get("through", "tests") not in ("tests", "origin") or (
-        "through" in given and "friction_angle" not in kind
-    ):
+    of_angle = "friction_angle" in kind
+    if given.get("through", "tests") not in ("tests", "origin") or ("through" in given and not of_angle):
         raise ValueError(f"{called}.through = {given['through']!r} must be 'tests' or 'origin', of a friction angle")
     fit = given.get("fit", bool(figure.state))
     if not isinstance(fit, bool):
@@ -291,10 +288,9 @@ def _check_free(free: dict[str, tuple[float, float]], base: Material, fixed: Jso
         raise ValueError(f"free.{sticks[0]} needs a law: fixed.cohesion = 'dmt' or 'jkr' would do")
     if sticks and free[sticks[0]][0] <= 0:
         raise ValueError(f"free.{sticks[0]} begins at {free[sticks[0]][0]:g}: above 0 would do")
-    if "cohesion" in fixed and fixed["cohesion"] != "none" and not sticks and "surface_energy" not in fixed:
-        raise ValueError(
-            "fixed.cohesion without a surface energy: fixed.surface_energy or free.surface_energy would do"
-        )
+    if fixed.get("cohesion", "none") != "none" and not sticks and "surface_energy" not in fixed:
+        what = "fixed.surface_energy or free.surface_energy would do"
+        raise ValueError(f"fixed.cohesion without a surface energy: {what}")
 
 
 def material_at(settings: CalibrateSettings, values: dict[str, float]) -> Material:

@@ -269,9 +269,6 @@ def _number(value: Any, scale: float, signed: bool) -> str:
     return f"{scale * value:+.4g}" if signed and value else f"{scale * value:.4g}"
 
 
-run, resume = computed_run("compare", CompareSettings, _compute, check=check)
-
-
 Array = NDArray[np.float64]
 ALIKE = 2e-3
 """Runs whose ends are no further apart last equally long [s]."""
@@ -381,3 +378,6 @@ def _in_space(moved: MovedInSpace, result: Mapping[str, Any]) -> _Numbers:
     for name, others in goes_with.items():
         known.events |= dict.fromkeys((name, *others), when(name))
     return known
+
+
+run, resume = computed_run("compare", CompareSettings, _compute, check=check)

@@ -162,9 +162,6 @@ def _model_quantities(
     )
 
 
-run, resume = computed_run("hop", HopSettings, _compute, check=check)
-
-
 NEAR_ESCAPE = 0.5
 """From this share of the escape speed on escape is near: a quarter of the energy, and high enough a hop to see how
 gravity falls with height."""
@@ -252,3 +249,6 @@ def _on_ground(plan: HopPlan, left: Launch, flown: Flight | None, given: Surface
     if left.slid and other.slid and faster and abs(steeper) <= SAME_ANGLE:
         return compared + say("into_speed")
     return compared + (say("thrown_up") if not left.slid and steeper > SAME_ANGLE else ".")
+
+
+run, resume = computed_run("hop", HopSettings, _compute, check=check)

@@ -158,10 +158,9 @@ def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
     found = _hop(settings, means, high)
     assert found is not None
     if abs(missed(high)) > 1e-6 * distance:
-        shortest = found.flight.distance if found.flight else math.inf
-        if shortest == math.inf:
+        if found.flight is None:
             raise ValueError(say("next_escapes", distance=distance))
-        raise ValueError(say("too_short", distance=distance, shortest=shortest, where=where))
+        raise ValueError(say("too_short", distance=distance, shortest=found.flight.distance, where=where))
     return found
 
 

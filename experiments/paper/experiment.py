@@ -242,9 +242,6 @@ def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
     )
 
 
-run, resume = computed_run("paper", PaperSettings, _compute, check=check)
-
-
 GRAINS = ("sand", "jsc1a")
 SWEPT = ("inertia", "wheel_inertia", "stiffness", "damping", "wheel_speed_0")
 """Numbers that the paper does not give, halved and doubled."""
@@ -315,3 +312,6 @@ def _grains(trial: Trial, *, whole: bool) -> Iterator[Variant]:
         ground = Ground(name=name, parameters={"rebound": LITTLE}, spikes_per_row=SPIKES_PER_ROW)
         varied = {"law": name, "stiffness": None, "rebound": LITTLE}
         yield name, replace(trial, ground=ground), "grains", varied
+
+
+run, resume = computed_run("paper", PaperSettings, _compute, check=check)

@@ -139,11 +139,8 @@ class _Work:
 
         try:
             with held_back() as asked_to_stop:
-                series = stepper.run(
-                    on_step=on_step,
-                    on_frame=frames.write if frames else None,
-                    frame_interval=frames.interval if frames else None,
-                )
+                on_frame, interval = (frames.write, frames.interval) if frames else (None, None)
+                series = stepper.run(on_step=on_step, on_frame=on_frame, frame_interval=interval)
         except RuntimeError as error:  # the bed's: a NaN, a grain lost, an overlap past its bound
             folder.save_checkpoint(f"{unit.id}.failed", stepper.state())
             raise RuntimeError(say("failed", unit=unit, error=error, remedy=_remedy(error))) from error
@@ -161,17 +158,6 @@ def _remedy(error: RuntimeError) -> str:
     if "rest" in str(error) or "rain" in str(error):
         return "change gravity, bed_size or the seed"
     return "change time_step (shorter), young or the speeds"
-
-
-run, resume = whole_run(
-    "penetrate",
-    PenetrateSettings,
-    _carry_out,
-    check=check,
-    material_copy=MATERIAL_COPY,
-    code=lambda: beds.fingerprint(),
-    as_given=False,
-)
 
 
 class Frames:
@@ -195,12 +181,9 @@ class Frames:
         self.interval = max(wanted, stepper.macro_step) if settings.frame_count else None
         self.limit = 2 * max(1, settings.frame_count)
         self.fields = tuple(GRAIN_FIELDS)
-        if resumed:
-            # The frame of the very step of the checkpoint was written after it, if at all: it comes again.
-            half = 0.5 * stepper.macro_step
-            self.writer = FrameWriter(folder.path, name=unit.id, resume=True, keep_until=stepper.time - half)
-        else:
-            self.writer = FrameWriter(folder.path, name=unit.id)
+        # The frame of the very step of the checkpoint was written after it, if at all: it comes again.
+        until = stepper.time - 0.5 * stepper.macro_step if resumed else None
+        self.writer = FrameWriter(folder.path, name=unit.id, resume=resumed, keep_until=until)
         spike = stepper.spike
         self.points, self.triangles = spike_mesh(
             spike.tip, diameter=spike.diameter, length=spike.length, shaft_diameter=spike.shaft,
@@ -224,3 +207,9 @@ class Frames:
             {"spike": (self.points + np.array(stepper.position), self.triangles)},
             values={"depth": stepper.depth, "velocity": stepper.velocity, "force": stepper.last_force},
         )
+
+
+run, resume = whole_run(
+    "penetrate", PenetrateSettings, _carry_out, check=check, material_copy=MATERIAL_COPY,
+    code=lambda: beds.fingerprint(), as_given=False,
+)  # fmt: skip

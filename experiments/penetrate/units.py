@@ -58,20 +58,18 @@ def plan_units(settings: PenetrateSettings) -> list[Unit]:
     """All runs, seed by seed: everything on the first seed, what the settings say on the others."""
     units = []
     for index, seed in enumerate(settings.seeds):
-        speeds = settings.speeds if index == 0 else settings.other_speeds
-        drops = settings.drop_speeds if index == 0 else settings.other_drop_speeds
-        units += [Unit(seed, "driven", speed) for speed in speeds]
-        units += [Unit(seed, "drop", speed) for speed in drops]
+        first, others = (settings.speeds, settings.drop_speeds), (settings.other_speeds, settings.other_drop_speeds)
+        speeds, drops = first if index == 0 else others
+        units += [Unit(seed, "driven", speed) for speed in speeds] + [Unit(seed, "drop", speed) for speed in drops]
         units.append(Unit(seed, "set_down", settings.lowering_speed))
     return units
 
 
 def shown_units(units: Sequence[Unit]) -> set[str]:
     """Ids of the runs of which frames are kept: of the first seed the slowest drive, the fastest drop, the set-down."""
-    first = [unit for unit in units if unit.seed == units[0].seed]
-    driven = sorted((unit for unit in first if unit.kind == "driven"), key=lambda unit: unit.speed)
-    drops = sorted((unit for unit in first if unit.kind == "drop"), key=lambda unit: unit.speed)
-    set_down = [unit for unit in first if unit.kind == "set_down"]
+    first = sorted((unit for unit in units if unit.seed == units[0].seed), key=lambda unit: unit.speed)
+    kinds = ("driven", "drop", "set_down")
+    driven, drops, set_down = ([unit for unit in first if unit.kind == kind] for kind in kinds)
     return {unit.id for unit in driven[:1] + drops[-1:] + set_down[:1]}
 
 
@@ -162,18 +160,11 @@ class PenetratePlan:
     """The plan of one run; `bed_is_there` and `is_over` mend it. `step` is that of the grains [s]."""
 
     def __init__(
-        self,
-        settings: PenetrateSettings,
-        units: Sequence[Unit],
-        folder: RunFolder,
-        progress: Progress,
-        *,
-        step: float,
-        stiffness: float,
-    ) -> None:
+        self, settings: PenetrateSettings, units: Sequence[Unit], folder: RunFolder, progress: Progress,
+        *, step: float, stiffness: float,
+    ) -> None:  # fmt: skip
         self._settings, self._units, self._progress = settings, list(units), progress
-        self._step, self._stiffness = step, stiffness
-        self._shown = shown_units(units)
+        self._step, self._stiffness, self._shown = step, stiffness, shown_units(units)
         self._lasted: dict[tuple[str, float], list[float]] = {}
         left = [unit for unit in units if not folder.is_done(unit.id)]
         costs: dict[str, float] = {}
@@ -187,11 +178,8 @@ class PenetratePlan:
         frames = {unit.id: count for unit in units if unit.id in self._shown} if settings.frame_count else {}
         report = PictureCosts(frames, grains).seconds
         unit = GRAIN_STEP * grains * 2 / min(settings.threads or os.cpu_count() or 2, 8)
-        progress.plan(
-            costs,
-            seconds={"spring-damper": SPRING_DAMPER, "report": report},
-            unit=unit if settings.arch == "cpu" else None,
-        )
+        seconds = {"spring-damper": SPRING_DAMPER, "report": report}
+        progress.plan(costs, seconds=seconds, unit=unit if settings.arch == "cpu" else None)
 
     def expected_time(self, unit: Unit) -> float:
         """About how long the run of `unit` lasts on the bed's clock [s]: as on other seeds, where it was made."""

@@ -6,6 +6,7 @@ wheel comes to it gives no more torque.
 
 import math
 from collections.abc import Callable
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -66,12 +67,9 @@ def platform_numbers(name: str, *, file: Path | None = None, in_plane: bool = Tr
     """
     platform = find_platform(name if file is None else file)
     wheel, stance = platform.wheel(), platform.stance()
-    try:
-        count: int | None = _spike_count(name, platform)
-    except ValueError:
-        if in_plane:
-            raise
-        count = None
+    count: int | None = None
+    with nullcontext() if in_plane else suppress(ValueError):
+        count = _spike_count(name, platform)
     return PlatformNumbers(
         name=name,
         mass=platform.mass,
@@ -128,11 +126,9 @@ def _when(run: Trajectory, speed: float) -> float:
     first = max(last - 1, 0)
     changes = [(float(time), state) for time, state, _ in run.transitions if time < run.time[last]]
     state = next((state for time, state in reversed(changes) if time <= run.time[first]), "stand")
-    edges, touching = [float(run.time[first])], [state != "hop"]
-    for time, state in changes:
-        if time > run.time[first]:
-            edges.append(time)
-            touching.append(state != "hop")
+    later = [(time, state) for time, state in changes if time > run.time[first]]
+    edges = [float(run.time[first]), *(time for time, _ in later)]
+    touching = [one != "hop" for one in (state, *(after for _, after in later))]
     spans = np.diff([*edges, float(run.time[last])]) * touching
     gained = run.wheel_speed[last] - run.wheel_speed[first]
     left = (speed - run.wheel_speed[first]) / gained * float(spans.sum())

@@ -114,10 +114,7 @@ def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
     with refusing(), stdout_to_stderr():
         for case in cases(names):
             kept = results / case.name / "result.json"
-            if not kept.exists():
-                continue
-            falls = read_json(kept).get("footfalls")
-            if falls:
+            if kept.exists() and (falls := read_json(kept).get("footfalls")):
                 group = case.name.removesuffix(f"-seed{case.settings.seed}")
                 groups.setdefault(group, {})[case.name] = [Footfall(**fall) for fall in falls]
     for group, beds in groups.items():
