@@ -137,11 +137,9 @@ class BedSettings(StrictSettings):
     def graded(self) -> Graded | None:
         """Sizes by place, where the bed is graded. Raises ValueError for what cannot be, or is given by halves."""
         if self.coarse is None:
-            given = [name for name in GRADED if getattr(self, name) not in (None, ())]
-            if given:
-                raise ValueError(
-                    f"{', '.join(given)}: only of a graded bed; coarse = {2 * self.grain:g} would make one"
-                )
+            if given := [name for name in GRADED if getattr(self, name) not in (None, ())]:
+                would = f"coarse = {2 * self.grain:g} would make one"
+                raise ValueError(f"{', '.join(given)}: only of a graded bed; {would}")
             return None
         if self.distribution != "uniform":
             raise ValueError(say("graded_distribution", s=self))

@@ -110,21 +110,15 @@ def _relative(first: float, second: float) -> float | None:
 def _whose(labels: Sequence[str], said: Sequence[Sequence[str]]) -> list[str]:
     """What is said of each run, by its label; what is said of both stands once."""
     both = [sentence for sentence in said[0] if sentence in said[1]]
-    alone = [
-        f"{label}: {sentence}"
-        for label, sentences in zip(labels, said, strict=True)
-        for sentence in sentences
-        if sentence not in both
+    pairs = [(label, sentence) for label, own in zip(labels, said, strict=True) for sentence in own]
+    return [
+        *(f"both: {sentence}" for sentence in both),
+        *(f"{label}: {sentence}" for label, sentence in pairs if sentence not in both),
     ]
-    return [f"both: {sentence}" for sentence in both] + alone
 
 
 def _add_motion(
-    result: Json,
-    runs: tuple[RunFolder, RunFolder],
-    results: list[Json],
-    labels: tuple[str, str],
-    folder: RunFolder,
+    result: Json, runs: Sequence[RunFolder], results: list[Json], labels: tuple[str, str], folder: RunFolder
 ) -> None:
     """series/compared.csv, the gaps between both as quantities, and sentences."""
     module: Any = compare_spatial if result["kind"] == IN_SPACE else compare_tumbles
@@ -252,9 +246,9 @@ def _table(title: str, labels: tuple[str, str], rows: list[Json], *, differences
     """For the terminal: angles in degrees."""
     shown = []
     for row in rows:
-        scale, unit = (
-            (180 / math.pi, "degrees") if row["unit"] == "rad" else (1.0, row["unit"] if row["unit"] != "1" else "")
-        )
+        scale, unit = 1.0, row["unit"] if row["unit"] != "1" else ""
+        if unit == "rad":
+            scale, unit = 180 / math.pi, "degrees"
         numbers = [_number(row[key], scale, False) for key in ("first", "second")]
         if differences:
             relative = f"{100 * row['relative']:+.3g} %" if row["relative"] is not None else ""
@@ -294,18 +288,16 @@ def numbers_until(
     known = _in_space(moved, result) if isinstance(moved, MovedInSpace) else _in_the_plane(moved, result)
     path = folder / "series" / "bed.csv"
     bed = read_series(path) if path.exists() else {}
-    known.final |= {
-        f"dissipated_{name}": (bed["t_s"], bed[f"{name}_lost_J"]) for name in LOST if f"{name}_lost_J" in bed
-    }
+    lost = {f"dissipated_{name}": f"{name}_lost_J" for name in LOST}
+    known.final |= {name: (bed["t_s"], bed[column]) for name, column in lost.items() if column in bed}
     found: dict[str, float | None] = {}
     if float(moved.time[-1]) <= end + ALIKE:
         names = (*known.largest, "time_of_max_speed", *known.final, *known.events)
         return {name: own[name] for name in names if name in own}
     for name, (time, values) in known.largest.items():
-        if name not in own:
-            continue
-        within = float(time[int(np.argmax(values))]) <= end
-        found[name] = own[name] if within else float(values[time <= end].max())
+        if name in own:
+            within = float(time[int(np.argmax(values))]) <= end
+            found[name] = own[name] if within else float(values[time <= end].max())
     if "max_speed" in known.largest and "time_of_max_speed" in own:
         time, values = known.largest["max_speed"]
         at = float(time[int(np.argmax(np.where(time <= end, values, -1.0)))])
@@ -320,12 +312,8 @@ def numbers_until(
 def sinkage_of(moved: Moved) -> dict[str, Json]:
     """`sinkage_start` and `sinkage_largest` as a tumble on grains has them, of a run whose result lacks them."""
     stood, deepest = float(moved.sinkage[0, [0, -1]].mean()), float(moved.sinkage.max())
-    return quantities_of(
-        {
-            "sinkage_start": (stood, "m", "of the two rows it stands on, mean, when the torque begins"),
-            "sinkage_largest": (deepest, "m", "of any row"),
-        }
-    )
+    of_two = "of the two rows it stands on, mean, when the torque begins"
+    return quantities_of({"sinkage_start": (stood, "m", of_two), "sinkage_largest": (deepest, "m", "of any row")})
 
 
 def _in_the_plane(moved: Moved, result: Mapping[str, Any]) -> _Numbers:
@@ -340,9 +328,8 @@ def _in_the_plane(moved: Moved, result: Mapping[str, Any]) -> _Numbers:
     gone = np.flatnonzero(away >= LAUNCH_DISTANCE)
     known.events["trajectory_angle"] = float(time[gone[0]]) if len(gone) else None
     for state in ("slip", "hop"):
-        known.events[f"transition_angle_{state}"] = next(
-            (float(entry["time"]) for entry in result["transitions"] if entry["state"] == state), None
-        )
+        times = (float(entry["time"]) for entry in result["transitions"] if entry["state"] == state)
+        known.events[f"transition_angle_{state}"] = next(times, None)
     return known
 
 

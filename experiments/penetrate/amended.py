@@ -179,14 +179,9 @@ class AmendedLaw:
         """One lane of the law, shape [1, slot_count]. Below `creep` times `speed` [m/s] friction lets go."""
         settings, (stiffness, damping) = self.settings, self.pair
         table = slot_table(1, self.own)
-        values = {
-            "mass": settings.mass,
-            "gravity": settings.weight / settings.mass,
-            "stiffness": stiffness,
-            "damping": damping,
-            "speed_scale": creep * speed,
-            "radius_depth": max(settings.tip_height, 1e-4 * settings.tip_diameter),
-        }
+        values = {"mass": settings.mass, "gravity": settings.weight / settings.mass, "speed_scale": creep * speed}
+        values |= {"stiffness": stiffness, "damping": damping}
+        values["radius_depth"] = max(settings.tip_height, 1e-4 * settings.tip_diameter)
         for name, value in (values | dict(self.slots)).items():
             table[0, _SLOT[name]] = value
         places = slot_places(self.own)
@@ -291,7 +286,7 @@ def run_beside(
         "force_gap_spring_damper": (plain, "1", note),
         "force_gap_amended": (amended, "1", f"the same with {law.words}"),
         "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
-        "work_returned_amended": (_returned(driven, runs), "1", "work of the way out over work in, driven"),
+        "work_returned_amended": (_returned(units, runs), "1", "work of the way out over work in, driven"),
     }
     known = plain is not None and amended is not None
     sentences = [say("off_by", law=law, amended=100 * amended, plain=100 * plain)] if known else []  # type: ignore[operator]
@@ -315,7 +310,6 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             folder.write_series(unit.id, plain[unit.id].columns())
             folder.write_series(f"{unit.id}.amended", runs[unit.id].columns())
             progress.update(done)
-        driven = [unit.id for unit in units if unit.kind == "driven"]
         stiffness, damping = law.pair
         found: dict[str, tuple[float | None, str, str]] = {
             "stiffness": (stiffness, "N/m", "of the model"),
@@ -323,8 +317,8 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             "load": (settings.weight, "N", "on the spike, set down and dropped"),
             "sinkage_spring_damper": (_rest(units, plain), "m", "depth at rest under the load"),
             "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
-            "work_returned_spring_damper": (_returned(driven, plain), "1", "work out over work in, driven"),
-            "work_returned_amended": (_returned(driven, runs), "1", f"the same with {law.words}"),
+            "work_returned_spring_damper": (_returned(units, plain), "1", "work out over work in, driven"),
+            "work_returned_amended": (_returned(units, runs), "1", f"the same with {law.words}"),
         }
         falls = f"; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N" if settings.drop_speeds else ""
         spike = say("model_spike", s=settings, tip_mm=1e3 * settings.tip_diameter, falls=falls)
@@ -366,8 +360,8 @@ def _rest(units: Sequence[Unit], runs: Runs) -> float | None:
     return mean_of([runs[unit.id].resting_depth for unit in units if unit.kind == "set_down"])
 
 
-def _returned(driven: Sequence[str], runs: Runs) -> float | None:
-    return mean_of([returned_work(runs[name]) for name in driven])
+def _returned(units: Sequence[Unit], runs: Runs) -> float | None:
+    return mean_of([returned_work(runs[unit.id]) for unit in units if unit.kind == "driven"])
 
 
 def _gap(driven: Sequence[str], beds: Runs, others: Runs) -> float | None:

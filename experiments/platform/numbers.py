@@ -42,21 +42,16 @@ class PlatformNumbers:
     lean: float  # angle from the vertical of the line from the leading tips to the centre, at rest [rad]
     spike_count: int | None  # rows of tips at equal angles; None where they are not
     wheel_inertia: float
-    motor_torque: float
+    max_motor_torque: float
     brake_torque: float
     max_wheel_speed: float
     spike_diameter: float  # of shafts and ball tips [m]; 0 where it has no spikes
     spike_clear: float  # how far a spike stands out of the hull, along itself [m]; 0 where it has none
 
     @property
-    def max_motor_torque(self) -> float:
-        """What the motor gives at most [N m], by the name of the setting."""
-        return self.motor_torque
-
-    @property
     def brake_words(self) -> str:
         """What slows the platform's wheel: a platform file without a brake_torque lets the motor do it."""
-        own = self.brake_torque > self.motor_torque or math.isinf(self.brake_torque)
+        own = self.brake_torque > self.max_motor_torque or math.isinf(self.brake_torque)
         return "the brake" if own else "the motor"
 
 
@@ -78,7 +73,7 @@ def platform_numbers(name: str, *, file: Path | None = None, in_plane: bool = Tr
         lean=stance.lean,
         spike_count=count,
         wheel_inertia=wheel.inertia,
-        motor_torque=wheel.motor_torque,
+        max_motor_torque=wheel.motor_torque,
         brake_torque=wheel.brake_torque,
         max_wheel_speed=wheel.max_speed,
         spike_diameter=2 * platform.tip_radius,

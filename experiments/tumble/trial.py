@@ -101,8 +101,8 @@ def plan_tumble(
     check_spike_length(numbers)
     surface, warnings = numbers.settle_surface(settings.surface, model=model)
     _settle_gravity(settings, model, numbers)
-    weak = platform.motor_torque < TORQUE
-    torque, origin = (platform.motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
+    weak = platform.max_motor_torque < TORQUE
+    torque, origin = (platform.max_motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
     if settings.drop_speed is not None:
         torque, origin = 0.0, "a landing"
     numbers.settle("torque", torque, origin)
