@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dem.measure.penetrometer import SHAFT, check_cone, cone_gradient, push_cone
 from experiments.runs.types import Json
 
 from .settings import say
@@ -22,8 +23,6 @@ _COARSE, _NARROW = 5.0, 5.0
 
 def check(settings: BedConeSettings) -> None:
     """Raise ValueError for a bed that is none or not level, and a cone that cannot go into it."""
-    from dem.measure.penetrometer import check_cone
-
     bed = check_bed(settings)
     check_cone(
         size=bed.size, surface=bed.surface, grain=bed.grain, diameter=settings.diameter, angle=settings.angle,
@@ -37,8 +36,6 @@ def place_of(push: int, size: tuple[float, ...]) -> tuple[float, float]:
 
 
 def _test(settings: BedConeSettings, bed: Any, about: Json, push: int, tell: Callable[[float], None]) -> Tested:
-    from dem.measure.penetrometer import SHAFT, cone_gradient, push_cone
-
     if settings.max_overlap is not None:
         bed.overlap_limit = settings.max_overlap
     found = push_cone(

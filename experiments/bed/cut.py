@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from dem.measure.cutting import LEAST, check_width, cohesion_of, cut_and_load
 from experiments.runs.types import Json
 
 from .test_settings import BedCutSettings
@@ -19,15 +20,11 @@ _ANGLES = (25.0, 30.0, 35.0, 40.0, 45.0)
 
 def check(settings: BedCutSettings) -> None:
     """Raise ValueError for a bed that is none or not level, or too narrow for a cut with two faces."""
-    from dem.measure.cutting import check_width
-
     bed = check_bed(settings)
     check_width(settings.width, width=bed.size[0], height=bed.surface, grain=bed.grain)
 
 
 def _test(settings: BedCutSettings, bed: Any, _about: Json, _: int, tell: Callable[[float], None]) -> Tested:
-    from dem.measure.cutting import cut_and_load
-
     found = cut_and_load(bed, width=settings.width, most=settings.most, tell=tell)
     columns = {"x_m": found.after[0], "thickness_m": found.after[1]}
     if found.before is not None:
@@ -45,8 +42,6 @@ def _test(settings: BedCutSettings, bed: Any, _about: Json, _: int, tell: Callab
 
 
 def _result(settings: BedCutSettings, runs: list[Json]) -> Json:
-    from dem.measure.cutting import LEAST, cohesion_of
-
     of, friction_angle, most = partial(quantity, runs), settings.friction_angle, settings.most
 
     def cohesion(run: Json, angle: float, key: str = "critical_height") -> float | None:

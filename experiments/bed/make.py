@@ -1,5 +1,6 @@
 """`hedgebed bed make`: a bed prepared as in a laboratory, in a run folder with a report of every stage."""
 
+from dem.contact.timestep import time_step_for
 from dem.grains.materials import Material, material
 from dem.prepare.prepare import check_options, fingerprint, soft_enough
 from experiments.grains.graded import grading_told
@@ -19,8 +20,6 @@ __all__ = ["check", "fingerprint", "resume", "run"]
 
 def check(settings: BedSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
-    from dem.contact.timestep import time_step_for
-
     check_name(settings.name)
     check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
     graded, local = settings.graded, settings.local

@@ -6,9 +6,11 @@ Its stages are those of the bed, then the packing fraction that the bed had; a c
 from dataclasses import replace
 
 from dem.grains.graded import Graded
-from dem.grains.materials import Material
+from dem.grains.materials import Facing, Material
 from dem.grains.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
 from dem.prepare.bedfile import find_bed, read_preparation
+from dem.prepare.prepare import check_options
+from dem.prepare.recipe import check_stages, parse_stage
 from dem.prepare.report import Prepared
 from experiments.grains.graded import grading_told
 from experiments.grains.sizes import KEPT, in_grains_of
@@ -62,8 +64,6 @@ def refined_options(settings: BedRefineSettings) -> tuple[Json, Prepared]:
         "threads": settings.threads,
     } | {key: recipe[key] for key in ("gravity", "max_overlap", "precision", "arch")}
     if recipe["floor"] is not None:
-        from dem.grains.materials import Facing
-
         options["floor"] = Facing(**recipe["floor"])
     return options, coarse
 
@@ -85,9 +85,6 @@ def _scaled(sizes: Sizes | Graded, share: float) -> Sizes | Graded:
 
 def check(settings: BedRefineSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what cannot be refined, or not on this machine."""
-    from dem.prepare.prepare import check_options
-    from dem.prepare.recipe import check_stages, parse_stage
-
     check_name(settings.name)
     options, _ = refined_options(settings)
     sizes: Sizes | Graded = options["grain"]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from dem.measure.repose import angle_of_repose, check_width
 from experiments.runs.types import Json
 
 from .test_settings import BedReposeSettings
@@ -19,15 +20,11 @@ _SHORT = 6.0
 
 def check(settings: BedReposeSettings) -> None:
     """Raise ValueError for a bed that is none, not level, or too narrow for two slopes."""
-    from dem.measure.repose import check_width
-
     bed = check_bed(settings)
     check_width(bed.size[0], slot=settings.slot, grain=bed.grain, depth=bed.surface)
 
 
 def _test(settings: BedReposeSettings, bed: Any, about: Json, _: int, tell: Callable[[float], None]) -> Tested:
-    from dem.measure.repose import angle_of_repose
-
     found = angle_of_repose(bed, slot=settings.slot, tell=tell)
     short = min(flank.end - flank.start for flank in found.flanks) < _SHORT * about["grain"]
     said = f"a slope was fitted over less than {_SHORT:g} diameters: a wider or a deeper bed tells it better"

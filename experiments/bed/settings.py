@@ -6,6 +6,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from dem.grains.graded import Graded
+from dem.grains.materials import material
 from dem.grains.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
 from dem.prepare.recipe import check_stages, parse_stage
 from experiments.grains.sizes import Distribution, Kept
@@ -96,8 +97,6 @@ class BedSettings(StrictSettings):
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:
-        from dem.grains.materials import material
-
         local = self.local
         if (graded := self.graded) is not None:
             graded.check(self.size)

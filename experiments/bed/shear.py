@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dem import Bed
+from dem.engine.state import read_file
 from dem.grains.materials import caveat
 from dem.measure.shearing import Shearing, shear_bed
 from dem.prepare.bedfile import find_bed
@@ -88,8 +89,6 @@ def fit_line(normal: np.ndarray, shear: np.ndarray) -> tuple[float, float, float
 
 def check(settings: BedShearSettings) -> None:
     """Raise ValueError for what is no bed, or one that does not lie level."""
-    from dem.engine.state import read_file
-
     stored, _, _ = read_file(find_bed(settings.bed))
     if stored.gravity[0] or stored.gravity[1]:
         raise ValueError(f"bed = {settings.bed!r} is tilted: a level one would do")

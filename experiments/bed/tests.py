@@ -8,8 +8,14 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from dem.grains.materials import Material, caveat
-from dem.prepare.bedfile import find_bed
+from dem import Bed
+from dem.contact.timestep import choose_young
+from dem.engine.state import read_file
+from dem.grains.materials import Material, caveat, material
+from dem.grains.packing import rain_column
+from dem.grains.sizes import Uniform
+from dem.prepare.bedfile import find_bed, read_preparation
+from dem.prepare.prepare import bound_of_mean, check_options
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.kept_material import keep_material
 from experiments.penetrate.fit import spread
@@ -40,11 +46,6 @@ class Extent:
 
 def check_bed(settings: BedTestSettings) -> Extent:
     """How large the bed is. Raises ValueError for no bed, one that is tilted or cut, or one that cannot be prepared."""
-    from dem.engine.state import read_file
-    from dem.grains.materials import material
-    from dem.prepare.bedfile import read_preparation
-    from dem.prepare.prepare import check_options
-
     if settings.bed is None:
         material(settings.material)
         check_options(settings.size, settings.grain, settings.gravity, 1, 0.05)
@@ -67,11 +68,6 @@ def stiff_enough(
 
     Depth of the bed and mean diameter in m, spread of the diameters over their mean, gravity in m/s2.
     """
-    from dem.contact.timestep import choose_young
-    from dem.grains.packing import rain_column
-    from dem.grains.sizes import Uniform
-    from dem.prepare.prepare import bound_of_mean
-
     sizes = Uniform(grain, spread)
     return choose_young(
         stuff,
@@ -84,9 +80,6 @@ def stiff_enough(
 
 def _beds(settings: BedTestSettings, bearing: float | None) -> Iterator[tuple[str, Callable[[Progress | None], Any]]]:
     """Name of each bed, and what makes it, anew whenever it is called; told where to show how far it is."""
-    from dem import Bed
-    from dem.grains.materials import material
-
     if settings.bed is not None:
         given = settings.bed
         yield "bed", lambda progress: Bed.load_prepared(find_bed(given), threads=settings.threads).bed

@@ -19,6 +19,7 @@ import numpy as np
 
 from dem import BedFailure
 from dem.grains.materials import Material
+from dem.measure.repose import check_width
 from dem.prepare.prepare import fingerprint
 from experiments.grains.bed_progress import Stages
 from experiments.grains.kept_material import BASE_COPY, keep_material
@@ -42,8 +43,6 @@ _SEEDS = 1000
 def check(settings: CalibrateSettings) -> None:
     """Raise ValueError for ranges with which no material can be, and a bed too narrow for an angle of repose."""
     if any(target.state == "drained" for target in settings.wanted.values()):
-        from dem.measure.repose import check_width
-
         length, _, depth = (settings.grain * side for side in settings.repose_size)
         try:
             check_width(length, slot=None, grain=settings.grain, depth=depth)

@@ -19,8 +19,10 @@ from typing import Any
 
 import numpy as np
 
+from dem import Bed
 from dem.grains.materials import Material
 from dem.measure.element import ElementShear, shear_element
+from dem.measure.repose import angle_of_repose
 from experiments.bed.repose import BEARING
 from experiments.bed.tests import picked, stiff_enough
 from experiments.runs.types import Json
@@ -96,9 +98,6 @@ class _Preparing:
 
 def _drain(stuff: Material, test: SampleTest, settings: CalibrateSettings, tell: Tell) -> Kept:
     """The angle of repose of one bed as rained, as ``hedgebed bed test repose`` has it."""
-    from dem import Bed
-    from dem.measure.repose import angle_of_repose
-
     length, width, depth = (settings.grain * side for side in settings.repose_size)
     sizes = {"grain": settings.grain, "spread": settings.spread}
     bed = Bed.prepare(
@@ -237,8 +236,6 @@ def laboratory_figure(
     ``progress``: anything with ``stage`` and ``update``, as ``dem.prepare.prepare.prepare_as`` takes it. Raises
     BedFailure where the bed did not come to rest, ValueError for a bed that cannot be.
     """
-    from dem import Bed
-
     stages = ["rain", "compact:densest" if name.endswith("_dense") else "fluff"]
     prepared = Bed.prepare_as(
         stuff, stages=stages, size=settings.bed_size, grain=settings.grain, spread=settings.spread,

@@ -3,6 +3,11 @@
 import math
 from typing import Any
 
+from dem import Bed
+from dem.contact.timestep import time_step_for
+from dem.grains.materials import material
+from dem.prepare import prepare
+from dem.prepare.bedfile import find_bed
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material
 from experiments.runs.progress import Progress
@@ -16,22 +21,16 @@ __all__ = ["bed_step", "choose_softness", "expected_stiffness", "find_material",
 
 def find_material(settings: PenetrateSettings) -> Any:
     """The grain material, for grains of this size. Raises ValueError naming those there are."""
-    from dem.grains.materials import material
-
     return material(settings.material, grain=settings.grain)
 
 
 def fingerprint() -> str:
     """A digest of the code that computes beds: other code may give other bits."""
-    from dem.prepare.prepare import fingerprint as of_dem
-
-    return of_dem()
+    return prepare.fingerprint()
 
 
 def bed_step(settings: PenetrateSettings, young: float) -> float:
     """The step that the bed will take [s]. Raises ValueError for one that is set and too long."""
-    from dem.contact.timestep import time_step_for
-
     return time_step_for(
         find_material(settings).softened(young),
         diameter=settings.grain * (1 - settings.spread),
@@ -42,11 +41,7 @@ def bed_step(settings: PenetrateSettings, young: float) -> float:
 
 def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: Progress) -> Any:
     """The bed of one seed: the one that is given, or prepared, or from the cache."""
-    from dem import Bed
-
     if settings.bed is not None:
-        from dem.prepare.bedfile import find_bed
-
         return Bed.load(find_bed(settings.bed), arch=settings.arch, threads=settings.threads)
     with held_back() as asked_to_stop:
         return Bed.prepare(
@@ -60,10 +55,8 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
 
 def choose_softness(settings: PenetrateSettings) -> Softening:
     """The modulus of the grains for these runs (see `experiments.grains.softening`), or the one that is set."""
-    material = find_material(settings)
-    bulk = 0.6 * material.density
+    material, stiffness = find_material(settings), expected_stiffness(settings)
     area = math.pi * settings.tip_diameter**2 / 4
-    stiffness = bearing_gradient(bulk, settings.gravity, material.friction) * area
     fastest, speed = settings.fastest
     drops = [
         drop_depth(speed, settings.mass, settings.weight, stiffness)
