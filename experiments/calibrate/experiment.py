@@ -178,13 +178,10 @@ def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progres
 
 
 def _mean(values: list[tuple[float, float]]) -> tuple[float, float]:
-    """Mean over seeds and its standard error: of their scatter, and no less than what the tests tell of themselves."""
-    count = len(values)
-    own = math.sqrt(sum(error**2 for _, error in values)) / count
-    if count == 1:
-        return values[0][0], own
-    found = np.array([value for value, _ in values])
-    return float(found.mean()), max(own, float(found.std(ddof=1)) / math.sqrt(count))
+    """Mean over seeds and its standard error: of their scatter, and no less than those of the tests themselves."""
+    count, found = len(values), np.array([value for value, _ in values])
+    scatter = float(found.std(ddof=1)) / math.sqrt(count) if count > 1 else 0.0
+    return float(found.mean()), max(math.sqrt(sum(error**2 for _, error in values)) / count, scatter)
 
 
 class _Hidden(Stages):
@@ -199,7 +196,7 @@ class _Hidden(Stages):
 
 
 def _of_bed(work: _Work, target: Target, stuff: Material) -> tuple[float, float | None] | None:
-    """A figure of a laboratory bed, or None where the bed cannot be made, which is told."""
+    """A figure of a laboratory bed, without a standard error; None, with a message, where the bed cannot be made."""
     # Packing and bulk density are those of one bed.
     about = f"bed-{target.figure.replace('bulk_density', 'packing')}"
     share = stuff.density if target.figure.startswith("bulk_density") else 1.0
@@ -211,15 +208,14 @@ def _of_bed(work: _Work, target: Target, stuff: Material) -> tuple[float, float 
         name, seed = about.removeprefix("bed-"), work.settings.check_seeds[0]
         kept = {"material": numbers, "value": None, "error": None, "reason": ""}
         try:
-            value, error = laboratory_figure(name, stuff, work.settings, seed=seed, progress=hidden)
-            kept |= {"value": value, "error": error}
+            kept["value"] = laboratory_figure(name, stuff, work.settings, seed=seed, progress=hidden)
         except (BedFailure, ValueError) as failure:
             kept["reason"] = str(failure)
         work.folder.mark_done(about, kept)
     if kept["value"] is None:
         work.progress.message(f"{target.name} could not be measured: {kept['reason']}")
         return None
-    return share * kept["value"], None if kept["error"] is None else share * kept["error"]
+    return share * kept["value"], None
 
 
 run, resume = whole_run("bed calibrate", CalibrateSettings, _carry_out, check=check, material_copy=BASE_COPY)

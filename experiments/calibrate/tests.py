@@ -228,10 +228,8 @@ def _line(
     return float(level @ shear), float(along @ shear), start_error, slope_error
 
 
-def laboratory_figure(
-    name: str, stuff: Material, settings: CalibrateSettings, *, seed: int, progress: Any
-) -> tuple[float, float | None]:
-    """A figure of a bed prepared as in a laboratory: its value and, where it tells one, its standard error.
+def laboratory_figure(name: str, stuff: Material, settings: CalibrateSettings, *, seed: int, progress: Any) -> float:
+    """A figure of a bed prepared as in a laboratory.
 
     ``progress``: anything with ``stage`` and ``update``, as ``dem.prepare.prepare.prepare_as`` takes it. Raises
     BedFailure where the bed did not come to rest, ValueError for a bed that cannot be.
@@ -242,4 +240,4 @@ def laboratory_figure(
         gravity=settings.gravity, seed=seed, threads=settings.threads, progress=progress,
     )  # fmt: skip
     packing = prepared.reports[-1].packing_fraction
-    return (packing if name.startswith("packing") else packing * stuff.density), None
+    return packing if name.startswith("packing") else packing * stuff.density

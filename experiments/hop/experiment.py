@@ -24,7 +24,7 @@ from .on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial, whee
 from .search import Hop, find_hop, longest_flight
 from .settings import HopSettings, say
 
-__all__ = ["NEAR_ESCAPE", "check", "resume", "run", "sentences", "warnings"]
+__all__ = ["NEAR_ESCAPE", "check", "resume", "run"]
 
 
 def check(settings: HopSettings) -> None:
@@ -103,8 +103,8 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "distance": quantity(flown.distance if flown else None, "m", lands or say("of_distance")),
         "escape_speed": quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
         "escape_ratio": quantity(left.speed / escape if escape else None, "1", say("of_escape")),
-    } | _model_quantities(plan, left, flown, given, escape)
-    said = sentences(plan, left, flown, given, torque=torque, speed=speed, by_brake=by_brake, sought=sought)
+    } | _model_quantities(plan, hop, given, escape)
+    said = _sentences(plan, hop, given, speed=speed, by_brake=by_brake, sought=sought)
     asked = {"distance": f"of {plan.distance or 0:g} m", "wheel_speed": f"from {settings.wheel_speed_0 or 0:g} rad/s"}
     asked["torque"] = f"by {settings.torque or 0:g} N m"
     answer = ""
@@ -131,14 +131,13 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
             "max_wheel_speed": wheel.max_speed,
             "sources": dict(plan.platform.sources),
         },
-        warnings=[*plan.warnings, *warnings(plan, left, flown, given, escape)],
+        warnings=[*plan.warnings, *_warnings(plan, hop, given, escape)],
     )
 
 
-def _model_quantities(
-    plan: HopPlan, left: Launch, flown: Flight | None, given: SurfaceHop | None, escape: float | None
-) -> dict[str, Json]:
+def _model_quantities(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> dict[str, Json]:
     """What the planar model makes of the same wheel and torque, and how many times theory's that is."""
+    left, flown = hop.launch, hop.flight
     other = given.launch if given is not None else None
     flight_of = given.flight if given is not None else None
     no = "it does not leave the ground" if other is None else "it escapes" if flight_of is None else ""
@@ -170,19 +169,14 @@ ALIKE = 0.05
 SAME_ANGLE = math.radians(1.0)
 
 
-def sentences(
-    plan: HopPlan,
-    left: Launch,
-    flown: Flight | None,
-    given: SurfaceHop | None,
-    *,
-    torque: float,
-    speed: float,
-    by_brake: bool,
-    sought: float | None = None,
+def _sentences(
+    plan: HopPlan, hop: Hop, given: SurfaceHop | None, *, speed: float, by_brake: bool, sought: float | None
 ) -> list[str]:
-    """The findings; `sought` is the wheel speed [rad/s] for the distance on ground that gives."""
-    tumbler = plan.tumbler
+    """The findings: theory on rigid ground, the planar model on ground that gives.
+
+    `speed` [rad/s] is the wheel's, `sought` [rad/s] that for the distance on ground that gives.
+    """
+    tumbler, left, flown, torque = plan.tumbler, hop.launch, hop.flight, hop.torque
     turning = f"{speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm)"
     by = "" if plan.brake == "the brake" else " by the motor"
     friction_sets_it = left.slid and math.isclose(math.tan(left.angle) * tumbler.sliding_friction, 1, rel_tol=0.02)
@@ -198,7 +192,7 @@ def sentences(
     ]  # fmt: skip
     if by_brake and left.time < plan.wheel.inertia * speed / torque * (1 - 1e-9):
         said.append(say("leaves_early"))
-    said.append(_on_ground(plan, left, flown, given))
+    said.append(_on_ground(plan, hop, given))
     if by_brake and plan.distance is not None and sought is None and given is not None:
         most = "" if math.isinf(plan.wheel.max_speed) else f" up to {plan.wheel.max_speed:g} rad/s"
         said.append(say("no_wheel_speed", most=most, plan=plan))
@@ -207,11 +201,9 @@ def sentences(
     return said
 
 
-def warnings(
-    plan: HopPlan, left: Launch, flown: Flight | None, given: SurfaceHop | None, escape: float | None
-) -> list[str]:
+def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> list[str]:
     """How far off rigid ground is, and how near escape the faster of the two launches is."""
-    found = []
+    found, left, flown = [], hop.launch, hop.flight
     other = given.launch if given is not None else None
     if given is None:
         found.append(say("taken_as_rigid", plan=plan))
@@ -233,11 +225,11 @@ def warnings(
     return found
 
 
-def _on_ground(plan: HopPlan, left: Launch, flown: Flight | None, given: SurfaceHop | None) -> str:
+def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None) -> str:
     """Theory and model side by side, and why they differ, as far as the numbers say so."""
     if given is None:
         return say("rigid_alone")
-    other, flight = given.launch, given.flight
+    left, flown, other, flight = hop.launch, hop.flight, given.launch, given.flight
     if other is None:
         return say("stays", plan=plan)
     goes = "escapes" if flight is None else say("goes", flight=flight)

@@ -8,6 +8,7 @@ round one; an angle is judged by the five degrees within which the paper calls m
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any
 
 from experiments.runs.types import Json
@@ -50,7 +51,10 @@ def claims(settings: PaperSettings, cases: Sequence[Json], jobs: Sequence[Any]) 
     low, rigs, brakes = min(settings.motor_torques), settings.rigs, settings.brake_torques
     found: list[Claim | None] = []
     if "brick" in settings.surfaces:
-        found += [_starts(table, rig, low) for rig in rigs]
+        for rig in rigs:
+            statement = say("starts", where=say("where", surface="brick", rig=rig, torque=low))
+            chord = say("chord") if table["brick", rig, low, "nominal"]["trajectory_angle"] is not None else ""
+            found.append(_angle(table, statement, "brick", rig, low, 22.5, chord))
     for surface in (name for name in HARD if name in settings.surfaces):
         found += [_grows(settings, table, surface, rig) for rig in rigs]
         found += [_grows_to(table, trials, surface, rigs[0], torque) for torque in brakes]
@@ -109,16 +113,10 @@ def _angle(table: Cases, statement: str, surface: str, rig: float, torque: float
     )  # fmt: skip
 
 
-def _starts(table: Cases, rig: float, torque: float) -> Claim:
-    statement = say("starts", where=say("where", surface="brick", rig=rig, torque=torque))
-    chord = say("chord") if table["brick", rig, torque, "nominal"]["trajectory_angle"] is not None else ""
-    return _angle(table, statement, "brick", rig, torque, 22.5, chord)
-
-
 def _varied(table: Cases, surface: str, rig: float, torque: float, kind: str) -> list[Case]:
     """The cases of one gravity, torque and surface in which something was varied."""
-    found = [case for (*where, _), case in table.items() if where == [surface, rig, torque]]
-    return [case for case in found if case["kind"] == kind]
+    here = [surface, rig, torque]
+    return [case for (*where, _), case in table.items() if where == here and case["kind"] == kind]
 
 
 def _grows_to(table: Cases, trials: Trials, surface: str, rig: float, torque: float) -> Claim:
@@ -198,12 +196,9 @@ def _pivots_first(table: Cases, trials: Trials, rig: float, torque: float) -> Cl
 
 def first_lasting(case: Case) -> str:
     """The first state in which the platform moves for `LASTING` or longer; stand if there is none."""
-    transitions = case["transitions"]
-    ends = [time for time, _, _ in transitions[1:]] + [math.inf]
-    for (begin, state, _), end in zip(transitions, ends, strict=True):
-        if state != "stand" and end - begin >= LASTING:
-            return str(state)
-    return "stand"
+    spells = pairwise([*case["transitions"], (math.inf, "", 0.0)])
+    lasting = (state for (begin, state, _), (end, *_) in spells if state != "stand" and end - begin >= LASTING)
+    return str(next(lasting, "stand"))
 
 
 def _negative(table: Cases, surface: str, rig: float, torque: float) -> Claim:
