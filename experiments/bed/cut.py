@@ -15,7 +15,7 @@ from .tests import Tested, bed_test, check_bed, of_beds, picked, quantity, table
 __all__ = ["check", "resume", "run"]
 
 _ANGLES = (25.0, 30.0, 35.0, 40.0, 45.0)
-"""Friction angles for which the table tells a cohesion [degrees]."""
+"""Friction angles for which the table has a cohesion [degrees]."""
 
 
 def check(settings: BedCutSettings) -> None:

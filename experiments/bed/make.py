@@ -19,7 +19,7 @@ __all__ = ["check", "fingerprint", "resume", "run"]
 
 
 def check(settings: BedSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
+    """Raise ValueError, naming key, value and what is allowed, for what machine or material cannot serve."""
     check_name(settings.name)
     check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
     graded, local = settings.graded, settings.local

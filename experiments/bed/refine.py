@@ -84,7 +84,7 @@ def _scaled(sizes: Sizes | Graded, share: float) -> Sizes | Graded:
 
 
 def check(settings: BedRefineSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for what cannot be refined, or not on this machine."""
+    """Raise ValueError, naming key, value and what is allowed, for what cannot be refined, or not on this machine."""
     check_name(settings.name)
     options, _ = refined_options(settings)
     sizes: Sizes | Graded = options["grain"]

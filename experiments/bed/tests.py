@@ -79,7 +79,7 @@ def stiff_enough(
 
 
 def _beds(settings: BedTestSettings, bearing: float | None) -> Iterator[tuple[str, Callable[[Progress | None], Any]]]:
-    """Name of each bed, and what makes it, anew whenever it is called; told where to show how far it is."""
+    """Name of each bed, and what makes it, anew whenever it is called, with a progress to report to."""
     if settings.bed is not None:
         given = settings.bed
         yield "bed", lambda progress: Bed.load_prepared(find_bed(given), threads=settings.threads).bed
@@ -185,7 +185,7 @@ def picked(found: Any, *names: str) -> Run:
 
 
 def _about(bed: Any) -> Run:
-    """What every run says of its bed before the test."""
+    """What every run reports about its bed before the test."""
     return {
         "grain": 2 * float(bed.grains().radius.mean()),
         **picked(bed, "grain_count", "packing_fraction", "surface", "size"),
@@ -230,7 +230,7 @@ def of_beds(runs: Sequence[Run], count: str) -> Json:
 
 
 def table(title: str, rows: Iterable[Any], columns: Mapping[str, Callable[[Any], str]]) -> Json:
-    """A table of a result: by its heading, what each column says of a row."""
+    """A table of a result; `columns`: heading to the text of a row."""
     return {"title": title, "head": list(columns), "rows": [[said(row) for said in columns.values()] for row in rows]}
 
 

@@ -133,7 +133,7 @@ _STAGE: dict[str, Callable[[StageReport], str]] = {
     "energy [m g d]": lambda report: f"{report.kinetic_energy:.1e}",
     "floor / weight": lambda report: f"{report.floor_share:.4f}",
 }
-"""What the table of stages says of each."""
+"""Columns of the table of stages."""
 
 
 def _warnings(prepared: Prepared) -> list[str]:

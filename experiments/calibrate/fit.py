@@ -3,7 +3,7 @@
 Each observable's response y(x) over the parameters, x scaled to 0..1, is a Gaussian process about a straight trend
 (universal kriging; Rasmussen & Williams 2006, sections 2.2, 2.7 and 5.4):
     y_i = b0 + b x_i + f(x_i) + noise,  cov f = s^2 exp(-|(x - x') / l|^2 / 2),  noise of variance e_i^2 + n^2,
-e_i the standard error that a test tells of itself and n what seeds scatter beyond that. s, l and n are those of the
+e_i the standard error that a test reports and n the scatter of seeds beyond that. s, l and n are those of the
 largest restricted likelihood, with wide priors, as a handful of points says little about them; b has none.
 
 The fit weighs every point of the parameters' box by exp(-chi^2 / 2), chi^2 = sum (y - target)^2 / (tolerance^2 +
@@ -33,7 +33,7 @@ class Response:
     """The response of one observable to the parameters, learnt from simulations.
 
     Attributes:
-        scatter: n, the standard deviation between seeds beyond what the tests tell of themselves, in the observable's
+        scatter: n, the standard deviation between seeds beyond the errors that the tests report, in the observable's
             unit. length: l [of the range], shape [parameter_count].
     """
 
@@ -196,7 +196,7 @@ def find_best(responses: Surfaces, wanted: Goals, ranges: Ranges) -> Fit:
 def next_point(
     responses: Surfaces, wanted: Goals, ranges: Ranges, done: np.ndarray, *, enough: float
 ) -> np.ndarray | None:
-    """Where one more simulation tells most, in units, shape [parameter_count]; None where no more is needed.
+    """Where one more simulation informs most, in units, shape [parameter_count]; None where no more is needed.
 
     It is where the weight times the largest standard deviation, over the tolerance, is greatest. Enough is known once
     that ratio is below ``enough`` at the best point for every figure that is fitted.

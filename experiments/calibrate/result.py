@@ -88,7 +88,7 @@ def calibration_result(
 
 
 def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float] | None) -> Json:
-    """What the result says of one figure: wanted, measured, and what the response surface expects."""
+    """The result's entry of one figure: wanted, measured, and what the response surface expects."""
     got, error = found if found is not None else (None, None)
     off = math.inf if got is None else abs(got - target.value)
     verdict = "met within the tests' noise" if off <= target.tolerance + 2 * (error or 0.0) else "not met"
@@ -196,7 +196,7 @@ _FIGURES: dict[str, Callable[[Json], str]] = {
     "verdict": lambda entry: entry["verdict"],
     "source": lambda entry: entry["source"],
 }
-"""What the table of figures says of each."""
+"""Columns of the table of figures."""
 
 
 def _point_table(settings: CalibrateSettings, done: Simulated) -> Json:

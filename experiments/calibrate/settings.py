@@ -58,14 +58,14 @@ class Target:
     Attributes:
         value, tolerance: in the figure's unit; the tolerance counts as a standard deviation.
         source: where it comes from.
-        figure: which of ``FIGURES`` it is: its name, if nothing else is said.
+        figure: which of ``FIGURES`` it is; its name if not given.
         plane: of a friction angle: "shear", stresses on the plane of shear as a shear box or a ring shear tester reads
             them, "triaxial", the angle of triaxial compression, or "mohr", Mohr's circle of the largest and least
             stress. Of a cohesion "shear" or "mohr", as a vertical cut has it.
         state: in which the sample is sheared: "loose" or "dense"; "drained" of an angle of repose.
         fit: whether the parameters are fitted to it, or it is only compared at the end.
         through: of a friction angle: "tests", a straight line through the tests of all pressures, or "origin", one
-            through the origin as well, as a laboratory has it that tells an angle and no cohesion.
+            through the origin as well, as a laboratory has it that reports an angle and no cohesion.
     """
 
     name: str
@@ -222,7 +222,7 @@ class CalibrateSettings(StrictSettings):
 
     @property
     def wanted(self) -> dict[str, Target]:
-        """The targets by name. Raises ValueError for one that will not do."""
+        """The targets by name. Raises ValueError for a bad one."""
         return {name: _target(name, given) for name, given in self.targets.items()}
 
 
@@ -294,7 +294,7 @@ def _check_free(free: dict[str, tuple[float, float]], base: Material, fixed: Jso
 
 
 def material_at(settings: CalibrateSettings, values: dict[str, float]) -> Material:
-    """The material with these values of what is free; its surface energy is said to hold for the settings' grain."""
+    """The material with these values of what is free; its surface energy holds for the settings' grain."""
     base = settings.base
     numbers = {f.name: getattr(base, f.name) for f in fields(base)} | {"grain": settings.grain}
     for key, value in values.items():

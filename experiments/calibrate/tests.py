@@ -177,7 +177,7 @@ def figures_of(
 ) -> dict[str, tuple[float, float]]:
     """Value and standard error of the targets' figures, from the tests of one set of parameters and one seed.
 
-    The error is what the tests tell of themselves; that of a peak is taken to be that of its test at large strain.
+    The error is what the tests report; that of a peak is taken to be that of its test at large strain.
     """
     found = {}
     for target in targets:

@@ -1,4 +1,4 @@
-"""``hedgebed doctor``: what this machine has, and what to install where something lacks."""
+"""``hedgebed doctor``: what this machine has, and what to install where something is missing."""
 
 import json
 import os
@@ -27,7 +27,7 @@ GIB = 2**30
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: whether it is there, whether nothing runs without it, and what to do if it is not."""
+    """One thing examined: whether it is there, whether nothing runs without it, and what to do if it is not."""
 
     name: str
     ok: bool

@@ -44,7 +44,7 @@ MOST_RELATIVE = 10.0
 
 
 def check(settings: CompareSettings) -> None:
-    """Raise ValueError, naming the folder and what would do, for runs that cannot be compared."""
+    """Raise ValueError, naming the folder and what is allowed, for runs that cannot be compared."""
     first, second = (_finished(path) for path in settings.runs)
     if first.path.resolve() == second.path.resolve():
         raise ValueError(say("same_run", runs=settings.runs))
@@ -108,7 +108,7 @@ def _relative(first: float, second: float) -> float | None:
 
 
 def _whose(labels: Sequence[str], said: Sequence[Sequence[str]]) -> list[str]:
-    """What is said of each run, by its label; what is said of both stands once."""
+    """Warnings of each run, by its label; those of both once."""
     both = [sentence for sentence in said[0] if sentence in said[1]]
     pairs = [(label, sentence) for label, own in zip(labels, said, strict=True) for sentence in own]
     return [
@@ -310,7 +310,7 @@ def numbers_until(
 
 
 def sinkage_of(moved: Moved) -> dict[str, Json]:
-    """`sinkage_start` and `sinkage_largest` as a tumble on grains has them, of a run whose result lacks them."""
+    """`sinkage_start` and `sinkage_largest` as a tumble on grains has them, of a run whose result has none."""
     stood, deepest = float(moved.sinkage[0, [0, -1]].mean()), float(moved.sinkage.max())
     of_two = "of the two rows it stands on, mean, when the torque begins"
     return quantities_of({"sinkage_start": (stood, "m", of_two), "sinkage_largest": (deepest, "m", "of any row")})

@@ -28,7 +28,7 @@ __all__ = ["NEAR_ESCAPE", "check", "resume", "run"]
 
 
 def check(settings: HopSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for a platform there is not or a hop that cannot be."""
+    """Raise ValueError, naming key, value and what is allowed, for an unknown platform or a hop that cannot be."""
     plan, hop = find_hop(settings)
     trial = _trial(settings, plan, hop)
     if trial is not None:

@@ -21,7 +21,7 @@ __all__ = ["HopPlan", "plan_hop"]
 
 @dataclass(frozen=True, kw_only=True)
 class HopPlan:
-    """The platform and the ground of a hop, and what is said of them."""
+    """The platform and the ground of a hop, with warnings."""
 
     platform: Platform
     wheel: Flywheel
@@ -42,14 +42,14 @@ class HopPlan:
         return f"{self.surface} (K = {self.stiffness:g} N/m, C = {self.damping:g} N s/m a row)"
 
     def sentences(self) -> list[str]:
-        """One line for each number and choice that was not given: every default is said."""
+        """One line for each number and choice that was not given: every default is reported."""
         return defaults_said(self.choices, self.numbers)
 
 
 def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPlan:
     """The numbers that `settings` stand for; `platform_file` stands in for ``settings.platform``, where copied.
 
-    Raises ValueError, naming the setting, for a platform or surface there is not, and numbers that cannot be.
+    Raises ValueError, naming the setting, for an unknown platform or surface, and numbers that cannot be.
     """
     platform = find_platform(platform_file or settings.platform)
     of_platform = platform_numbers(settings.platform, file=platform_file, in_plane=False)

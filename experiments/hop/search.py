@@ -165,7 +165,7 @@ def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
 
 
 def _on_surface(settings: HopSettings, plan: HopPlan, means: _Means) -> str:
-    """What the planar model says of a distance that rigid ground does not allow."""
+    """How the planar model answers a distance that rigid ground does not allow."""
     by_brake, distance = settings.actuator == "brake", plan.distance
     assert distance is not None
     if plan.spike_count is None:

@@ -13,7 +13,7 @@ __all__ = ["DEFAULT_DISTANCE", "HopSettings"]
 say = Sentences(__package__)
 
 DEFAULT_DISTANCE = 5.0
-"""Of a hop that is told neither distance nor wheel speed nor torque of a motor [m]."""
+"""Of a hop that is given neither distance nor wheel speed nor torque of a motor [m]."""
 
 
 class _Question(StrictSettings):

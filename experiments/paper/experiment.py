@@ -66,7 +66,7 @@ class Job:
 
 
 def check(settings: PaperSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    """Raise ValueError, naming key, value and what is allowed, for what the settings class cannot see."""
     for job in plan_jobs(settings):
         if job.variant == "paper":  # a step too long for the ground
             simulate(job.trial, duration=1e-3, method="paper")
@@ -251,7 +251,7 @@ SLIDING = (0.6, 0.8, 1.0)
 TORQUE_RISE, RISE = Path(__file__).parents[1] / "terms" / "torque_rise.py", 0.1
 """A term, and its time constant [s]: what a step of the torque hides."""
 MEMORY_LAW, LITTLE = "katsuragi-durian", 0.05
-"""A law whose stiffness and rebound can be set apart, and its own rebound [1]: it gives back next to nothing."""
+"""A law whose stiffness and rebound can be set apart, and its own rebound [1]: it returns next to nothing."""
 HALF = 0.5
 """The most that `rebound` can be."""
 OTHER_LAWS = ("bekker", "rft")

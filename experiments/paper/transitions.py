@@ -60,7 +60,7 @@ def measured_angles(
 ) -> dict[tuple[str, float, str], float]:
     """Angles [degrees] by (surface, torque, state), from `SURFACE-TORQUE-STATE=DEGREES`.
 
-    Raises ValueError, naming the entry and what would do, for one of another form, of no such trial, or given twice.
+    Raises ValueError, naming the entry and what is allowed, for one of another form, of no such trial, or given twice.
     """
     found: dict[tuple[str, float, str], float] = {}
     for entry in entries:

@@ -113,7 +113,7 @@ def rate_change(by_bed: Sequence[Sequence[Penetration]], fit: Fit) -> Json | Non
 
 
 def _mean_drag(run: Penetration, fit: Fit, above: float = 0.0, to: float = np.inf) -> tuple[float, float] | None:
-    """Mean force of bed and law over the way in, in a band of depth [m] [N]; None where there is none."""
+    """Mean force of bed and law during loading, in a band of depth [m] [N]; None where there is none."""
     rows = fit_rows(run) & (run.depth > above) & (run.depth <= to)
     if not rows.any():
         return None
@@ -121,7 +121,7 @@ def _mean_drag(run: Penetration, fit: Fit, above: float = 0.0, to: float = np.in
 
 
 def depth_exponent(driven: Sequence[Penetration]) -> dict[float, tuple[float, float | None, int]]:
-    """Exponent n of F ~ z^n on the way in, per speed: mean over the beds, standard deviation between them, how many.
+    """Exponent n of F ~ z^n during loading, per speed: mean over the beds, standard deviation between them, how many.
 
     A straight line through log F against log z of each run, from the deeper three quarters: mean forces of 12 equal
     bands. Runs in which fewer than four bands push back are left out.

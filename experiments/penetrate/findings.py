@@ -1,4 +1,4 @@
-"""From finished runs to the result: fits, the same runs on the spring-damper, departures, and what is said of the bed.
+"""From finished runs to the result: fits, the same runs on the spring-damper, departures, and facts about the bed.
 
 Spread between seeds is that of the runs which every seed has (same kind, same speed), each seed fitted by itself; the
 value is fitted to all runs of all seeds. A quantity that no second seed has gets the std null, one that is exact 0.
@@ -30,7 +30,7 @@ Runs = Mapping[str, Penetration]
 
 @dataclass(frozen=True)
 class BedFacts:
-    """What the result says of one bed, taken before the first run; SI units."""
+    """What the result reports about one bed, taken before the first run; SI units."""
 
     seed: int
     grain_count: int
@@ -196,7 +196,7 @@ class Findings:
 
 
 def returned_work(run: Penetration) -> float | None:
-    """Share of the work put in that the way out returns [1]; None where none was put in."""
+    """Share of the work of loading that unloading returns [1]; None without such work."""
     return run.work_out / run.work_in if run.work_in > 0 else None
 
 
@@ -220,7 +220,7 @@ def bed_entry(facts: Sequence[BedFacts], settings: PenetrateSettings, softening:
 
 
 def bed_quantities(facts: Sequence[BedFacts], overlap: float | None) -> dict[str, Json]:
-    """Numbers of the beds, means over seeds; what is exact gets the std 0, what one bed does not tell null."""
+    """Numbers of the beds, means over seeds; what is exact gets the std 0, what is unknown null."""
     found: dict[str, Json] = {}
     for name, unit, note in (
         ("grain_count", "1", ""),

@@ -1,6 +1,6 @@
 """Fits the spring-damper to runs in a bed: F = K z + C max(0, dz/dt) for z > 0, with K and C not below zero.
 
-Least squares on the measured force at the measured depth and speed. Driven runs count on their way in, drops up to
+Least squares on the measured force at the measured depth and speed. Driven runs count while loading, drops up to
 their first stop; set-downs, rests and pull-outs do not count. Inside a run every macro step weighs the same (equal
 times, which at constant speed is equal depths), and every run weighs the same whatever its length:
     minimise  sum over runs of  mean over its rows of  (F - K z - C max(0, dz/dt))^2.
@@ -91,7 +91,7 @@ def moments_of(run: Penetration) -> Moments | None:
 
 
 def fit_spring_damper(runs: Mapping[str, Penetration], weights: Mapping[str, float] | None = None) -> Fit:
-    """Fit K and C to `runs` (id -> run), each of weight 1 or as given. Raises ValueError where no run has a way in."""
+    """Fit K and C to `runs` (id -> run), each of weight 1 or as given. Raises ValueError where no run has a loading."""
     found = {name: moments_of(run) for name, run in runs.items()}
     return fit_moments({name: part for name, part in found.items() if part is not None}, weights)
 
@@ -116,7 +116,7 @@ def fit_moments(runs: Mapping[str, Moments], weights: Mapping[str, float] | None
 
 
 def drag_gap(runs: Sequence[Penetration], fit: Fit, weights: Sequence[float] | None = None) -> float | None:
-    """Rms difference of law and bed over the rms drag of the bed, way in of driven runs [1].
+    """Rms difference of law and bed over the rms drag of the bed, loading of driven runs [1].
 
     Every run weighs the same unless `weights` says otherwise. None where there is no driven run.
     """

@@ -22,7 +22,7 @@ MOST_STEPS = 1e9
 
 
 def check(settings: PenetrateSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for what this machine or the material cannot serve."""
+    """Raise ValueError, naming key, value and what is allowed, for what machine or material cannot serve."""
     if settings.model is not None:
         read_law(settings.model, settings)
     if settings.campaign is not None:

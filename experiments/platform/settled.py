@@ -98,9 +98,9 @@ class Settled(dict[str, Number]):
             self.settle(name, getattr(platform, name) if known else math.inf, origin)
 
     def settle_surface(self, surface: str | None, *, model: Any = None) -> tuple[str, list[str]]:
-        """Settle K, C and friction; return the material's name and what has to be said of it. `model`: a `TumbleModel`.
+        """Settle K, C and friction; return the material's name and warnings about it. `model`: a `TumbleModel`.
 
-        Raises ValueError for a surface there is not, and for more sliding than static friction.
+        Raises ValueError for an unknown surface, and for more sliding than static friction.
         """
         material: Any
         warnings: list[str] = []
@@ -145,7 +145,7 @@ class Settled(dict[str, Number]):
 
 
 def defaults_said(choices: Mapping[str, str], numbers: Mapping[str, Number]) -> list[str]:
-    """One line for each choice at its default and each number that was not given: every default is said."""
+    """One line for each choice at its default and each number that was not given: every default is reported."""
     lines = [f"{name} = {value} (default)" for name, value in choices.items()]
     for name, number in numbers.items():
         if number.origin != "given":
@@ -160,7 +160,7 @@ def _said(name: str, number: Number) -> str:
 
 
 def of_other_spikes(numbers: Mapping[str, Number], surface: str, *, diameter: float, whose: str) -> list[str]:
-    """What has to be said where K or C is the surface's and was found with other spikes than these [m]; 0: none."""
+    """A warning where K or C is the surface's and was found with other spikes than these [m]; 0: none."""
     taken = [name for name in ("stiffness", "damping") if numbers[name].origin.startswith("surface ")]
     own = find_surface(surface).spike if taken else None
     if own is None or math.isclose(diameter, own, rel_tol=1e-6):
@@ -173,7 +173,7 @@ def of_other_spikes(numbers: Mapping[str, Number], surface: str, *, diameter: fl
 def of_earth(
     numbers: Mapping[str, Number], surface: str, *, weight: float, mass: float, counterweight: float
 ) -> list[str]:
-    """What has to be said in flight where K is the surface's, found in grains at 1 g; `weight` in N, masses in kg."""
+    """A warning in flight where K is the surface's, found in grains at 1 g; `weight` in N, masses in kg."""
     own = find_surface(surface)
     gravity = weight / mass
     if counterweight > 0 or own.grains is None or gravity > 0.5 * STANDARD_GRAVITY or gravity == 0:
@@ -198,7 +198,7 @@ LONGEST_SPIKE = 100.0
 of its radii out of it; millimetres for metres make a thousand times as much."""
 LARGEST = {"spike_diameter": 1.0, "spike_clear": 2.0, "grain": 1.0, "coarse": 1.0, "bed_size": 100.0}
 """Of spikes, grains and their bed, over the distance from the centre to a tip [1]. What is too large by less than that,
-as a grain larger than its spike, is refused elsewhere, by what would do."""
+as a grain larger than its spike, is refused elsewhere, with what is allowed."""
 
 
 def check_spike_length(numbers: Mapping[str, Number]) -> None:

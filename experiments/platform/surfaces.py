@@ -11,7 +11,7 @@ __all__ = ["DEFAULT_SURFACE", "Surface", "find_surface", "surface_names"]
 
 FILE = Path(__file__).parent / "surfaces.toml"
 DEFAULT_SURFACE = "brick"
-"""The surface of every command that is told none: of the paper's two hard ones the rougher, as rock is, and that
+"""The surface of every command that is given none: of the paper's two hard ones the rougher, as rock is, and that
 on which most of what the paper states comes out (docs/tumble.md)."""
 
 

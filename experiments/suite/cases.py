@@ -29,7 +29,7 @@ RATES = ((2.8e3, 3.8e6), (2e4, 9.52e6), (1e5, 7.09e6))
 """Grain-steps a second, with rolling, by the count of grains computed: docs/performance.md, 2026-11-21, a quiet machine
 with 2 cores; the first from `grains3-row-seed1` (2,800 awake of 84,772), where one core does as well as two."""
 BOOK = 1.19
-"""Time of a step with the book of what grains lose over one without (docs/coupling.md, 2026-11-22)."""
+"""Time of a step with the balance of what grains lose over one without (docs/coupling.md, 2026-11-22)."""
 MACRO_STEP = 5e-3
 """Of the coupling beyond the grains, a macro step [s] (docs/coupling.md, 2026-11-21)."""
 SET_DOWN = 0.4 * 0.05
