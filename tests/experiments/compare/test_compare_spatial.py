@@ -100,7 +100,7 @@ def test_grains_and_spring_damper_stand_side_by_side_in_curves_and_flat_pictures
     monkeypatch.setenv("HEDGEBED_NO_OPENGL", "1")
     out = tmp_path / "both"
     result = compared(runs, out, "bed", "law")
-    assert result["title"] == "bed of sand and spring-damper" and result["kind"] == "tumble spatial"
+    assert {"sand", "spring-damper"} <= {*result["title"].split()} and result["kind"] == "tumble spatial"
     assert any("the attitudes are" in sentence for sentence in result["departures"]["sentences"])
     differs = {row["key"] for row in result["differs"]}
     assert {"ground", "substeps"} <= differs and not {"grain", "seed", "bed_size"} & differs
@@ -128,7 +128,7 @@ def test_a_run_without_frames_has_its_curves_compared_and_says_why_there_is_no_p
     shutil.copytree(runs / "moved", bare)
     shutil.rmtree(bare / "frames")
     compared(runs, tmp_path / "out", "law", str(bare))
-    assert "bare kept no frames (frame_count = 0)" in (tmp_path / "out" / "report.html").read_text()
+    assert "(frame_count = 0)" in (tmp_path / "out" / "report.html").read_text()
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 
 import pytest
+from golden import golden
 
 from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.hop.numbers import plan_hop
@@ -62,7 +63,7 @@ def test_the_wheel_speed_takes_the_hedgehog_the_distance(tmp_path, capsys):
 def test_without_a_radius_it_says_that_it_cannot_tell(result_of):
     result = result_of("--distance", "5")
     assert result["quantities"]["escape_speed"]["value"] is None
-    assert any("cannot be told without body_radius" in warning for warning in result["warnings"])
+    golden("hop/without_a_radius", result["warnings"])
 
 
 def test_near_escape_it_says_so_with_the_share(tmp_path, capsys):
@@ -71,11 +72,9 @@ def test_near_escape_it_says_so_with_the_share(tmp_path, capsys):
     value = {key: quantity["value"] for key, quantity in result["quantities"].items()}
     assert 0.5 < value["escape_ratio"] < 1 < value["model_escape_ratio"]
     assert value["model_distance"] is None
-    said = f"it escapes: {value['model_launch_speed']:.4g} m/s on brick"
-    assert any(
-        said in warning and f"{100 * value['model_escape_ratio']:.3g} % of the escape speed" in warning
-        for warning in result["warnings"]
-    )
+    golden("hop/near_escape", result["warnings"])
+    speed, share = f"{value['model_launch_speed']:.4g}", f"{100 * value['model_escape_ratio']:.3g}"
+    assert any(speed in warning and share in warning for warning in result["warnings"])
 
 
 def test_escape_is_near_from_half_its_speed_on(result_of):
@@ -116,8 +115,7 @@ def test_springy_ground_throws_a_sliding_platform_faster_at_the_same_angle(resul
     there = hop_on_surface(slower, expected_time=0.02, longest=1.0, radius=300.0)
     assert there.flight.distance == pytest.approx(5.0, rel=1e-4)
     assert value["model_wheel_speed"] < 0.7 * value["wheel_speed"]
-    assert any("sliding tips keep the angle" in sentence for sentence in result["departures"]["sentences"])
-    assert any("times the distance" in warning for warning in result["warnings"])
+    golden("hop/springy_ground", result["departures"]["sentences"] + result["warnings"])
 
 
 def test_springy_ground_throws_tips_that_hold_up_more_steeply(tmp_path, capsys):
@@ -134,7 +132,7 @@ def test_soft_ground_has_no_wheel_speed_for_what_it_cannot_throw(result_of):
     result = result_of("--surface", "sand", "--distance", "5")
     assert result["quantities"]["distance_factor"]["value"] < 0.4
     assert result["quantities"]["model_wheel_speed"]["value"] is None
-    assert any("No wheel speed up to 1050 rad/s" in sentence for sentence in result["departures"]["sentences"])
+    golden("hop/soft_ground", [result["title"], *result["departures"]["sentences"]])
 
 
 def test_ground_that_hardly_gives_and_gives_nothing_back_is_rigid_ground(tmp_path, capsys):
@@ -191,10 +189,10 @@ def test_the_report_stands_on_its_own(tmp_path, capsys, reported):
 def test_a_motor_slows_the_wheel_where_there_is_no_brake_and_unequal_sides_have_no_model(tmp_path, capsys, reported):
     """mascot.toml has no brake_torque: its motor's 0.1 N m slow the wheel."""
     status, error = hop(tmp_path, capsys, "--platform", "mascot", "--distance", "500")
-    assert status == BAD_INPUT and "the motor's 0.1 N m, slowing a wheel" in error and "brake" not in error
+    assert status == BAD_INPUT and "brake" not in error
     status, result = hop(tmp_path, capsys, "--platform", "mascot", "--distance", "0.01")
     assert status == DONE
-    assert "with 0.1 N m by the motor," in result["departures"]["sentences"][0]
+    golden("hop/slowed_by_its_motor", [" ".join(error.split()), *result["departures"]["sentences"]])
     assert result["quantities"]["model_distance"]["value"] is None
     assert any("MASCOT has not" in warning for warning in result["warnings"])
     assert (tmp_path / "run" / "report.html").exists()
@@ -205,11 +203,7 @@ def test_what_is_said_reads_well(result_of):
     brake = result_of("--distance", "5")
     motor = result_of("--actuator", "motor", "--distance", "0.5")
     first = [result["departures"]["sentences"][0] for result in (brake, motor)]
-    assert re.fullmatch(
-        r"Braking a wheel at \S+ rad/s \(\S+ rpm\) with 6 N m, the platform slides off rigid ground at \S+ m/s, .*",
-        first[0],
-    )
-    assert re.fullmatch(r"A motor at \S+ N m, whose wheel comes to \S+ rad/s \(\S+ rpm\), the platform .*", first[1])
+    golden("hop/first_sentences", first)
 
 
 def test_the_wheel_speeds_of_both_grounds_stand_side_by_side_and_say_which_is_which(result_of):
@@ -217,11 +211,9 @@ def test_the_wheel_speeds_of_both_grounds_stand_side_by_side_and_say_which_is_wh
     rigid, gives = (result["quantities"][name] for name in ("wheel_speed", "model_wheel_speed"))
     assert list(result["quantities"])[:2] == ["wheel_speed", "model_wheel_speed"]
     assert "rigid ground" in rigid["note"] and "on brick" in gives["note"]
-    assert result["title"].endswith(
-        f"by a wheel at {rigid['value']:.4g} rad/s from rigid ground, {gives['value']:.4g} from brick"
-    )
-    result = result_of("--surface", "sand", "--distance", "5")
-    assert result["title"].endswith("from rigid ground, none from sand")
+    assert all(f"{speed['value']:.4g}" in result["title"] for speed in (rigid, gives))
+    soft = result_of("--surface", "sand", "--distance", "5")
+    golden("hop/titles", [result["title"], soft["title"]])
 
 
 def test_a_brake_beyond_the_platforms_own_is_said_as_a_tumble_says_it_and_not_of_another_wheel():
@@ -233,14 +225,14 @@ def test_a_brake_beyond_the_platforms_own_is_said_as_a_tumble_says_it_and_not_of
     for plan in (plan_hop(HopSettings(**brake)), plan_tumble(TumbleSettings(**brake))):
         assert not any("beyond" in warning for warning in plan.warnings)
     slowed = plan_hop(HopSettings(torque=0.2, platform="mascot")).warnings
-    assert "torque = 0.2 N m is beyond the motor of mascot, 0.1 N m" in slowed
+    golden("hop/beyond_its_motor", slowed)
 
 
 def test_a_value_that_was_given_is_no_default_though_it_equals_it():
     for settings, origin in ((HopSettings(), "default"), (HopSettings(gravity=1e-3, actuator="brake"), "given")):
         plan = plan_hop(settings)
         assert plan.numbers["gravity"].value == 1e-3 and plan.numbers["gravity"].origin == origin
-        assert ("actuator = brake (default)" in plan.sentences()) == (origin == "default")
+        assert any(line.startswith("actuator =") for line in plan.sentences()) == (origin == "default")
 
 
 # Asked by what the flywheel does
@@ -295,9 +287,7 @@ def test_a_body_of_ones_own_takes_the_closed_forms_wheel_speed(tmp_path, capsys)
 def test_a_distance_too_far_says_what_each_ground_allows(tmp_path, capsys):
     """Between the two limits the wheel speed for the ground that gives is named, and goes there."""
     _, error = hop(tmp_path, capsys, "--distance", "5000")
-    assert re.search(
-        r"on rigid ground .* hops \S+ m at most .*; on brick .* the planar model hops \S+ m at most", error
-    )
+    golden("hop/too_far", " ".join(error.split()))
     _, error = hop(tmp_path, capsys, "--distance", "40")
     speed = re.search(r"goes that far with a wheel at (\S+) rad/s: --wheel-speed-0", error)[1]
     _, result = hop(tmp_path, capsys, "--wheel-speed-0", speed)

@@ -42,7 +42,6 @@ def test_what_the_bed_pushes_with_at_its_surface_is_said_where_it_matters(tmp_pa
     found = penetrate.run(settings, tmp_path / "out")
     assert found["quantities"]["surface_force"]["value"] == pytest.approx(0.2)
     said = found["departures"]["surface"]
-    assert "0.20 N, 50 %" in said
     golden("penetrate/surface_force", said)
     assert said in found["departures"]["sentences"]
 

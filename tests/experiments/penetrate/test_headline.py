@@ -5,6 +5,8 @@ import os
 import shutil
 from pathlib import Path
 
+from golden import golden
+
 from experiments.cli.main import main
 from experiments.penetrate.headline import penetrate_headline
 
@@ -41,7 +43,7 @@ def test_warnings_are_never_left_out_and_a_reference_is_one_sentence():
     headline = penetrate_headline(result)
     assert headline.warnings == tuple(result["warnings"])
     assert len(headline.sentences) == 2
-    assert headline.sentences[-1] == "Against the reference, K +10 %, C +10 %, the sinkage +10 %."
+    golden("penetrate/headline_reference", headline.sentences[-1])
     assert headline.left >= found - 2
     assert penetrate_headline({"quantities": {"stiffness": {"value": 1.0}}}) is None  # without a bed
 
