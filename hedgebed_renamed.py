@@ -70,12 +70,12 @@ _MODULES = {
             "runfolder=folder stopping strict whole_runs"
         ),
         "experiments.spatial": (
-            "spatial_frames=frames spatial_result=result spatial_settings=settings spatial_trial=trial"
+            "spatial_frames=result spatial_result=result spatial_settings=settings spatial_trial=trial"
         ),
         "experiments.suite": "suite_commands=commands suite_cost=cost",
         "experiments.tumble": (
             "campaign_settings footfalls sweep_ranges synthesis tumble_coupled=coupled tumble_grains=on_grains "
-            "tumble_grains_frames=on_grains_frames tumble_grains_result=on_grains_result tumble_opening=opening "
+            "tumble_grains_frames=on_grains_result tumble_grains_result=on_grains_result tumble_opening=opening "
             "tumble_recorded=recorded tumble_settings=settings tumble_steppers=steppers tumble_sweep=sweep "
             "tumble_tables=campaign_tables tumble_trial=trial tumble_words=words"
         ),

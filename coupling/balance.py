@@ -175,6 +175,23 @@ class EnergyBalance:
             worst = max(worst, float(np.abs(balance[at] + gap).max()))
         return worst / self.energy_scale
 
+    @property
+    def balance_numbers(self) -> dict[str, tuple[float, str]]:
+        """Numbers of the balance that a result quotes, each the largest: name -> value and unit.
+
+        The residual of body and exchange, and of the exchange alone, over `energy_scale`; what the ground made, by how
+        much the momenta of all are off, and what a bed lost by the end.
+        """
+        gap, errors = self.columns["given"] - self.columns["taken"], self.samples
+        return {
+            "coupling_residual": (float(np.abs(self.balance).max()) / self.energy_scale, "1"),
+            "exchange_residual": (float(np.abs(gap - gap[0]).max()) / self.energy_scale, "1"),
+            "dissipation_reversal": (self.dissipation_reversal, "1"),
+            "momentum_residual": (float(errors["momentum_error"].max()), "N s"),
+            "angular_momentum_residual": (float(errors["angular_momentum_error"].max()), "N m s"),
+            **{f"dissipated_{name}": (float(lost[-1]), "J") for name, lost in self.losses.items()},
+        }
+
     def _balance_state(self) -> State:
         return {
             "books.samples": self._sample_table,

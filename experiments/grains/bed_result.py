@@ -10,7 +10,7 @@ from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import write_series
 from experiments.runs.types import Json
 
-from .sentences import say
+from . import say
 from .settings import GrainsSettings
 from .softening import Softening, stable_overlap
 

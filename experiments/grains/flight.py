@@ -19,7 +19,7 @@ from experiments.platform.surfaces import find_surface
 from rigid.model.trial import Trial
 from rigid.platform.rig import STANDARD_GRAVITY
 
-from .sentences import say
+from . import say
 from .softening import bearing_gradient
 
 __all__ = ["Lying", "lies_in_flight"]

@@ -15,7 +15,7 @@ from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
-from .sentences import say
+from . import say
 from .spells import spells
 
 __all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched", "tips_in_ground"]

@@ -1,14 +1,15 @@
 """Settings of runs on grains: the bed, how it is coupled; and of a tumble the spikes in it. They belong to
 ``ground = "bed"``."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from pydantic import Field
 
 from experiments.platform.settings import NotNegative, Positive
 from experiments.runs.strict import StrictSettings
 
-from .sentences import say
+from . import say
 
 __all__ = ["OF_THE_MASTER", "GrainsSettings", "TumbleBedSettings"]
 
@@ -76,6 +77,10 @@ class GrainsSettings(StrictSettings):
     arch: Literal["cpu", "cuda"] = Field("cpu", description="On a bed: where it is computed.")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
     cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
+
+    def stepping(self) -> Mapping[str, Any]:
+        """How the master steps the run."""
+        return {name: getattr(self, name) for name in ("substeps", "body_steps", "extrapolation", "iterations")}
 
     def stepping_fault(self) -> str | None:
         """Steps that do not go into one another, in words."""

@@ -9,7 +9,7 @@ from dem.grains.materials import Material
 from dem.grains.sizes import Sieve, Sizes
 from experiments.runs.types import Json
 
-from .sentences import say
+from . import say
 
 __all__ = ["KEPT", "Distribution", "Kept", "bond_number", "in_grains_of", "scaling_told", "sizes_table"]
 

@@ -31,7 +31,7 @@ from typing import Any
 
 from dem.contact.timestep import CHAIN
 
-from .sentences import say
+from . import say
 
 __all__ = [
     "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit", "soften",

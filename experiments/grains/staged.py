@@ -11,8 +11,8 @@ from dem.prepare.recipe import check_stages, parse_stage
 from experiments.platform.surfaces import Surface
 from experiments.runs.progress import Progress
 
+from . import say
 from .bed_progress import Stages
-from .sentences import say
 
 __all__ = ["check_bed_stages", "packing_warning", "staged_bed"]
 

@@ -2,7 +2,7 @@
 
 from experiments.runs.memory import cores_there
 
-from .sentences import say
+from . import say
 
 __all__ = ["check_where"]
 

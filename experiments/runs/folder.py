@@ -14,7 +14,6 @@ checkpoint/<name>.npz     arrays to carry on from; checkpoint/<name>.done.json s
 """
 
 import json
-import math
 import os
 import re
 import tomllib
@@ -28,8 +27,8 @@ import numpy as np
 from filelock import FileLock, Timeout
 from pydantic import BaseModel
 
-from experiments.runs.version import __version__
-from rigid.series import read_series, replacing, write_series
+from rigid.result import plain, read_json, toml_value, write_json, write_text
+from rigid.series import __version__, read_series, replacing, write_series
 
 __all__ = [
     "RunFolder",
@@ -50,59 +49,6 @@ Status = Literal["running", "stopped", "failed", "done"]
 
 RUN_FORMAT = "hedgebed-run/1"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write `text` to `path` (UTF-8), all of it or nothing."""
-    with replacing(Path(path)) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def plain(value: Any) -> Any:
-    """`value` in terms of what JSON knows; a number that is not finite becomes null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, BaseModel):
-        return plain(value.model_dump())
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(item) for item in value]
-    if isinstance(value, Path):
-        return str(value)
-    return value
-
-
-def write_json(path: Path, data: Any) -> None:
-    """Write `data` to `path` as JSON, all of it or nothing.
-
-    Takes numpy scalars and arrays, paths and pydantic models as well; NaN and infinities become null. Raises TypeError
-    for what JSON cannot hold.
-    """
-    write_text(path, json.dumps(plain(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
-
-
-def read_json(path: Path) -> Any:
-    """The contents of the JSON file `path`."""
-    return json.loads(Path(path).read_text(encoding="utf-8"))
-
-
-def toml_value(value: Any) -> str:
-    """`value` as TOML writes it."""
-    import tomlkit  # where the first file is written: the command line starts without it
-
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(toml_value(item) for item in value) + "]"
-    if isinstance(value, Mapping):  # keys in quotes; tomlkit writes them bare
-        return "{" + ", ".join(f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items()) + "}"
-    try:
-        return tomlkit.item(value).as_string()
-    except (TypeError, ValueError):
-        raise TypeError(f"a setting of type {type(value).__name__} cannot be written to run.toml: {value!r}") from None
 
 
 def settings_toml(command: str, settings: BaseModel, version: str, code: str = "") -> str:

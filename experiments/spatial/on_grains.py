@@ -1,26 +1,25 @@
 """A platform in space on a bed of grains; what a run in the plane does alike is in `experiments.grains.on_bed`."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from coupling import BedGround, SpatialRun, spatial_members
 from coupling.members import Member
 from dem import Bed
-from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
-from experiments.grains.softening import PUSHED, Softening
+from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
+from experiments.grains.softening import PUSHED
 from experiments.platform.lengths import check_lengths
-from experiments.runs.folder import RunFolder
-from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
-from .frames import SpatialFrames
-from .on_law import feet_count, run_on_law, start_of
+from .on_law import SpatialFollowed
 from .result import conclude
 from .settings import SpatialSettings
 from .trial import SpatialPlan
@@ -37,14 +36,13 @@ class SpatialForecast(Forecast):
     high: tuple[float, float]  # corners of where tips come down, x and y from the start [m]
 
 
-class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
+class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
     """A platform in space on a bed."""
 
     def __init__(self, settings: SpatialSettings, plan: SpatialPlan) -> None:
-        self.settings, self.plan, self.trial = settings, plan, plan.trial
-        self.platform = platform = plan.trial.platform
+        super().__init__(settings, plan)
+        platform = self.platform
         self.duration, self.surface = settings.duration, plan.surface
-        self.weight = float(np.linalg.norm(plan.trial.weight))
         self.gravity = -float(plan.trial.weight[2]) / platform.mass
         self.counterweight = plan.trial.counterweight
         self.spike_diameter, self.reach = 2 * platform.tip_radius, platform.reach
@@ -52,7 +50,7 @@ class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
     @cached_property
     def forecast(self) -> SpatialForecast:
         """The same trial on the spring-damper."""
-        run = run_on_law(self.settings, self.plan)
+        run = self.run_on_law()
         rows = run.run()
         tips = self.platform.tips - self.platform.centre_of_mass
         centre = np.column_stack([rows[name] for name in "xyz"])
@@ -94,7 +92,7 @@ class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
     @property
     def pressure(self) -> float:
         """Of the weight, in flight of what the torque presses with too, under one of the spikes that carry [Pa]."""
-        load = self.weight / feet_count(self.plan)
+        load = self.weight / self.feet_count
         if self.counterweight == 0:
             pushed = PUSHED[self.settings.actuator] * self.plan.numbers["stiffness"].value * self.forecast.deepest
             load = max(load, pushed)
@@ -111,28 +109,13 @@ class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
         """All spikes and the ball inside the hull."""
         return spatial_members(self.platform)
 
-    def ground(self, bed: Bed) -> BedGround:
-        """All of the platform on the bed, which is periodic along both sides."""
-        low, high, s = self.forecast.low, self.forecast.high, self.settings
+    def layout(self, bed: Bed) -> Mapping[str, Any]:
+        low, high = self.forecast.low, self.forecast.high
         x, y = (0.5 * (bed.size[k] - low[k] - high[k]) for k in range(2))
-        return BedGround(
-            bed, self.members(), origin=(x, y), bounded_across=True, touch=TOUCH * self.weight,
-            friction=s.spike_friction, restitution=s.spike_restitution,
-        )  # fmt: skip
+        return {"origin": (x, y), "bounded_across": True}
 
     def run_on(self, ground: BedGround) -> SpatialRun:
-        """Set down or let fall."""
-        return SpatialRun(self.trial, ground, **self.stepping(), **start_of(self.settings, self.platform))
+        return SpatialRun(self.trial, ground, **self.stepping(), **self.start())
 
-    def announce(self, progress: Progress) -> None:
-        """Every default, and the warnings."""
-        for sentence in self.plan.announcement():
-            progress.message(sentence)
-
-    def frames(self, run: SpatialRun, folder: Path, resumed: bool) -> SpatialFrames | None:
-        """Of all of the platform."""
-        return SpatialFrames(self.settings, run, folder, resumed=resumed) if self.settings.frame_count else None
-
-    def conclude(self, run: SpatialRun, softening: Softening, folder: RunFolder) -> Result:
-        """The result, its series written."""
-        return conclude(self.settings, self.plan, run, self.forecast.run, softening, folder.path)
+    def conclude(self, run: SpatialRun, folder: Path) -> Result:
+        return conclude(self.settings, self.plan, run, folder, beside=self.forecast.run, softening=self.softening())

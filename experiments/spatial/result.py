@@ -1,11 +1,13 @@
-"""What comes of a platform in space: its series and its result."""
+"""What a run of a platform in space leaves: its frames, its series and its result."""
 
 import math
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling import BedGround, SpatialRun
+from coupling.members import HULL, spatial_members
 from dem.prepare.prepare import fingerprint
 from experiments.grains.bed_result import (
     bed_numbers,
@@ -17,23 +19,24 @@ from experiments.grains.bed_result import (
     write_bed_series,
 )
 from experiments.grains.softening import Softening
+from experiments.grains.tracked_frames import PlatformFrames, member_mesh
 from experiments.runs.folder import write_series
 from experiments.runs.result import Result
 from experiments.runs.result import quantities_of as as_quantities
 from experiments.runs.types import Json
 from experiments.tumble.words import way_through
+from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .settings import SpatialSettings
 from .trial import SpatialPlan
 
-__all__ = ["conclude", "sinkage_start", "write_series_of"]
+__all__ = ["SpatialFrames", "conclude", "sinkage_start", "write_series_of"]
 
 APART = 5e-3
 """For how long nothing must touch that it counts as a hop [s]: sand that is only grazed lets go and takes hold."""
-SLOW = 2e-3
-"""Centre and tips of what has settled are slower [m/s]."""
+SLOW = 2e-3  # Centre and tips of what has settled are slower [m/s]
 UNITS = {
     "time": "t_s", "vx": "vx_m_s", "vy": "vy_m_s", "vz": "vz_m_s", "wx": "wx_rad_s", "wy": "wy_rad_s",
     "wz": "wz_rad_s", "wheel_x": "wheel_x_rad_s", "wheel_y": "wheel_y_rad_s", "wheel_z": "wheel_z_rad_s",
@@ -47,9 +50,40 @@ FEET = ("normal", "N"), ("along_x", "N"), ("along_y", "N"), ("slip_x", "m_s"), (
 """Of each spike in series/feet.csv, as `SpatialRun.feet` has them."""
 
 
-def write_series_of(folder: Path, run: SpatialRun) -> None:
+Array = NDArray[np.float64]
+
+
+class SpatialFrames(PlatformFrames[SpatialRun]):
+    """All spikes and the hull (grains meet the ball inside); `row_forces` are of each spike that touches."""
+
+    def body_meshes(self, run: SpatialRun) -> dict[str, Mesh]:
+        platform = run.trial.platform
+        hull = platform.hull()
+        found = {"hull": Mesh(hull.vertices - platform.centre_of_mass, hull.faces)}
+        if platform.tip_radius > 0:
+            spikes = [member for member in spatial_members(platform) if member.row != HULL]
+            found["spikes"] = merge([member_mesh(spike, segments=16) for spike in spikes])
+        return found
+
+    def values(self, run: SpatialRun) -> dict[str, float]:
+        """The ground's force on the platform [N]."""
+        return {f"force_{axis}": float(run.master.wrench.force[k]) for k, axis in enumerate("xyz")}
+
+    def row_forces(self, run: SpatialRun, origin: Array) -> tuple[Array, dict[str, Array]]:
+        """At the points of the last step's contacts; under a Coulomb bound the normal force alone."""
+        contacts = run.master.last.by_member if run.master.last is not None else {}
+        at = [origin + contact.point for contact in contacts.values()]
+        force = [
+            np.array([0.0, 0.0, contact.normal_force])
+            + (contact.tangential_force if contact.tangential_force is not None else 0.0)
+            for contact in contacts.values()
+        ]
+        numbers = np.array([float(row) for row in contacts])
+        return np.array(at).reshape(-1, 3), {"force": np.array(force).reshape(-1, 3), "row": numbers}
+
+
+def write_series_of(run: SpatialRun, folder: Path) -> None:
     """trajectory.csv and the series of a run, as far as it has come."""
-    (folder / "series").mkdir(exist_ok=True)
     write_series(folder / "trajectory.csv", path_columns(run))
     rows = run.columns
     stored = run.stored_by_row
@@ -95,17 +129,17 @@ def conclude(
     settings: SpatialSettings,
     plan: SpatialPlan,
     run: SpatialRun,
-    beside: SpatialRun | None,
-    softening: Softening | None,
     folder: Path,
+    *,
+    beside: SpatialRun | None = None,
+    softening: Softening | None = None,
 ) -> Result:
-    """The result, its series written. `beside`: the trial on the spring-damper, where the run is on grains."""
-    write_series_of(folder, run)
-    numbers, trial = quantities_of(run), plan.trial
-    where, what = "rig" if trial.counterweight > 0 else "free", "bed of " if settings.ground == "bed" else ""
+    """The result, its series written. On grains `beside` is the trial on the spring-damper."""
+    write_series_of(run, folder)
+    numbers, trial, in_rig = quantities_of(run), plan.trial, plan.trial.counterweight > 0
+    where, what = "rig" if in_rig else "free", "bed of " if settings.ground == "bed" else ""
     title = say("title", plan=plan, what=what, where=where, gravity=plan.numbers["gravity_sim"].value)
-    said = [residual_warning(run.energy_residual), unsettled_warning(run.master)]
-    warnings = [*plan.warnings, *(warning for warning in said if warning)]
+    warnings = [*plan.warnings, residual_warning(run.energy_residual), unsettled_warning(run.master)]
     result: Json = {
         "title": title, "status": "done",
         "quantities": numbers, "departures": {"sentences": _sentences(run)},
@@ -119,9 +153,19 @@ def conclude(
         "macro_step": run.master.macro_step, "steps": run.master.count,
         "lowering_time": run.placing_steps * run.master.macro_step,
     }  # fmt: skip
-    if softening is not None and beside is not None:
+    if softening is not None and beside is not None and isinstance(run.ground, BedGround):
         write_series(folder / "series" / "spring-damper.csv", path_columns(beside))
-        _add_grains(result, settings, plan, run, beside, softening)
+        bed = run.ground.bed
+        result["code"] = fingerprint()
+        result["grains"] = bed_numbers(settings, run, bed, softening, in_rig=in_rig) | {
+            "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
+            "beside_transitions": passages(beside),
+        }  # fmt: skip
+        warnings += [
+            reversal_warning(run.dissipation_reversal), overlap_warning(bed, softening, settings.max_overlap),
+            *bed_warnings(bed, plan.surface, across=2 * trial.platform.tip_radius / settings.grain), say("one_bed"),
+        ]  # fmt: skip
+    result["warnings"] = [warning for warning in warnings if warning]
     return Result.make("tumble spatial", **result)
 
 
@@ -139,9 +183,7 @@ def quantities_of(run: SpatialRun) -> dict[str, Json]:
     spin = np.linalg.norm([rows[name] for name in ("wx", "wy", "wz")], axis=0)
     turns = np.column_stack([rows[f"q{k}"] for k in range(4)])
     force = np.linalg.norm([rows[name] for name in ("fx", "fy", "fz")], axis=0)
-    up = float(to_matrix(turns[-1])[2, 2])
-    gap = rows["given"] - rows["taken"]
-    bed = isinstance(run.ground, BedGround)
+    up, balance = float(to_matrix(turns[-1])[2, 2]), run.balance_numbers
     found: dict[str, tuple[float | None, str, str]] = {
         "displacement_x": (float(way[0]), "m", say("displacement")),
         "displacement_y": (float(way[1]), "m", "likewise"),
@@ -157,17 +199,14 @@ def quantities_of(run: SpatialRun) -> dict[str, Json]:
         "largest_spike_force": (float(run.feet[:, 0].max()), "N", say("spike_force")),
         "largest_force": (float(force.max()), "N", say("whole_force")),
         "energy_residual": (run.energy_residual, "1", say("residual")),
-        "coupling_residual": (float(np.abs(run.balance).max()) / run.energy_scale, "1", say("coupling")),
-        "exchange_residual": (float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1", say("exchange")),
     }
-    if bed:
-        errors = run.samples
-        found["dissipation_reversal"] = (run.dissipation_reversal, "1", say("reversal"))
-        found["momentum_residual"] = (float(errors["momentum_error"].max()), "N s", say("momentum"))
-        angular = float(errors["angular_momentum_error"].max())
-        found["angular_momentum_residual"] = (angular, "N m s", say("angular_momentum"))
-        for name, values in run.losses.items():
-            found[f"dissipated_{name}"] = (float(values[-1]), "J", say("by_grains"))
+    notes = {"coupling_residual": say("coupling"), "exchange_residual": say("exchange")}
+    if isinstance(run.ground, BedGround):
+        notes |= {
+            "dissipation_reversal": say("reversal"), "momentum_residual": say("momentum"),
+            "angular_momentum_residual": say("angular_momentum"),
+        } | {f"dissipated_{name}": say("by_grains") for name in run.losses}  # fmt: skip
+    found |= {name: (*balance[name], note) for name, note in notes.items()}
     return as_quantities(found, std=None)
 
 
@@ -233,26 +272,3 @@ def _sentences(run: SpatialRun) -> list[str]:
     if rest:
         said.append(say("at_rest", rest=rest))
     return said
-
-
-def _add_grains(
-    result: Json,
-    settings: SpatialSettings,
-    plan: SpatialPlan,
-    run: SpatialRun,
-    beside: SpatialRun,
-    softening: Softening,
-) -> None:
-    """What a run on grains has beyond: the bed's numbers, warnings, the spring-damper's beside."""
-    assert isinstance(run.ground, BedGround)
-    bed, platform = run.ground.bed, plan.trial.platform
-    result["code"] = fingerprint()
-    result["grains"] = bed_numbers(settings, run, bed, softening, in_rig=plan.trial.counterweight > 0) | {
-        "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
-        "beside_transitions": passages(beside),
-    }  # fmt: skip
-    warnings = [
-        reversal_warning(run.dissipation_reversal), overlap_warning(bed, softening, settings.max_overlap),
-        *bed_warnings(bed, plan.surface, across=2 * platform.tip_radius / settings.grain), say("one_bed"),
-    ]  # fmt: skip
-    result["warnings"] += [warning for warning in warnings if warning]

@@ -1,7 +1,7 @@
 """`hedgebed tumble --method coupled`: the spring-damper through the coupling's master, as a bed of grains is stepped.
 
-What comes out is that of `rigid.planar.simulate` to its tolerance (docs/coupling.md); what it is for is a
-spring-damper that is stepped, booked and read as grains are, so that only the ground differs between two runs.
+What comes out is that of `rigid.planar.simulate` to its tolerance (docs/coupling.md). It is for a spring-damper that is
+stepped, recorded and read as grains are, so that only the ground differs between two runs.
 """
 
 from dataclasses import replace
@@ -23,7 +23,7 @@ from .settings import TumbleSettings
 from .steppers import own_quantities, own_warning, stepper_of, words
 from .trial import TumblePlan
 
-__all__ = ["check_coupled", "compute_coupled", "coupled_quantities", "coupled_tumble", "feet_columns", "law_feet"]
+__all__ = ["check_coupled", "compute_coupled", "coupled_quantities", "coupled_tumble", "feet_columns", "row_quantities"]
 
 STEP = 4e-5
 """The law's own step [s]: with ten of them, the default, every channel is within the planar model's tolerance.
@@ -48,9 +48,8 @@ def coupled_tumble(settings: TumbleSettings, plan: TumblePlan, *, duration: floa
     ground = LawGround.of_trial(plan.trial)
     ground.grounds = [replace(ground, time_step=STEP) for ground in ground.grounds]
     return stepper_of(
-        settings, plan.trial, ground, duration=duration, substeps=settings.substeps,
-        body_steps=settings.body_steps, extrapolation=settings.extrapolation, iterations=settings.iterations,
-        max_wheel_speed=plan.max_wheel_speed, energy_interval=1e-3,
+        settings, plan.trial, ground, **settings.stepping(), duration=duration, max_wheel_speed=plan.max_wheel_speed,
+        energy_interval=1e-3,
     )  # fmt: skip
 
 
@@ -71,43 +70,48 @@ def compute_coupled(
 
 def coupled_quantities(run: CoupledTumble) -> tuple[dict[str, Json], Json]:
     """What it has beyond the planar model's numbers; and what a row of tumbles adds to the result besides."""
-    sinkage, normal = law_feet(run)
-    gap = run.columns["given"] - run.columns["taken"]
-    found = {
-        "sinkage_start": (float(sinkage[0][[0, -1]].mean()), "m", say("of_sinkage_start")),
+    own, more = own_quantities(run, *row_feet(run))
+    return quantities_of(row_quantities(run, start=say("of_sinkage_start"), ground="ground")) | own, more
+
+
+def row_quantities(run: CoupledTumble, *, start: str, ground: str) -> dict[str, tuple[float, str, str]]:
+    """Sinkage, load and error of the exchange: name -> value, unit, note. `start`: note of the sinkage at the start;
+    `ground`: name of the ground in a note."""
+    sinkage, load = row_feet(run)
+    return {
+        "sinkage_start": (float(sinkage[0, [0, -1]].mean()), "m", start),
         "sinkage_largest": (float(sinkage.max()), "m", say("of_any_row")),
-        "largest_row_force": (float(normal.max()), "N", say("of_row_force")),
-        "exchange_residual": (
-            float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1", say("of_exchange", ground="ground"),
-        ),
-    }  # fmt: skip
-    own, more = own_quantities(run, sinkage, normal)
-    return quantities_of(found) | own, more
+        "largest_row_force": (float(load.max()), "N", say("of_row_force")),
+        "exchange_residual": (*run.balance_numbers["exchange_residual"], say("of_exchange", ground=ground)),
+    }
 
 
 def feet_columns(run: CoupledTumble) -> Json:
-    """The columns of series/feet.csv: work given and taken; load, slip and sinkage of each row.
+    """The columns of series/feet.csv: work given and taken; load, friction, slip and sinkage of each row.
 
-    Friction is not among them: rows that stick share it, and the law itself says only how large it may be.
+    On a law friction is not among them: rows that stick share it, and the law gives only its bound.
     """
-    rows = run.columns
-    sinkage, normal = law_feet(run)
+    rows, feet = run.columns, run.feet
+    sinkage, load = row_feet(run)
     columns: Json = {"t_s": rows["time"], "given_J": rows["given"], "taken_J": rows["taken"]}
     for row in range(run.trial.spike_count):
-        columns[f"normal_{row}_N"] = normal[:, row]
-        columns[f"slip_{row}_m_s"] = run.feet[:, 2, row]
-        columns[f"sinkage_{row}_m"] = sinkage[:, row]
+        columns[f"normal_{row}_N"] = load[:, row]
+        if run.ground.gives_friction:
+            columns[f"along_{row}_N"] = feet[:, 1, row]
+        columns |= {f"slip_{row}_m_s": feet[:, 2, row], f"sinkage_{row}_m": sinkage[:, row]}
     return columns
 
 
-def law_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
+def row_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
     """Depth of each row's tip [m], 0 above the surface, and its load [N], shape [step, row] both.
 
-    The load is the mean over the step before; at the start, before any, it is what the spring carries at rest.
+    The load is the mean over the step before; on a law, at the start, before any, it is what the spring carries at
+    rest, and the depth is that of the row's end now.
     """
-    rows, trial = run.columns, run.trial
-    depth = tip_depth(rows["theta"], rows["y"], count=trial.spike_count, length=trial.spike_length)
-    sinkage = np.maximum(0.0, depth)
-    normal = run.feet[:, 0].copy()
-    normal[0] = trial.stiffness * sinkage[0]
-    return sinkage, normal
+    sinkage, load = run.feet[:, 3], run.feet[:, 0].copy()
+    if not run.ground.gives_friction:
+        rows, trial = run.columns, run.trial
+        depth = tip_depth(rows["theta"], rows["y"], count=trial.spike_count, length=trial.spike_length)
+        sinkage = np.maximum(0.0, depth)
+        load[0] = trial.stiffness * sinkage[0]
+    return sinkage, load

@@ -12,7 +12,7 @@ from experiments.cli.main import main
 from experiments.runs.folder import RunFolder, read_series
 from experiments.spatial import experiment as spatial
 from experiments.spatial.on_grains import SpatialOnBed
-from experiments.spatial.on_law import run_on_law
+from experiments.spatial.on_law import SpatialFollowed
 from experiments.spatial.settings import SpatialSettings
 from experiments.spatial.trial import plan_spatial
 from experiments.tumble.settings import TumbleSettings
@@ -83,7 +83,7 @@ def test_the_hand_sets_down_heavy_on_soft_ground_and_what_it_cannot_is_refused_b
     """The Hedgehog free at 1 m/s2: 5.3 N on four spikes of sand, W / 4 K = 32 mm deep; at the rig's speed too late."""
     heavy = {"surface": "sand", "gravity": 1.0, "duration": 0.05}
     plan = plan_spatial(SpatialSettings(**heavy))
-    run = run_on_law(SpatialSettings(**heavy), plan)
+    run = SpatialFollowed(SpatialSettings(**heavy), plan).run_on_law()
     while not run.placed:
         run.advance()
     assert run.columns["sinkage"][0] == pytest.approx(5.3 / (4 * 41.1), rel=0.01)

@@ -403,7 +403,7 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_made_and_of_overl
     beside = PlanarOnBed(settings).forecast.trajectory
     run.run()
     result = tumble_grains_result.conclude(
-        settings, plan, run, beside, Softening(1e7, 1.0, 1.0, 7e10), SimpleNamespace(path=tmp_path),
+        settings, plan, run, beside, Softening(1e7, 1.0, 1.0, 7e10), tmp_path,
     )  # fmt: skip
     assert result["wheel_at_limit"] == pytest.approx(plan.trial.wheel_inertia / 0.125, rel=1e-9)
     assert any("max_wheel_speed = 1 rad/s, at 0.0096 s" in said for said in result["warnings"])
