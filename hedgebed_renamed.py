@@ -5,14 +5,17 @@ Imports nothing of ours. The packages import this file, so that the old names wo
 
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar, cast
 
-__all__ = ["MOVED", "RENAMED", "renamed"]
+__all__ = ["MOVED", "RENAMED", "renamed", "renamed_keywords", "renamed_names"]
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 _MODULES = {
     "coupling": {
@@ -329,6 +332,35 @@ def renamed(old: str, new: str) -> Any:
         return getattr(owner, new)
 
     return property(get, doc=f"Old name of `{new}`.")
+
+
+def renamed_keywords(**today: str) -> Callable[[F], F]:
+    """A decorator: the method takes a keyword by its old name too, with a DeprecationWarning."""
+
+    def decorate(method: F) -> F:
+        @wraps(method)
+        def call(owner: object, *args: Any, **options: Any) -> Any:
+            for old in today.keys() & options.keys():
+                warnings.warn(f"{old} of {type(owner).__name__} is now {today[old]}", DeprecationWarning, stacklevel=2)
+                options[today[old]] = options.pop(old)
+            return method(owner, *args, **options)
+
+        return cast(F, call)
+
+    return decorate
+
+
+def renamed_names(module: str, **today: Any) -> Callable[[str], Any]:
+    """The `__getattr__` of a package at the top: its old names, with a DeprecationWarning."""
+
+    def find(name: str) -> Any:
+        if name not in today:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        text = f"{module}.{name} is now {module}.{today[name].__name__}"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return today[name]
+
+    return find
 
 
 class _Renamed(MetaPathFinder, Loader):

@@ -16,18 +16,21 @@ __all__ = ["EnergyBalance"]
 
 
 class EnergyBalance:
-    """Samples of the ground's energies beside the rows of a run, and their balance.
+    """The rows of a run, samples of the ground's energies beside them, and their balance.
 
-    A run gives `columns` (`time`, `kinetic_energy`, `potential_energy`, `torque_work`, `given`, `taken`, one
-    entry a macro step) and `energy_scale`, and calls `_start_balance` where time begins, `_sample` now and then.
+    A run has `time`, `kinetic_energy`, `potential_energy`, `torque_work`, `given` and `taken` among its columns. It
+    calls `_start_balance` where time begins, `_sample` now and then.
     """
 
+    COLUMNS: tuple[str, ...]  # Of a row
     ground: Ground
     master: Master
     _free: tuple[int, ...] = (0, 1, 2)  # Along which axes the body can move
     _turns: tuple[int, ...] = (0, 1, 2)  # About which axes it can turn
 
-    def _no_samples(self) -> None:
+    def __init__(self) -> None:
+        super().__init__()
+        self._rows: list[list[float]] = []  # One a macro step
         self._samples: list[list[float]] = []
         self.energy_names: tuple[str, ...] = ()  # What the ground's energies are, in the order of `samples`
         self.work_names: tuple[str, ...] = ()  # Likewise of what a bed's contacts took (`Bed.contact_work`)
@@ -37,8 +40,12 @@ class EnergyBalance:
 
     @property
     def columns(self) -> dict[str, Vector]:
-        """The rows so far, by name."""
-        raise NotImplementedError
+        """The rows so far, by COLUMNS."""
+        return dict(zip(self.COLUMNS, self._row_table.T, strict=True))
+
+    @property
+    def _row_table(self) -> Vector:
+        return np.array(self._rows, dtype=float).reshape(-1, len(self.COLUMNS))
 
     @property
     def energy_scale(self) -> float:
@@ -57,7 +64,7 @@ class EnergyBalance:
             self._momentum = self._momentum + self.ground.momentum()
             self._angular_momentum = self._angular_momentum + self.ground.angular_momentum()
 
-    def _pull(self, before: Vector, after: Vector, weight: Vector, masses: Vector) -> None:
+    def _record_moment(self, before: Vector, after: Vector, weight: Vector, masses: Vector) -> None:
         """A macro step on which the body went from `before` to `after` [m]: weight about (0, 0, 0), and the rig.
 
         In a rig the momentum is not along the velocity v, since it is heavier upwards, and v x P is the moment of the
@@ -194,15 +201,14 @@ class EnergyBalance:
 
     def _balance_state(self) -> State:
         return {
-            "books.samples": self._sample_table,
-            "books.energies": np.array(self.energy_names, dtype=str),
-            "books.works": np.array(self.work_names, dtype=str),
-            "books.momentum": np.concatenate([self._momentum, self._angular_momentum, self._moment]),
+            "samples": self._sample_table,
+            "energies": np.array(self.energy_names, dtype=str),
+            "works": np.array(self.work_names, dtype=str),
+            "momentum": np.concatenate([self._momentum, self._angular_momentum, self._moment]),
         }
 
-    def _restore_balance(self, state: State) -> None:
-        self._samples = np.asarray(state["books.samples"]).tolist()
-        self.energy_names = tuple(str(name) for name in np.asarray(state["books.energies"]))
-        self.work_names = tuple(str(name) for name in np.asarray(state["books.works"]))
-        numbers = np.array(state["books.momentum"], dtype=float)
+    def _restore_balance(self, own: State) -> None:
+        self._samples = np.asarray(own["samples"]).tolist()
+        self.energy_names, self.work_names = (tuple(map(str, np.asarray(own[name]))) for name in ("energies", "works"))
+        numbers = np.array(own["momentum"], dtype=float)
         self._momentum, self._angular_momentum, self._moment = (part.copy() for part in np.split(numbers, 3))

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dem.engine.values import Grains
-from hedgebed_renamed import renamed
+from hedgebed_renamed import renamed, renamed_keywords
 from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 from rigid.platform.spike import Spike
 from rigid.spatial.quaternions import multiply, to_matrix
 
-from .deprecated import renamed_keywords
+from .ground import part_of, prefixed
 from .members import HULL, Member, spike_member
 from .poses import Pose, Twist, Vector, chord_share, matrices
 
@@ -400,7 +400,7 @@ class BedGround:
 
     def state(self) -> State:
         """The bed's, which contains the bodies and their contacts."""
-        return {f"bed.{key}": value for key, value in self.bed.state().items()} | {
+        return prefixed("bed", self.bed.state()) | {
             "impulse": self.impulse.copy(),
             "used": np.array(self._used),
             "grain_steps": np.array(self.grain_steps),
@@ -408,7 +408,7 @@ class BedGround:
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
-        self.bed.restore({key[4:]: np.asarray(value) for key, value in state.items() if key.startswith("bed.")})
+        self.bed.restore({key: np.asarray(value) for key, value in part_of(state, "bed").items()})
         self.impulse = np.array(state["impulse"], dtype=float)
         self._used = [int(index) for index in np.asarray(state["used"])]
         self.grain_steps = int(np.asarray(state["grain_steps"]))

@@ -27,11 +27,10 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from hedgebed_renamed import renamed
+from hedgebed_renamed import renamed, renamed_keywords
 from rigid.ground.reaction import Contact, Reaction, State
 
-from .deprecated import renamed_keywords
-from .ground import Ground
+from .ground import Ground, part_of, prefixed
 from .poses import Pose, Twist, Vector, Wrench
 
 __all__ = ["Body", "Exchange", "Master"]
@@ -253,30 +252,31 @@ class Master:
         past = [_row(wrench) for wrench in self._wrenches]
         held = self._held
         own: State = {
-            "master.count": np.array(self.count),
-            "master.wrenches": np.array(past).reshape(-1, 6),
-            "master.wrench": _row(self.wrench),
-            "master.held": np.concatenate([held.velocity, held.spin]) if held is not None else np.zeros(0),
-            "master.books": np.array(astuple(self.exchange), dtype=float),
-            "master.learnt": np.array(self._learnt, dtype=float).reshape(-1, 2, 6),
+            "count": np.array(self.count),
+            "wrenches": np.array(past).reshape(-1, 6),
+            "wrench": _row(self.wrench),
+            "held": np.concatenate([held.velocity, held.spin]) if held is not None else np.zeros(0),
+            "exchange": np.array(astuple(self.exchange), dtype=float),
+            "learnt": np.array(self._learnt, dtype=float).reshape(-1, 2, 6),
         }
-        own |= {f"body.{key}": value for key, value in self.body.state().items()}
-        return own | {f"footing.{key}": value for key, value in self.ground.state().items()}
+        return prefixed("master", own) | prefixed("body", self.body.state()) | prefixed("ground", self.ground.state())
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
-        self.count = int(state["master.count"])
+        own = part_of(state, "master")
+        self.count = int(own["count"])
         self._wrenches.clear()
-        self._wrenches.extend(_unpack(row) for row in np.asarray(state["master.wrenches"], dtype=float))
-        self.wrench = _unpack(np.asarray(state["master.wrench"], dtype=float))
-        held = np.asarray(state["master.held"], dtype=float)
+        self._wrenches.extend(_unpack(row) for row in np.asarray(own["wrenches"], dtype=float))
+        self.wrench = _unpack(np.asarray(own["wrench"], dtype=float))
+        held = np.asarray(own["held"], dtype=float)
         self._held = Twist(held[:3].copy(), held[3:].copy()) if held.size else None
-        learnt = np.asarray(state.get("master.learnt", ()), dtype=float).reshape(-1, 2, 6)
+        learnt = np.asarray(own.get("learnt", ()), dtype=float).reshape(-1, 2, 6)
         self._learnt = [(into.copy(), out.copy()) for into, out in learnt]
-        given, taken, worst, largest, *counts = (float(number) for number in state["master.books"])
+        exchange = own["exchange"] if "exchange" in own else own["books"]  # as an earlier version has it
+        given, taken, worst, largest, *counts = (float(number) for number in exchange)
         self.exchange = Exchange(given, taken, worst, largest, *(int(count) for count in counts))
-        for name, part in (("body.", self.body), ("footing.", self.ground)):
-            part.restore({key[len(name) :]: value for key, value in state.items() if key.startswith(name)})
+        self.body.restore(part_of(state, "body"))
+        self.ground.restore(part_of(state, "ground"))
 
 
 def _differences(tried: list[tuple[Vector, Vector]]) -> list[tuple[Vector, Vector]]:

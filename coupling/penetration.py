@@ -27,7 +27,7 @@ from rigid.ground.reaction import Facts, State
 from rigid.platform.spike import Spike
 
 from .bed_ground import BedGround, GrainBed
-from .ground import Described, Ground
+from .ground import Described, Ground, part_of, prefixed
 from .stepper import Reporting, Stepper
 from .trajectory import PHASES, Penetration
 
@@ -162,27 +162,27 @@ class Run(Stepper):
     def state(self) -> State:
         """All that the rest of the run depends on: a flat dict of numpy arrays, the ground's under "ground.*"."""
         own = {
-            "run.kind": np.array(self.kind),
-            "run.numbers": np.array([self.depth, self.velocity, *self._memory()], dtype=float),
-            "run.counts": np.array([self.count, self._approach, self._frames], dtype=np.int64),
-            "run.ended": np.array(self.ended),
-            "run.rows": np.array(self._rows, dtype=float).reshape(-1, 4),
-            "run.phases": np.array(self._phases, dtype=np.int8),
+            "kind": np.array(self.kind),
+            "numbers": np.array([self.depth, self.velocity, *self._memory()], dtype=float),
+            "counts": np.array([self.count, self._approach, self._frames], dtype=np.int64),
+            "ended": np.array(self.ended),
+            "rows": np.array(self._rows, dtype=float).reshape(-1, 4),
+            "phases": np.array(self._phases, dtype=np.int8),
         }
-        return own | {f"ground.{key}": value for key, value in self.ground.state().items()}
+        return prefixed("run", own) | prefixed("ground", self.ground.state())
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave. Raises ValueError for the state of another kind of run."""
-        if str(state["run.kind"]) != self.kind:
-            raise ValueError(f"the state is of a {state['run.kind']} run, this one is {self.kind}")
-        self.depth, self.velocity, *memory = (float(number) for number in state["run.numbers"])
-        self.count, self._approach, self._frames = (int(number) for number in state["run.counts"])
+        own = part_of(state, "run")
+        if str(own["kind"]) != self.kind:
+            raise ValueError(f"the state is of a {own['kind']} run, this one is {self.kind}")
+        self.depth, self.velocity, *memory = (float(number) for number in own["numbers"])
+        self.count, self._approach, self._frames = (int(number) for number in own["counts"])
         self._recall(memory)
-        self.ended = str(state["run.ended"])
-        self._rows = [tuple(row) for row in np.asarray(state["run.rows"]).tolist()]
-        self._phases = [int(code) for code in state["run.phases"]]
-        prefix = "ground."
-        self.ground.restore({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+        self.ended = str(own["ended"])
+        self._rows = [tuple(row) for row in np.asarray(own["rows"]).tolist()]
+        self._phases = [int(code) for code in own["phases"]]
+        self.ground.restore(part_of(state, "ground"))
 
     def _held_velocity(self) -> float:
         """Velocity of the step to come [m/s]."""

@@ -16,7 +16,7 @@ from rigid.planar.trajectory import STATES
 from .balance import EnergyBalance
 from .bed_ground import BedGround
 from .contact_state import ContactReader, feet_of
-from .ground import Ground
+from .ground import Ground, part_of, prefixed
 from .law_ground import LawGround
 from .lowered_gravity import pace_under
 from .master import Master
@@ -43,14 +43,15 @@ class PlatformRun(EnergyBalance, Stepper):
 
     Parameters
     ----------
+    duration : how long it is followed from where time begins [s].
     lift : whether the body is lifted until it is clear of grains. Raises ValueError for a start in overlap with grains.
+    weight : as a force on the body [N], shape (3,).
+    members : of the body, where each is about its origin [m], shape [member, 3], in space; in the plane their number.
     lowering_speed : of a placement before time begins [m/s]; None: none.
     energy_interval : between measurements of what the ground holds [s].
-    members : of the body, where each is about its origin [m], shape [member, 3], in space; in the plane their number.
     options : of `Master`.
     """
 
-    COLUMNS: tuple[str, ...]  # Of a row
     _prefix: str  # Of the keys of a state
     _hull = 0  # Members that are no spikes
     trial: Any
@@ -64,12 +65,17 @@ class PlatformRun(EnergyBalance, Stepper):
         *,
         duration: float,
         lift: bool,
-        lowering_speed: float | None,
-        energy_interval: float,
+        weight: Vector,
         members: Vector | int,
+        lowering_speed: float | None = None,
+        energy_interval: float = 0.02,
         **options: Any,
     ) -> None:
         super().__init__()
+        check_above_zero("in s", duration=duration, energy_interval=energy_interval)
+        if lowering_speed is not None:
+            check_above_zero("in m/s", lowering_speed=lowering_speed)
+        self._pull = weight
         self.trial, self.ground, self.body, self.duration = trial, ground, body, float(duration)
         if isinstance(ground, BedGround | LawGround):
             if lift:
@@ -88,10 +94,8 @@ class PlatformRun(EnergyBalance, Stepper):
         self.placing_steps = 0  # Macro steps that the placement took
         self._members = count
         self._settling: list[Vector] = []
-        self._rows: list[list[float]] = []
         self._states: list[int] = []
         self._feet: list[Vector] = []
-        self._no_samples()
         self._order()
 
     held_long, footing = renamed("held_long", "placement_is_long"), renamed("footing", "ground")
@@ -99,12 +103,6 @@ class PlatformRun(EnergyBalance, Stepper):
     def __repr__(self) -> str:
         when = f"{self.time:.4g} of {self.duration:g} s" if self.placed else f"being placed for {self.body.time:.4g} s"
         return f"{type(self).__name__}({self.body!r} on {self.ground!r}, {when})"
-
-    @staticmethod
-    def _check(duration: float, energy_interval: float, lowering_speed: float | None) -> None:
-        check_above_zero("in s", duration=duration, energy_interval=energy_interval)
-        if lowering_speed is not None:
-            check_above_zero("in m/s", lowering_speed=lowering_speed)
 
     @property
     def done(self) -> bool:
@@ -150,7 +148,7 @@ class PlatformRun(EnergyBalance, Stepper):
         if not self.placed:
             self._lower(reaction)
             return
-        self._pull(before, self.body.pose.position, self._pull_of_weight, self.body.masses)
+        self._record_moment(before, self.body.pose.position, self._pull, self.body.masses)
         self._keep(reaction)
         if (self.master.count - self.placing_steps) % self._every == 0 or self.done:
             self._measure()
@@ -162,7 +160,7 @@ class PlatformRun(EnergyBalance, Stepper):
 
     def _measure(self) -> None:
         body = self.body
-        self._sample(body.time, body.momentum - self._pull_of_weight * body.time, self._turning)
+        self._sample(body.time, body.momentum - self._pull * body.time, self._turning)
 
     def _keep(self, reaction: Reaction | None) -> None:
         now = self.body.twist_now(self.ground.lag)
@@ -180,19 +178,14 @@ class PlatformRun(EnergyBalance, Stepper):
     @property
     def _weight(self) -> float:
         """[N]"""
-        raise NotImplementedError
-
-    @property
-    def _pull_of_weight(self) -> Vector:
-        """Weight as a force [N], shape (3,)."""
-        raise NotImplementedError
+        return float(np.linalg.norm(self._pull))
 
     @property
     def _turning(self) -> Vector:
         """Angular momentum of the body about (0, 0, 0) [N m s], for the balance."""
         raise NotImplementedError
 
-    def _unrest(self) -> tuple[Vector, Vector]:
+    def _out_of_balance(self) -> tuple[Vector, Vector]:
         """What of the weight the ground does not carry yet [N], and the speeds [m/s]."""
         raise NotImplementedError
 
@@ -209,15 +202,6 @@ class PlatformRun(EnergyBalance, Stepper):
         raise NotImplementedError
 
     @property
-    def columns(self) -> dict[str, Vector]:
-        """The rows so far, by COLUMNS."""
-        return dict(zip(self.COLUMNS, self._row_table.T, strict=True))
-
-    @property
-    def _row_table(self) -> Vector:
-        return np.array(self._rows, dtype=float).reshape(-1, len(self.COLUMNS))
-
-    @property
     def states(self) -> list[str]:
         """The state at every row: on grains as `coupling.contact_state` reads it, on a law by who sticks and slides."""
         return [STATES[code] for code in self._states]
@@ -229,7 +213,7 @@ class PlatformRun(EnergyBalance, Stepper):
 
     def state(self) -> State:
         """All that the rest of the run depends on: a flat dict of numpy arrays."""
-        width = sum(part.size for part in self._unrest())
+        width = sum(part.size for part in self._out_of_balance())
         own: State = {
             "counts": np.array([self.placed, self.placing_steps, self._frames], dtype=np.int64),
             "settling": np.array(self._settling, dtype=float).reshape(-1, width),
@@ -237,26 +221,28 @@ class PlatformRun(EnergyBalance, Stepper):
             "states": np.array(self._states, dtype=np.int8),
             "feet": self._feet_table,
         }
-        own = {f"{self._prefix}.{key}": value for key, value in own.items()}
-        own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
-        return own | self._balance_state() | self.master.state()
+        parts = {self._prefix: own, "reader": self.reader.state(), "balance": self._balance_state()}
+        found = self.master.state()
+        for name, part in parts.items():
+            found |= prefixed(name, part)
+        return found
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
-        own = {key.partition(".")[2]: value for key, value in state.items() if key.startswith(f"{self._prefix}.")}
+        own = part_of(state, self._prefix)
         placed, self.placing_steps, self._frames = (int(number) for number in own["counts"])
         self.placed = bool(placed)
         self._settling = list(np.array(own["settling"], dtype=float))
         self._rows = np.asarray(own["rows"]).tolist()
         self._states = [int(code) for code in own["states"]]
         self._feet = list(np.array(own["feet"], dtype=float))
-        self._restore_balance(state)
-        self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
+        self._restore_balance(part_of(state, "balance"))
+        self.reader.restore(part_of(state, "reader"))
         self.master.restore(state)
         self._order()
 
     def _lower(self, reaction: Reaction) -> None:
-        self._settle(reaction, *self._unrest())
+        self._settle(reaction, *self._out_of_balance())
 
     def _settle(self, reaction: Reaction, lacking: Vector, moving: Vector) -> None:
         """A step of the placement, which ends at rest: what of the weight the ground does not carry yet [N], and the

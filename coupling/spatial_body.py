@@ -23,8 +23,7 @@ from rigid.ground.reaction import Contact, Reaction, State
 from rigid.spatial.quaternions import from_turn, multiply, to_matrix
 from rigid.spatial.spatial import SpatialTrial
 
-from .deprecated import PlacedBody
-from .planar_body import placement_time
+from .planar_body import PlacedBody, placement_time
 from .poses import Pose, Twist, Vector, Wrench, moved
 
 __all__ = ["SpatialBody"]
@@ -45,6 +44,11 @@ class SpatialBody(PlacedBody):
 
     Raises ValueError, naming the key, for what is not finite or no unit quaternion.
     """
+
+    _ARRAYS = (
+        "place", "turn", "momentum", "angular_momentum", "wheels", "_force", "_moment", "_torques", "_masses", "_drag",
+    )  # fmt: skip
+    _NUMBERS = ("time", "torque_work", "_lag", "touching", "in_placement")
 
     def __init__(
         self,
@@ -136,9 +140,7 @@ class SpatialBody(PlacedBody):
 
     def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
         """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
-        if lag > dt * (1 + 1e-9):
-            raise ValueError(f"dt = {dt} s is shorter than the footing's own step of {lag} s")
-        self._lag, half = lag, 0.5 * max(dt - lag, 0.0)
+        self._lag, half = lag, self._spare(dt, lag)
         self._torques = self._mean_torques(dt)
         drag = self._drag
         momentum = (self.momentum + half * (self.trial.weight + guess.force)) / (1 + half * drag[0] / self._masses)
@@ -226,27 +228,15 @@ class SpatialBody(PlacedBody):
         """All that its next steps depend on."""
         slides = sorted(self.sliding)
         return {
-            "numbers": np.concatenate(
-                [
-                    self.place, self.turn, self.momentum, self.angular_momentum, self.wheels, self._force, self._moment,
-                    self._torques, self._masses, self._drag,
-                    [self.time, self.torque_work, self._lag, self.touching, self.in_placement],
-                ]
-            ),
+            "numbers": self._numbers(),
             "inertia": self._inertia.copy(),
             "sliding": np.array([[tip, *self.sliding[tip]] for tip in slides], dtype=float).reshape(-1, 3),
             "sticking": np.array(sorted(self.sticking), dtype=np.int64),
-        }  # fmt: skip
+        }
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
-        numbers = np.asarray(state["numbers"], dtype=float)
-        ends = np.cumsum([3, 4, 3, 3, 3, 3, 3, 3, 3, 2])
-        parts = [part.copy() for part in np.split(numbers, ends)]
-        self.place, self.turn, self.momentum, self.angular_momentum, self.wheels = parts[:5]
-        self._force, self._moment, self._torques, self._masses, self._drag = parts[5:10]
-        self.time, self.torque_work, self._lag = (float(number) for number in parts[10][:3])
-        self.touching, self.in_placement = bool(parts[10][3]), bool(parts[10][4])
+        self._restore_numbers(state["numbers"])
         self._inertia = np.array(state["inertia"], dtype=float)
         rows = np.asarray(state["sliding"], dtype=float).reshape(-1, 3)
         self.sliding = {int(row[0]): row[1:].copy() for row in rows}
@@ -256,7 +246,6 @@ class SpatialBody(PlacedBody):
     _force: Vector = np.zeros(3)
     _moment: Vector = np.zeros(3)
     _torques: Vector = np.zeros(3)
-    _next_touching = False
     _next_sliding: dict[int, Vector]
     _next_sticking: frozenset[int]
 

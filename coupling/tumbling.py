@@ -12,13 +12,13 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from hedgebed_renamed import renamed_keywords
 from rigid.ground.reaction import Reaction, State
 from rigid.model.trial import Trial
 from rigid.planar.trajectory import Tally, Trajectory, Transition
 
 from .bed_ground import BedGround
 from .contact_state import changes_of, state_of
-from .deprecated import renamed_keywords
 from .ground import Ground
 from .law_ground import LawGround
 from .lowered_gravity import LoweredGravity
@@ -50,13 +50,12 @@ class CoupledTumble(PlatformRun):
 
     Parameters
     ----------
-    substeps, body_steps, extrapolation, iterations : as `Master` has them.
     tip_radius : of the balls that its spikes end with [m]; 0 for a surface law.
-    lowering_speed : of the placement [m/s]; None: none, the platform starts at `height`.
     height : of the centre at the start [m]; None: on a law where the law carries it, on a bed just clear of the grains.
-    energy_interval : between measurements of what the ground holds [s].
     max_wheel_speed : where a motor has no torque left [rad/s].
     lower_gravity : whether the placement goes on until gravity has fallen from the bed's to the trial's.
+    options : `duration`, `lowering_speed` (None: no placement, the platform starts at `height`) and `energy_interval`
+        of `PlatformRun`, and those of `Master`.
 
     Raises ValueError for a start in overlap with grains, a gravity to be lowered where there is no placement, no bed or
     a rig, and for what `Master`, `PlanarBody` and `LoweredGravity` refuse.
@@ -72,33 +71,30 @@ class CoupledTumble(PlatformRun):
         trial: Trial,
         ground: Ground,
         *,
-        duration: float,
         tip_radius: float = 0.0,
-        lowering_speed: float | None = None,
         height: float | None = None,
-        energy_interval: float = 0.02,
         max_wheel_speed: float = math.inf,
         lower_gravity: bool = False,
-        **master: Any,
+        **options: Any,
     ) -> None:
-        self._check(duration, energy_interval, lowering_speed)
+        self.tip_radius = tip_radius
         half = math.pi / trial.spike_count
         self.level = (trial.spike_length - tip_radius) * math.cos(half) + tip_radius
         """Height of the centre with the lowest tips at the surface [m]."""
         start = self.level if height is None else float(height)
         if height is None and isinstance(ground, LawGround):
             start -= _sinkage(ground, 0.5 * trial.weight)
-        rests = lowering_speed is None and height is None
-        weight = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
+        placed = options.get("lowering_speed") is not None
+        rests = not placed and height is None
+        carried = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
         super().__init__(
-            trial, ground, PlanarBody(trial, z=start), duration=duration, lift=height is None,
-            lowering_speed=lowering_speed, energy_interval=energy_interval, members=trial.spike_count,
-            first_guess=weight, **master,
+            trial, ground, PlanarBody(trial, z=start), lift=height is None, weight=np.array([0.0, 0.0, -trial.weight]),
+            members=trial.spike_count, first_guess=carried, **options,
         )  # fmt: skip
         self.body.max_wheel_speed = max_wheel_speed
         self.lowered: LoweredGravity | None = None
         if lower_gravity:
-            if not isinstance(ground, BedGround) or lowering_speed is None or trial.counterweight > 0:
+            if not isinstance(ground, BedGround) or not placed or trial.counterweight > 0:
                 raise ValueError("lower_gravity is for a platform that is placed on a bed, without a rig")
             self.lowered = LoweredGravity(ground, last=trial.gravity_sim, duration=self.duration)
         if self.placed:
@@ -113,10 +109,6 @@ class CoupledTumble(PlatformRun):
         return float(self.body.trial.weight)
 
     @property
-    def _pull_of_weight(self) -> Vector:
-        return np.array([0.0, 0.0, -self.trial.weight])
-
-    @property
     def _placement_time(self) -> float:
         lowered = self.lowered
         return super()._placement_time + (lowered.steps * lowered.every + 3 * self.pace * REST_TIME if lowered else 0.0)
@@ -126,7 +118,7 @@ class CoupledTumble(PlatformRun):
         self.follow(**reporting)
         return self.trajectory()
 
-    def _unrest(self) -> tuple[Vector, Vector]:
+    def _out_of_balance(self) -> tuple[Vector, Vector]:
         wrench, rates, length = self.master.wrench, self.body.rates, self.trial.spike_length
         lacking = np.array([wrench.force[2] - self._weight, wrench.torque[1] / length])
         return lacking, np.array([rates[1], rates[2] * length])
@@ -135,7 +127,7 @@ class CoupledTumble(PlatformRun):
         if self.lowered is None or self.lowered.begun is None:
             super()._lower(reaction)
         elif self.lowered.at_last:
-            self._calm(*self._unrest())
+            self._calm(*self._out_of_balance())
         elif self.lowered.fall(self.body.time):
             self._weigh()
             self._settling = []
@@ -181,6 +173,12 @@ class CoupledTumble(PlatformRun):
             body.kinetic_energy(lag), body.potential_energy, body.torque_work, *self.master.exchanged(),
         ]  # fmt: skip
 
+    def _reach(self, theta: float) -> Vector:
+        """How far below the centre each row's lowest point is with the platform turned by `theta` [rad]; [m]."""
+        count = self.trial.spike_count
+        angles = theta + math.pi / count * (1 + 2 * np.arange(count))
+        return np.asarray((self.trial.spike_length - self.tip_radius) * np.cos(angles) + self.tip_radius)
+
     def _keep_feet(self, feet: Vector) -> None:
         self._feet.append(feet[[0, 1, 3, 5]])
 
@@ -203,9 +201,7 @@ class CoupledTumble(PlatformRun):
         """Normal and horizontal force [N], slip speed [m/s] and sinkage [m] of each row, shape [step, 4, row]."""
         return np.array(self._feet).reshape(-1, 4, self.trial.spike_count)
 
-    @property
-    def _feet_table(self) -> Vector:
-        return self.feet
+    _feet_table = feet
 
     @property
     def energy_scale(self) -> float:
