@@ -8,8 +8,7 @@ __all__ = ["BedProgress", "Stages"]
 
 _SHARES = {"rain": 0.30, "calm": 0.12, "settle": 0.32, "rest": 0.26}
 """Of the time, as measured on 20,000 grains, compiling left out [1]."""
-_TAPPED = 0.1
-"""What all of that is where the bed is tapped to a packing fraction: 15 taps took ten times as long [1]."""
+_TAPPED = 0.1  # What all of that is where the bed is tapped to a packing fraction: 15 taps took ten times as long [1]
 _DOWN = 0.82
 """Share of the fall from the top at which the grains are down: what lies is 1 / 2.5 as high as what fell [1]."""
 _CALM, _REST = 4, 14

@@ -34,14 +34,13 @@ from dem.contact.timestep import CHAIN
 from . import say
 
 __all__ = [
-    "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit", "soften",
+    "PACKING", "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit",
     "soften_material", "stable_overlap",
 ]  # fmt: skip
 
 RAIN_OVERLAP = 0.05
 """Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
-INERTIA = 1.1
-"""lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
+INERTIA = 1.1  # lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)
 
 PUSHED = {"motor": 1.0, "brake": 3.0}
 """Force on a platform's rows in flight that grains are made stiff enough for, over the spring-damper's largest [1].
@@ -57,22 +56,18 @@ SOFTEST = 0.1
 """Of the modulus chosen for `max_overlap`, below which one that is set is refused [1]: grains would overlap by
 10^(2/3) = 4.6 times as much. The estimate has a factor of some 3 to spare in the modulus (`chain`, and depth and speed
 beyond the forecast), and the softest case that ships has half of what is chosen."""
-SOFT = 0.05
-"""Overlap at and above which grains share the load: `CHAIN`, as `dem` has it."""
+PACKING = 0.6  # Of a bed, for its bulk density [1]
+SOFT = 0.05  # Overlap at and above which grains share the load: `CHAIN`, as `dem` has it
 
 
 @dataclass(frozen=True)
 class Softening:
     """What was chosen and why."""
 
-    young: float
-    """Young's modulus of the softened grains [Pa]."""
-    pressure: float
-    """Largest pressure expected under the tip [Pa]."""
-    speed: float
-    """Largest speed of the spike [m/s]."""
-    real: float
-    """Young's modulus of the real grains [Pa]."""
+    young: float  # Young's modulus of the softened grains [Pa]
+    pressure: float  # Largest pressure expected under the tip [Pa]
+    speed: float  # Largest speed of the spike [m/s]
+    real: float  # Young's modulus of the real grains [Pa]
 
     @property
     def factor(self) -> float:
@@ -152,85 +147,52 @@ def chain(max_overlap: float) -> float:
     return CHAIN + (STIFF_CHAIN - CHAIN) * min(1.0, max(0.0, share))
 
 
-def soften(
+def soften_material(
+    material: Any,
     *,
+    young: float | None = None,
     max_overlap: float,
     grain: float,
-    density: float,
-    poisson: float,
-    friction: float,
-    real_young: float,
+    spread: float,
     gravity: float,
     bed_height: float,
     depth: float,
     speed: float,
     pressure: float = 0.0,
     fall: float = 0.0,
-    packing: float = 0.6,
-    surface_energy: float = 0.0,
     fastest: str = "speed",
 ) -> Softening:
-    """Young's modulus that keeps overlaps below `max_overlap` (see the module). All SI; `grain` is the mean diameter.
+    """Young's modulus of the grains of a material that keeps overlaps below `max_overlap` (see the module). All SI.
 
-    `depth` is the deepest the tip goes, `speed` its fastest, `pressure` what the load alone presses with, `fall` how
-    deep a grain fell when the bed was made, `surface_energy` that of the grains [J/m2], 0 without cohesion; `fastest`
-    is the key that set the speed. Raises ValueError for an overlap that is no share of a diameter, and where the real
-    grains, `real_young`, are too soft to keep it.
-    """
-    if not 0 < max_overlap <= 0.2:
-        raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
-    bulk = packing * density
-    under_tip = bearing_gradient(bulk, gravity, friction) * depth + INERTIA * bulk * speed**2
-    highest = max(under_tip, pressure) + bulk * gravity * bed_height
-    pulled = 2 * math.pi * surface_energy / grain
-    pair = 1.5 * (chain(max_overlap) * highest + pulled) / max_overlap**1.5
-    static = 2 * (1 - poisson**2) * pair
-    mass = density * math.pi * grain**3 / 6
-    struck, landed = (
-        0.75 * 1.25 * mass * squared / (bound * grain) ** 2.5 / math.sqrt(0.5 * grain) * (1 - poisson**2)
-        for squared, bound in ((speed**2, max_overlap), (2 * gravity * fall, max(max_overlap, RAIN_OVERLAP)))
-    )
-    if struck > real_young:
-        most = 0.99 * speed * math.sqrt(real_young / struck)
-        raise ValueError(
-            say("too_fast", fastest=fastest, speed=speed, max_overlap=max_overlap, real=real_young, most=most)
-        )
-    if static > real_young:
-        would = max_overlap * (static / real_young) ** (2 / 3)
-        raise ValueError(
-            say("too_deep", max_overlap=max_overlap, highest=highest, static=static, real=real_young, would=would)
-        )
-    return Softening(min(real_young, max(static, struck, landed)), highest, speed, real_young)
-
-
-def soften_material(
-    material: Any,
-    *,
-    young: float | None,
-    max_overlap: float,
-    grain: float,
-    spread: float,
-    fastest: str = "speed",
-    **case: float,
-) -> Softening:
-    """`soften` for the grains of a material; where `young` [Pa] is set, that, with what presses and how fast.
-
-    Diameters are uniform within 1 +- `spread`: where that is wide, the mean grain is held to less than `max_overlap`,
-    so that the smallest keep it (`dem.prepare.prepare.bound_of_mean`). `case` are the options of `soften` that are
-    not the material's. Raises ValueError as `soften` does.
+    Diameters are uniform around `grain` within 1 +- `spread`: where that is wide, the mean grain is held to less than
+    `max_overlap`, so that the smallest keep it (`dem.prepare.prepare.bound_of_mean`). `depth` is the deepest the tip
+    goes, `speed` its fastest, `pressure` of the load alone, `fall` how deep a grain fell when the bed was made;
+    `fastest` is the key that set the speed. Where `young` [Pa] is set, the result has that, with the pressure and the
+    speed. Raises ValueError for an overlap that is no share of a diameter, and where the real grains are too soft.
     """
     from dem.grains.sizes import Uniform
     from dem.prepare.prepare import bound_of_mean
 
-    chosen = soften(
-        max_overlap=bound_of_mean(Uniform(grain, spread), max_overlap),
-        grain=grain,
-        density=material.density,
-        poisson=material.poisson,
-        friction=material.friction,
-        real_young=material.young,
-        surface_energy=material.surface_energy,
-        fastest=fastest,
-        **case,
+    max_overlap = bound_of_mean(Uniform(grain, spread), max_overlap)
+    if not 0 < max_overlap <= 0.2:
+        raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
+    poisson, real = material.poisson, material.young
+    bulk = PACKING * material.density
+    under_tip = bearing_gradient(bulk, gravity, material.friction) * depth + INERTIA * bulk * speed**2
+    highest = max(under_tip, pressure) + bulk * gravity * bed_height
+    pulled = 2 * math.pi * material.surface_energy / grain
+    pair = 1.5 * (chain(max_overlap) * highest + pulled) / max_overlap**1.5
+    static = 2 * (1 - poisson**2) * pair
+    mass = material.density * math.pi * grain**3 / 6
+    struck, landed = (
+        0.75 * 1.25 * mass * squared / (bound * grain) ** 2.5 / math.sqrt(0.5 * grain) * (1 - poisson**2)
+        for squared, bound in ((speed**2, max_overlap), (2 * gravity * fall, max(max_overlap, RAIN_OVERLAP)))
     )
-    return chosen if young is None else Softening(young, chosen.pressure, chosen.speed, material.young)
+    given = {"max_overlap": max_overlap, "real": real}
+    if struck > real:
+        most = 0.99 * speed * math.sqrt(real / struck)
+        raise ValueError(say("too_fast", **given, fastest=fastest, speed=speed, most=most))
+    if static > real:
+        would = max_overlap * (static / real) ** (2 / 3)
+        raise ValueError(say("too_deep", **given, highest=highest, static=static, would=would))
+    return Softening(min(real, max(static, struck, landed)) if young is None else young, highest, speed, real)

@@ -21,8 +21,7 @@ from .settings import ZERO, SpatialSettings
 __all__ = ["SpatialPlan", "plan_spatial"]
 
 DEFAULT_RIG, TORQUE = 0.0085, 0.22
-SPIKES_PER_ROW = 2.0
-"""Surfaces have their K and C for a row of two spikes."""
+SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
 
 
 @dataclass(frozen=True)

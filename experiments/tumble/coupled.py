@@ -18,12 +18,12 @@ from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
 from . import say
-from .result import title_of
+from .result import result_of, title_of
 from .settings import TumbleSettings
 from .steppers import own_quantities, own_warning, stepper_of, words
 from .trial import TumblePlan
 
-__all__ = ["check_coupled", "compute_coupled", "coupled_quantities", "coupled_tumble", "feet_columns", "row_quantities"]
+__all__ = ["STEP", "check_coupled", "compute_coupled", "feet_columns", "row_feet", "row_quantities"]
 
 STEP = 4e-5
 """The law's own step [s]: with ten of them, the default, every channel is within the planar model's tolerance.
@@ -43,35 +43,23 @@ def check_coupled(settings: TumbleSettings, plan: TumblePlan) -> None:
         raise ValueError(say("long_step", s=settings, step=1e3 * step, most=int(1e-3 / STEP + 1e-9)))
 
 
-def coupled_tumble(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> CoupledTumble:
-    """The trial on the spring-damper, ready to be stepped."""
-    ground = LawGround.of_trial(plan.trial)
-    ground.grounds = [replace(ground, time_step=STEP) for ground in ground.grounds]
-    return stepper_of(
-        settings, plan.trial, ground, **settings.stepping(), duration=duration, max_wheel_speed=plan.max_wheel_speed,
-        energy_interval=1e-3,
-    )  # fmt: skip
-
-
 def compute_coupled(
     settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress
-) -> tuple[Trajectory, float | None, Json, Json, tuple[str, ...]]:
-    """The trial by the master, series/feet.csv written.
-
-    The trajectory, when the wheel comes to its limit [s], quantities and other entries of the result, and warnings.
-    """
-    run = coupled_tumble(settings, plan, duration=settings.duration)
+) -> tuple[Trajectory, Json]:
+    """The trial by the master, series/feet.csv written: the trajectory, and the entries of the result."""
+    ground = LawGround.of_trial(plan.trial)
+    ground.grounds = [replace(ground, time_step=STEP) for ground in ground.grounds]
+    run = stepper_of(
+        settings, plan.trial, ground, **settings.stepping(), duration=settings.duration,
+        max_wheel_speed=plan.max_wheel_speed, energy_interval=1e-3,
+    )  # fmt: skip
     trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
     folder.write_series("feet", feet_columns(run))
-    quantities, more = coupled_quantities(run)
-    warnings = tuple(warning for warning in (unsettled_warning(run.master), own_warning(run)) if warning)
-    return trajectory, run.body.wheel_at_limit, quantities, more | {"title": words(settings, title_of(plan))}, warnings
-
-
-def coupled_quantities(run: CoupledTumble) -> tuple[dict[str, Json], Json]:
-    """What it has beyond the planar model's numbers; and what a row of tumbles adds to the result besides."""
+    result = result_of(settings, plan, trajectory, run.body.wheel_at_limit)
     own, more = own_quantities(run, *row_feet(run))
-    return quantities_of(row_quantities(run, start=say("of_sinkage_start"), ground="ground")) | own, more
+    result["quantities"] |= quantities_of(row_quantities(run, start=say("of_sinkage_start"), ground="ground")) | own
+    result["warnings"] += [warning for warning in (unsettled_warning(run.master), own_warning(run)) if warning]
+    return trajectory, result | more | {"title": words(settings, title_of(plan))}
 
 
 def row_quantities(run: CoupledTumble, *, start: str, ground: str) -> dict[str, tuple[float, str, str]]:

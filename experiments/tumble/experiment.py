@@ -5,7 +5,6 @@ on the spring-damper (`coupled`), or the planar model, for which a sweep and a c
 trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json, figures and a report.
 """
 
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -29,23 +28,12 @@ from .trial import TumblePlan, plan_tumble
 __all__ = ["check", "resume", "run"]
 
 
-@dataclass(frozen=True)
-class _Computed:
-    """A trajectory, when the wheel comes to its limit [s], and what the result has beyond the planar model's."""
-
-    trajectory: Trajectory
-    full: float | None
-    quantities: Json = field(default_factory=dict)
-    more: Json = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
-
-
 def check(settings: TumbleSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
     if settings.ground == "bed":
-        from .on_grains import check_on_grains  # loads Taichi
+        from .on_grains import PlanarOnBed  # loads Taichi
 
-        check_on_grains(settings)
+        PlanarOnBed(settings).check()
         return
     check_sweep(settings)
     plan = plan_tumble(middle_of_sweep(settings))
@@ -59,20 +47,13 @@ def check(settings: TumbleSettings) -> None:
 
 
 def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
-    if settings.ground == "bed":
-        from .on_grains import tumble_on_grains  # loads Taichi
-
-        return tumble_on_grains(settings, folder, progress)
     with folder.lock():
-        return _on_law(settings, folder, progress)
+        if settings.ground != "bed":
+            return _on_law(settings, folder, progress)
+        from .on_grains import PlanarOnBed  # loads Taichi
 
-
-def _compute(settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress) -> _Computed:
-    if settings.method == "coupled":
-        from .coupled import compute_coupled  # loads Taichi
-
-        return _Computed(*compute_coupled(settings, plan, folder, progress))
-    return _Computed(*_integrate(settings, plan, duration=settings.duration))
+        copied = keep_platform(settings.platform, folder.path, progress.message)
+        return PlanarOnBed(settings, copied).carry_out(folder, progress)
 
 
 def _check_planar(settings: TumbleSettings, plan: TumblePlan) -> None:
@@ -103,14 +84,16 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     for sentence in (*plan.sentences(), *(f"warning: {warning}" for warning in plan.warnings)):
         progress.message(sentence)
     progress.stage("tumble", total=1.0)
-    computed = _compute(settings, plan, folder, progress)
+    if settings.method == "coupled":
+        from .coupled import compute_coupled  # loads Taichi
+
+        trajectory, result = compute_coupled(settings, plan, folder, progress)
+    else:
+        trajectory, full = _integrate(settings, plan, duration=settings.duration)
+        result = result_of(settings, plan, trajectory, full)
     progress.update(1.0)
-    write_series(folder.path / "trajectory.csv", trajectory_columns(computed.trajectory))
-    folder.write_series("motion", motion_columns(computed.trajectory))
-    result = result_of(settings, plan, computed.trajectory, computed.full)
-    result["quantities"] |= computed.quantities
-    result["warnings"] += computed.warnings
-    result |= computed.more
+    write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
+    folder.write_series("motion", motion_columns(trajectory))
     if settings.sweep:
         progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
         progress.stage("sweep")

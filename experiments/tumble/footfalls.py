@@ -15,8 +15,7 @@ from . import say
 
 __all__ = ["Footfall", "Sinking", "find_footfalls", "footfall_quantities", "footfall_table", "sinking_over"]
 
-GRAZE = 1e-3
-"""A row that goes less deep [m] has not come down."""
+GRAZE = 1e-3  # A row that goes less deep [m] has not come down
 
 
 @dataclass(frozen=True)

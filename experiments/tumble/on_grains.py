@@ -21,12 +21,10 @@ from experiments.grains.graded import graded_under
 from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
 from experiments.grains.softening import PUSHED, Softening
 from experiments.grains.staged import check_bed_stages, packing_warning
-from experiments.platform.kept_platform import keep_platform
 from experiments.platform.lengths import check_lengths
 from experiments.platform.numbers import platform_numbers, torque_within_limit
 from experiments.platform.surfaces import find_surface
 from experiments.platform.tips import tip_angles, tip_depth
-from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.planar.simulate import simulate
@@ -39,7 +37,7 @@ from .settings import TumbleSettings
 from .steppers import is_plain, stepper_of
 from .trial import plan_tumble, spikes_of
 
-__all__ = ["PlanarForecast", "PlanarOnBed", "check_on_grains", "tumble_on_grains"]
+__all__ = ["PlanarForecast", "PlanarOnBed"]
 
 ROLLED = {"motor": 0.8, "brake": 0.4}
 """Way on grains over that of rolling without slip or loss: 0.64 to 0.78 and 0.3 were met (docs/experiments.md) [1]."""
@@ -64,18 +62,6 @@ class PlanarForecast(Forecast):
     def length(self) -> float:
         """Between the outermost tips [m]."""
         return self.ahead - self.behind
-
-
-def check_on_grains(settings: TumbleSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for a bed that does not suit this trial."""
-    PlanarOnBed(settings).check()
-
-
-def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
-    """Carry it out in `folder`, from its checkpoint where there is one; the result."""
-    with folder.lock():
-        on_bed = PlanarOnBed(settings, keep_platform(settings.platform, folder.path, progress.message))
-        return on_bed.carry_out(folder, progress)
 
 
 class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):

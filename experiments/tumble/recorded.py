@@ -33,8 +33,7 @@ __all__ = ["TumbleRecording", "campaign_of_tumbles", "write_tumbles_campaign"]
 SPIKES_PER_ROW = 2.0
 SHARED = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d", "gravity")
 """Numbers that all trials of a campaign have in common."""
-FEWEST = 0.1
-"""A shorter run has too few rows of the camera to be diagnosed [s]."""
+FEWEST = 0.1  # A shorter run has too few rows of the camera to be diagnosed [s]
 
 
 class TumbleRecording(StrictSettings):

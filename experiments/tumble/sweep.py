@@ -31,8 +31,7 @@ from .trial import plan_tumble
 __all__ = ["SWEEP_FILE", "check_sweep", "middle_of_sweep", "run_sweep"]
 
 SWEEP_FILE = "sweep.csv"
-MOST_ROWS = 24
-"""Rows that the terminal shows."""
+MOST_ROWS = 24  # Rows that the terminal shows
 COLUMNS = {
     "trajectory_angle": "rad",
     "max_speed": "m/s",
@@ -41,8 +40,7 @@ COLUMNS = {
     "transition_angle_hop": "rad",
 }
 """Of each trial, by the names of a tumble's quantities."""
-GAPS = ("trajectory_angle", "max_speed", "max_angular_velocity")
-"""What is compared with the accurate integrator."""
+GAPS = ("trajectory_angle", "max_speed", "max_angular_velocity")  # What is compared with the accurate integrator
 WHEEL_SAMPLES = 128
 """Moments of a trial among which the one at which its wheel is at its limit is sought, over and over more closely."""
 SUFFIXES = {"1": "", "9.80665 m/s2": "_g"}

@@ -46,14 +46,11 @@ from .campaign_tables import platform_table, sensor_set, sensor_tables, trial_ta
 
 __all__ = ["TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "write_tumble_campaign"]
 
-TRUTH = "truth.toml"
-"""What is true, in a run folder; never in the campaign's."""
+TRUTH = "truth.toml"  # What is true, in a run folder; never in the campaign's
 
-MOST_ROWS = 24
-"""Trials that the terminal shows."""
+MOST_ROWS = 24  # Trials that the terminal shows
 
-MOTION = ("time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "ax", "ay")
-"""What sensors see of a trajectory."""
+MOTION = ("time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "ax", "ay")  # What sensors see of a trajectory
 _DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 
 

@@ -35,12 +35,9 @@ from .settings import TumbleSettings
 
 __all__ = ["DEFAULT_RIG", "Spikes", "TumblePlan", "model_trial", "plan_tumble", "spikes_of", "turns_of"]
 
-TORQUE = 0.22
-"""The paper's middle one [N m]."""
-DEFAULT_RIG = 0.0085
-"""The paper's lower gravity [9.80665 m/s2]."""
-SPIKES_PER_ROW = 2.0
-"""The platform stands on two rows of two."""
+TORQUE = 0.22  # The paper's middle one [N m]
+DEFAULT_RIG = 0.0085  # The paper's lower gravity [9.80665 m/s2]
+SPIKES_PER_ROW = 2.0  # The platform stands on two rows of two
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from . import say
 
 __all__ = ["MOST", "stayed_words", "tumble_sentences", "way_through"]
 
-MOST = 8
-"""Changes of state that are stated one by one."""
+MOST = 8  # Changes of state that are stated one by one
 
 
 def tumble_sentences(trajectory: Trajectory) -> list[str]:

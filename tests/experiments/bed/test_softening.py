@@ -15,13 +15,17 @@ from experiments.grains.softening import (
     check_young,
     drop_depth,
     run_limit,
-    soften,
     soften_material,
     stable_overlap,
 )
 
-SAND = {"grain": 0.0024, "density": 2650.0, "poisson": 0.25, "friction": 0.5, "real_young": 7e10, "gravity": 9.81,
-        "bed_height": 0.05, "depth": 0.02, "speed": 0.1}  # fmt: skip
+SAND = {"grain": 0.0024, "gravity": 9.81, "bed_height": 0.05, "depth": 0.02, "speed": 0.1}
+
+
+def soften(*, surface_energy=0.0, **case):
+    """Of grains of one size."""
+    sticks = {"cohesion": "dmt", "surface_energy": surface_energy} if surface_energy else {}
+    return soften_material(Material("stuff", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1, **sticks), spread=0.0, **case)
 
 
 def test_bearing_of_a_plate_as_published():
@@ -56,8 +60,7 @@ def test_grains_that_stick_are_as_stiff_as_their_pull_asks_for():
 def test_the_smallest_of_wide_sizes_keep_the_bound():
     """Within 1 +- 0.15 nothing changes; within 1 +- 0.5 the mean grain is held to 0.5 / 0.85 of the bound."""
     stuff = Material("stuff", 2650, 7e10, 0.25, 0.5, 0.5)
-    case = {key: SAND[key] for key in ("grain", "gravity", "bed_height", "depth", "speed")} | {"young": None}
-    narrow, usual, wide = (soften_material(stuff, max_overlap=0.05, spread=s, **case).young for s in (0.05, 0.15, 0.5))
+    narrow, usual, wide = (soften_material(stuff, max_overlap=0.05, spread=s, **SAND).young for s in (0.05, 0.15, 0.5))
     assert narrow == usual == soften(max_overlap=0.05, **SAND).young
     assert wide == soften(max_overlap=0.05 * 0.5 / 0.85, **SAND).young > 2 * usual
 

@@ -26,7 +26,7 @@ from experiments.tumble import experiment as tumble
 from experiments.tumble import on_grains_result as tumble_grains_result
 from experiments.tumble import opening as tumble_opening
 from experiments.tumble import steppers as tumble_steppers
-from experiments.tumble.on_grains import PlanarOnBed, tumble_on_grains
+from experiments.tumble.on_grains import PlanarOnBed
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble, spikes_of
 from rigid import Trial
@@ -380,7 +380,7 @@ def test_jsc1a_without_stages_is_told_before_the_bed_is_made_which_would_do(tmp_
         progress, told[name] = Progress(), []
         monkeypatch.setattr(progress, "message", told[name].append)
         with pytest.raises(ReachedError):
-            tumble_on_grains(settings, RunFolder.create(tmp_path / name, "tumble", settings), progress)
+            tumble.run(settings, tmp_path / name, progress=progress)
     (said,) = (text for text in told["plain"] if "bed_stages the bed is" in text)
     assert said.startswith("warning: ") and "packed at 0.57" in said and "will not be jsc1a" in said
     assert f"--bed-stages {' '.join(shipped)} would do" in said
