@@ -143,10 +143,7 @@ def conclude(
     result: Json = {
         "title": title, "status": "done",
         "quantities": numbers, "departures": {"sentences": _sentences(run)},
-        "trial": {
-            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
-            for name, number in plan.numbers.items()
-        } | {"weight": {"value": float(np.linalg.norm(trial.weight)), "unit": "N", "origin": "(m + m_b) g_sim"}},
+        "trial": plan.trial_table(float(np.linalg.norm(trial.weight))),
         "surface": plan.surface, "ground": settings.ground, "actuator": settings.actuator,
         "duration": settings.duration, "spike_count": len(trial.platform.tips),
         "transitions": passages(run), "warnings": warnings,

@@ -81,7 +81,7 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
     middle = middle_of_sweep(settings, model_file=copied, platform=platform)
     plan = plan_tumble(middle, model_file=copied, platform=platform)
-    for sentence in (*plan.sentences(), *(f"warning: {warning}" for warning in plan.warnings)):
+    for sentence in plan.announcement():
         progress.message(sentence)
     progress.stage("tumble", total=1.0)
     if settings.method == "coupled":

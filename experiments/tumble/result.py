@@ -90,11 +90,7 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         "status": "done",
         "quantities": quantities_of(trajectory),
         "departures": {"sentences": tumble_sentences(trajectory)},
-        "trial": {
-            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
-            for name, number in plan.numbers.items()
-        }
-        | {"weight": {"value": trial.weight, "unit": "N", "origin": "(m + m_b) g_sim"}},
+        "trial": plan.trial_table(trial.weight),
         "surface": plan.surface,
         "ground": settings.ground,
         "actuator": settings.actuator,

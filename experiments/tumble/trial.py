@@ -4,7 +4,7 @@ What is given wins over the model, the model over the surface's numbers and over
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,11 @@ from experiments.platform.lengths import check_spike_length
 from experiments.platform.numbers import PlatformNumbers, platform_numbers
 from experiments.platform.settled import (
     Number,
+    Plan,
     Settled,
+    at_default,
     check_actuation,
     check_body,
-    defaults_said,
     of_earth,
     of_other_spikes,
     rig_fault,
@@ -64,22 +65,14 @@ def spikes_of(settings: TumbleSettings, own: PlatformNumbers) -> Spikes:
     return Spikes(given["spike_diameter"], given["spike_clear"], lacking)
 
 
-@dataclass(frozen=True)
-class TumblePlan:
-    """A trial, and what is said of it."""
+@dataclass(frozen=True, kw_only=True)
+class TumblePlan(Plan):
+    """A trial in the plane."""
 
     trial: Trial
-    numbers: Mapping[str, Number]
-    surface: str  # name of the material
-    choices: Mapping[str, str]  # what else was left at its default: name -> value, as a person would type it
-    platform: PlatformNumbers  # what gives the numbers that nothing else gives
-    spikes: Spikes  # what grains meet of its spikes
-    warnings: tuple[str, ...] = ()
-    max_wheel_speed: float = math.inf  # where a motor's torque ends [rad/s]
-
-    def sentences(self) -> list[str]:
-        """One line for each number and choice that was not given: every default is said."""
-        return defaults_said(self.choices, self.numbers)
+    platform: PlatformNumbers  # What gives the numbers that nothing else gives
+    spikes: Spikes  # What grains meet of its spikes
+    max_wheel_speed: float = math.inf  # Where a motor's torque ends [rad/s]
 
 
 def plan_tumble(
@@ -139,24 +132,24 @@ def plan_tumble(
     warnings += _rig_warnings(trial)
     if ground is None and model is None:
         warnings += of_earth(numbers, surface, weight=trial.weight, mass=trial.mass, counterweight=trial.counterweight)
-    choices = _choices(settings, surface, model)
     spikes = spikes or Spikes(platform.spike_diameter, platform.spike_clear, ("spike_diameter", "spike_clear"))
-    limit = numbers.value("max_wheel_speed")
-    return TumblePlan(trial, numbers, surface, choices, platform, spikes, tuple(warnings), limit)
+    return TumblePlan(
+        trial=trial, numbers=numbers, surface=surface, choices=_choices(settings, surface, model), platform=platform,
+        spikes=spikes, warnings=tuple(warnings), max_wheel_speed=numbers.value("max_wheel_speed"),
+    )  # fmt: skip
 
 
 def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:
     """The settings that are no numbers of the trial and stand at their defaults."""
     found = {"surface": surface} if settings.surface is None and model is None else {}
-    units = {"duration": " s", "sample_interval": " s"}
-    names = ["platform", "ground", "actuator", "duration", "method", "sample_interval"]
+    units = {
+        "platform": "", "ground": "", "actuator": "", "duration": " s", "method": "", "sample_interval": " s"
+    }  # fmt: skip
     if settings.gravity is None:
-        names.append("rig_reading")
+        units["rig_reading"] = ""
         if settings.rig is None:
             found["rig"] = f"{DEFAULT_RIG:g}"
-    for name in names:
-        if name not in settings.model_fields_set:
-            found[name] = f"{getattr(settings, name)}{units.get(name, '')}"
+    found |= at_default(settings, units)
     if not settings.effects and model is None:
         found["effects"] = "none"
     return found
