@@ -1,18 +1,12 @@
 """Pivot, slip or hop, read off the forces of grains by stated rules, so that it compares with the planar model's.
 
-Over a window of 5 ms the means of each row's normal force N, of its horizontal force F and of the horizontal velocity u
-of its lowest material point are taken. In the plane of motion F and u have one component and a row is one of spikes
-side by side; in space they have two and a row is a single spike. A row
+Of each row the normal force N, the horizontal force F and the horizontal velocity u of its lowest material point are
+averaged over 5 ms: F and u have one component in the plane, where a row is one of spikes side by side, two in space,
+where it is a single spike. A row *touches* while N and F together are above 1 % of the weight. It *slides* while |F| is
+at least mu_d N, F is against u (F . u < 0) and |u| is above 2 mm/s; what touches and does not slide sticks.
 
-- *touches* while the force on it, N and F together, is above 1 % of the weight on the surface: sand pushes a spike that
-  is in it sideways where nothing bears it any more;
-- *slides* while |F| is at least mu_d N, F is against u (F . u < 0) and |u| is above 2 mm/s; what touches and does not
-  slide sticks. mu_d is the surface's, as the spring-damper has it.
-
-Then as in the planar model: hop (none touches), slip (all that touch slide), pivot (one sticks), stand (more do). A row
-of spikes side by side is a line about which the platform can turn; so in space it is a pivot while those that stick
-lie in one line, and it stands on three that do not. A grain's knocks are shorter than the window and a torque's
-changes longer. Changes come late by half the window.
+Then as in the planar model: hop (none touches), slip (all that touch slide), pivot (one sticks), stand (more do). In
+space it is a pivot while those that stick lie in one line. docs/coupling.md says why. Changes come late by 2.5 ms.
 """
 
 from collections.abc import Iterable

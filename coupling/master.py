@@ -1,24 +1,17 @@
 """The master: steps a body and its ground together, and records the work that passes between them.
 
 Over one macro step H the body's twist is held and the ground answers with its mean wrench. The twist is that of the
-step's middle, guessed with a wrench that is extrapolated from the steps before (`extrapolation` 0: the last one, 1: on
-the straight line through the last two, 2: on the parabola through three). With `iterations` above 1 the step is
-repeated, from the ground's checkpoint, until the wrench that comes out is the one that went in, within `tolerance` of
-the largest force met. Handing back what came out contracts by K H^2 / 4m, K the contacts' stiffness: no better than the
-explicit step, which is stable up to K H^2 / m = 4, and of no use to a light body. So what goes in is what the
-differences between the times before, or in the step before, say would come out unchanged (interface quasi-Newton with
-an inverse Jacobian from least squares; Degroote et al. 2009, Comput. Struct. 87:793). What is found is the implicit
-midpoint rule, stable at any K H^2 / m.
+step's middle, under a wrench extrapolated from the steps before. With `iterations` above 1 the step is repeated from
+the ground's checkpoint until the wrench that comes out is the one that went in: the implicit midpoint rule, stable at
+any K H^2 / m, K the contacts' stiffness; the explicit step is stable up to K H^2 / m = 4. What goes in is found by
+interface quasi-Newton with an inverse Jacobian from least squares (Degroote et al. 2009, Comput. Struct. 87:793).
 
-Either side may be sub-cycled: the ground takes `substeps` of its own steps in H, the body `body_steps` of its own. The
-wrench is exchanged once all the same. With the guess the body goes through its steps H / body_steps, the ground under
-each with the twist held over it; then the body goes through them once more, from where it was and along the same
-twists, with what the ground answered to each. So what the body does by itself within H (it nutates, its wheels run
-up) is followed at H / body_steps; the bound on K H^2 / m stays.
+Either side may take several steps within H: the ground `substeps`, the body `body_steps`. The wrench is exchanged once
+all the same: the body goes through its steps with the guess, then again along the same twists with what was answered.
 
-The energy balance is in docs/coupling.md. The ground takes its wrench times the twist it saw, the body gives the wrench
-times the mean of its rates before and after; the difference is the error of the exchange, of second order in H
-(Sadjina et al. 2016, Eng. Comput. 33:607, call it the residual of a power bond).
+The difference between the ground's work (its wrench times the held twist) and the body's (times the mean of its rates
+before and after) is the error of the exchange, of second order in H (Sadjina et al. 2016, Eng. Comput. 33:607: the
+residual of a power bond). docs/coupling.md has the equations and the energy balance.
 """
 
 from collections import deque

@@ -1,19 +1,15 @@
 """A spike that goes straight down into a ground: driven, dropped or set down.
 
 One macro step H is a whole number of the ground's own steps. Over it the spike moves at a constant velocity and the
-ground answers with its mean force F, so what passes between them is the exact impulse F H and the exact work
-F (velocity) H, whatever the ground does inside the step. A free spike of mass m under the load W is stepped
+ground answers with its mean force F, so that F H and F (velocity) H are exact. A free spike of mass m under the load W:
 
     u     = v + (W - F_before) H / (2 m)       the velocity held during the step, a guess at its middle
     z'    = z + u H
     v'    = v + (W - F) H / m                  F: the mean force of the step just done
 
-which is explicit and staggered (the ground moves first), of second order in H, and exact in free fall. Time is 0 where
-the tip meets the undisturbed surface, depth 0; before that the spike is carried at its speed (phase "free"), from just
-clear of the grains that stick out.
-
-Each run is a stepper: `advance` once or `run` to the end, `state` and `restore` at any time between macro steps, the
-ground's memory included, so that a run taken up again is bitwise the same.
+which is of second order in H, and exact in free fall. Time is 0 where the tip meets the undisturbed surface, depth 0;
+before that the spike is carried at its speed (phase "free"), from just clear of the grains that stick out. `state` and
+`restore` work between any two macro steps: a run goes on to the same bits.
 """
 
 import math

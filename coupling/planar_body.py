@@ -9,10 +9,9 @@ A macro step of length H from the velocity v, s the ground's lag (0 for a law, i
     q' = q + H u
     v' = v + H M^-1 (G + F)                      F: the mean force of the step just done
 
-v belongs to a time s / 2 later than q, as in the grains' leapfrog; with H = s it is that leapfrog. Where the ground
-gives Coulomb bounds, F holds the friction that these leave open: sticking rows share the horizontal force in proportion
-to their loads, and their mean slip is zero at the step's end; beyond mu_s N they slide with mu_d N until the slip
-passes through zero. Events of friction are found to the step, so they are of first order in H.
+v belongs to a time s / 2 later than q. Where the ground gives Coulomb bounds, sticking rows share the horizontal force
+in proportion to their loads, and their mean slip is zero at the step's end; beyond mu_s N they slide with mu_d N until
+the slip passes through zero. Events of friction are found to the step, so they are of first order in H.
 """
 
 import math

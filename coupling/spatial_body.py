@@ -1,17 +1,17 @@
 """A platform with six degrees of freedom and up to three flywheels as a body that a ground pushes.
 
-World axes, z up from the undisturbed surface; the origin is the centre of mass. Momentum P and angular momentum L about
-it (platform and wheels) are what a step changes, so flight keeps both to round-off; I omega = L - sum h_i a_i, as in
-`rigid.spatial.motion`. A macro step of length H, s the ground's lag (0 for a law, its own step for a bed):
+World axes, z up from the undisturbed surface; the origin is the centre of mass. A step changes momentum P and angular
+momentum L about it (platform and wheels); I omega = L - sum h_i a_i, as in `rigid.spatial.motion`. A macro step of
+length H, s the ground's lag (0 for a law, its own step for a bed):
 
     u, w  of  P + (H - s) / 2 (W + F_guess),  L + (H - s) / 2 T_guess,  turned half way     held during the step
     r' = r + H u,   q' = exp(H w) q
     P' = P + H (W + F),   L' = L + H T,   h_i' = h_i - H tau_i
 
-P and L belong to a time s / 2 later than r and q, as `coupling.planar_body` has it. Under a Coulomb bound the tips that
-stick share what holds them in proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)), so that at the
-step's end their mean slip, and turning about the vertical, are zero; one beyond mu_s N_k slides with mu_d N_k until its
-slip turns back (docs/platform.md). Events of friction are found to the step: of first order in H.
+P and L belong to a time s / 2 later than r and q. Under a Coulomb bound the tips that stick share what holds them in
+proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)), so that at the step's end their mean slip, and
+turning about the vertical, are zero; one beyond mu_s N_k slides with mu_d N_k until its slip turns back
+(docs/platform.md). Events of friction are of first order in H.
 """
 
 import math

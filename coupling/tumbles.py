@@ -1,10 +1,8 @@
 """Several tumbles in a row on one ground, and a landing: `CoupledTumble` with another beginning or end.
 
 Several tumbles: the torque acts until the platform has turned by `turn` times half the angle between two rows (1: its
-middle is over the leading row, from where it falls by itself); then it waits until the platform lies at rest, which is
-noted, and begins anew. The wheel goes on from the speed that it has. Over how many rows a tumble goes is as it comes.
-
-A landing: no placement and no torque; the platform starts just clear of the ground with the velocities of its fall.
+middle is over the leading row, from where it falls by itself); then the platform comes to rest, which is noted, and the
+next begins. The wheel keeps its speed. A landing starts just clear of the ground with the velocities of its fall.
 """
 
 import math

@@ -1,9 +1,7 @@
 """A tumble of the planar platform on any ground: placed, released, turned over by its flywheel.
 
-A stepper as those of `coupling.penetration`: `advance` makes one macro step, `state` and `restore` work between any
-two. On a bed the platform is first lowered until the sand carries it (`PlanarBody.begin_placement`), under a larger
-gravity if asked to, which then is lowered (`coupling.lowered_gravity`); then time is 0, the torque begins and the
-energy balance starts. Every macro step leaves one row.
+On a bed the platform is first lowered until the sand carries it, under a larger gravity if asked to, which then falls
+to the run's (`coupling.lowered_gravity`); then time is 0, the torque begins and the energy balance starts.
 """
 
 import math

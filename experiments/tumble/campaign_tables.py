@@ -1,16 +1,20 @@
-"""Tables of a tumble's campaign.toml that are written alike for trials made up and for runs on grains."""
+"""Tables of a tumble's campaign.toml that are written alike for made-up trials and for runs on grains."""
 
 from collections.abc import Mapping
 from typing import Any, Literal
 
 from experiments.campaign.tables import (
+    FORMAT,
     HEDGEHOG_ROWS,
     ImuSensor,
     PlatformTable,
     PoseSensor,
+    RigTable,
     TumbleSensors,
+    TumbleSurface,
     TumbleTrial,
     WheelSensor,
+    WheelTable,
 )
 from experiments.runs.types import Json
 from rigid.model.trial import Trial
@@ -18,17 +22,45 @@ from rigid.sensors import SensorSet
 
 from .campaign_settings import CampaignSettings
 
-__all__ = ["platform_table", "sensor_set", "sensor_tables", "trial_table"]
+__all__ = ["sensor_set", "shared_tables", "trial_table"]
 
 Actuator = Literal["motor", "brake"]
 NUMBERS = ("gravity_sim", "torque", "torque_until", "wheel_speed_0", "counterweight")
 """Of a trial [m/s2, N m, s, rad/s, kg]."""
 
 
-def platform_table(*, mass: float, inertia: float, spike_length: float, spike_count: int) -> PlatformTable:
-    """A platform [kg, kg m2, m]; the Hedgehog's number of rows goes without saying, as the format has it."""
-    told = None if spike_count == HEDGEHOG_ROWS else spike_count
-    return PlatformTable(mass=mass, inertia=inertia, spike_length=spike_length, spike_count=told)
+def shared_tables(
+    name: str,
+    numbers: Mapping[str, float],
+    sensors: SensorSet,
+    *,
+    spike_count: int,
+    kind: str,
+    granular: bool,
+    rig: RigTable | None,
+) -> Json:
+    """What a campaign of tumbles and its truth both have.
+
+    `numbers` of platform, wheel and surface by the names of `Trial`; `kind` and `granular` of the surface. The
+    Hedgehog's number of rows is left out, as the format has it.
+    """
+    return {
+        "format": FORMAT, "kind": "tumble", "name": name,
+        "platform": PlatformTable(
+            mass=numbers["mass"], inertia=numbers["inertia"], spike_length=numbers["spike_length"],
+            spike_count=None if spike_count == HEDGEHOG_ROWS else spike_count,
+        ),
+        "wheel": WheelTable(inertia=numbers["wheel_inertia"]),
+        "rig": rig,
+        "surface": TumbleSurface(
+            kind=kind, granular=granular, stiffness=numbers["stiffness"], damping=numbers["damping"],
+            mu_s=numbers["mu_s"], mu_d=numbers["mu_d"],
+        ),
+        "sensors": TumbleSensors(
+            pose=PoseSensor(std=sensors.pose_std), imu=ImuSensor(std=sensors.imu_std, window=sensors.imu_window),
+            wheel=WheelSensor(std=(sensors.wheel_std,)),
+        ),
+    }  # fmt: skip
 
 
 def trial_table(name: str, trial: Trial | Mapping[str, Any], actuator: Actuator = "motor") -> TumbleTrial:
@@ -50,12 +82,3 @@ def sensor_set(settings: CampaignSettings, *, noise: float = 1.0) -> SensorSet:
         pose_std=(x, y, theta), imu_std=(gyro, ax, ay), wheel_std=noise * settings.wheel_std,
         imu_window=settings.imu_window, lead=settings.lead,
     )  # fmt: skip
-
-
-def sensor_tables(sensors: SensorSet) -> TumbleSensors:
-    """What campaign.toml says of these sensors."""
-    return TumbleSensors(
-        pose=PoseSensor(std=sensors.pose_std),
-        imu=ImuSensor(std=sensors.imu_std, window=sensors.imu_window),
-        wheel=WheelSensor(std=(sensors.wheel_std,)),
-    )

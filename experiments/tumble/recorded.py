@@ -16,7 +16,7 @@ from pydantic import Field
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign, write_campaign
 from experiments.campaign.files import check_target
-from experiments.campaign.tables import RigTable, TumbleSurface, TumbleUncertainty, WheelTable
+from experiments.campaign.tables import RigTable, TumbleUncertainty
 from experiments.runs.folder import RunFolder, read_series
 from experiments.runs.kept_results import PATH_AND_MOTION, require_files
 from experiments.runs.strict import StrictSettings
@@ -26,7 +26,7 @@ from rigid.sensors import Motion, SensorSet, measure, sensor_times
 
 from . import say
 from .campaign_settings import CampaignSettings
-from .campaign_tables import platform_table, sensor_set, sensor_tables, trial_table
+from .campaign_tables import sensor_set, shared_tables, trial_table
 
 __all__ = ["TumbleRecording", "campaign_of_tumbles", "write_tumbles_campaign"]
 
@@ -40,12 +40,10 @@ class TumbleRecording(StrictSettings):
     """What goes into a campaign made of tumbles beside the first run, and how noisy it is."""
 
     also: tuple[str, ...] = Field((), description="Of tumbles: folders of further runs, each a trial of the campaign.")
-    fitted: str | None = Field(
-        None, description="Of tumbles: folder of a run of penetrate in the same grains, whose K and C are stated."
-    )
-    noise: Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(
-        1.0, description="Of tumbles: noise of the sensors over that of `hedgebed campaign` [1]."
-    )
+    fitted: str | None = None
+    """Of tumbles: folder of a run of penetrate in the same grains, whose K and C are stated."""
+    noise: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+    """Of tumbles: noise of the sensors over that of `hedgebed campaign` [1]."""
 
 
 def write_tumbles_campaign(
@@ -86,22 +84,15 @@ def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = 
     stiffness, damping, sigmas, said = _law(first, recording.fitted)
     trial = _numbers(first)
     tables = TumbleCampaign(
-        format="hedgehog-campaign/1", kind="tumble", name=f"tumbles on {_ground(first)}",
-        platform=platform_table(
-            mass=trial["mass"], inertia=trial["inertia"], spike_length=trial["spike_length"],
-            spike_count=int(first["spike_count"]),
-        ),
-        wheel=WheelTable(inertia=trial["wheel_inertia"]),
-        rig=RigTable(gravity=trial["gravity"]) if trial["counterweight"] > 0 else None,
-        surface=TumbleSurface(
-            kind=str(first["surface"]), granular=first["ground"] == "bed", stiffness=stiffness, damping=damping,
-            mu_s=trial["mu_s"], mu_d=trial["mu_d"],
+        **shared_tables(
+            f"tumbles on {_ground(first)}", trial | {"stiffness": stiffness, "damping": damping}, sensors,
+            spike_count=int(first["spike_count"]), kind=str(first["surface"]), granular=first["ground"] == "bed",
+            rig=RigTable(gravity=trial["gravity"]) if trial["counterweight"] > 0 else None,
         ),
         uncertainty=TumbleUncertainty(
             mass=plain.sigma_mass, inertia=plain.sigma_inertia, mu_s=plain.sigma_mu_s, mu_d=plain.sigma_mu_d,
             gravity_sim=plain.sigma_gravity_sim, **sigmas,
         ),
-        sensors=sensor_tables(sensors),
         notes={
             "made_by": f"hedgebed {__version__} tumble on {_ground(first)}", "stiffness_and_damping": said,
             "code": str(first.get("code", "")), "noise_seed": seed,

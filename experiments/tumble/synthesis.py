@@ -25,7 +25,7 @@ from experiments.campaign import (
     write_model,
 )
 from experiments.campaign.files import check_target, place_campaign
-from experiments.campaign.tables import FORMAT, RigTable, TumbleSurface, TumbleTrial, TumbleUncertainty, WheelTable
+from experiments.campaign.tables import RigTable, TumbleTrial, TumbleUncertainty
 from experiments.platform.numbers import torque_within_limit
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
@@ -42,7 +42,7 @@ from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
 
 from . import say
 from .campaign_settings import CampaignSettings
-from .campaign_tables import platform_table, sensor_set, sensor_tables, trial_table
+from .campaign_tables import sensor_set, shared_tables, trial_table
 
 __all__ = ["TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "write_tumble_campaign"]
 
@@ -212,25 +212,12 @@ def write_tumble_campaign(settings: TumbleSettings, plan: TumblePlan, folder: Pa
 def _tables(settings: CampaignSettings, plan: TumblePlan, values: Json) -> Json:
     """What the campaign and the truth both say, with their own numbers."""
     trial = plan.trial
-    known = find_surface(settings.surface) if settings.surface is not None else None
-    rig = RigTable(wire_length=settings.wire_length, gravity=trial.gravity) if trial.counterweight > 0 else None
-    return {
-        "format": FORMAT,
-        "kind": "tumble",
-        "name": settings.name,
-        "platform": platform_table(
-            mass=values["mass"], inertia=values["inertia"], spike_length=trial.spike_length,
-            spike_count=trial.spike_count,
-        ),
-        "wheel": WheelTable(inertia=trial.wheel_inertia),
-        "rig": rig,
-        "surface": TumbleSurface(
-            kind=plan.surface,
-            granular=known.granular if known is not None else False,
-            **{name: values[name] for name in ("stiffness", "damping", "mu_s", "mu_d")},
-        ),
-        "sensors": sensor_tables(sensor_set(settings)),
-    }  # fmt: skip
+    numbers = values | {"spike_length": trial.spike_length, "wheel_inertia": trial.wheel_inertia}
+    return shared_tables(
+        settings.name, numbers, sensor_set(settings), spike_count=trial.spike_count, kind=plan.surface,
+        granular=find_surface(settings.surface).granular if settings.surface is not None else False,
+        rig=RigTable(wire_length=settings.wire_length, gravity=trial.gravity) if trial.counterweight > 0 else None,
+    )  # fmt: skip
 
 
 def _stated(settings: CampaignSettings, conditions: Sequence[_Condition]) -> TumbleCampaign:
