@@ -9,15 +9,7 @@ from numpy.typing import NDArray
 from coupling import BedGround, SpatialRun
 from coupling.members import HULL, spatial_members
 from dem.prepare.prepare import fingerprint
-from experiments.grains.bed_result import (
-    bed_numbers,
-    bed_warnings,
-    overlap_warning,
-    residual_warning,
-    reversal_warning,
-    unsettled_warning,
-    write_bed_series,
-)
+from experiments.grains import bed_result as grains
 from experiments.grains.softening import Softening
 from experiments.grains.tracked_frames import PlatformFrames, member_mesh
 from experiments.runs.folder import write_series
@@ -93,7 +85,7 @@ def write_series_of(run: SpatialRun, folder: Path) -> None:
     write_series(folder / "series" / "motion.csv", rest)
     write_series(folder / "series" / "feet.csv", feet_columns(run))
     if isinstance(run.ground, BedGround):
-        write_bed_series(folder, run)
+        grains.write_bed_series(folder, run)
 
 
 def sinkage_start(run: SpatialRun) -> float:
@@ -139,7 +131,7 @@ def conclude(
     numbers, trial, in_rig = quantities_of(run), plan.trial, plan.trial.counterweight > 0
     where, what = "rig" if in_rig else "free", "bed of " if settings.ground == "bed" else ""
     title = say("title", plan=plan, what=what, where=where, gravity=plan.numbers["gravity_sim"].value)
-    warnings = [*plan.warnings, residual_warning(run.energy_residual), unsettled_warning(run.master)]
+    warnings = [*plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master)]
     result: Json = {
         "title": title, "status": "done",
         "quantities": numbers, "departures": {"sentences": _sentences(run)},
@@ -154,13 +146,15 @@ def conclude(
         write_series(folder / "series" / "spring-damper.csv", path_columns(beside))
         bed = run.ground.bed
         result["code"] = fingerprint()
-        result["grains"] = bed_numbers(settings, run, bed, softening, in_rig=in_rig) | {
+        result["grains"] = grains.bed_numbers(settings, run, bed, softening, in_rig=in_rig) | {
             "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
             "beside_transitions": passages(beside),
         }  # fmt: skip
         warnings += [
-            reversal_warning(run.dissipation_reversal), overlap_warning(bed, softening, settings.max_overlap),
-            *bed_warnings(bed, plan.surface, across=2 * trial.platform.tip_radius / settings.grain), say("one_bed"),
+            grains.reversal_warning(run.dissipation_reversal),
+            grains.overlap_warning(bed, softening, settings.max_overlap),
+            *grains.bed_warnings(bed, plan.surface, across=2 * trial.platform.tip_radius / settings.grain),
+            say("one_bed"),
         ]  # fmt: skip
     result["warnings"] = [warning for warning in warnings if warning]
     return Result.make("tumble spatial", **result)

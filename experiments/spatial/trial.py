@@ -6,17 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.platform import settled
 from experiments.platform.lengths import check_spike_length
-from experiments.platform.settled import (
-    Number,
-    Plan,
-    Settled,
-    at_default,
-    of_earth,
-    of_other_spikes,
-    rig_fault,
-    settle_surface,
-)
 from rigid.platform.actuation import TorqueHistory
 from rigid.platform.files import find_platform
 from rigid.platform.platform import Platform
@@ -33,7 +24,7 @@ SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpatialPlan(Plan):
+class SpatialPlan(settled.Plan):
     """A trial in space."""
 
     trial: SpatialTrial
@@ -47,44 +38,46 @@ def plan_spatial(settings: SpatialSettings, *, platform_file: Path | None = None
     """
     platform = find_platform(settings.platform if platform_file is None else platform_file)
     whose = f"platform {settings.platform}"
-    length, moment = Number(platform.stance().spike_length, "m", whose), Number(platform.moment(), "kg m2", whose)
-    check_spike_length({"mass": Number(platform.mass, "kg", ""), "inertia": moment, "spike_length": length})
-    numbers = Settled(settings)
-    numbers["mass"] = Number(platform.mass, "kg", whose)
-    surface, warnings = settle_surface(numbers, settings.surface, spikes_per_row=SPIKES_PER_ROW)
+    numbers = settled.Settled(settings)
+    numbers["mass"] = settled.Number(platform.mass, "kg", whose)
+    length = settled.Number(platform.stance().spike_length, "m", whose)
+    check_spike_length(
+        {**numbers, "inertia": settled.Number(platform.moment(), "kg m2", whose), "spike_length": length}
+    )
+    surface, warnings = settled.settle_surface(numbers, settings.surface, spikes_per_row=SPIKES_PER_ROW)
     gravity, counterweight = _settle_gravity(settings, platform, numbers)
     trial = SpatialTrial(
         platform=platform, gravity=gravity, counterweight=counterweight, mu_s=numbers.value("mu_s"),
         mu_d=numbers.value("mu_d"), ground_parameters={key: numbers.value(key) for key in ("stiffness", "damping")},
         torques=_torques(settings, platform, numbers), torque_in_flight=settings.torque_in_flight,
     )  # fmt: skip
-    warnings += of_other_spikes(numbers, surface, diameter=2 * platform.tip_radius, whose=whose)
+    warnings += settled.of_other_spikes(numbers, surface, diameter=2 * platform.tip_radius, whose=whose)
     weight = float(np.linalg.norm(trial.weight))
-    warnings += of_earth(numbers, surface, weight=weight, mass=platform.mass, counterweight=counterweight)
+    warnings += settled.of_earth(numbers, surface, weight=weight, mass=platform.mass, counterweight=counterweight)
     choices = {"surface": surface} if settings.surface is None else {}
-    choices |= at_default(settings, {
+    choices |= settled.at_default(settings, {
         "platform": "", "ground": "", "actuator": "", "duration": " s", "turn": " rad", "velocity": " m/s",
         "angular_velocity": " rad/s", "torque_in_flight": "",
     })  # fmt: skip
     return SpatialPlan(trial=trial, numbers=numbers, surface=surface, choices=choices, warnings=tuple(warnings))
 
 
-def _settle_gravity(settings: SpatialSettings, platform: Platform, numbers: Settled) -> tuple[float, float]:
+def _settle_gravity(settings: SpatialSettings, platform: Platform, numbers: settled.Settled) -> tuple[float, float]:
     """Gravity of the platform [m/s2] and counterweight [kg]."""
     if settings.gravity is not None:
-        numbers["gravity_sim"] = Number(settings.gravity, "m/s2", "given")
+        numbers["gravity_sim"] = settled.Number(settings.gravity, "m/s2", "given")
         return settings.gravity, 0.0
     stated = settings.rig if settings.rig is not None else DEFAULT_RIG
-    if fault := rig_fault(stated):
+    if fault := settled.rig_fault(stated):
         raise ValueError(fault)
     rig = Rig.offloading(platform.mass, stated * STANDARD_GRAVITY, reading=settings.rig_reading)
     read = f"rig = {stated:g}{'' if settings.rig is not None else ' by default'}, read as {settings.rig_reading}"
-    numbers["gravity_sim"] = Number(rig.gravity_sim, "m/s2", read)
-    numbers["counterweight"] = Number(rig.counterweight, "kg", "of that rig")
+    numbers["gravity_sim"] = settled.Number(rig.gravity_sim, "m/s2", read)
+    numbers["counterweight"] = settled.Number(rig.counterweight, "kg", "of that rig")
     return rig.gravity_sim, rig.counterweight
 
 
-def _torques(settings: SpatialSettings, platform: Platform, numbers: Settled) -> tuple[TorqueHistory, ...]:
+def _torques(settings: SpatialSettings, platform: Platform, numbers: settled.Settled) -> tuple[TorqueHistory, ...]:
     """The history of each wheel that is driven or turns."""
     torque = settings.torque
     if torque is None:
@@ -93,8 +86,8 @@ def _torques(settings: SpatialSettings, platform: Platform, numbers: Settled) ->
     made = []
     for axis, direction, value, speed in zip("xyz", np.eye(3), torque, settings.wheel_speed_0, strict=True):
         origin = "given" if settings.torque is not None else "default"
-        numbers[f"torque_{axis}"] = Number(value, "N m", origin)
-        numbers[f"wheel_speed_0_{axis}"] = Number(speed, "rad/s", "given" if speed else "default")
+        numbers[f"torque_{axis}"] = settled.Number(value, "N m", origin)
+        numbers[f"wheel_speed_0_{axis}"] = settled.Number(speed, "rad/s", "given" if speed else "default")
         if not value and not speed:
             continue
         wheel = next((each for each in platform.wheels if np.allclose(each.axis, direction)), None)

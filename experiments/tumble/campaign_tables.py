@@ -3,19 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from experiments.campaign.tables import (
-    FORMAT,
-    HEDGEHOG_ROWS,
-    ImuSensor,
-    PlatformTable,
-    PoseSensor,
-    RigTable,
-    TumbleSensors,
-    TumbleSurface,
-    TumbleTrial,
-    WheelSensor,
-    WheelTable,
-)
+from experiments.campaign import tables
 from experiments.runs.types import Json
 from rigid.model.trial import Trial
 from rigid.sensors import SensorSet
@@ -37,7 +25,7 @@ def shared_tables(
     spike_count: int,
     kind: str,
     granular: bool,
-    rig: RigTable | None,
+    rig: tables.RigTable | None,
 ) -> Json:
     """What a campaign of tumbles and its truth both have.
 
@@ -45,29 +33,29 @@ def shared_tables(
     Hedgehog's number of rows is left out, as the format has it.
     """
     return {
-        "format": FORMAT, "kind": "tumble", "name": name,
-        "platform": PlatformTable(
+        "format": tables.FORMAT, "kind": "tumble", "name": name,
+        "platform": tables.PlatformTable(
             mass=numbers["mass"], inertia=numbers["inertia"], spike_length=numbers["spike_length"],
-            spike_count=None if spike_count == HEDGEHOG_ROWS else spike_count,
+            spike_count=None if spike_count == tables.HEDGEHOG_ROWS else spike_count,
         ),
-        "wheel": WheelTable(inertia=numbers["wheel_inertia"]),
+        "wheel": tables.WheelTable(inertia=numbers["wheel_inertia"]),
         "rig": rig,
-        "surface": TumbleSurface(
+        "surface": tables.TumbleSurface(
             kind=kind, granular=granular, stiffness=numbers["stiffness"], damping=numbers["damping"],
             mu_s=numbers["mu_s"], mu_d=numbers["mu_d"],
         ),
-        "sensors": TumbleSensors(
-            pose=PoseSensor(std=sensors.pose_std), imu=ImuSensor(std=sensors.imu_std, window=sensors.imu_window),
-            wheel=WheelSensor(std=(sensors.wheel_std,)),
+        "sensors": tables.TumbleSensors(
+            pose=tables.PoseSensor(std=sensors.pose_std), wheel=tables.WheelSensor(std=(sensors.wheel_std,)),
+            imu=tables.ImuSensor(std=sensors.imu_std, window=sensors.imu_window),
         ),
     }  # fmt: skip
 
 
-def trial_table(name: str, trial: Trial | Mapping[str, Any], actuator: Actuator = "motor") -> TumbleTrial:
+def trial_table(name: str, trial: Trial | Mapping[str, Any], actuator: Actuator = "motor") -> tables.TumbleTrial:
     """One trial, its recordings named after it; no counterweight is none, not 0. `actuator`: beside a mapping."""
     numbers = trial if isinstance(trial, Mapping) else {key: getattr(trial, key) for key in NUMBERS}
     given: Json = {key: numbers[key] for key in NUMBERS} | {"counterweight": numbers["counterweight"] or None}
-    return TumbleTrial(
+    return tables.TumbleTrial(
         id=name, actuator=actuator if isinstance(trial, Mapping) else trial.actuator, **given,
         pose=f"{name}-pose.csv", imu=f"{name}-imu.csv", wheel=f"{name}-wheel.csv",
     )  # fmt: skip

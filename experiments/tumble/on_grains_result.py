@@ -11,15 +11,7 @@ from coupling import MOST_REVERSAL, BedGround, CoupledTumble
 from coupling.members import HULL
 from dem import Graded
 from dem.prepare.prepare import fingerprint
-from experiments.grains.bed_result import (
-    bed_numbers,
-    bed_warnings,
-    overlap_warning,
-    residual_warning,
-    reversal_warning,
-    unsettled_warning,
-    write_bed_series,
-)
+from experiments.grains import bed_result as grains
 from experiments.grains.graded import coarsest_touched, tips_in_ground
 from experiments.grains.softening import Softening
 from experiments.grains.tracked_frames import PlatformFrames, member_mesh
@@ -85,7 +77,7 @@ def write_trajectory(run: CoupledTumble, folder: Path) -> Trajectory:
     write_series(folder / "trajectory.csv", trajectory_columns(found))
     write_series(folder / "series" / "motion.csv", motion_columns(found))
     write_series(folder / "series" / "feet.csv", feet_columns(run))
-    write_bed_series(folder, run)
+    grains.write_bed_series(folder, run)
     return found
 
 
@@ -130,10 +122,11 @@ def conclude(
             coarser = say("coarser_than_expected", coarsest=1e3 * coarsest, fine=1e3 * settings.grain)
     surface = find_surface(plan.surface)
     warnings = [
-        residual_warning(run.energy_residual), reversal_warning(run.dissipation_reversal),
-        unsettled_warning(run.master), own_warning(run), overlap_warning(bed, softening, settings.max_overlap),
+        grains.residual_warning(run.energy_residual), grains.reversal_warning(run.dissipation_reversal),
+        grains.unsettled_warning(run.master), own_warning(run),
+        grains.overlap_warning(bed, softening, settings.max_overlap),
         _same_sand_again(settings, run, spikes.diameter), coarser,
-        *bed_warnings(bed, plan.surface, across=spikes.diameter / coarsest),
+        *grains.bed_warnings(bed, plan.surface, across=spikes.diameter / coarsest),
         say("law_in_flight", plan=plan) if surface.granular and plan.trial.counterweight == 0 else None,
         say("one_bed") if surface.granular else None,
     ]  # fmt: skip
@@ -155,7 +148,7 @@ def _same_sand_again(settings: TumbleSettings, run: CoupledTumble, spike: float)
 
 def _grains(settings: TumbleSettings, plan: TumblePlan, run: CoupledTumble, softening: Softening) -> Json:
     """The bed and how it was stepped, for ``grains`` of result.json."""
-    found = bed_numbers(settings, run, _ground(run).bed, softening, in_rig=plan.trial.counterweight > 0)
+    found = grains.bed_numbers(settings, run, _ground(run).bed, softening, in_rig=plan.trial.counterweight > 0)
     own, whole = found["grain_steps"], found["grain_steps_all_awake"]
     return found | {
         "series": SERIES, "macro_step": run.master.macro_step, "arch": settings.arch, "steps": run.master.count,

@@ -10,22 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.campaign import TumbleModel, read_model
+from experiments.platform import settled
 from experiments.platform.lengths import check_spike_length
 from experiments.platform.numbers import PlatformNumbers, platform_numbers
-from experiments.platform.settled import (
-    Number,
-    Plan,
-    Settled,
-    at_default,
-    check_actuation,
-    check_body,
-    of_earth,
-    of_other_spikes,
-    rig_fault,
-    settle_limits,
-    settle_platform,
-    settle_surface,
-)
 from experiments.runs.types import Json
 from rigid.model.trial import Effect, Ground, Trial
 from rigid.platform.rig import STANDARD_GRAVITY, Rig
@@ -66,7 +53,7 @@ def spikes_of(settings: TumbleSettings, own: PlatformNumbers) -> Spikes:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TumblePlan(Plan):
+class TumblePlan(settled.Plan):
     """A trial in the plane."""
 
     trial: Trial
@@ -90,11 +77,11 @@ def plan_tumble(
     """
     source = model_file if model_file is not None else Path(settings.model) if settings.model is not None else None
     model = _read(source) if source is not None else None
-    numbers = Settled(settings)
+    numbers = settled.Settled(settings)
     platform = platform_numbers(settings.platform) if platform is None else platform
-    settle_platform(numbers, platform, model=model)
+    settled.settle_platform(numbers, platform, model=model)
     check_spike_length(numbers)
-    surface, warnings = settle_surface(numbers, settings.surface, model=model)
+    surface, warnings = settled.settle_surface(numbers, settings.surface, model=model)
     _settle_gravity(settings, model, numbers)
     weak = platform.motor_torque < TORQUE
     torque, origin = (platform.motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
@@ -104,14 +91,14 @@ def plan_tumble(
     numbers.settle("torque_until", math.inf, "default: as long as the trial")
     numbers.settle("wheel_speed_0", 0.0, "default")
     values: Json = {name: number.value for name, number in numbers.items()}
-    settle_limits(numbers, platform, in_model=model is not None)
-    warnings += check_actuation(settings.actuator, platform, numbers)
-    warnings += check_body(numbers, platform) if model is None else []
+    settled.settle_limits(numbers, platform, in_model=model is not None)
+    warnings += settled.check_actuation(settings.actuator, platform, numbers)
+    warnings += settled.check_body(numbers, platform) if model is None else []
     ground = _ground(settings)
     if ground is None:
         diameter = platform.spike_diameter if spikes is None else spikes.diameter
         whose = f"platform {platform.name}" if spikes is None else "this run"
-        warnings += of_other_spikes(numbers, surface, diameter=diameter, whose=whose)
+        warnings += settled.of_other_spikes(numbers, surface, diameter=diameter, whose=whose)
     assert platform.spike_count is not None  # or it would have been refused
     trial = Trial(
         **values,
@@ -126,12 +113,14 @@ def plan_tumble(
         for name, value in ground.law.values(ground.parameters).items():
             unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
-            numbers[name] = Number(value, unit, origin)
+            numbers[name] = settled.Number(value, unit, origin)
     rows = f"rows of platform {platform.name}" if model is None else "model"
-    numbers["spike_count"] = Number(trial.spike_count, "1", rows)
+    numbers["spike_count"] = settled.Number(trial.spike_count, "1", rows)
     warnings += _rig_warnings(trial)
     if ground is None and model is None:
-        warnings += of_earth(numbers, surface, weight=trial.weight, mass=trial.mass, counterweight=trial.counterweight)
+        warnings += settled.of_earth(
+            numbers, surface, weight=trial.weight, mass=trial.mass, counterweight=trial.counterweight
+        )
     spikes = spikes or Spikes(platform.spike_diameter, platform.spike_clear, ("spike_diameter", "spike_clear"))
     return TumblePlan(
         trial=trial, numbers=numbers, surface=surface, choices=_choices(settings, surface, model), platform=platform,
@@ -149,7 +138,7 @@ def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) 
         units["rig_reading"] = ""
         if settings.rig is None:
             found["rig"] = f"{DEFAULT_RIG:g}"
-    found |= at_default(settings, units)
+    found |= settled.at_default(settings, units)
     if not settings.effects and model is None:
         found["effects"] = "none"
     return found
@@ -162,19 +151,19 @@ def _read(path: Path) -> TumbleModel:
     return model
 
 
-def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers: Settled) -> None:
+def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers: settled.Settled) -> None:
     """Settle gravity_sim, local gravity and counterweight, in the rig or free of it."""
     if settings.gravity is not None:
-        numbers["gravity_sim"] = Number(settings.gravity, "m/s2", "given")
-        numbers["gravity"] = Number(settings.gravity, "m/s2", "free platform: the same")
-        numbers["counterweight"] = Number(0.0, "kg", "free platform")
+        numbers["gravity_sim"] = settled.Number(settings.gravity, "m/s2", "given")
+        numbers["gravity"] = settled.Number(settings.gravity, "m/s2", "free platform: the same")
+        numbers["counterweight"] = settled.Number(0.0, "kg", "free platform")
         return
     if model is not None and model.rig is None and settings.rig is None:
         raise ValueError(f"gravity must be given: the model {settings.model!r} has no [rig] (m/s2, or rig)")
     in_model = model.rig if model is not None else None
     local = in_model.gravity if in_model is not None else STANDARD_GRAVITY
     stated = settings.rig if settings.rig is not None else DEFAULT_RIG
-    if fault := rig_fault(stated, local):
+    if fault := settled.rig_fault(stated, local):
         raise ValueError(fault)
     counterweight = settings.counterweight
     origin = "given"
@@ -185,9 +174,9 @@ def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers
     if counterweight is None:
         origin = "m (g - g_sim) / (g + g_sim)" if settings.rig_reading == "pair" else "m (1 - rig g0 / g)"
     read = f"rig = {stated:g}{'' if settings.rig is not None else ' by default'}, read as {settings.rig_reading}"
-    numbers["gravity_sim"] = Number(rig.gravity_sim, "m/s2", read)
-    numbers["gravity"] = Number(local, "m/s2", "model" if in_model is not None else "default")
-    numbers["counterweight"] = Number(rig.counterweight, "kg", origin)
+    numbers["gravity_sim"] = settled.Number(rig.gravity_sim, "m/s2", read)
+    numbers["gravity"] = settled.Number(local, "m/s2", "model" if in_model is not None else "default")
+    numbers["counterweight"] = settled.Number(rig.counterweight, "kg", origin)
 
 
 def _rig_warnings(trial: Trial) -> list[str]:
