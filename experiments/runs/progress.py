@@ -17,9 +17,9 @@ import math
 import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self, TextIO
+from typing import TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, ProgressColumn, Task, TaskID, TextColumn
@@ -102,7 +102,7 @@ class _Pace:
         return (now - self.first[0]) / (1.0 - self.first[1])
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """Keeps count, shows nothing. Also the interface that work reports to.
 
     `stage_fraction`, `fraction` are in 0..1, or None where a total was not given; `remaining()` is in seconds.
@@ -114,21 +114,23 @@ class Progress:
     """
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic):
-        self._clock = clock
-        self._began = self._planned = clock()
-        self._costs: dict[str, float] = {}
-        self._seconds: dict[str, float] = {}
-        self._unit: float | None = None
-        self._over: set[str] = set()  # stages of the plan that are over
-        self._work: dict[str, float] = {}  # those of them that had something to do -> how long it took [s]
-        self._open = ""  # the stage of the plan that is under way
-        self._opened = _Pace(clock())
-        self._waited = 0.0  # until the first share of all was told [s]
-        self._reached = 0.0  # the largest share of the whole that was told
+        self._clock, self._began = clock, clock()
         self.stage_name = ""
-        self._pace = self._opened
         self._total: float | None = None
         self._done = 0.0
+        self._start_reckoning({}, {}, None)
+        self._pace = self._opened
+
+    def _start_reckoning(self, costs: Mapping[str, float], seconds: Mapping[str, float], unit: float | None) -> None:
+        self._costs, self._seconds, self._unit = dict(costs), dict(seconds), unit
+        self._over: set[str] = set()  # stages of the plan that are over
+        self._work: dict[str, float] = {}  # those of them that had something to do -> how long it took [s]
+        self._open = self.stage_name if self.stage_name in {*costs, *seconds} else ""
+        """The stage of the plan that is under way."""
+        self._waited = 0.0  # until the first share of all was reported [s]
+        self._reached = 0.0  # the largest share of the whole that was reported
+        self._planned = self._clock()
+        self._opened = _Pace(self._planned)
 
     def plan(
         self, costs: Mapping[str, float], *, seconds: Mapping[str, float] | None = None, unit: float | None = None
@@ -142,11 +144,7 @@ class Progress:
         every = dict(costs) | dict(seconds or {})
         if any(not cost >= 0 for cost in every.values()):
             raise ValueError(f"a stage cannot cost less than nothing: {every}")
-        self._costs, self._seconds, self._unit = dict(costs), dict(seconds or {}), unit
-        self._over, self._work, self._waited, self._reached = set(), {}, 0.0, 0.0
-        self._open = self.stage_name if self.stage_name in every else ""
-        self._planned = self._clock()
-        self._opened = _Pace(self._planned)
+        self._start_reckoning(costs, seconds or {}, unit)
 
     def expect(self, costs: Mapping[str, float]) -> None:
         """Stages of the plan that have not begun cost this after all; others are left as they are."""
@@ -189,12 +187,7 @@ class Progress:
                 self._work[self._open] = self._opened.over(self._clock())
         self._open = ""
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
@@ -210,9 +203,7 @@ class Progress:
     @property
     def stage_fraction(self) -> float | None:
         """How much of the stage is done, 0..1; None if its total is unknown."""
-        if self._total is None or self._total <= 0:
-            return None
-        return min(max(self._done / self._total, 0.0), 1.0)
+        return min(max(self._done / self._total, 0.0), 1.0) if self._total is not None and self._total > 0 else None
 
     @property
     def fraction(self) -> float | None:
@@ -300,38 +291,29 @@ class LineProgress(Progress):
         self._every = every
         self._last = float("-inf")
 
-    def _write(self, text: str) -> None:
-        print(f"[{duration(self.elapsed):>7}] {text}", file=self._stream, flush=True)
-        self._last = self._clock()
-
-    def _where(self) -> str:
-        parts = []
-        if (fraction := self.stage_fraction) is not None:
-            parts.append(_percent(fraction))
-        if (rest := self.stage_remaining()) is not None:
-            parts.append(_to_go(rest))
-        if (whole := self.fraction) is not None:
-            parts.append(f"all {_percent(whole)}")
-            if (rest := self.remaining()) is not None:
-                parts.append(_to_go(rest))
-        return ", ".join(parts)
+    def _of_all(self) -> list[str]:
+        """The share of the whole and its time to go, as far as they are known."""
+        if (whole := self.fraction) is None:
+            return []
+        return [f"all {_percent(whole)}", *([] if (rest := self.remaining()) is None else [_to_go(rest)])]
 
     def stage(self, name: str, total: float | None = None) -> None:
         super().stage(name, total)
-        where = "" if (whole := self.fraction) is None else f" (all {_percent(whole)}"
-        if where:
-            where += ")" if (rest := self.remaining()) is None else f", {_to_go(rest)})"
-        self._write(f"{name}{where}")
+        where = ", ".join(self._of_all())
+        self.message(f"{name} ({where})" if where else name)
+        self._last = self._clock()
 
     def update(self, done: float) -> None:
         super().update(done)
         if self._clock() - self._last >= self._every:
-            self._write(f"{self.stage_name}: {self._where() or f'{done:g}'}")
+            share, rest = self.stage_fraction, self.stage_remaining()
+            where = [] if share is None else [_percent(share)]
+            where += [] if rest is None else [_to_go(rest)]
+            self.message(f"{self.stage_name}: {', '.join([*where, *self._of_all()]) or f'{done:g}'}")
+            self._last = self._clock()
 
     def message(self, text: str) -> None:
-        last = self._last
-        self._write(text)
-        self._last = last
+        print(f"[{duration(self.elapsed):>7}] {text}", file=self._stream, flush=True)
 
 
 class _ToGo(ProgressColumn):
