@@ -60,7 +60,7 @@ class EnergyBalance:
         self._momentum, self._angular_momentum = moving.copy(), turning.copy()
         self._moment = np.zeros(3)
         if isinstance(self.ground, BedGround):
-            self.ground.keep_book()
+            self.ground.bed.track_contact_work()
             self._momentum = self._momentum + self.ground.momentum()
             self._angular_momentum = self._angular_momentum + self.ground.angular_momentum()
 

@@ -10,6 +10,7 @@ space it is a pivot while those that stick lie in one line. docs/coupling.md say
 """
 
 from collections.abc import Iterable
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,13 +57,10 @@ def in_a_line(places: Array, within: float) -> bool:
 
 
 def feet_of(reaction: Reaction | None, centre: Vector, twist: Twist, count: int, *, hull: bool = False) -> Array:
-    """What each row feels: N [N], F along x and y [N], u along x and y [m/s], depth [m]; shape [6, row].
+    """What each of `count` rows feels: N [N], F along x and y [N], u along x and y [m/s], depth [m]; shape [6, row].
 
-    Parameters
-    ----------
-    reaction : of the step before; None before the first.
-    centre, twist : where the body's origin was in the step's middle [m], and how it moves at its end.
-    count : of the rows; `hull`: whether one more, the last, is what is no spike.
+    `reaction` is of the step before, None before the first. `centre` is where the body's origin was in the step's
+    middle [m], `twist` how it moves at its end. `hull`: whether one more row, the last, is what is no spike.
     """
     feet = np.zeros((6, count + hull))
     if reaction is None:
@@ -86,11 +84,9 @@ def changes_of(
     times: Iterable[float], states: Iterable[str], angles: Iterable[float]
 ) -> tuple[tuple[float, str, float], ...]:
     """(time [s], state entered, angle [rad]) where the state changes; the first is the one it begins with."""
-    found: list[tuple[float, str, float]] = []
-    for time, state, angle in zip(times, states, angles, strict=True):
-        if not found or state != found[-1][1]:
-            found.append((float(time), state, float(angle)))
-    return tuple(found)
+    rows = zip(times, states, angles, strict=True)
+    firsts = (next(group) for _, group in groupby(rows, key=lambda row: row[1]))
+    return tuple((float(time), state, float(angle)) for time, state, angle in firsts)
 
 
 class ContactReader:

@@ -64,7 +64,7 @@ class LoweredGravity:
 
     @property
     def calm(self) -> bool:
-        """Whether the grains, under the first gravity, would go less than NEAR d in sqrt(d / g1): what moves flies."""
+        """Whether the grains, under the first gravity, would go less than NEAR d in sqrt(d / g1)."""
         return self.ground.grain_speed() * math.sqrt(self.grain / self.first) < NEAR * self.grain
 
     def begin(self, time: float) -> None:
@@ -84,7 +84,7 @@ class LoweredGravity:
         if due <= self.done:
             return False
         self.done = due
-        self.ground.set_gravity(self.now)
+        self.ground.bed.set_gravity(self.now)
         return True
 
     def far(self, speeds: Sequence[float], lacking: Sequence[float]) -> float:

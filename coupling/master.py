@@ -154,9 +154,8 @@ class Master:
         if not self._wrenches:
             return Wrench.none()
         weights = _WEIGHTS[min(self.extrapolation, len(self._wrenches) - 1)]
-        force = sum(w * past.force for w, past in zip(weights, self._wrenches, strict=False))
-        torque = sum(w * past.torque for w, past in zip(weights, self._wrenches, strict=False))
-        return Wrench(np.asarray(force), np.asarray(torque))
+        rows = (w * _row(past) for w, past in zip(weights, self._wrenches, strict=False))
+        return _unpack(np.asarray(sum(rows)))
 
     def step(self) -> Reaction:
         """One macro step; the ground's answer, its mean over the step."""
@@ -174,7 +173,7 @@ class Master:
             pieces = self._answered(trial, before)
             self._take(pieces, trial)
             wrench = _mean_wrench([piece.wrench for piece in pieces])
-            passed.largest_force = max(passed.largest_force, _size(wrench))
+            passed.largest_force = max(passed.largest_force, float(np.linalg.norm(wrench.force)))
             if _apart(wrench, trial) <= self.tolerance * passed.largest_force:
                 break
             if self.iterations > 1:
@@ -326,10 +325,6 @@ def _joined(reactions: list[Reaction]) -> Reaction:
 
 def _mean(one: Twist, other: Twist) -> Twist:
     return Twist(0.5 * (one.velocity + other.velocity), 0.5 * (one.spin + other.spin))
-
-
-def _size(wrench: Wrench) -> float:
-    return float(np.linalg.norm(wrench.force))
 
 
 def _apart(one: Wrench, other: Wrench) -> float:

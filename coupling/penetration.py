@@ -24,13 +24,13 @@ from rigid.platform.spike import Spike
 
 from .bed_ground import BedGround, GrainBed
 from .ground import Described, Ground, part_of, prefixed
+from .planar_body import PLACEMENT_TIME
 from .stepper import Reporting, Stepper
 from .trajectory import PHASES, Penetration
 
 __all__ = ["Drive", "Drop", "Run", "SetDown", "drive", "drop", "overdamped_below", "set_down"]
 
 SUBSTEPS = 10  # Steps of the ground in a macro step, by default
-PLACEMENT_TIME = 0.002  # Mass over drag of a spike that is set down [s]
 AT_REST = 0.003  # What of its load may still be missing at rest, and the mean speed there over the lowering speed [1]
 FREE, IN, REST, OUT = range(4)
 
@@ -406,8 +406,7 @@ def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any
     (10), start_depth [m, negative] (just clear of the grains), and `on_step`, `on_frame`, `frame_interval`, `progress`
     of `Stepper.follow`. Raises ValueError, naming key and value, for what cannot be; and what the ground raises.
     """
-    reporting = _reporting(options)
-    return Drive(spike, into, speed=speed, depth=depth, **options).run(**reporting)
+    return _done(Drive, spike, into, speed=speed, depth=depth, **options)
 
 
 def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetration:
@@ -416,8 +415,7 @@ def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetratio
     Options: mass [kg] (the spike's), load [N] (mass * gravity), gravity [m/s2] (9.80665), rest_time [s],
     rest_tolerance [1], max_depth [m], max_time [s], and those of `drive` that are not about the way out.
     """
-    reporting = _reporting(options)
-    return Drop(spike, into, speed=speed, **options).run(**reporting)
+    return _done(Drop, spike, into, speed=speed, **options)
 
 
 def set_down(spike: Spike, *, onto: Any, load: float, **options: Any) -> Penetration:
@@ -425,10 +423,9 @@ def set_down(spike: Spike, *, onto: Any, load: float, **options: Any) -> Penetra
 
     Options: lowering_speed [m/s] (0.03), mass [kg] that counts during placement, and those of `drop`.
     """
-    reporting = _reporting(options)
-    return SetDown(spike, onto, load=load, **options).run(**reporting)
+    return _done(SetDown, spike, onto, load=load, **options)
 
 
-def _reporting(options: dict[str, Any]) -> Reporting:
-    found = {key: options.pop(key) for key in Reporting.__annotations__ if key in options}
-    return Reporting(**found)  # type: ignore[typeddict-item]
+def _done(kind: type[Run], spike: Spike, ground: Any, **options: Any) -> Penetration:
+    reporting = {key: options.pop(key) for key in Reporting.__annotations__ if key in options}
+    return kind(spike, ground, **options).run(**reporting)

@@ -27,7 +27,7 @@ from .poses import Pose, Twist, Vector, Wrench
 
 __all__ = ["PLACEMENT_STEP", "PLACEMENT_TIME", "PlanarBody", "placement_time"]
 
-PLACEMENT_TIME = 0.002  # Mass over drag of a body during placement [s], as in `coupling.SetDown`
+PLACEMENT_TIME = 0.002  # Mass over drag of a body during placement [s]
 PLACEMENT_STEP = 4e-4
 """Macro step up to which that mass is stable [s]; beyond, mass goes with the square of the step, as K H^2 / m does."""
 _OPEN = 9  # Mode of a row that does not touch

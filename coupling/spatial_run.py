@@ -149,12 +149,11 @@ class SpatialRun(PlatformRun):
 
     @property
     def energy_scale(self) -> float:
-        """max(|work of the torques|, W reach, the kinetic energy at the start) [J], which residuals are relative to."""
+        """max(|work of the torques|, W reach, the kinetic energy at the start) [J]."""
         rows = self.columns
         lifted = self._weight * self.trial.platform.reach
         return max(float(np.abs(rows["torque_work"]).max()), lifted, float(rows["kinetic_energy"][0]), 1e-300)
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
         super().restore(state)
         self._feet = [np.array(state["run.feet"], dtype=float)]

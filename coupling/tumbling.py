@@ -13,11 +13,11 @@ import numpy as np
 from hedgebed_renamed import renamed_keywords
 from rigid.ground.reaction import Reaction, State
 from rigid.model.trial import Trial
-from rigid.planar.trajectory import Tally, Trajectory, Transition
+from rigid.planar.trajectory import Tally, Trajectory
 
 from .bed_ground import BedGround
 from .contact_state import changes_of, state_of
-from .ground import Ground
+from .ground import Ground, prefixed
 from .law_ground import LawGround
 from .lowered_gravity import LoweredGravity
 from .planar_body import PlanarBody
@@ -203,7 +203,7 @@ class CoupledTumble(PlatformRun):
 
     @property
     def energy_scale(self) -> float:
-        """max(|work of the torque|, W l) [J], which residuals are relative to."""
+        """max(|work of the torque|, W l) [J]."""
         return max(float(np.abs(self.columns["torque_work"]).max()), self.trial.weight * self.trial.spike_length)
 
     def trajectory(self) -> Trajectory:
@@ -228,7 +228,7 @@ class CoupledTumble(PlatformRun):
             state=np.array(self._states, dtype=np.int8),
             stored_energy=self.stored_by_row,
             dissipated=self.dissipated_by_row,
-            transitions=self._transitions(),
+            transitions=changes_of(rows["time"], self.states, rows["theta"]),
             trajectory_angle=tally.angle,
             max_speed=tally.max_speed,
             time_of_max_speed=tally.time_of_max_speed,
@@ -238,16 +238,11 @@ class CoupledTumble(PlatformRun):
             **shared,
         )
 
-    def _transitions(self) -> tuple[Transition, ...]:
-        return changes_of((row[0] for row in self._rows), self.states, (row[3] for row in self._rows))
-
     def state(self) -> State:
-        """See `PlatformRun.state`."""
-        own = {"tumble.lowered": self.lowered.numbers()} if self.lowered is not None else {}
-        return own | super().state()
+        own = {"lowered": self.lowered.numbers()} if self.lowered is not None else {}
+        return prefixed("tumble", own) | super().state()
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
         if self.lowered is not None:
             self.lowered.restore(np.asarray(state["tumble.lowered"], dtype=float))
             self._weigh()

@@ -5,23 +5,21 @@ on the spring-damper (`coupled`), or the planar model, for which a sweep and a c
 trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json, figures and a report.
 """
 
-from pathlib import Path
 from typing import Literal
 
 from experiments.campaign.files import keep_model
 from experiments.platform.kept_platform import keep_platform
-from experiments.platform.numbers import PlatformNumbers, platform_numbers, torque_within_limit
+from experiments.platform.numbers import platform_numbers, torque_within_limit
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
-from experiments.runs.types import Json
 from experiments.runs.whole_runs import publish, whole_run
 from rigid.planar.simulate import PAPER_STEP, check_step, simulate
 from rigid.planar.trajectory import Trajectory
 
 from .result import motion_columns, result_of, trajectory_columns
 from .settings import TumbleSettings
-from .sweep import check_sweep, middle_of_sweep, run_sweep
+from .sweep import Sweep
 from .synthesis import check_tumble_campaign, write_tumble_campaign
 from .trial import TumblePlan, plan_tumble
 
@@ -35,8 +33,8 @@ def check(settings: TumbleSettings) -> None:
 
         PlanarOnBed(settings).check()
         return
-    check_sweep(settings)
-    plan = plan_tumble(middle_of_sweep(settings))
+    sweep = Sweep(settings) if settings.sweep else None
+    plan = sweep.plans[sweep.shown] if sweep else plan_tumble(settings)
     check_tumble_campaign(settings)
     if settings.method == "coupled":
         from .coupled import check_coupled  # loads Taichi
@@ -79,8 +77,8 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     """A tumble on the spring-damper or another law, with its sweep and its campaign where they are asked for."""
     copied = keep_model(settings.model, folder.path)
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
-    middle = middle_of_sweep(settings, model_file=copied, platform=platform)
-    plan = plan_tumble(middle, model_file=copied, platform=platform)
+    sweep = Sweep(settings, model_file=copied, platform=platform) if settings.sweep else None
+    plan = sweep.plans[sweep.shown] if sweep else plan_tumble(settings, model_file=copied, platform=platform)
     for sentence in plan.announcement():
         progress.message(sentence)
     progress.stage("tumble", total=1.0)
@@ -94,23 +92,16 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     progress.update(1.0)
     write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
     folder.write_series("motion", motion_columns(trajectory))
-    if settings.sweep:
+    if sweep:
         progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
         progress.stage("sweep")
-        _add_sweep(result, settings, folder, copied, platform)
+        swept = sweep.run(folder)
+        result["departures"]["sentences"] += swept["sweep"]["sentences"]
+        result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
+        result |= swept
     made = write_tumble_campaign(settings, plan, folder.path, progress)
     result |= {"campaign": made} if made is not None else {}
     return publish(folder, Result.make("tumble", **result), progress)
-
-
-def _add_sweep(
-    result: Json, settings: TumbleSettings, folder: RunFolder, model: Path | None, platform: PlatformNumbers
-) -> None:
-    """Integrate the sweep and put what came out beside the trial in its middle."""
-    swept = run_sweep(settings, folder, model_file=model, platform=platform)
-    result["departures"]["sentences"] += swept["sweep"]["sentences"]
-    result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
-    result |= swept
 
 
 run, resume = whole_run("tumble", TumbleSettings, _carry_out, check=check)
