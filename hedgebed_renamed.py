@@ -80,7 +80,7 @@ _MODULES = {
             "campaign_settings footfalls sweep_ranges synthesis tumble_coupled=coupled tumble_grains=on_grains "
             "tumble_grains_frames=on_grains_result tumble_grains_result=on_grains_result tumble_opening=opening "
             "tumble_recorded=recorded tumble_settings=settings tumble_steppers=steppers tumble_sweep=sweep "
-            "tumble_tables=campaign_tables tumble_trial=trial tumble_words=words"
+            "tumble_tables=campaign_tables tumble_trial=trial tumble_words=result"
         ),
         "experiments.validate": "validate_settings=settings",
     },
@@ -241,7 +241,7 @@ _NAMES = {
     "experiments.tumble.campaign_settings": {
         "experiments.diagnose.settings": "CheckSettings",
     },
-    "experiments.tumble.words": {
+    "experiments.tumble.result": {
         "experiments.grains.bed_result": "residual_warning reversal_warning unsettled_warning",
     },
     "rigid.batch": {

@@ -203,6 +203,6 @@ def toml_value(value: Any) -> str:
     if isinstance(value, Mapping):  # keys in quotes; tomlkit writes them bare
         return "{" + ", ".join(f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items()) + "}"
     try:
-        return tomlkit.item(value).as_string()
+        return tomlkit.item(str(value) if isinstance(value, Path) else value).as_string()
     except (TypeError, ValueError):
         raise TypeError(f"a setting of type {type(value).__name__} cannot be written to run.toml: {value!r}") from None

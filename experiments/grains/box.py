@@ -10,14 +10,11 @@ __all__ = ["carried_height", "expected_grain_count"]
 def carried_height(material: Material, *, reach: float, rise: float, grain: float) -> float:
     """How high over the surface grains that stick ride up on a platform that turns [m]; 0 for those that do not.
 
-    ``reach``: from the platform's centre to its farthest point [m]; the centre stands no higher than that. ``rise``: of
-    the centre, hops included, at most [m]. ``grain``: mean diameter [m]; two lie on the tip.
-
-    In JSC-1A at 0.22 N m grains hung on a spike 0.15 m over the surface (grains1-jsc1a-0.0085-0.22, 2026-11-23).
+    `reach` from the platform's centre to its farthest point [m], `rise` of the centre, hops included, at most [m];
+    `grain`: mean diameter [m]; two lie on the tip. In JSC-1A at 0.22 N m grains hung on a spike 0.15 m over the surface
+    (grains1-jsc1a-0.0085-0.22, 2026-11-23).
     """
-    if material.cohesion == "none":
-        return 0.0
-    return 2 * reach + max(rise, 0.0) + 2 * grain
+    return 0.0 if material.cohesion == "none" else 2 * reach + max(rise, 0.0) + 2 * grain
 
 
 def expected_grain_count(bed_size: tuple[float, float, float], grain: float, spread: float) -> float:

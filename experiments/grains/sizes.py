@@ -46,10 +46,7 @@ def scaling_told(before: Material, now: Material, *, diameter: float, gravity: f
 
 
 def sizes_table(radii: np.ndarray, sizes: Sizes) -> Json:
-    """The bed's grading by mass: beside the sieve table where there is one, else D10 to D90.
-
-    ``radii``: of the bed's grains [m], shape [grain_count].
-    """
+    """The bed's grading by mass, from the grains' `radii` [m]: beside the sieve table if there is one, or D10-D90."""
     diameters = np.sort(2 * np.asarray(radii, dtype=float))
     mass = np.cumsum(diameters**3)
     mass /= mass[-1]

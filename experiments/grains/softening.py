@@ -45,8 +45,8 @@ INERTIA = 1.1  # lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)
 PUSHED = {"motor": 1.0, "brake": 3.0}
 """Force on a platform's rows in flight that grains are made stiff enough for, over the spring-damper's largest [1].
 
-There a bed's own weight says nothing of what a torque presses with. 0.7 to 0.8 (motor) and 2.9 to 4.9 (brake, whose
-spring-damper is not yet pressed in when a tip has its speed in grains) were met (docs/results/grains2-flight-*)."""
+0.7 to 0.8 (motor) and 2.9 to 4.9 (brake, whose spring-damper is not yet pressed in when a tip has its speed in grains)
+were met (docs/results/grains2-flight-*)."""
 SMALL = 0.05
 """Overlap that grains meant to be hard may have [of a diameter]: the default of `max_overlap`, past which a drive of
 a spike fails, and a platform's run at `run_limit`. A run that had more is told so."""
@@ -97,12 +97,9 @@ class Softening:
 def run_limit(max_overlap: float) -> float:
     """Overlap past which a platform's run on a bed made for `max_overlap` ends [of a diameter]: twice it, at most 0.2.
 
-    The step is chosen for grains all of whose contacts are at `max_overlap` (`dem.contact.timestep`); that holds up to
-    `stable_overlap`, some 1.2 times it. Beyond, single contacts are still followed: at twice the bound the step is
-    1/6.7 of the half-period of a grain on a wall, which is lost at 1/1.6 (`dem.contact.timestep.stable_step`, a pair
-    alone).
-    Whether more than a few were there, and made energy, the books tell (`energy_residual`, `dissipation_reversal`): the
-    result warns.
+    The step is stable for a whole lattice up to `stable_overlap`, some 1.2 times `max_overlap`. Beyond, single contacts
+    are still followed: at twice the bound the step is 1/6.7 of the half-period of a grain on a wall, which is lost at
+    1/1.6 (`dem.contact.timestep.stable_step`). The result warns where more of them made energy.
     """
     return max(max_overlap, min(2 * max_overlap, 0.2))
 

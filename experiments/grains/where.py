@@ -8,11 +8,7 @@ __all__ = ["check_where"]
 
 
 def check_where(*, arch: str, threads: int | None, precision: str = "float64") -> None:
-    """Start what is not on every machine, so that it is missed before there is a folder.
-
-    ``arch``: "cpu" or "cuda". ``threads``: of the CPU; all when None. ``precision``: "float64" or "float32". Raises
-    ValueError for more threads than cores; a backend that does not start here.
-    """
+    """Raise ValueError for more threads than cores (None: all), and where the backend `arch` does not start here."""
     cores = cores_there()
     if threads is not None and threads > cores:
         raise ValueError(say("few_cores", threads=threads, cores=cores))

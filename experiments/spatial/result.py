@@ -16,7 +16,7 @@ from experiments.runs.folder import write_series
 from experiments.runs.result import Result
 from experiments.runs.result import quantities_of as as_quantities
 from experiments.runs.types import Json
-from experiments.tumble.words import way_through
+from experiments.tumble.result import way_through
 from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
 

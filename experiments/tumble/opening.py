@@ -1,4 +1,4 @@
-"""What is said of a tumble on grains before its bed is made: what was set, what follows from it, what it may lack."""
+"""Messages before the bed of a tumble on grains is made: what was set, what follows from it, what may be missing."""
 
 import math
 import re
@@ -29,10 +29,7 @@ STRONGER = (2.0, 4.0, 8.0)
 def opening(
     settings: TumbleSettings, plan: TumblePlan, *, grains: float, softening: Softening, lowering_speed: float
 ) -> list[str]:
-    """What was set and what follows from it; how many settings are at their defaults, and where those stand.
-
-    `grains`: about how many the bed will have; lowering_speed [m/s].
-    """
+    """What was set and what follows from it; how many settings are at their defaults. `grains`: about how many."""
     fields = TumbleSettings.model_fields
     # A run that is taken up again has all of them set, by its run.toml.
     given = [name for name, field in fields.items() if name in settings.model_fields_set
@@ -86,10 +83,10 @@ def short_of_way(settings: TumbleSettings, plan: TumblePlan, law: Trajectory) ->
 
 
 def _stronger_brake(plan: TumblePlan, duration: float) -> str:
-    """What would bring it LAUNCH_DISTANCE away on the spring-damper, in words.
+    """The brake that would bring it LAUNCH_DISTANCE away on the spring-damper, in words.
 
-    A brake gives J_w wheel_speed_0 and no more, however long it lasts, and may be too weak to tip it over: the wheel's
-    speed, within its limit, is tried alone, then the torque, then both.
+    A brake gives J_w wheel_speed_0 and no more, and may be too weak to tip it over: the wheel's speed, within its
+    limit, is tried alone, then the torque, then both.
     """
     trial = plan.trial
     for times in STRONGER:

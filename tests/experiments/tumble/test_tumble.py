@@ -19,9 +19,9 @@ from experiments.grains.bed_result import residual_warning, reversal_warning
 from experiments.platform.numbers import torque_within_limit
 from experiments.platform.surfaces import find_surface, surface_names
 from experiments.runs.folder import read_series
+from experiments.tumble.result import tumble_sentences
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
-from experiments.tumble.words import tumble_sentences
 from rigid.planar.simulate import simulate
 from rigid.platform.rig import STANDARD_GRAVITY
 
