@@ -148,19 +148,15 @@ class PlatformRun(EnergyBalance, Stepper):
         if not self.placed:
             self._lower(reaction)
             return
-        self._record_moment(before, self.body.pose.position, self._pull, self.body.masses)
+        self._record_moment(before)
         self._keep(reaction)
         if (self.master.count - self.placing_steps) % self._every == 0 or self.done:
-            self._measure()
+            self._sample()
 
     def _begin(self) -> None:
-        self._start_balance(self.body.momentum, self._turning)
+        self._start_balance()
         self._keep(self.master.last)
-        self._measure()
-
-    def _measure(self) -> None:
-        body = self.body
-        self._sample(body.time, body.momentum - self._pull * body.time, self._turning)
+        self._sample()
 
     def _keep(self, reaction: Reaction | None) -> None:
         now = self.body.twist_now(self.ground.lag)
@@ -179,11 +175,6 @@ class PlatformRun(EnergyBalance, Stepper):
     def _weight(self) -> float:
         """[N]"""
         return float(np.linalg.norm(self._pull))
-
-    @property
-    def _turning(self) -> Vector:
-        """Angular momentum of the body about (0, 0, 0) [N m s], for the balance."""
-        raise NotImplementedError
 
     def _out_of_balance(self) -> tuple[Vector, Vector]:
         """What of the weight the ground does not carry yet [N], and the speeds [m/s]."""
@@ -242,14 +233,14 @@ class PlatformRun(EnergyBalance, Stepper):
         self._order()
 
     def _lower(self, reaction: Reaction) -> None:
-        self._settle(reaction, *self._out_of_balance())
+        """A step of the placement, which ends at rest.
 
-    def _settle(self, reaction: Reaction, lacking: Vector, moving: Vector) -> None:
-        """A step of the placement, which ends at rest: what of the weight the ground does not carry yet [N], and the
-        speeds [m/s]. A body that bounces (its mass during placement is small against the contacts' stiffness), so that
-        it rests on the mean alone or not for half the time there is, is placed more slowly. Raises RuntimeError where
-        it takes too long."""
+        A body that bounces (its mass during placement is small against the contacts' stiffness), so that it rests on
+        the mean alone or not for half the time there is, is placed more slowly. Raises RuntimeError where it takes too
+        long.
+        """
         assert self.lowering_speed is not None
+        lacking, moving = self._out_of_balance()
         mean = self._mean_of_late(lacking, moving)
         longest = self.pace * LONGEST_PLACING
         if mean is not None:
@@ -258,7 +249,7 @@ class PlatformRun(EnergyBalance, Stepper):
             late = self._settling[-max(2, len(self._settling) // 4) :]
             calm = bool((np.sqrt(np.mean(np.square(late), axis=0)) <= SWINGS * scale).all())
             if rests and calm:
-                self._lies()
+                self._end_placement()
             elif rests or (
                 self.body.time > 0.5 * longest and bool((np.std(self._settling, axis=0) > SWINGS * scale).any())
             ):
@@ -277,7 +268,7 @@ class PlatformRun(EnergyBalance, Stepper):
         self._settling = [*self._settling, np.concatenate([lacking, moving])][-count:]
         return np.abs(np.mean(self._settling, axis=0)) if len(self._settling) == count else None
 
-    def _lies(self) -> None:
+    def _end_placement(self) -> None:
         """It lies where it was set down: the placement ends."""
         self.body.release()
         self.placed = True

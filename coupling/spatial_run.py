@@ -117,7 +117,6 @@ class SpatialRun(PlatformRun):
 
     @property
     def _turning(self) -> Vector:
-        """Angular momentum of platform and wheels about (0, 0, 0) [N m s]."""
         return np.asarray(np.cross(self.body.place, self.body.momentum) + self.body.angular_momentum)
 
     @property

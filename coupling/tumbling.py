@@ -135,10 +135,10 @@ class CoupledTumble(PlatformRun):
             now = self.lowered.now
             self.body.trial = self.trial if self.lowered.at_last else replace(self.trial, gravity_sim=now)
 
-    def _lies(self) -> None:
+    def _end_placement(self) -> None:
         """It lies: gravity falls, if it is to fall and has not yet, once the grains are calm; else placement ends."""
         if self.lowered is None or self.lowered.begun is not None:
-            super()._lies()
+            super()._end_placement()
         elif self.master.count % GRAINS_EVERY == 0 and self.lowered.calm:
             self.lowered.begin(self.body.time)
 
@@ -154,7 +154,7 @@ class CoupledTumble(PlatformRun):
         speeds = *mean[2:], self.ground.grain_speed()
         if lowered.far(speeds, lack) <= 1:
             if not lowered.dragged:
-                self._lies()
+                self._end_placement()
             lowered.drag(False)
             self._settling = []
         elif self.body.time > lowered.begun + lowered.steps * lowered.every + LONGEST_CALM * lowered.sees:
@@ -188,7 +188,6 @@ class CoupledTumble(PlatformRun):
 
     @property
     def _turning(self) -> np.ndarray:
-        """Angular momentum of the platform about (0, 0, 0), less what the wheel gave it [N m s]."""
         body, trial = self.body, self.trial
         given = trial.wheel_inertia * (body.wheel_speed - trial.wheel_speed_0)
         own = body.inertia[2] * body.rates[2] - (given if trial.actuator == "motor" else -given)
