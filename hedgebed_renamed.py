@@ -52,7 +52,7 @@ _MODULES = {
         ),
         "experiments.diagnose": "diagnose_settings=settings inspection",
         "experiments.grains": (
-            "bed_box=box bed_graded=graded bed_progress bed_sizes=sizes bed_staged=staged following kept_material "
+            "bed_box=sizes bed_graded=graded bed_progress bed_sizes=sizes bed_staged=staged following kept_material "
             "softening spells tracked_frames tumble_bed_settings=settings tumble_flight=flight where"
         ),
         "experiments.hop": (
@@ -227,7 +227,7 @@ _NAMES = {
         "experiments.campaign.files": "place_campaign",
     },
     "experiments.penetrate.settings": {
-        "experiments.grains.box": "expected_grain_count",
+        "experiments.grains.sizes": "expected_grain_count",
     },
     "experiments.platform.numbers": {
         "experiments.tumble.trial": "Spikes spikes_of",

@@ -233,7 +233,7 @@ class BedGround:
     def step(
         self, position: ArrayLike, velocity: ArrayLike, dt: float, turn: Turned = None, spin: Turned = None
     ) -> Reaction:
-        """See `Ground.step`. Raises LeftTheBedError, ValueError where dt is no multiple of the bed's step, and what the
+        """Raises LeftTheBedError, ValueError where dt is no multiple of the bed's step, and what the
         bed raises."""
         pose, twist = Pose.of(position, turn), Twist.of(velocity, spin)
         steps = round(dt / self.time_step)

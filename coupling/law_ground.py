@@ -74,7 +74,6 @@ class LawGround:
 
     @property
     def name(self) -> str:
-        """The law's."""
         return self.grounds[0].name
 
     @property
@@ -126,11 +125,9 @@ class LawGround:
         return {"springs": float(sum(held))}
 
     def checkpoint(self) -> State:
-        """See `Ground.checkpoint`."""
         return self.state()
 
     def rollback(self, kept: State) -> None:
-        """See `Ground.rollback`."""
         self.restore(kept)
 
     def state(self) -> State:
@@ -141,7 +138,6 @@ class LawGround:
         return kept
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
         self._depths = np.array(state["depths"], dtype=float)
         for row, ground in enumerate(self.grounds):
             ground.restore(part_of(state, str(row)))

@@ -64,7 +64,7 @@ class PlacedBody:
 
 
 class PlanarBody(PlacedBody):
-    """The platform of `trial`, at rest at (`x`, `z`) [m] and `theta` [rad].
+    """The platform of `trial`, at rest at (`x`, `z`) [m] and `theta` [rad]; a `coupling.Body`.
 
     Raises ValueError for a trial with effects: the master has the base model only.
     """
@@ -138,7 +138,6 @@ class PlanarBody(PlacedBody):
         return Pose(np.array([x, 0.0, z]), np.array([math.cos(0.5 * theta), 0.0, math.sin(0.5 * theta), 0.0]))
 
     def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
-        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
         half = self._spare(dt, lag)
         self._torque = self._mean_torque(dt)
         push = self._applied() + _generalised(guess)
@@ -146,7 +145,6 @@ class PlanarBody(PlacedBody):
         return _twist(held)
 
     def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
-        """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
         bounded = {row: contact for row, contact in reaction.by_member.items() if contact.tangential_force is None}
         self._next_modes = np.full(len(self.modes), _OPEN, dtype=np.int8)
         self._next_touching = bool(reaction.contacts)
@@ -156,7 +154,6 @@ class PlanarBody(PlacedBody):
         return Wrench(reaction.force + force[0], reaction.torque + force[1])
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
-        """Take the step: along `twist`, with the impulse of `wrench`."""
         held = np.array([twist.velocity[0], twist.velocity[2], twist.spin[1]])
         push = self._applied() + _generalised(wrench)
         self.place = self.place + dt * held
@@ -209,11 +206,9 @@ class PlanarBody(PlacedBody):
         return self.trial.weight * float(self.place[1])
 
     def state(self) -> State:
-        """All that its next steps depend on."""
         return {"numbers": self._numbers(), "modes": self.modes.copy()}
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
         self._restore_numbers(state["numbers"])
         self.modes = np.array(state["modes"], dtype=np.int8)
 

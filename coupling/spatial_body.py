@@ -33,7 +33,9 @@ _ROUNDS = 20
 
 
 class SpatialBody(PlacedBody):
-    """The platform of `trial` at `position` [m] with the turn `quaternion`; of the trial, the ground is not used.
+    """The platform of `trial` at `position` [m] with the turn `quaternion`; a `coupling.Body`.
+
+    Of the trial, the ground is not used.
 
     Parameters
     ----------
@@ -106,7 +108,6 @@ class SpatialBody(PlacedBody):
         self.momentum, self.angular_momentum = self._masses * velocity, self._spin_to_momentum(spin)
 
     def slow_placement(self, factor: float) -> None:
-        """As `PlanarBody.slow_placement`."""
         wheels = self._wheels_at(self.wheels, self.turn)
         self._masses, self._inertia, self._drag = (factor * held for held in (self._masses, self._inertia, self._drag))
         self.momentum = factor * self.momentum
@@ -120,7 +121,6 @@ class SpatialBody(PlacedBody):
         self.time = self.torque_work = 0.0
 
     def lift(self, height: float) -> None:
-        """Put it higher by this [m]."""
         self.place[2] += height
 
     def start(self, lag: float) -> None:
@@ -135,11 +135,9 @@ class SpatialBody(PlacedBody):
 
     @property
     def pose(self) -> Pose:
-        """Where it is."""
         return Pose(self.place, self.turn)
 
     def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
-        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
         self._lag, half = lag, self._spare(dt, lag)
         self._torques = self._mean_torques(dt)
         drag = self._drag
@@ -157,7 +155,6 @@ class SpatialBody(PlacedBody):
         return Twist(momentum / self._masses, spin)
 
     def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
-        """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
         bounded = {tip: contact for tip, contact in reaction.by_member.items() if contact.tangential_force is None}
         self._next_sliding, self._next_sticking = dict[int, Vector](), frozenset[int]()
         self._next_touching = bool(reaction.contacts)
@@ -169,7 +166,6 @@ class SpatialBody(PlacedBody):
         return Wrench(reaction.force + force, reaction.torque + torque)
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
-        """Take the step: along `twist`, with the impulse of `wrench`."""
         middle = to_matrix(moved(self.pose, twist, 0.5 * dt).turn)
         self.torque_work += dt * float(self._torques @ (self.axes @ (middle.T @ twist.spin)))
         end = moved(self.pose, twist, dt)
@@ -225,7 +221,6 @@ class SpatialBody(PlacedBody):
         return self.wheels / np.array(inertias[:3])
 
     def state(self) -> State:
-        """All that its next steps depend on."""
         slides = sorted(self.sliding)
         return {
             "numbers": self._numbers(),
@@ -235,7 +230,6 @@ class SpatialBody(PlacedBody):
         }
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
         self._restore_numbers(state["numbers"])
         self._inertia = np.array(state["inertia"], dtype=float)
         rows = np.asarray(state["sliding"], dtype=float).reshape(-1, 3)

@@ -26,9 +26,9 @@ from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
 from .bed_progress import BedProgress
-from .box import carried_height, expected_grain_count
 from .following import Followed, Run
 from .settings import GrainsSettings
+from .sizes import carried_height, expected_grain_count
 from .softening import Softening, check_young, run_limit, soften_material
 from .staged import staged_bed
 from .where import check_where

@@ -10,7 +10,7 @@ import os
 from collections.abc import Sequence
 from statistics import fmean
 
-from experiments.grains.box import expected_grain_count
+from experiments.grains.sizes import expected_grain_count
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.reporting import PictureCosts

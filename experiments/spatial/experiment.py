@@ -1,7 +1,6 @@
 """`hedgebed tumble spatial`: a platform in six degrees of freedom on a bed of grains or on the spring-damper.
 
-Both go through the coupling's master. On a bed the same trial on the spring-damper is stepped first: it says how far
-and how deep the bed must reach, and stands beside the result.
+Both go through the coupling's master.
 """
 
 from experiments.platform.kept_platform import keep_platform
@@ -10,8 +9,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.whole_runs import whole_run
 
-from .on_grains import SpatialOnBed
-from .on_law import SpatialFollowed
+from .on_grains import SpatialFollowed, SpatialOnBed
 from .settings import SpatialSettings
 from .trial import plan_spatial
 

@@ -1,30 +1,95 @@
-"""A platform in space on a bed of grains; what a run in the plane does alike is in `experiments.grains.on_bed`."""
+"""A platform in space, followed on the spring-damper or on a bed of grains.
+
+What a run in the plane does alike is in `experiments.grains.on_bed`. On a bed the same trial on the spring-damper is
+stepped first: it says how far and how deep the bed must reach, and stands beside the result.
+"""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from coupling import BedGround, SpatialRun, spatial_members
+from coupling import BedGround, LawGround, SpatialRun, spatial_members
 from coupling.members import Member
 from dem import Bed
+from experiments.grains.following import Followed
 from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
 from experiments.grains.softening import PUSHED
 from experiments.platform.lengths import check_lengths
+from experiments.runs.progress import Progress
 from experiments.runs.result import Result
-from rigid.spatial.quaternions import to_matrix
+from experiments.runs.types import Json
+from experiments.tumble.coupled import STEP
+from rigid.spatial.quaternions import from_turn, to_matrix
 
 from . import say
-from .on_law import SpatialFollowed
-from .result import conclude
+from .result import SpatialFrames, conclude, sinkage_start, write_series_of
 from .settings import SpatialSettings
 from .trial import SpatialPlan
 
-__all__ = ["SpatialForecast", "SpatialOnBed"]
+__all__ = ["SpatialFollowed", "SpatialForecast", "SpatialOnBed"]
+
+LAW_LOWERING, LAW_REST = 0.05, 0.11
+"""Of the placement on a law, where it is not set: its least speed [m/s], and the longest time constant with which a
+platform comes to rest, W / (K speed) on all tips that it stands on [s]; on one of four it still rests within 3 s."""
+
+
+class SpatialFollowed(Followed[SpatialRun]):
+    """A platform in space; its run on the spring-damper."""
+
+    settings: SpatialSettings
+
+    def __init__(self, settings: SpatialSettings, plan: SpatialPlan) -> None:
+        self.settings, self.plan, self.trial = settings, plan, plan.trial
+        self.platform, self.weight = plan.trial.platform, float(np.linalg.norm(plan.trial.weight))
+        stance = self.platform.stance()
+        self.feet_count = len(stance.row) + len(stance.rear)  # Spikes that the platform stands on
+
+    def run_on_law(self) -> SpatialRun:
+        """The trial on the spring-damper, ready to be stepped; beside a bed explicitly, ten steps at a time."""
+        settings = self.settings
+        ground = LawGround.of_spatial(self.trial)
+        ground.grounds = [replace(ground, time_step=STEP) for ground in ground.grounds]
+        # Heavier on softer ground is set down faster.
+        slow = self.weight / (self.feet_count * self.plan.numbers["stiffness"].value * LAW_REST)
+        lowering = settings.lowering_speed or max(LAW_LOWERING, slow)
+        return SpatialRun(
+            self.trial, ground, duration=settings.duration, lowering_speed=lowering if settings.placed else None,
+            energy_interval=1e-3, **({} if settings.ground == "bed" else settings.stepping()), **self.start(),
+        )  # fmt: skip
+
+    def start(self) -> Mapping[str, Any]:
+        """Where it starts and how it moves there, as `SpatialRun` takes it."""
+        settings, platform = self.settings, self.platform
+        turn = from_turn(settings.turn)
+        start: Json = {
+            "quaternion": tuple(turn), "velocity": settings.velocity, "angular_velocity": settings.angular_velocity,
+        }  # fmt: skip
+        if settings.height is not None:
+            lowest = float(((platform.tips - platform.centre_of_mass) @ to_matrix(turn)[2]).min())
+            start["position"] = (0.0, 0.0, settings.height - lowest)
+        return start
+
+    def announce(self, progress: Progress) -> None:
+        """Every default, and the warnings."""
+        for sentence in self.plan.announcement():
+            progress.message(sentence)
+
+    def sinkage(self, run: SpatialRun) -> float:
+        return sinkage_start(run)
+
+    def frames(self, run: SpatialRun, folder: Path, resumed: bool) -> SpatialFrames:
+        return SpatialFrames(run, folder, self.settings, resumed=resumed)
+
+    def write_series(self, run: SpatialRun, folder: Path) -> None:
+        write_series_of(run, folder)
+
+    def conclude(self, run: SpatialRun, folder: Path) -> Result:
+        return conclude(self.settings, self.plan, run, folder)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +114,6 @@ class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, S
 
     @cached_property
     def forecast(self) -> SpatialForecast:
-        """The same trial on the spring-damper."""
         run = self.run_on_law()
         rows = run.run()
         tips = self.platform.tips - self.platform.centre_of_mass
@@ -78,7 +142,6 @@ class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, S
             raise ValueError(say("forecast_fails", error=error)) from error
 
     def check_extent(self) -> None:
-        """Raise ValueError for a bed too short along x or y for the forecast."""
         margin, s, forecast = MARGIN * self.spike_diameter, self.settings, self.forecast
         for axis, (name, low, high) in enumerate(zip("xy", forecast.low, forecast.high, strict=True)):
             need = high - low + 2 * margin

@@ -215,7 +215,6 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         return 2 * (forecast.farthest + MARGIN * self.spike_diameter) - forecast.behind - forecast.ahead
 
     def check_extent(self) -> None:
-        """Raise ValueError for a bed too short or too narrow for the forecast."""
         s, forecast, spike = self.settings, self.forecast, self.spike_diameter
         margin = MARGIN * spike
         need, on_grains = forecast.length + 2 * margin, self._length_on_grains()

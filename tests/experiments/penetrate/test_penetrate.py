@@ -15,7 +15,7 @@ import pytest
 from fake_bed import FakeBed
 from pydantic import ValidationError
 
-from experiments.grains.box import expected_grain_count
+from experiments.grains.sizes import expected_grain_count
 from experiments.penetrate import beds, units
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate import result as result_of_run

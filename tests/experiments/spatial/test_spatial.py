@@ -11,8 +11,7 @@ from tumble_runs import stop_at
 from experiments.cli.main import main
 from experiments.runs.folder import RunFolder, read_series
 from experiments.spatial import experiment as spatial
-from experiments.spatial.on_grains import SpatialOnBed
-from experiments.spatial.on_law import SpatialFollowed
+from experiments.spatial.on_grains import SpatialFollowed, SpatialOnBed
 from experiments.spatial.settings import SpatialSettings
 from experiments.spatial.trial import plan_spatial
 from experiments.tumble.settings import TumbleSettings
