@@ -39,8 +39,7 @@ class EnergyBalance:
         self.energy_names: tuple[str, ...] = ()  # What the ground's energies are, in the order of `samples`
         self.work_names: tuple[str, ...] = ()  # Likewise of what a bed's contacts took (`Bed.contact_work`)
         self._momentum, self._angular_momentum = np.zeros(3), np.zeros(3)
-        self._moment = np.zeros(3)
-        """Angular impulse on the body from elsewhere than the ground since the balance began [N m s]."""
+        self._moment = np.zeros(3)  # Angular impulse from elsewhere than the ground since the balance began [N m s]
 
     @property
     def columns(self) -> dict[str, Vector]:

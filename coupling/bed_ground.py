@@ -118,8 +118,7 @@ class BedGround:
         self._turns = np.array([member.turn for member in self.members])
         self._mass = float(bed.grains().mass.sum())
         self.impulse = np.zeros(3)  # Of gravity and floor on the grains since the start [N s]
-        self.drag_time = math.inf
-        """Of a drag that calms the grains before time begins (`Bed.advance`) [s]; no energy balance has it."""
+        self.drag_time = math.inf  # Of a drag that calms the grains before time begins (`Bed.advance`) [s]
         self.grain_steps = 0  # Grains computed since the start, summed over the bed's steps (fewer where grains sleep)
 
     def _put_in(self, spike: Spike, at: tuple[float, float] | None) -> int:

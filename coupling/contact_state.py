@@ -26,8 +26,7 @@ __all__ = [
 WINDOW = 5e-3  # Over which forces and speeds are averaged [s]
 TOUCH_SHARE = 0.01  # Force on a row that touches, over the weight [1]
 CREEP = 2e-3  # Horizontal speed up to which a row counts as held [m/s]
-LINE = 0.05
-"""Spikes lie in a line where none is farther off than this, over the largest distance of any from the centre [1]."""
+LINE = 0.05  # Largest distance of spikes from their line, over that of any from the centre [1]
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,7 @@ from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 
 __all__ = ["Contact", "Described", "Ground", "Reaction", "State", "part_of", "prefixed"]
 
-_BEFORE = {"balance": "books", "ground": "footing"}
-"""Parts of states by the names that checkpoints of earlier versions have."""
+_BEFORE = {"balance": "books", "ground": "footing"}  # Names in checkpoints of earlier versions
 
 
 @runtime_checkable

@@ -67,8 +67,7 @@ class Body(Protocol):
 class Exchange:
     """What passed between body and ground since the energy balance began [J]."""
 
-    given: float = 0.0
-    """Work of the body on the ground, as the body sees it: by the mean of its rates before and after each step."""
+    given: float = 0.0  # Work on the ground as the body sees it: by the mean of its rates before and after a step
     taken: float = 0.0  # The same as the ground sees it: by the twist that was held
     worst_guess: float = 0.0  # Largest |force guessed - force found| [N]
     largest_force: float = 0.0  # Largest force of one step [N]
@@ -133,8 +132,7 @@ class Master:
         self.count = 0  # Macro steps done
         self._wrenches: deque[Wrench] = deque([first_guess] if first_guess is not None else [], maxlen=3)
         self._held: Twist | None = None
-        self._learnt: list[tuple[Vector, Vector]] = []
-        """How the wrench that came out changed with the one that went in, when a step was last repeated."""
+        self._learnt: list[tuple[Vector, Vector]] = []  # Changes of the wrench in and out, when last repeated
         self.exchange = Exchange()
         self.last: Reaction | None = None  # The ground's answer in the last step
         self.wrench = Wrench.none()  # The whole wrench of the body's last step, friction included

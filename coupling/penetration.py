@@ -39,8 +39,7 @@ class Run(Stepper):
     """A spike that goes into `ground` (or a bed): what all three runs share, clock, rows and saved state."""
 
     kind = ""
-    lets_go_at_touch = False
-    """Whether the prescribed approach ends where the ground is first felt, if that is above its surface."""
+    lets_go_at_touch = False  # Whether the approach ends where the ground is first felt, above its surface
 
     def __init__(
         self,

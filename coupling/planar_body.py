@@ -28,8 +28,7 @@ from .poses import Pose, Twist, Vector, Wrench
 __all__ = ["PLACEMENT_STEP", "PLACEMENT_TIME", "PlanarBody", "placement_time"]
 
 PLACEMENT_TIME = 0.002  # Mass over drag of a body during placement [s]
-PLACEMENT_STEP = 4e-4
-"""Macro step up to which that mass is stable [s]; beyond, mass goes with the square of the step, as K H^2 / m does."""
+PLACEMENT_STEP = 4e-4  # Macro step up to which that mass is stable [s]; beyond, mass goes with its square
 _OPEN = 9  # Mode of a row that does not touch
 
 
@@ -214,8 +213,7 @@ class PlanarBody(PlacedBody):
 
     acceleration: Vector = np.zeros(3)  # Of x, z and theta, the mean of the last step
     _torque = 0.0
-    _until_limit = math.inf
-    """From the start of this step until a motor's wheel is at its limit, if the torque lasts [s]."""
+    _until_limit = math.inf  # From the start of this step until a motor's wheel is at its limit [s]
     _next_modes: NDArray[np.int8] = np.zeros(0, dtype=np.int8)
 
     def _applied(self) -> Vector:

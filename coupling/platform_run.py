@@ -26,13 +26,10 @@ from .stepper import Stepper
 __all__ = ["AT_REST", "REST_TIME", "PlatformRun"]
 
 AT_REST = 0.005  # What of its weight may still be missing at rest, and the mean speed there over the lowering speed [1]
-SWINGS = math.sqrt(AT_REST)
-"""Root of the mean square of the same in the last quarter of the time, at most [1]: what comes to rest from one side
-has less once its mean is at rest; what bounces does not."""
+SWINGS = math.sqrt(AT_REST)  # Of the same, largest root mean square in the last quarter of the time [1]
 FIRMER = 4.0  # Factor on drag and mass of the placement of what swings [1]
 REST_TIME = 0.04  # For how long the signs of rest must hold [s]
-PLACING_WAY = 0.02
-"""Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
+PLACING_WAY = 0.02  # Lowering speed times the usual time of a placement [m]; for progress only
 LONGEST_PLACING = 3.0  # A platform that has not come to rest after this [s] is an error
 
 
@@ -136,7 +133,7 @@ class PlatformRun(EnergyBalance, Stepper):
         return self.pace * REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
 
     def _order(self) -> None:
-        """During placement, where the body is light, the guess at the next force is the last one, whatever is asked."""
+        """During placement, where the body is light, the guess at the next force is the last one."""
         self.master.extrapolation = self._extrapolation if self.placed else 0
 
     def advance(self) -> None:

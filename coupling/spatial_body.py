@@ -28,8 +28,7 @@ from .poses import Pose, Twist, Vector, Wrench, moved
 
 __all__ = ["SpatialBody"]
 
-_ROUNDS = 20
-"""Of the spin of a step's middle, which turns the axes that it is made from: each leaves H |w| of the error."""
+_ROUNDS = 20  # Iterations for the spin of a step's middle: each leaves H |w| of the error
 
 
 class SpatialBody(PlacedBody):

@@ -5,8 +5,7 @@ from typing import Any, Protocol, TypedDict
 
 __all__ = ["Progress", "Reporters", "Reporting", "Stepper"]
 
-Reporters = Callable[[Any], None] | Iterable[Callable[[Any], None]] | None
-"""What is called with the run: one, several or none."""
+Reporters = Callable[[Any], None] | Iterable[Callable[[Any], None]] | None  # Called with the run
 
 
 class Progress(Protocol):

@@ -24,8 +24,7 @@ from .tumbling import CoupledTumble
 
 __all__ = ["Landing", "Rest", "TumblesInARow"]
 
-REST_SPEED = 2e-3
-"""A platform whose centre and tips are slower is at rest [m/s]: the speed above which a row is said to slide."""
+REST_SPEED = 2e-3  # Centre and tips of a platform at rest are slower [m/s]: as fast as a row that slides
 REST_LASTS = 0.1  # For how long [s]
 LONGEST_WAIT = 3.0  # After the torque's end the next begins at the latest [s], at rest or not, which is noted
 

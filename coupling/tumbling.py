@@ -28,12 +28,8 @@ from .stepper import Reporting
 __all__ = ["MOST_REVERSAL", "CoupledTumble"]
 
 MOST_REVERSAL = 1e-3
-"""A larger `CoupledTumble.dissipation_reversal` is worth a warning [1].
-
-What the grains' integrator and the coupling leave of a lossless collision is 3e-4 to 7e-4 of its energy
-(tests/coupling); here it is set against the energy of the whole tumble. One on grains that dissipate has shown less
-than 1e-6.
-"""
+"""A larger `CoupledTumble.dissipation_reversal` is worth a warning [1]: a lossless collision leaves 3e-4 to 7e-4 of its
+energy (tests/coupling), a tumble on grains that dissipate less than 1e-6."""
 GRAINS_EVERY = 100  # Macro steps between two measurements of how fast the grains are that wait under a lowered gravity
 LONGEST_CALM = 10.0  # A platform that does not come to rest there for longer is an error [of the time watched]
 COLUMNS = (

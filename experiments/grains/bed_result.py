@@ -19,8 +19,7 @@ __all__ = [
     "write_bed_series",
 ]  # fmt: skip
 
-PACKING_OFF = 0.02
-"""A bed whose packing differs by more from that at which its grains were calibrated is worth a warning [1]."""
+PACKING_OFF = 0.02  # Difference of the packing from that of the grains' calibration that is worth a warning [1]
 MOST_RESIDUAL = 0.01  # A larger energy_residual is worth a warning [1]
 BED_COLUMNS = {
     "time": "t_s", "momentum_error": "momentum_error_N_s", "angular_momentum_error": "angular_momentum_error_N_m_s",

@@ -38,8 +38,7 @@ __all__ = [
     "soften_material", "stable_overlap",
 ]  # fmt: skip
 
-RAIN_OVERLAP = 0.05
-"""Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
+RAIN_OVERLAP = 0.05  # Of a grain with the floor at the end of its fall, while the bed is made [of a diameter]
 INERTIA = 1.1  # lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)
 
 PUSHED = {"motor": 1.0, "brake": 3.0}
@@ -48,14 +47,11 @@ PUSHED = {"motor": 1.0, "brake": 3.0}
 0.7 to 0.8 (motor) and 2.9 to 4.9 (brake, whose spring-damper is not yet pressed in when a tip has its speed in grains)
 were met (docs/results/grains2-flight-*)."""
 SMALL = 0.05
-"""Overlap that grains meant to be hard may have [of a diameter]: the default of `max_overlap`, past which a drive of
-a spike fails, and a platform's run at `run_limit`. A run that had more is told so."""
-STIFF, STIFF_CHAIN = 0.01, 7.4
-"""Overlap [of a diameter] at and below which a chain of grains carries as much as it does among stiff ones [1]."""
+"""Overlap that is small [of a diameter]: the default of `max_overlap`. A run that had more gets a warning."""
+STIFF, STIFF_CHAIN = 0.01, 7.4  # Overlap [of a diameter] up to which chains carry as among stiff grains [1]
 SOFTEST = 0.1
-"""Of the modulus chosen for `max_overlap`, below which one that is set is refused [1]: grains would overlap by
-10^(2/3) = 4.6 times as much. The estimate has a factor of some 3 to spare in the modulus (`chain`, and depth and speed
-beyond the forecast), and the softest case that ships has half of what is chosen."""
+"""A modulus that is set below this share of the chosen one is refused [1]: grains would overlap 10^(2/3) = 4.6 times as
+much. The estimate is some 3 times too stiff, and the softest case that ships has half of what is chosen."""
 PACKING = 0.6  # Of a bed, for its bulk density [1]
 SOFT = 0.05  # Overlap at and above which grains share the load: `CHAIN`, as `dem` has it
 

@@ -30,11 +30,9 @@ __all__ = ["LineProgress", "LiveProgress", "Progress", "as_expected", "duration"
 
 
 _SAYS_SOMETHING = 0.03  # Share of a stage from which on its pace so far is taken for its pace
-_A_MOMENT = 1.0
-"""A stage that told its first share sooner has gone on from an earlier one's, or does little at a time [s]."""
+_A_MOMENT = 1.0  # A stage that reports its first share sooner has gone on from an earlier one's [s]
 _GUESSED = 15.0  # A first guess of the rate weighs as much as so much work done [s]
-_MOST_SLOWER = 3.0
-"""Times known in seconds follow the machine's pace over the one guessed up to so much, either way [1]."""
+_MOST_SLOWER = 3.0  # Most by which the machine's pace scales times that are known in seconds [1]
 _LATE = 0.15  # What a stage that is late is said to take yet, over how late it is [1]
 
 

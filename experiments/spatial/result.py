@@ -26,8 +26,7 @@ from .trial import SpatialPlan
 
 __all__ = ["SpatialFrames", "conclude", "sinkage_start", "write_series_of"]
 
-APART = 5e-3
-"""For how long nothing must touch that it counts as a hop [s]: sand that is only grazed lets go and takes hold."""
+APART = 5e-3  # A hop lasts at least that long [s]: grazed sand loses and regains contact
 SLOW = 2e-3  # Centre and tips of what has settled are slower [m/s]
 UNITS = {
     "time": "t_s", "vx": "vx_m_s", "vy": "vy_m_s", "vz": "vz_m_s", "wx": "wx_rad_s", "wy": "wy_rad_s",

@@ -26,10 +26,8 @@ from .trial import TumblePlan
 __all__ = ["STEP", "check_coupled", "compute_coupled", "feet_columns", "row_feet", "row_quantities"]
 
 STEP = 4e-5
-"""The law's own step [s]: with ten of them, the default, every channel is within the planar model's tolerance.
-
-At 1 ms omega is off by twice of that after 0.9 s, as the torque ends with the step in which the last tip lifts off.
-"""
+"""The law's own step [s]: with ten of them every channel is within the planar model's tolerance; at 1 ms omega is off
+by twice of that after 0.9 s, as the torque ends with the step in which the last tip lifts off."""
 
 
 def check_coupled(settings: TumbleSettings, plan: TumblePlan) -> None:

@@ -42,8 +42,7 @@ __all__ = ["PlanarForecast", "PlanarOnBed"]
 ROLLED = {"motor": 0.8, "brake": 0.4}
 """Way on grains over that of rolling without slip or loss: 0.64 to 0.78 and 0.3 were met (docs/experiments.md) [1]."""
 THROW = 2.0  # Speed of a grain that a spike throws up, over the spike's [1]: an elastic ball has twice the wall's
-HULL_SHARE = 0.95
-"""The hull's cylinder over the distance of its sides from the axis, so that it never stands out of the hull [1]."""
+HULL_SHARE = 0.95  # The hull's cylinder over the distance of its sides: it stays inside the hull [1]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,8 +54,7 @@ class PlanarForecast(Forecast):
     ahead: float  # where the tips come down, from the start [m]
     sunk: float  # depth of the tips that it stands on before it moves [m]
     pushed: float  # largest force of the rows together [N]
-    farthest: float
-    """Where tips may come down on grains, which hold a row and the torque with it as long as it acts [m]."""
+    farthest: float  # Where tips may come down on grains, which hold a row and the torque with it [m]
 
     @property
     def length(self) -> float:

@@ -20,10 +20,8 @@ from .trial import TumblePlan
 
 __all__ = ["opening", "short_of_way"]
 
-LONGER = (2.0, 4.0, 8.0)
-"""Times the duration for which the spring-damper is followed until it is LAUNCH_DISTANCE away [1]."""
-STRONGER = (2.0, 4.0, 8.0)
-"""Times the wheel's speed, or the torque, of a brake that does not bring the platform that far [1]."""
+LONGER = (2.0, 4.0, 8.0)  # Durations that are tried, over the one that is set [1]
+STRONGER = (2.0, 4.0, 8.0)  # Likewise the wheel's speed, or the torque, of a brake [1]
 
 
 def opening(

@@ -1,6 +1,5 @@
 """Which stepper a tumble's settings ask for: one tumble, several in a row, or a landing."""
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -101,10 +100,7 @@ def own_warning(run: CoupledTumble) -> str | None:
     """Which tumbles of a row ended without the platform at rest, in words; None where there are none."""
     if not isinstance(run, TumblesInARow):
         return None
-    return _unrested(run.rests["at_rest"][1:].tolist(), ended=run.ended, asked=run.tumbles, rest=run.rest)
-
-
-def _unrested(at_rest: Sequence[float], *, ended: int, asked: int, rest: Rest) -> str | None:
+    at_rest, ended, asked, rest = run.rests["at_rest"][1:].tolist(), run.ended, run.tumbles, run.rest
     moving = [str(k) for k, lay in enumerate(at_rest, start=1) if not lay]
     said = []
     if moving:

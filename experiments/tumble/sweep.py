@@ -34,10 +34,8 @@ SWEEP_FILE = "sweep.csv"
 MOST_ROWS = 24  # Rows that the terminal shows
 _UNITS = {"trajectory_angle": "rad", "max_speed": "m/s", "max_angular_velocity": "rad/s"}
 GAPS = tuple(_UNITS)  # What is compared with the accurate integrator
-COLUMNS = _UNITS | {f"transition_angle_{state}": "rad" for state in ("slip", "hop")}
-"""Of each trial: quantity of a tumble -> unit."""
-WHEEL_SAMPLES = 128
-"""Moments of a trial among which the one at which its wheel is at its limit is sought, over and over more closely."""
+COLUMNS = _UNITS | {f"transition_angle_{state}": "rad" for state in ("slip", "hop")}  # Quantity -> unit
+WHEEL_SAMPLES = 128  # Times at which the batch is looked at for the moment of the wheel's limit
 SUFFIXES = {"1": "", "9.80665 m/s2": "_g"}
 
 Array = NDArray[np.float64]
