@@ -11,6 +11,7 @@ from coupling.members import HULL, spatial_members
 from dem.prepare.prepare import fingerprint
 from experiments.grains import bed_result as grains
 from experiments.grains.softening import Softening
+from experiments.grains.spells import spells
 from experiments.grains.tracked_frames import PlatformFrames, member_mesh
 from experiments.runs.folder import write_series
 from experiments.runs.result import Result
@@ -219,12 +220,7 @@ def _landing(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
     if touched is not None:
         came = max(float(-rows["vz"][touched]), 0.0) if touched else None
         lasting = max(1, round(APART / step))
-        run_length = 0
-        for k in range(touched, len(free)):
-            run_length = run_length + 1 if free[k] else 0
-            if run_length == lasting:
-                left = k - lasting + 1
-                break
+        left = next((touched + low for low, high in spells(free[touched:]) if high - low >= lasting), None)
         if left is not None and came and rows["vz"][left] > 0:
             share = float(rows["vz"][left]) / came
     speed = np.linalg.norm([rows[name] for name in ("vx", "vy", "vz")], axis=0)

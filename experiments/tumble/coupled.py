@@ -6,11 +6,8 @@ stepped, recorded and read as grains are, so that only the ground differs betwee
 
 from dataclasses import replace
 
-import numpy as np
-
 from coupling import CoupledTumble, LawGround
 from experiments.grains.bed_result import unsettled_warning
-from experiments.platform.tips import tip_depth
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import quantities_of
@@ -20,10 +17,10 @@ from rigid.planar.trajectory import Trajectory
 from . import say
 from .result import result_of, title_of
 from .settings import TumbleSettings
-from .steppers import own_quantities, own_warning, stepper_of, words
+from .steppers import own_quantities, own_warning, row_feet, stepper_of, words
 from .trial import TumblePlan
 
-__all__ = ["STEP", "check_coupled", "compute_coupled", "feet_columns", "row_feet", "row_quantities"]
+__all__ = ["STEP", "check_coupled", "compute_coupled", "feet_columns", "row_quantities"]
 
 STEP = 4e-5
 """The law's own step [s]: with ten of them every channel is within the planar model's tolerance; at 1 ms omega is off
@@ -54,7 +51,7 @@ def compute_coupled(
     trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
     folder.write_series("feet", feet_columns(run))
     result = result_of(settings, plan, trajectory, run.body.wheel_at_limit)
-    own, more = own_quantities(run, *row_feet(run))
+    own, more = own_quantities(run)
     result["quantities"] |= quantities_of(row_quantities(run, start=say("of_sinkage_start"), ground="ground")) | own
     result["warnings"] += [warning for warning in (unsettled_warning(run.master), own_warning(run)) if warning]
     return trajectory, result | more | {"title": words(settings, title_of(plan))}
@@ -86,18 +83,3 @@ def feet_columns(run: CoupledTumble) -> Json:
             columns[f"along_{row}_N"] = feet[:, 1, row]
         columns |= {f"slip_{row}_m_s": feet[:, 2, row], f"sinkage_{row}_m": sinkage[:, row]}
     return columns
-
-
-def row_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
-    """Depth of each row's tip [m], 0 above the surface, and its load [N], shape [step, row] both.
-
-    The load is the mean over the step before; on a law, at the start, before any, it is what the spring carries at
-    rest, and the depth is that of the row's end now.
-    """
-    sinkage, load = run.feet[:, 3], run.feet[:, 0].copy()
-    if not run.ground.gives_friction:
-        rows, trial = run.columns, run.trial
-        depth = tip_depth(rows["theta"], rows["y"], count=trial.spike_count, length=trial.spike_length)
-        sinkage = np.maximum(0.0, depth)
-        load[0] = trial.stiffness * sinkage[0]
-    return sinkage, load

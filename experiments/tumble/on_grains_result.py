@@ -25,7 +25,7 @@ from rigid.spatial.quaternions import to_matrix
 from vis.tumble.beside import HEAD, beside_rows, beside_words
 
 from . import say
-from .coupled import feet_columns, row_feet, row_quantities
+from .coupled import feet_columns, row_quantities
 from .result import motion_columns, passages, quantities_of, result_of, trajectory_columns
 from .settings import TumbleSettings
 from .steppers import own_quantities, own_warning, words
@@ -97,7 +97,7 @@ def conclude(
     bed, spikes = _ground(run).bed, plan.spikes
     result["title"] = words(settings, say("title_on_grains", plan=plan, rest=result["title"].partition(": ")[2]))
     result["code"] = fingerprint()
-    added, tables = own_quantities(run, *row_feet(run))
+    added, tables = own_quantities(run)
     result["quantities"] |= _own_quantities(run) | added
     result |= tables
     next_to = quantities_of(beside)
