@@ -2,6 +2,7 @@
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -36,18 +37,9 @@ class Followed(ABC, Generic[Run]):
     """An experiment that steps a platform: what is drawn, written and concluded of its run."""
 
     settings: Any  # `GrainsSettings` with a duration
-
-    @abstractmethod
-    def sinkage(self, run: Run) -> float:
-        """How deep the platform stands once it is set down [m]."""
-
-    @abstractmethod
-    def frames(self, run: Run, folder: Path, resumed: bool) -> Frames:
-        """What writes the frames; `resumed`: whether the run goes on from its checkpoint."""
-
-    @abstractmethod
-    def write_series(self, run: Run, folder: Path) -> Any:
-        """Write trajectory.csv and the series of the run, as far as it has come."""
+    frames: Callable[..., Frames]  # Of a run, a folder, the settings and whether it is `resumed`: what writes frames
+    sinkage: Callable[[Any], float]  # Of a run: how deep the platform stands once it is set down [m]
+    write_series: Callable[[Any, Path], Any]  # Of a run and a folder: writes the series, as far as it has come
 
     @abstractmethod
     def conclude(self, run: Run, folder: Path) -> Result:
@@ -73,7 +65,8 @@ class Followed(ABC, Generic[Run]):
             if bed is not None:  # a checkpoint has the bound on overlaps of the version that made it
                 bed.overlap_limit = limit
             progress.message(say("goes_on", time=run.time))
-        drawn = self.frames(run, folder.path, kept is not None) if self.settings.frame_count else None
+        resumed, settings = kept is not None, self.settings
+        drawn = self.frames(run, folder.path, settings, resumed=resumed) if settings.frame_count else None
         progress.stage("tumble", total=1.0)
         saved, placing, late = time.monotonic(), not run.placed, False
 

@@ -42,6 +42,7 @@ class SpatialFollowed(Followed[SpatialRun]):
     """A platform in space; its run on the spring-damper."""
 
     settings: SpatialSettings
+    frames, write_series, sinkage = SpatialFrames, staticmethod(write_series_of), staticmethod(sinkage_start)
 
     def __init__(self, settings: SpatialSettings, plan: SpatialPlan) -> None:
         self.settings, self.plan, self.trial = settings, plan, plan.trial
@@ -78,15 +79,6 @@ class SpatialFollowed(Followed[SpatialRun]):
         """Every default, and the warnings."""
         for sentence in self.plan.announcement():
             progress.message(sentence)
-
-    def sinkage(self, run: SpatialRun) -> float:
-        return sinkage_start(run)
-
-    def frames(self, run: SpatialRun, folder: Path, resumed: bool) -> SpatialFrames:
-        return SpatialFrames(run, folder, self.settings, resumed=resumed)
-
-    def write_series(self, run: SpatialRun, folder: Path) -> None:
-        write_series_of(run, folder)
 
     def conclude(self, run: SpatialRun, folder: Path) -> Result:
         return conclude(self.settings, self.plan, run, folder)

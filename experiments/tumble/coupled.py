@@ -17,7 +17,7 @@ from rigid.planar.trajectory import Trajectory
 from . import say
 from .result import result_of, title_of
 from .settings import TumbleSettings
-from .steppers import own_quantities, own_warning, row_feet, stepper_of, words
+from .steppers import own_quantities, own_warning, row_feet, sinkage_start, stepper_of, words
 from .trial import TumblePlan
 
 __all__ = ["STEP", "check_coupled", "compute_coupled", "feet_columns", "row_quantities"]
@@ -62,7 +62,7 @@ def row_quantities(run: CoupledTumble, *, start: str, ground: str) -> dict[str, 
     `ground`: name of the ground in a note."""
     sinkage, load = row_feet(run)
     return {
-        "sinkage_start": (float(sinkage[0, [0, -1]].mean()), "m", start),
+        "sinkage_start": (sinkage_start(run), "m", start),
         "sinkage_largest": (float(sinkage.max()), "m", say("of_any_row")),
         "largest_row_force": (float(load.max()), "N", say("of_row_force")),
         "exchange_residual": (*run.balance_numbers["exchange_residual"], say("of_exchange", ground=ground)),

@@ -34,7 +34,7 @@ from . import say
 from .on_grains_result import TumbleFrames, conclude, write_trajectory
 from .opening import opening, short_of_way
 from .settings import TumbleSettings
-from .steppers import is_plain, stepper_of
+from .steppers import is_plain, sinkage_start, stepper_of
 from .trial import plan_tumble, spikes_of
 
 __all__ = ["PlanarForecast", "PlanarOnBed"]
@@ -66,6 +66,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
     """A tumble in the plane on a slice of a bed. `plan` has the numbers of the spring-damper beside it."""
 
     copies = 2.0  # Spikes in a row: the bed holds one of them and the sand that it has for itself
+    frames, write_series, sinkage = TumbleFrames, staticmethod(write_trajectory), staticmethod(sinkage_start)
 
     def __init__(self, settings: TumbleSettings, platform_file: Path | None = None) -> None:
         """`platform_file` stands in for ``settings.platform``, where that was copied."""
@@ -306,15 +307,6 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
             self.settings, self.trial, ground, **lowered, **self.stepping(), tip_radius=0.5 * self.spikes.diameter,
             max_wheel_speed=self.plan.max_wheel_speed,
         )  # fmt: skip
-
-    def sinkage(self, run: CoupledTumble) -> float:
-        return float(run.feet[0, 3, [0, -1]].mean())
-
-    def frames(self, run: CoupledTumble, folder: Path, resumed: bool) -> TumbleFrames:
-        return TumbleFrames(run, folder, self.settings, resumed=resumed)
-
-    def write_series(self, run: CoupledTumble, folder: Path) -> Trajectory:
-        return write_trajectory(run, folder)
 
     def conclude(self, run: CoupledTumble, folder: Path) -> Result:
         law = self.forecast.trajectory

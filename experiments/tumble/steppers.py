@@ -15,7 +15,7 @@ from . import say
 from .footfalls import find_footfalls, footfall_quantities, footfall_table
 from .settings import TumbleSettings
 
-__all__ = ["is_plain", "own_quantities", "own_warning", "row_feet", "stepper_of", "words"]
+__all__ = ["is_plain", "own_quantities", "own_warning", "row_feet", "sinkage_start", "stepper_of", "words"]
 
 
 def is_plain(settings: TumbleSettings) -> bool:
@@ -59,6 +59,11 @@ def row_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
         sinkage = np.maximum(0.0, depth)
         load[0] = trial.stiffness * sinkage[0]
     return sinkage, load
+
+
+def sinkage_start(run: CoupledTumble) -> float:
+    """Mean depth of the two rows that it stands on when the torque begins [m]."""
+    return float(row_feet(run)[0][0, [0, -1]].mean())
 
 
 def own_quantities(run: CoupledTumble) -> tuple[dict[str, Json], Json]:
