@@ -69,7 +69,7 @@ _MODULES = {
             "kept_platform lengths platform_settings=settings settled surfaces tips tumble_platform=numbers"
         ),
         "experiments.runs": (
-            "cli_streams=streams kept_results kernel_cache memory progress reading registry reporting "
+            "cli_streams=streams kept_results kernel_cache memory progress reading registry reporting=whole_runs "
             "runfolder=folder stopping strict whole_runs"
         ),
         "experiments.spatial": (

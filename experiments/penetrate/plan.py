@@ -13,7 +13,7 @@ from statistics import fmean
 from experiments.grains.sizes import expected_grain_count
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import PictureCosts
+from experiments.runs.whole_runs import PictureCosts
 
 from .settings import PenetrateSettings
 from .units import Unit, expected_time, shown_units
