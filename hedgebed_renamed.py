@@ -80,7 +80,7 @@ _MODULES = {
             "campaign_settings footfalls sweep_ranges synthesis tumble_coupled=coupled tumble_grains=on_grains "
             "tumble_grains_frames=on_grains_result tumble_grains_result=on_grains_result tumble_opening=opening "
             "tumble_recorded=recorded tumble_settings=settings tumble_steppers=steppers tumble_sweep=sweep "
-            "tumble_tables=campaign_tables tumble_trial=trial tumble_words=result"
+            "tumble_tables=synthesis tumble_trial=trial tumble_words=result"
         ),
         "experiments.validate": "validate_settings=settings",
     },

@@ -25,7 +25,7 @@ from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
 
 from . import say
 from .campaign_settings import CampaignSettings
-from .campaign_tables import sensor_set, shared_tables, trial_table
+from .synthesis import sensor_set, shared_tables, trial_table
 
 __all__ = ["TumbleRecording", "campaign_of_tumbles", "write_tumbles_campaign"]
 

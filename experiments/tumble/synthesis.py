@@ -8,24 +8,15 @@ A tumble's campaign goes where it is asked for, and the truth into the tumble's 
 
 import math
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from experiments.campaign import (
-    Campaign,
-    EffectTable,
-    Recording,
-    TumbleCampaign,
-    TumbleModel,
-    write_campaign,
-    write_model,
-)
-from experiments.campaign.files import check_target, place_campaign
-from experiments.campaign.tables import RigTable, TumbleUncertainty
+from experiments.campaign import Campaign, EffectTable, Recording, TumbleCampaign, TumbleModel, tables
+from experiments.campaign.files import check_target, place_campaign, write_campaign, write_model
 from experiments.platform.numbers import torque_within_limit
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
@@ -42,16 +33,74 @@ from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
 
 from . import say
 from .campaign_settings import CampaignSettings
-from .campaign_tables import sensor_set, shared_tables, trial_table
 
-__all__ = ["TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "write_tumble_campaign"]
+__all__ = [
+    "TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "sensor_set", "shared_tables", "trial_table",
+    "write_tumble_campaign",
+]  # fmt: skip
 
 TRUTH = "truth.toml"  # What is true, in a run folder; never in the campaign's
-
 MOST_ROWS = 24  # Trials that the terminal shows
-
 MOTION = ("time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "ax", "ay")  # What sensors see of a trajectory
 _DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
+NUMBERS = ("gravity_sim", "torque", "torque_until", "wheel_speed_0", "counterweight")  # Of a trial, SI units
+
+
+def shared_tables(
+    name: str,
+    numbers: Mapping[str, float],
+    sensors: SensorSet,
+    *,
+    spike_count: int,
+    kind: str,
+    granular: bool,
+    rig: tables.RigTable | None,
+) -> Json:
+    """What a campaign of tumbles and its truth both have.
+
+    `numbers` of platform, wheel and surface by the names of `Trial`; `kind` and `granular` of the surface. The
+    Hedgehog's number of rows is left out, as the format has it.
+    """
+    return {
+        "format": tables.FORMAT, "kind": "tumble", "name": name,
+        "platform": tables.PlatformTable(
+            mass=numbers["mass"], inertia=numbers["inertia"], spike_length=numbers["spike_length"],
+            spike_count=None if spike_count == tables.HEDGEHOG_ROWS else spike_count,
+        ),
+        "wheel": tables.WheelTable(inertia=numbers["wheel_inertia"]),
+        "rig": rig,
+        "surface": tables.TumbleSurface(
+            kind=kind, granular=granular, stiffness=numbers["stiffness"], damping=numbers["damping"],
+            mu_s=numbers["mu_s"], mu_d=numbers["mu_d"],
+        ),
+        "sensors": tables.TumbleSensors(
+            pose=tables.PoseSensor(std=sensors.pose_std), wheel=tables.WheelSensor(std=(sensors.wheel_std,)),
+            imu=tables.ImuSensor(std=sensors.imu_std, window=sensors.imu_window),
+        ),
+    }  # fmt: skip
+
+
+def trial_table(
+    name: str, trial: Trial | Mapping[str, Any], actuator: Literal["motor", "brake"] = "motor"
+) -> tables.TumbleTrial:
+    """One trial, its recordings named after it; no counterweight is none, not 0. `actuator`: beside a mapping."""
+    numbers = trial if isinstance(trial, Mapping) else {key: getattr(trial, key) for key in NUMBERS}
+    given: Json = {key: numbers[key] for key in NUMBERS} | {"counterweight": numbers["counterweight"] or None}
+    return tables.TumbleTrial(
+        id=name, actuator=actuator if isinstance(trial, Mapping) else trial.actuator, **given,
+        pose=f"{name}-pose.csv", imu=f"{name}-imu.csv", wheel=f"{name}-wheel.csv",
+    )  # fmt: skip
+
+
+def sensor_set(settings: CampaignSettings, *, noise: float = 1.0) -> SensorSet:
+    """The sensors that `settings` describe, their standard deviations `noise` times as large."""
+    x, y, theta = (noise * std for std in settings.pose_std)
+    gyro, ax, ay = (noise * std for std in settings.imu_std)
+    return SensorSet(
+        camera_rate=settings.camera_rate, imu_rate=settings.imu_rate, wheel_rate=settings.wheel_rate,
+        pose_std=(x, y, theta), imu_std=(gyro, ax, ay), wheel_std=noise * settings.wheel_std,
+        imu_window=settings.imu_window, lead=settings.lead,
+    )  # fmt: skip
 
 
 def check(settings: CampaignSettings) -> None:
@@ -152,7 +201,7 @@ class _MadeUp:
         sigmas = {name: getattr(self.settings, f"sigma_{name}") for name in (*_DRAWN, "gravity_sim")}
         stated = TumbleCampaign(
             **self._tables(self.stated),
-            uncertainty=TumbleUncertainty(**sigmas),
+            uncertainty=tables.TumbleUncertainty(**sigmas),
             notes={"made_by": f"hedgebed {__version__} campaign", "seed": self.settings.seed},
             trial=tuple(trial_table(name, plan.trial) for name, plan in self.plans.items()),
         )
@@ -167,10 +216,11 @@ class _MadeUp:
         """What the campaign and the truth both have, with their own numbers."""
         settings, trial = self.settings, self.first.trial
         numbers = values | {"spike_length": trial.spike_length, "wheel_inertia": trial.wheel_inertia}
+        rig = tables.RigTable(wire_length=settings.wire_length, gravity=trial.gravity)
         return shared_tables(
             settings.name, numbers, self.sensors, spike_count=trial.spike_count, kind=self.first.surface,
             granular=find_surface(settings.surface).granular if settings.surface is not None else False,
-            rig=RigTable(wire_length=settings.wire_length, gravity=trial.gravity) if trial.counterweight > 0 else None,
+            rig=rig if trial.counterweight > 0 else None,
         )  # fmt: skip
 
 

@@ -10,9 +10,8 @@ import pytest
 from experiments.campaign import read_campaign
 from experiments.cli.main import main
 from experiments.tumble.campaign_settings import CampaignSettings
-from experiments.tumble.campaign_tables import sensor_set
 from experiments.tumble.settings import TumbleSettings
-from experiments.tumble.synthesis import record
+from experiments.tumble.synthesis import record, sensor_set
 from experiments.tumble.trial import plan_tumble
 
 
