@@ -12,7 +12,7 @@ from .folder import RunFolder
 from .progress import Progress
 from .result import Result
 
-__all__ = ["PictureCosts", "computed_run", "draw_report", "publish", "whole_run"]
+__all__ = ["PictureCosts", "computed_run", "draw_report", "publish", "whole_run", "write_report"]
 
 # What the report of `penetrate` takes with OpenGL in software on two cores [s], by the files' times of two runs, of
 # 20,187 grains and 112 frames and of 51,850 grains and 190 frames.
@@ -80,12 +80,17 @@ class PictureCosts:
         return over / self.seconds
 
 
-def draw_report(folder: RunFolder, progress: Progress, costs: PictureCosts | None = None) -> None:
-    """Figures, pictures and report.html of a folder that has its result, as the last stage of a run."""
-    from vis.report import write_report
+def write_report(folder: Path, progress: Progress, costs: PictureCosts | None = None) -> None:
+    """Figures, pictures and report.html of a run folder; `costs` tell what share of the time each is."""
+    from vis.report import write_report as write
 
+    write(folder, progress=progress.update if costs is None else lambda told: progress.update(costs.share(told)))
+
+
+def draw_report(folder: RunFolder, progress: Progress, *costs: PictureCosts) -> None:
+    """The report of a folder that has its result, as the last stage of a run."""
     progress.stage("report", total=1.0)
-    write_report(folder.path, progress=lambda told: progress.update(told if costs is None else costs.share(told)))
+    write_report(folder.path, progress, *costs)
 
 
 def computed_run(

@@ -2,6 +2,8 @@
 
 from types import SimpleNamespace
 
+from golden import golden
+
 from experiments.grains.following import Followed
 
 
@@ -43,7 +45,4 @@ def test_a_hand_that_takes_longer_than_was_guessed_is_said_once():
     progress = SimpleNamespace(stage=lambda *_, **__: None, update=lambda _: None, message=told.append)
     folder = SimpleNamespace(path=None, load_checkpoint=lambda _: None, save_checkpoint=lambda *_: None)
     assert Placed().follow(InAHand(), folder, progress) == "found"
-    assert told == [
-        "still in the hand that sets it down after 1.5 s: it is let go once it rests",
-        "set down after 2 s: 23.9 mm deep",
-    ]
+    golden("tumble/placement", told)

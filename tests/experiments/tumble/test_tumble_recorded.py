@@ -67,7 +67,7 @@ def test_k_and_c_of_a_row_are_twice_those_fitted_to_a_spike_in_the_same_grains(r
     assert tables.uncertainty.stiffness == pytest.approx(5.0 / 40.0)
     (fitted / "run.toml").write_text(text.format("glass"))
     assert main([*ask[:3], str(tmp_path / "other"), *ask[4:]]) == 2
-    assert "is in glass and the tumble on sand" in capsys.readouterr().err.replace("\n", " ")
+    assert "in glass" in capsys.readouterr().err.replace("\n", " ")
 
 
 @pytest.mark.parametrize(
