@@ -87,9 +87,9 @@ class LoweredGravity:
         self.ground.bed.set_gravity(self.now)
         return True
 
-    def far(self, speeds: Sequence[float], lacking: Sequence[float]) -> float:
-        """How far what has these speeds [m/s] and lacks these accelerations [m/s2] would go, over NEAR d [1]."""
-        way = max(self.sees * max(speeds), 0.5 * self.sees**2 * max(lacking))
+    def far(self, speeds: Sequence[float], missing: Sequence[float]) -> float:
+        """How far what has these speeds [m/s] and misses these accelerations [m/s2] would go, over NEAR d [1]."""
+        way = max(self.sees * max(speeds), 0.5 * self.sees**2 * max(missing))
         return float(way / (NEAR * self.grain))
 
     def numbers(self) -> np.ndarray:

@@ -29,7 +29,7 @@ from .poses import Pose, Twist, Vector, Wrench
 __all__ = ["Body", "Exchange", "Master"]
 
 _WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))  # Of the last wrenches, the newest first, by order of extrapolation
-_MOST_PAIRS = 6  # Repeats of a step that the next one is told from: as many as a wrench has components
+_MOST_PAIRS = 6  # Repeats of a step that the next one is computed from: as many as a wrench has components
 
 
 @runtime_checkable
@@ -132,7 +132,7 @@ class Master:
         self.count = 0  # Macro steps done
         self._wrenches: deque[Wrench] = deque([first_guess] if first_guess is not None else [], maxlen=3)
         self._held: Twist | None = None
-        self._learnt: list[tuple[Vector, Vector]] = []  # Changes of the wrench in and out, when last repeated
+        self._changes: list[tuple[Vector, Vector]] = []  # Of the wrench in and out, when a step was last repeated
         self.exchange = Exchange()
         self.last: Reaction | None = None  # The ground's answer in the last step
         self.wrench = Wrench.none()  # The whole wrench of the body's last step, friction included
@@ -176,11 +176,11 @@ class Master:
                 break
             if self.iterations > 1:
                 tried.append((_row(trial), _row(wrench)))
-                trial = _unpack(_unchanged(tried[-1], _differences(tried) or self._learnt))
+                trial = _unpack(_unchanged(tried[-1], _differences(tried) or self._changes))
         else:
             passed.unsettled += self.iterations > 1
         if len(tried) > 1:
-            self._learnt = _differences(tried)
+            self._changes = _differences(tried)
         for piece in pieces:
             self._record(piece)
         passed.worst_guess = max(passed.worst_guess, _apart(wrench, expected))
@@ -247,7 +247,7 @@ class Master:
             "wrench": _row(self.wrench),
             "held": np.concatenate([held.velocity, held.spin]) if held is not None else np.zeros(0),
             "exchange": np.array(astuple(self.exchange), dtype=float),
-            "learnt": np.array(self._learnt, dtype=float).reshape(-1, 2, 6),
+            "learnt": np.array(self._changes, dtype=float).reshape(-1, 2, 6),
         }
         return prefixed("master", own) | prefixed("body", self.body.state()) | prefixed("ground", self.ground.state())
 
@@ -261,7 +261,7 @@ class Master:
         held = np.asarray(own["held"], dtype=float)
         self._held = Twist(held[:3].copy(), held[3:].copy()) if held.size else None
         learnt = np.asarray(own.get("learnt", ()), dtype=float).reshape(-1, 2, 6)
-        self._learnt = [(into.copy(), out.copy()) for into, out in learnt]
+        self._changes = [(into.copy(), out.copy()) for into, out in learnt]
         exchange = own["exchange"] if "exchange" in own else own["books"]  # as an earlier version has it
         given, taken, worst, largest, *counts = (float(number) for number in exchange)
         self.exchange = Exchange(given, taken, worst, largest, *(int(count) for count in counts))

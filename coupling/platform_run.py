@@ -237,11 +237,11 @@ class PlatformRun(EnergyBalance, Stepper):
         long.
         """
         assert self.lowering_speed is not None
-        lacking, moving = self._out_of_balance()
-        mean = self._mean_of_late(lacking, moving)
+        missing, moving = self._out_of_balance()
+        mean = self._mean_of_late(missing, moving)
         longest = self.pace * LONGEST_PLACING
         if mean is not None:
-            scale = np.array([self._weight] * len(lacking) + [self.lowering_speed] * len(moving))
+            scale = np.array([self._weight] * len(missing) + [self.lowering_speed] * len(moving))
             rests = bool(reaction.contacts) and bool((mean <= AT_REST * scale).all())
             late = self._settling[-max(2, len(self._settling) // 4) :]
             calm = bool((np.sqrt(np.mean(np.square(late), axis=0)) <= SWINGS * scale).all())
@@ -258,11 +258,11 @@ class PlatformRun(EnergyBalance, Stepper):
                 f"{self.master.wrench.force[2]:.3g} of {self._weight:.3g} N at the end"
             )
 
-    def _mean_of_late(self, lacking: Vector, moving: Vector) -> Vector | None:
-        """Size of the mean over the last REST_TIME of what lacks and moves; None as long as there is less of it."""
+    def _mean_of_late(self, missing: Vector, moving: Vector) -> Vector | None:
+        """Size of the mean over the last REST_TIME of missing weight and speeds; None while there is less time."""
         self.placing_steps = self.master.count
         count = max(2, round(self.pace * REST_TIME / self.master.macro_step))
-        self._settling = [*self._settling, np.concatenate([lacking, moving])][-count:]
+        self._settling = [*self._settling, np.concatenate([missing, moving])][-count:]
         return np.abs(np.mean(self._settling, axis=0)) if len(self._settling) == count else None
 
     def _end_placement(self) -> None:

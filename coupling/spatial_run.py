@@ -90,8 +90,8 @@ class SpatialRun(PlatformRun):
 
     def _out_of_balance(self) -> tuple[Vector, Vector]:
         wrench, twist, reach = self.master.wrench, self.body.twist, self.trial.platform.reach
-        lacking = np.concatenate([wrench.force + self.trial.weight, wrench.torque / reach])
-        return lacking, np.concatenate([twist.velocity, twist.spin * reach])
+        missing = np.concatenate([wrench.force + self.trial.weight, wrench.torque / reach])
+        return missing, np.concatenate([twist.velocity, twist.spin * reach])
 
     def _row(self, reaction: Reaction | None, now: Twist) -> list[float]:
         body = self.body

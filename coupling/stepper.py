@@ -49,7 +49,7 @@ class Stepper:
 
     @property
     def at_bottom(self) -> bool:
-        """Whether the step just done ended the way in, at the deepest point."""
+        """Whether the step just done ended the loading, at the deepest point."""
         return False
 
     @property

@@ -114,8 +114,8 @@ class CoupledTumble(PlatformRun):
 
     def _out_of_balance(self) -> tuple[Vector, Vector]:
         wrench, rates, length = self.master.wrench, self.body.rates, self.trial.spike_length
-        lacking = np.array([wrench.force[2] - self._weight, wrench.torque[1] / length])
-        return lacking, np.array([rates[1], rates[2] * length])
+        missing = np.array([wrench.force[2] - self._weight, wrench.torque[1] / length])
+        return missing, np.array([rates[1], rates[2] * length])
 
     def _lower(self, reaction: Reaction) -> None:
         if self.lowered is None or self.lowered.begun is None:
@@ -138,9 +138,9 @@ class CoupledTumble(PlatformRun):
         elif self.master.count % GRAINS_EVERY == 0 and self.lowered.calm:
             self.lowered.begin(self.body.time)
 
-    def _calm(self, lacking: Vector, moving: Vector) -> None:
+    def _calm(self, missing: Vector, moving: Vector) -> None:
         """A step of the placement under the run's own gravity: it ends at rest (see `coupling.lowered_gravity`)."""
-        mean, lowered = self._mean_of_late(lacking, moving), self.lowered
+        mean, lowered = self._mean_of_late(missing, moving), self.lowered
         assert lowered is not None and lowered.begun is not None and isinstance(self.ground, BedGround)
         if mean is None or self.master.count % GRAINS_EVERY:
             return

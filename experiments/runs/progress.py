@@ -29,8 +29,8 @@ from rich.text import Text
 __all__ = ["LineProgress", "LiveProgress", "Progress", "as_expected", "duration", "make_progress"]
 
 
-_SAYS_SOMETHING = 0.03  # Share of a stage from which on its pace so far is taken for its pace
-_A_MOMENT = 1.0  # A stage that reports its first share sooner has gone on from an earlier one's [s]
+_LEAST_SHARE = 0.03  # Share of a stage from which on its pace so far is taken for its pace
+_QUICK_START = 1.0  # A stage that reports its first share sooner has gone on from an earlier one's [s]
 _GUESSED = 15.0  # A first guess of the rate weighs as much as so much work done [s]
 _MOST_SLOWER = 3.0  # Most by which the machine's pace scales times that are known in seconds [1]
 _LATE = 0.15  # What a stage that is late is said to take yet, over how late it is [1]
@@ -66,32 +66,32 @@ def as_expected(passed: float) -> float:
 
 @dataclass
 class _Pace:
-    """How fast one stage goes, read off the shares of it that were told."""
+    """How fast one stage goes, from the shares of it that were reported."""
 
     began: float
-    first: tuple[float, float] | None = None  # when it told its first share [s], and that
-    last: float = 0.0  # when it told its last [s]
+    first: tuple[float, float] | None = None  # when it reported its first share [s], and that
+    last: float = 0.0  # when it reported its last [s]
     share: float = 0.0
 
-    def tell(self, now: float, share: float) -> None:
+    def report(self, now: float, share: float) -> None:
         self.first = self.first or (now, share)
         self.last, self.share = now, share
 
     @property
     def gained(self) -> float:
-        """What was done since the first share was told, which may have waited for compilers or a file."""
+        """What was done since the first share was reported, which may have waited for compilers or a file."""
         return self.share - self.first[1] if self.first else 0.0
 
     def work(self) -> float | None:
         """How long the whole stage takes at its pace, without what it waited for at first [s]."""
-        if self.first is None or self.gained < _SAYS_SOMETHING:
+        if self.first is None or self.gained < _LEAST_SHARE:
             return None
         return (self.last - self.first[0]) / self.gained
 
     def so_far(self) -> float | None:
         """As `work`, where there was hardly more than one share to go by: with what it may have waited for."""
-        told = self.first is not None and self.share >= _SAYS_SOMETHING and self.first[0] - self.began >= _A_MOMENT
-        return (self.last - self.began) / self.share if told else None
+        known = self.first is not None and self.share >= _LEAST_SHARE and self.first[0] - self.began >= _QUICK_START
+        return (self.last - self.began) / self.share if known else None
 
     def over(self, now: float) -> float:
         """`work` of a stage that ends now."""
@@ -164,11 +164,11 @@ class Progress(AbstractContextManager["Progress"]):
         """`done` of the stage's total is done (not: more than last time). Less than before is not believed."""
         self._done = max(self._done, float(done))
         share, now = self.stage_fraction, self._clock()
-        if not self._counts_down() and (share or 0.0) < _SAYS_SOMETHING:
+        if not self._counts_down() and (share or 0.0) < _LEAST_SHARE:
             self._waited = now - self._opened.began
-        self._pace.tell(now, share or 0.0)
+        self._pace.report(now, share or 0.0)
         if self._opened is not self._pace and self._opened.first is None:
-            self._opened.tell(now, 0.0)  # something is done within it
+            self._opened.report(now, 0.0)  # something is done within it
 
     def message(self, text: str) -> None:
         """Tell the person something: a warning, a finding."""
@@ -260,7 +260,7 @@ class Progress(AbstractContextManager["Progress"]):
         return left - passed if (1.0 + _LATE) * passed < left else _LATE * passed
 
     def _counts_down(self) -> bool:
-        """Whether time that passes is work done: before anything has told a share, compilers are waited for."""
+        """Whether time that passes is work done: before anything has reported a share, compilers run."""
         return self._opened.first is not None or self._open not in self._costs or bool(self._work)
 
     def _rate(self) -> float | None:
@@ -315,7 +315,7 @@ class LineProgress(Progress):
 
 
 class _ToGo(ProgressColumn):
-    """The time to go, counted down where nothing new is told for a while; never to nothing."""
+    """The time to go, counted down while nothing new is reported; never to nothing."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         super().__init__()
@@ -323,10 +323,10 @@ class _ToGo(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         """See the class."""
-        rest, told = task.fields["rest"], task.fields["told"]
+        rest, reported = task.fields["rest"], task.fields["reported"]
         if rest is None:
             return Text("")
-        passed = max(self._clock() - told, 0.0)
+        passed = max(self._clock() - reported, 0.0)
         return Text(_to_go(rest - passed if passed < (1 - _LATE) * rest else _LATE * rest))
 
 
@@ -355,7 +355,7 @@ class LiveProgress(Progress):
             completed=fraction or 0.0,
             percent="" if fraction is None else _percent(fraction),
             rest=rest,
-            told=self._clock() if self._counts_down() else math.inf,
+            reported=self._clock() if self._counts_down() else math.inf,
         )
 
     def _refresh(self) -> None:
@@ -370,7 +370,7 @@ class LiveProgress(Progress):
     ) -> None:
         super().plan(costs, seconds=seconds, unit=unit)
         if self._whole is None:
-            self._whole = self._bars.add_task("all", total=1.0, percent="", rest=None, told=0.0)
+            self._whole = self._bars.add_task("all", total=1.0, percent="", rest=None, reported=0.0)
         self._refresh()
 
     def stage(self, name: str, total: float | None = None) -> None:
@@ -383,7 +383,7 @@ class LiveProgress(Progress):
             )
         if self._stage is not None:
             self._bars.remove_task(self._stage)
-        self._stage = self._bars.add_task(name, total=None, percent="", rest=None, told=0.0)
+        self._stage = self._bars.add_task(name, total=None, percent="", rest=None, reported=0.0)
         self._refresh()
 
     def update(self, done: float) -> None:

@@ -19,7 +19,7 @@ from experiments.runs.strict import may_be_empty
 
 __all__ = ["Layer", "find_case", "nearest", "option", "read_case", "settings_from"]
 
-_NEAR = 4  # Names that are told at most of those that are spelt like one there is not
+_NEAR = 4  # Most names that a message suggests for one that does not exist
 
 
 @dataclass(frozen=True)

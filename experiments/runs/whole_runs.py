@@ -22,7 +22,7 @@ _STILL, _STILL_GRAIN = 0.9, 5.4e-5
 _FILM, _FILM_GRAIN = 0.06, 1.4e-5  # a frame of the animation
 _MOST_FRAMES = 48  # of an animation (vis.pictures.pictures)
 # Where `vis.report` tells that the plots and the pictures are done, and a still counts so many frames.
-_TOLD_PLOTS, _TOLD_PICTURES, _TOLD_STILL = 0.1, 0.95, 4
+_SHARE_PLOTS, _SHARE_PICTURES, _SHARE_STILL = 0.1, 0.95, 4
 
 Settings = TypeVar("Settings", bound=BaseModel)
 
@@ -53,16 +53,16 @@ class PictureCosts:
     def _parts(self) -> list[tuple[float, float]]:
         """Parts of the work in their order: the share that the report tells at the end of each, and its time [s]."""
         if not self.frames:
-            return [(_TOLD_PLOTS, _PLOTS), (1.0, _WRITTEN)]
+            return [(_SHARE_PLOTS, _PLOTS), (1.0, _WRITTEN)]
         still, moving = _STILL + _STILL_GRAIN * self.grains, _FILM + _FILM_GRAIN * self.grains
         opened = _STARTED + _READ * self.grains * sum(self.frames.values())
-        counted = (_TOLD_PICTURES - _TOLD_PLOTS) / (_TOLD_STILL * self._stills + self._animated)
-        first, stills = (_TOLD_PLOTS + counted * _TOLD_STILL * count for count in (1, self._stills))
+        counted = (_SHARE_PICTURES - _SHARE_PLOTS) / (_SHARE_STILL * self._stills + self._animated)
+        first, stills = (_SHARE_PLOTS + counted * _SHARE_STILL * count for count in (1, self._stills))
         return [
-            (_TOLD_PLOTS, _PLOTS),
+            (_SHARE_PLOTS, _PLOTS),
             (first, opened + still),
             (stills, still * (self._stills - 1)),
-            (_TOLD_PICTURES, moving * self._animated),
+            (_SHARE_PICTURES, moving * self._animated),
             (1.0, _WRITTEN),
         ]
 
@@ -71,12 +71,12 @@ class PictureCosts:
         """About how long it takes [s]."""
         return sum(time for _, time in self._parts())
 
-    def share(self, told: float) -> float:
-        """Share of the time that is over when the report tells `told` [1]."""
+    def share(self, reported: float) -> float:
+        """Share of the time that is over when the report is at `reported` [1]."""
         parts = self._parts()
         over = 0.0
         for (before, _), (after, time) in pairwise([(0.0, 0.0), *parts]):
-            over += time * min(1.0, max(0.0, (told - before) / (after - before))) if after > before else 0.0
+            over += time * min(1.0, max(0.0, (reported - before) / (after - before))) if after > before else 0.0
         return over / self.seconds
 
 
@@ -84,7 +84,7 @@ def write_report(folder: Path, progress: Progress, costs: PictureCosts | None = 
     """Figures, pictures and report.html of a run folder; `costs` tell what share of the time each is."""
     from vis.report import write_report as write
 
-    write(folder, progress=progress.update if costs is None else lambda told: progress.update(costs.share(told)))
+    write(folder, progress=progress.update if costs is None else lambda share: progress.update(costs.share(share)))
 
 
 def draw_report(folder: RunFolder, progress: Progress, *costs: PictureCosts) -> None:

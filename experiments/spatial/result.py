@@ -103,16 +103,16 @@ def path_columns(run: SpatialRun) -> Json:
 def feet_columns(run: SpatialRun) -> Json:
     """The columns of series/feet.csv: force, slip and depth of the spikes that came down, and of the hull if it did.
 
-    Those that never did are left out; so are the hull's depth, which no footing tells, and friction on a law, which
-    says only how large it may be.
+    Those that never did are left out; so are the hull's depth, which no ground gives, and friction on a law,
+    which gives only its bound.
     """
     columns: Json = {"t_s": run.columns["time"]}
     feet, hull = run.feet, len(run.trial.platform.tips)
     for spike in np.flatnonzero(feet.any(axis=(0, 1))):
         name = "hull" if spike == hull else str(spike)
         for k, (what, unit) in enumerate(FEET):
-            told = name != "hull" if what == "sinkage" else run.ground.gives_friction or not what.startswith("along")
-            if told:
+            known = name != "hull" if what == "sinkage" else run.ground.gives_friction or not what.startswith("along")
+            if known:
                 columns[f"{what}_{name}_{unit}"] = feet[:, k, spike]
     return columns
 
@@ -242,19 +242,19 @@ def _landing(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
 def _sentences(run: SpatialRun) -> list[str]:
     """What happened, in words."""
     rows = run.columns
-    said = []
+    sentences = []
     if run.placing_steps:
         held = run.placing_steps * run.master.macro_step
-        said.append(say("placed", held=held, depth=1e3 * rows["sinkage"][0]))
+        sentences.append(say("placed", held=held, depth=1e3 * rows["sinkage"][0]))
     landing = _landing(run)
     touch, hop, rest = (landing[name][0] for name in ("first_touch", "first_hop", "settling_time"))
     if touch is None:
-        said.append(say("touches_nothing"))
+        sentences.append(say("touches_nothing"))
     elif touch > 0:
-        said.append(say("comes_down", touch=touch, speed=landing["impact_speed"][0]))
-    said.append(way_through(run.transitions))
+        sentences.append(say("comes_down", touch=touch, speed=landing["impact_speed"][0]))
+    sentences.append(way_through(run.transitions))
     if hop is not None:
-        said.append(say("lets_go", hop=hop))
+        sentences.append(say("lets_go", hop=hop))
     if rest:
-        said.append(say("at_rest", rest=rest))
-    return said
+        sentences.append(say("at_rest", rest=rest))
+    return sentences

@@ -34,17 +34,17 @@ def opening(
              and getattr(settings, name) not in (None, (), field.get_default(call_default_factory=True))]  # fmt: skip
     said = ["set: " + ", ".join(f"{name} = {_shown(settings, name)}" for name in given)]
     numbers: dict[str, list[str]] = {}
-    told = {*given, "bed_size", "grain", "seed", "young", "duration", "lowering_speed"}
+    shown = {*given, "bed_size", "grain", "seed", "young", "duration", "lowering_speed"}
     for name, number in plan.numbers.items():
         if number.origin == "given" or number.origin.startswith("default"):
             continue
-        told.add(name)
+        shown.add(name)
         unit = "" if number.unit == "1" else f" {number.unit}"
         numbers.setdefault(number.origin, []).append(f"{name} = {number.value:.6g}{unit}")
     spikes = plan.spikes
     for name, length in (("spike_diameter", spikes.diameter), ("spike_clear", spikes.clear)):
         if name in spikes.of_platform:
-            told.add(name)
+            shown.add(name)
             numbers.setdefault(f"platform {settings.platform}", []).append(f"{name} = {length:.6g} m")
     said += [f"{listed[0]} ({origin})" if len(listed) == 1 else f"{origin}: {', '.join(listed)}"
              for origin, listed in numbers.items()]  # fmt: skip
@@ -53,7 +53,7 @@ def opening(
     return [
         *said, say("the_bed", s=settings, grains=count, grain=grain, young=softening, chosen=chosen),
         say("duration_and_lowering", s=settings, speed=lowering_speed), say("stiffness_beside"),
-        say("rest_at_default", count=sum(name not in told for name in fields)),
+        say("rest_at_default", count=sum(name not in shown for name in fields)),
     ]  # fmt: skip
 
 

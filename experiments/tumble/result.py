@@ -117,13 +117,13 @@ def tumble_sentences(trajectory: Trajectory) -> list[str]:
 
 def way_through(transitions: Sequence[Transition]) -> str:
     """The states in their order, each with when and at which angle it was entered; the first few of them."""
-    told = [
+    changes = [
         f"{state} at {time:.4g} s, {_degrees(angle)}" if time > 0 else f"{state} at once"
         for time, state, angle in transitions[:MOST]
     ]
     more = len(transitions) - MOST
     rest = say("more_changes", more=more, s="s" if more > 1 else "") if more > 0 else ""
-    return f"{' -> '.join(told)}{rest}."
+    return f"{' -> '.join(changes)}{rest}."
 
 
 def stayed_words(trajectory: Trajectory) -> str:

@@ -44,12 +44,12 @@ def spikes_of(settings: TumbleSettings, own: PlatformNumbers) -> Spikes:
     for a platform without spikes.
     """
     given = {name: getattr(settings, name) for name in ("spike_diameter", "spike_clear")}
-    lacking = tuple(name for name, value in given.items() if value is None)
-    if lacking:
+    not_given = tuple(name for name, value in given.items() if value is None)
+    if not_given:
         if own.spike_diameter == 0:
-            raise ValueError(say("no_spikes", platform=settings.platform, names=" and ".join(lacking)))
-        given |= {name: getattr(own, name) for name in lacking}
-    return Spikes(given["spike_diameter"], given["spike_clear"], lacking)
+            raise ValueError(say("no_spikes", platform=settings.platform, names=" and ".join(not_given)))
+        given |= {name: getattr(own, name) for name in not_given}
+    return Spikes(given["spike_diameter"], given["spike_clear"], not_given)
 
 
 @dataclass(frozen=True, kw_only=True)
