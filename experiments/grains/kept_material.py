@@ -11,7 +11,7 @@ BASE_COPY = "base.toml"  # Its name in that of a calibration, whose material.tom
 
 
 def keep_material(name: str, folder: Path, *, copy: str = MATERIAL_COPY) -> str:
-    """What the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made if there is none.
+    """Where the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made once.
 
     Raises ValueError for a name that is none and a file that will not do, unless the copy is there.
     """
