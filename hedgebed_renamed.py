@@ -124,7 +124,7 @@ _MODULES = {
     "rigid": {
         "rigid.batch": "batch_kernel=kernel runtime",
         "rigid.ground": "grounds law_functions laws reaction rft",
-        "rigid.model": "mechanics trial",
+        "rigid.model": "mechanics=model trial",
         "rigid.planar": (
             "dormand_prince=methods dynamics implicit=methods modes=events planar_events=events planar_located=located "
             "planar_paper=paper rest=statics statics trajectory"
@@ -133,7 +133,7 @@ _MODULES = {
         "rigid.spatial": "quaternions spatial_motion=motion spatial_steps=steps",
     },
     "rigid.batch_kernel": {
-        "rigid.batch.kernel": "advance changes=events columns=parts dry=forces parts samples stand",
+        "rigid.batch.kernel": "advance changes=events columns=parts dry=forces parts samples=advance stand",
     },
     "rigid.terms": {
         "rigid.terms.body": "wires=wire_compliance",
