@@ -92,7 +92,8 @@ _MODULES = {
             "tumble_advice=effect_texts"
         ),
         "experiments.diagnose.fit": (
-            "bounds evidence fitting gaps gate localise own problem slopes together tumble_shapes=forms"
+            "bounds evidence fitting gaps gate localise own problem slopes together tumble_fit=fitting "
+            "tumble_shapes=forms tumble_steps=fitting"
         ),
         "experiments.diagnose.noise": (
             "astray=diverging colour jitter lone_beds noise_words=colour replicates spectrum stuck unrest=wander"
@@ -103,9 +104,9 @@ _MODULES = {
         ),
         "experiments.diagnose.report": "candidates document sizes=document summary telling",
         "experiments.diagnose.tumble": (
-            "tumble_checks=checks tumble_data=data tumble_fit=fit tumble_follow=latent tumble_forms=forms "
+            "tumble_checks=checks tumble_data=data tumble_follow=latent tumble_forms=forms "
             "tumble_forward=forward tumble_guess=guess tumble_latent=latent tumble_problem=problem "
-            "tumble_readings=readings tumble_spikes=spikes tumble_steps=steps"
+            "tumble_readings=readings tumble_spikes=spikes"
         ),
     },
     "experiments.plausible": {

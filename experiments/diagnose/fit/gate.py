@@ -281,5 +281,5 @@ class _Shifted(Model):
 
     shift: Array | float = 0.0
 
-    def evaluate(self, points: Sequence[Values]) -> list[Array]:
-        return [modes - self.shift for modes in super().evaluate(points)]
+    def modes(self, residuals: Sequence[Mapping[str, Array]]) -> list[Array]:
+        return [modes - self.shift for modes in super().modes(residuals)]

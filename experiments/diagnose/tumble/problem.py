@@ -1,7 +1,7 @@
 """Tumbles as the statistics of `hedgebed diagnose` see them (`experiments.diagnose.fit.problem`).
 
 A trial's own nuisance is its simulated gravity. The camera's zero is no parameter: it is marginalised in the whitening
-(`steps.whiten`) and, for the gap that a person reads, put at its most probable value.
+(`data.whiten`) and, for the gap that a person reads, put at its most probable value.
 """
 
 import hashlib
@@ -9,7 +9,6 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,16 +25,17 @@ from experiments.diagnose.noise.replicates import parted
 from rigid.planar.trajectory import STATES
 from rigid.terms import EFFECTS
 
-from .data import CHANNELS, TumbleData, tumble_data
+from .data import CHANNELS, LOST, ZERO_STD, TumbleData, thinned, tumble_data, whiten
 from .forms import physical_at, tumble_forms
 from .forward import OWN_TO_A_TRIAL, SHARED, Forward, Prediction
 from .guess import Guesser
 from .latent import followed_until, latent_columns
-from .steps import LOST, ZERO_STD, whiten
 
 __all__ = ["TumbleProblem", "make_problem"]
 
 _UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
+_COARSE = 1e-3  # step of the integration of a search [s]; what follows is finer
+_THIN = 5  # every fifth reading of the wheel, which is fast and says little, is enough for a search
 _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
 _SWITCH = 5e-4
 """From the moment of a reading [s] within which a model that jumps leaves it in doubt: one step of the integration."""
@@ -55,8 +55,9 @@ class TumbleProblem(Problem):
 
     def __init__(
         self, data: TumbleData, *, findings: Sequence[Finding] = (), threads: int | None = None,
-        own: Sequence[OwnEffect] = (),
+        own: Sequence[OwnEffect] = (), coarse: bool = False,
     ) -> None:  # fmt: skip
+        """`coarse`: with the time step of a search, and none of its own."""
         for effect in own:
             inner = [hook for hook in effect.term.hooks if hook.startswith("inner_")]
             if inner:
@@ -64,9 +65,8 @@ class TumbleProblem(Problem):
             _ = effect.tumble  # refused here where it has no forms
         self.data = data
         self.own = {effect.id: effect for effect in own}
-        self.forward = Forward(data, threads=threads, own=own)
+        self.forward = Forward(data, **({"time_step": _COARSE} if coarse else {}), threads=threads, own=own)
         self.findings = tuple(findings)
-        self.contacts = self
         self.trials = self._trials()
         self.base = self._base()
         self.scatter = {
@@ -84,6 +84,9 @@ class TumbleProblem(Problem):
         self._shaken: dict[str, Shaken] = {}
         self._along: Mapping[str, Array] = {}
         self._switches: dict[str, Array] = {}
+        if not coarse:
+            few = thinned(data, "wheel", _THIN)
+            self.contacts = Guesser(TumbleProblem(few, threads=threads, own=own, coarse=True), self.forms)
 
     def _trials(self) -> tuple[TrialInfo, ...]:
         trials = self.data.trials
@@ -141,11 +144,11 @@ class TumbleProblem(Problem):
         data = self.data.trials[self._index[trial]]
         return Samples(time=data.time, channel=np.array(CHANNELS)[data.channel], std=data.std)
 
-    def evaluate(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], share: float = 1.0
-    ) -> list[dict[str, Array]]:
+    def evaluate_together(
+        self, asked: Sequence[tuple[Sequence[Values], Sequence[Form]]], trials: Sequence[str], share: float = 1.0
+    ) -> list[list[dict[str, Array]]]:
         """Whitened residuals of the first share of each trial's time, which alone is simulated; 0 after it."""
-        found = self._predict(points, forms, trials, states=False, horizon=share)
+        found = self._predict(asked, trials, states=False, horizon=share)
 
         def whitened(place: int) -> Array:
             data, value = self.data.trials[self._index[trials[place]]], found[place].value
@@ -157,7 +160,8 @@ class TumbleProblem(Problem):
             return np.where(good, shaken.whitened(np.where(good, rest, LOST)), LOST)
 
         residuals = each(whitened, range(len(trials)), threads=self.forward.threads)
-        return [{trial: rows[k] for trial, rows in zip(trials, residuals, strict=True)} for k in range(len(points))]
+        rows = iter([dict(zip(trials, own, strict=True)) for own in zip(*residuals, strict=True)])
+        return [[next(rows) for _ in points] for points, _ in asked]
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """Take readings at a switch of the contact for doubtful, where this model switches."""
@@ -188,7 +192,7 @@ class TumbleProblem(Problem):
         """See `Problem`."""
         moved = replace(self.data, trials=tuple(replace(trial, time=trial.time + late) for trial in self.data.trials))
         forward = Forward(moved, threads=self.forward.threads, own=self.forward.own) if late else self.forward
-        found = self._predict([values], forms, trials, states=False, forward=forward)
+        found = self._predict([([values], forms)], trials, states=False, forward=forward)
         return {
             trial: one.value[0] / self.data.trials[self._index[trial]].std
             for trial, one in zip(trials, found, strict=True)
@@ -231,7 +235,7 @@ class TumbleProblem(Problem):
 
     def phases(self, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
         """stand, pivot, slip or hop at each sample."""
-        return np.array(STATES)[self._predict([values], forms, [trial])[0].state[0]]
+        return np.array(STATES)[self._predict([([values], forms)], [trial])[0].state[0]]
 
     def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
         """The term's parameters under the fixed names of docs/diagnose.md."""
@@ -263,15 +267,14 @@ class TumbleProblem(Problem):
 
     def prepare(self, tell: Callable[[str, float], None]) -> None:
         """Compile the kernels, which takes a while where that was not done before, and says so."""
-        for place, forward in enumerate((self.forward, self._guesser.forward)):
-            tell("compiling the kernels (kept for the next time)", 0.5 * place)
-            forward.predict({}, trials=[0], horizon=0.01)
-            forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)
+        tell("compiling the kernels (kept for the next time)", 0.0)
+        self.forward.predict({}, trials=[0], horizon=0.01)
+        self.forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """Force and torque that the model lacks, and what they might depend on (`latent_columns`)."""
         data = self.data.trials[self._index[trial]]
-        prediction = self._predict([values], forms, [trial], motion=True)[0]
+        prediction = self._predict([([values], forms)], [trial], motion=True)[0]
         mass = values.get("mass", self.forward.nominal["mass"])
         inertia = values.get("inertia", self.forward.nominal["inertia"])
         return latent_columns(data, prediction, mass=mass, inertia=inertia)
@@ -279,7 +282,7 @@ class TumbleProblem(Problem):
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """Measured and modelled, by channel, the camera's zero put right in the model."""
         data = self.data.trials[self._index[trial]]
-        value = self._predict([values], forms, [trial])[0].value[0]
+        value = self._predict([([values], forms)], [trial])[0].value[0]
         value = value + self._zero(data.channel, (data.value - value) / data.std) * data.std
         told = {}
         for number, name in enumerate(CHANNELS):
@@ -316,35 +319,18 @@ class TumbleProblem(Problem):
         """What would tell two effects apart."""
         return advice(first.effect, second.effect)
 
-    def guess(
-        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
-        apart: Sequence[Parameter] = (),
-    ) -> dict[str, float]:  # fmt: skip
-        """Values near the best, from which a local fit may begin (`Guesser`)."""
-        return self._guesser.guess(forms, trials, values, held=held, apart=_of(apart, trials))
-
-    def refine(
-        self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str], *, apart: Sequence[Parameter] = ()
-    ) -> list[dict[str, float]]:
-        """The same for several sets of forms at once, all of whose values are given (`Guesser`)."""
-        return self._guesser.refine(asked, trials, apart=_of(apart, trials))
-
     def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
         """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
         where that is no good part of it (`followed_until`)."""
         data, sigma = self.data.trials[self._index[trial]], self.data.tables.uncertainty.gravity_sim
         scan = 1 + sigma * SCAN if sigma > 0 else np.ones(1)
         points = [values, *({**values, f"gravity_sim[{trial}]": data.gravity_sim * float(g)} for g in scan)]
-        found = self._predict(points, forms, [trial])[0]
+        found = self._predict([(points, forms)], [trial])[0]
         moments = [
             followed_until(data, np.where(np.isfinite(value), (data.value - value) / data.std, LOST), state)
             for value, state in zip(found.value, found.state, strict=True)
         ]
         return max((moment for moment in moments if moment is not None), default=None)
-
-    @cached_property
-    def _guesser(self) -> Guesser:
-        return Guesser(self.forward, self.forms)
 
     def gravity(self, points: Sequence[Values]) -> Array:
         """Of each trial over its stated one, shape [point_count, trial_count]."""
@@ -352,22 +338,26 @@ class TumbleProblem(Problem):
         return np.array([[values.get(name, own) / own for name, own in stated] for values in points])
 
     def _predict(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], *, states: bool = True,
+        self, asked: Sequence[tuple[Sequence[Values], Sequence[Form]]], trials: Sequence[str], *, states: bool = True,
         motion: bool = False, forward: Forward | None = None, horizon: float = 1.0,
     ) -> list[Prediction]:  # fmt: skip
-        known, ids = self.forward.nominal.items(), tuple(self._index)
+        points, ids = [values for own, _ in asked for values in own], tuple(self._index)
+        known = self.forward.nominal.items()
         columns = {name: np.array([values.get(name, value) for values in points]) for name, value in known}
         columns["gravity"] = self.gravity(points)
         for kind in OWN_TO_A_TRIAL[1:]:
             columns[kind] = np.array([[1 + values.get(f"{kind}[{id}]", 0.0) for id in ids] for values in points])
-        for form in forms:
-            columns |= physical_at(form, points)
+        at = 0
+        for own, forms in asked:
+            for name, array in [pair for form in forms for pair in physical_at(form, own).items()]:
+                columns.setdefault(name, np.full(len(points), self.forward.neutral(name)))[at : at + len(own)] = array
+            at += len(own)
         chosen = [self._index[trial] for trial in trials]
         return (forward or self.forward).predict(columns, trials=chosen, states=states, motion=motion, horizon=horizon)
 
     def _residual(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
         data = self.data.trials[self._index[trial]]
-        residual = (data.value - self._predict([values], forms, [trial])[0].value[0]) / data.std
+        residual = (data.value - self._predict([([values], forms)], [trial])[0].value[0]) / data.std
         return np.where(np.isfinite(residual), residual, LOST)
 
     @staticmethod
@@ -384,10 +374,6 @@ class TumbleProblem(Problem):
     @staticmethod
     def _physical(values: Mapping[str, float], form: Form) -> dict[str, float]:
         return {name: float(array[0]) for name, array in physical_at(form, [values]).items()}
-
-
-def _of(apart: Sequence[Parameter], trials: Sequence[str]) -> list[Parameter]:
-    return [p for p in apart if p.trial in trials]
 
 
 def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> TumbleProblem:
