@@ -92,7 +92,7 @@ _MODULES = {
             "tumble_advice=effect_texts"
         ),
         "experiments.diagnose.fit": (
-            "bounds evidence fitting gaps gate localise own problem slopes together tumble_fit=fitting "
+            "bounds evidence fitting gaps gate localise own=forms problem slopes=localise together tumble_fit=fitting "
             "tumble_shapes=forms tumble_steps=fitting"
         ),
         "experiments.diagnose.noise": (

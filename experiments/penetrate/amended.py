@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from coupling import Penetration
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.tables import EffectTable
-from experiments.diagnose.fit.own import OwnEffect, load_own
+from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, push, slot_places, slot_table
 from experiments.runs.types import Json

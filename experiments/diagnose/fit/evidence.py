@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .fitting import Fit, Model, fit, scanned
-from .gate import low_modes
+from .gate import column_basis, low_modes
 from .problem import Array, Form, Values
 
 __all__ = [
@@ -153,12 +153,7 @@ def signature_matrix(found: Fit, forms: Sequence[Form]) -> tuple[Array, list[For
 
     A form that changes nothing here, or only what the parameters change as well, has none.
     """
-    free = found.free
-    weights = np.diag(np.sqrt(found.prior_precision()))
-    joint = np.vstack([found.jacobian, weights])[:, free]
-    joint = joint / np.maximum(np.linalg.norm(joint, axis=0), 1e-300)
-    left, sizes, _ = np.linalg.svd(joint, full_matrices=False)
-    basis = left[:, sizes > 1e-9]
+    basis = column_basis(np.vstack([found.jacobian, np.diag(np.sqrt(found.prior_precision()))])[:, found.free])
     columns, whose = [], []
     for form in forms:
         if form.effect in {f.effect for f in found.model.forms}:

@@ -74,7 +74,7 @@ def _statistics(modes: Array, slow: Mapping[tuple[str, str], np.ndarray], signat
     energy = {key: squares[:, rows].sum(axis=1) for key, rows in slow.items()}
     found = {"all": squares.sum(axis=1), "slow": np.sum(list(energy.values()), axis=0)}
     excess = np.stack([(e - len(slow[key])) / np.sqrt(2 * len(slow[key])) for key, e in energy.items()])
-    found["one trial"] = excess.max(axis=0)
+    found["one trial"] = excess.max(axis=0) + _OFFSET
     channels = dict.fromkeys(name for _, name in slow)
     for name in channels:
         rows = [rows for (_, channel), rows in slow.items() if channel == name]
@@ -122,7 +122,6 @@ def open_gate(
         if kept is not None:
             _write(kept, gate)
     here = {name: float(value[0]) for name, value in _statistics(found.modes[None, :], slow, columns).items()}
-    here["one trial"] += _OFFSET
     here["parameters"] = _moved(found)
     return gate, gate.judge(here)
 
@@ -138,15 +137,14 @@ def held_out_gate(found: Fit, trials: Sequence[str], values: Values, *, seed: in
     slow = low_modes(model)
     shared = np.array([p.trial is None for p in model.parameters], dtype=bool)
     scales = np.array([p.scale for p in model.parameters])
-    names = [p.name for p in found.model.parameters]
-    rows = [names.index(p.name) for p in model.parameters if p.trial is None]
+    rows = [k for k, p in enumerate(found.model.parameters) if p.trial is None]
     covariance = found.covariance()[np.ix_(rows, rows)] / np.outer(scales[shared], scales[shared])
     free = found.free[rows]  # what a bound holds is not uncertain
     covariance = covariance * np.outer(free, free)
     sizes, turns = np.linalg.eigh(covariance)
     spread = jacobian[:, shared] @ (turns * np.sqrt(np.maximum(sizes, 0.0)))
     priors = np.array([0.0 if np.isinf(p.std) else p.scale / p.std for p in model.parameters])[~shared]
-    basis, prior = _split_basis(np.vstack([jacobian[:, ~shared], np.diag(priors)]), len(modes))
+    basis, prior = np.split(column_basis(np.vstack([jacobian[:, ~shared], np.diag(priors)])), [len(modes)])
     random = np.random.default_rng(seed)
     parts, nothing = [], np.zeros((len(modes), 0))
     for _ in range(0, draws, 100):
@@ -155,7 +153,6 @@ def held_out_gate(found: Fit, trials: Sequence[str], values: Values, *, seed: in
         parts.append(_statistics(noise - (noise @ basis + more @ prior) @ basis.T, slow, nothing))
     gate = _gate_of(parts)
     here = {name: float(value[0]) for name, value in _statistics(modes[None, :], slow, nothing).items()}
-    here["one trial"] += _OFFSET
     return gate.judge(here)
 
 
@@ -164,7 +161,9 @@ def _calibrated(
     tell: Callable[[float], None] | None,
 ) -> Gate:  # fmt: skip
     random = np.random.default_rng(seed)
-    basis, prior = _basis(found)
+    # What a refit takes out of data and priors: rows of the data [n, p], of the priors.
+    joint = np.vstack([found.jacobian, np.diag(np.sqrt(found.prior_precision()))])
+    basis, prior = np.split(column_basis(joint[:, found.free]), [found.count])
     stated = _stated(found)
     if refit:
         made = np.stack([_refitted(found, random, tell, k / draws) for k in range(draws)])
@@ -190,18 +189,14 @@ def _stated(found: Fit) -> NDArray[np.bool_]:
 
 def _moved(found: Fit) -> float:
     """Squared standard deviations by which the base model's numbers are off what was stated, and one."""
-    off = [
-        (found.values[p.name] - p.value) / p.std
-        for p, counts in zip(found.model.parameters, _stated(found), strict=True)
-        if counts
-    ]
+    stated = zip(found.model.parameters, _stated(found), strict=True)
+    off = [(found.values[p.name] - p.value) / p.std for p, counts in stated if counts]
     return float(np.sum(np.square(off))) + 1.0
 
 
 def _gate_of(parts: Sequence[Mapping[str, Array]], more: Mapping[str, Array] | None = None) -> Gate:
     """The gate that draws of statistics make."""
     sample = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    sample["one trial"] = sample["one trial"] + _OFFSET
     sample |= {name: values[: len(sample["all"])] for name, values in (more or {}).items()}
     names = tuple(sample)
     table = np.stack([sample[name] for name in names], axis=1)
@@ -246,17 +241,6 @@ def _write(path: Path, gate: Gate) -> None:
         unfinished.replace(path)
     except OSError as problem:
         warnings.warn(f"the gate could not be kept: {problem}", stacklevel=2)
-
-
-def _basis(found: Fit) -> tuple[Array, Array]:
-    """An orthonormal basis of what a refit takes out of data and priors: rows of the data [n, p], of the priors."""
-    joint = np.vstack([found.jacobian, np.diag(np.sqrt(found.prior_precision()))])
-    return _split_basis(joint[:, found.free], found.count)
-
-
-def _split_basis(joint: Array, count: int) -> tuple[Array, Array]:
-    basis = column_basis(joint)
-    return basis[:count], basis[count:]
 
 
 def column_basis(joint: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Where a model fails: sensor, trial, phase and seconds; and what a force that no effect explains goes with."""
+"""Where a model fails: sensor, trial, phase and seconds; the force that is missing, and what it depends on."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from .fitting import Model
 from .problem import Array, Form, Problem, Values
 
-__all__ = ["Place", "depends_on", "latent_table", "phases_of", "places", "places_in"]
+__all__ = ["Place", "acceleration", "depends_on", "latent_table", "phases_of", "places", "places_in", "slope"]
 
 _SURE = 4.0  # standard deviations by which the energy of a stretch must exceed that of noise
 _MOST = 24
 _WINDOW = 9
+_SHARE = 1 / 12  # of a recording, over which an acceleration is taken
+_FEWEST = 7
 
 
 @dataclass(frozen=True)
@@ -158,3 +160,26 @@ def _explained(x: Array, y: Array) -> float:
     rest = y[~learn] - means[bins[~learn]]
     total = float(np.sum((y[~learn] - y[learn].mean()) ** 2))
     return max(0.0, 1.0 - float(np.sum(rest**2)) / total) if total > 0 else 0.0
+
+
+def slope(time: Array, values: Array, *, rows: int) -> Array:
+    """Slope of a straight line through each `rows` neighbouring readings; shapes [n]."""
+    return _fitted(time, values, rows, 1)
+
+
+def acceleration(time: Array, values: Array) -> Array:
+    """Second derivative, of a parabola through the readings of a twelfth of the time; shapes [n]."""
+    return 2.0 * _fitted(time, values, max(_FEWEST, round(_SHARE * len(time))), 2)
+
+
+def _fitted(time: Array, values: Array, rows: int, degree: int) -> Array:
+    """The coefficient of the highest power of a polynomial through the rows around each; 0 where there are too few."""
+    half, found = rows // 2, np.zeros(len(time))
+    for k in range(len(time)):
+        own = slice(max(0, k - half), k + half + 1)
+        t = time[own] - time[own].mean()
+        span = float(np.ptp(t))
+        if len(t) > degree and span > 0:
+            powers = (t / span)[:, None] ** np.arange(degree + 1)
+            found[k] = np.linalg.lstsq(powers, values[own], rcond=None)[0][degree] / span**degree
+    return found

@@ -19,8 +19,7 @@ white noise, and slow misfit stands in the first modes.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -67,6 +66,10 @@ class Parameter:
     """Step of finite differences, in units of the parameter; for models whose contacts make small steps rough."""
     least: float | None = None
     """Of what may differ between replicates: the std below which it says nothing; None: the problem's own."""
+
+    def in_each(self, trials: Iterable[str]) -> tuple[Parameter, ...]:
+        """Nuisances of this name, one for each trial."""
+        return tuple(replace(self, name=f"{self.name}[{id}]", kind=self.name, trial=id) for id in trials)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,15 +309,11 @@ class Whitener:
         parts = [dct(np.take(residuals, rows, axis=-1), norm="ortho", axis=-1) for rows in self.blocks[trial]]
         return np.concatenate(parts, axis=-1) * self.weights[trial]
 
-    def block_slices(self, trial: str) -> list[slice]:
-        """Where each channel's modes stand."""
-        edges = np.cumsum([0, *(len(rows) for rows in self.blocks[trial])]).tolist()
-        return [slice(low, high) for low, high in itertools.pairwise(edges)]
-
     def channel_blocks(self, problem: Problem, trial: str) -> list[tuple[str, slice]]:
         """Each channel of a trial, and where its modes stand."""
+        edges = np.cumsum([0, *(len(rows) for rows in self.blocks[trial])]).tolist()
         channels = dict.fromkeys(problem.samples(trial).channel.tolist())
-        return list(zip(channels, self.block_slices(trial), strict=True))
+        return list(zip(channels, map(slice, edges[:-1], edges[1:]), strict=True))
 
 
 @dataclass(frozen=True)

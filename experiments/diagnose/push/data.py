@@ -57,6 +57,12 @@ class Prepared:
         """Whether its depth was prescribed."""
         return self.table.mode == "driven"
 
+    @property
+    def path(self) -> SmoothDepth:
+        """The smoothed depth of a driven trial."""
+        assert self.smooth is not None
+        return self.smooth
+
 
 def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     """The trials that can be used, and what was wrong with the data.

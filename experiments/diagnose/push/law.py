@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.forms import OwnEffect
 from rigid.batch.runtime import ensure
 from rigid.model.model import for_taichi
 from rigid.terms import CANDIDATES, STATE_FIELDS, Term

@@ -68,8 +68,7 @@ def find_force_zeros(trials: Sequence[Prepared], noise: float) -> ForceZeros | N
 
 def _before_touch(trial: Prepared) -> Array:
     """Forces read before the spike first comes near the surface [N]."""
-    smooth = trial.smooth
-    assert smooth is not None
+    smooth = trial.path
     near = smooth.depth > -_CLEAR * smooth.depth_std - np.abs(smooth.speed) * np.gradient(trial.time)
     first = int(np.argmax(near)) if near.any() else len(near)
     rows = trial.other[:first]

@@ -11,8 +11,8 @@ an IMU has it from the camera's rows: inertia times the second derivative of mea
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.diagnose.fit.localise import acceleration, slope
 from experiments.diagnose.fit.problem import Array
-from experiments.diagnose.fit.slopes import acceleration, slope
 
 from .data import CHANNELS, TrialData
 from .forward import Prediction

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
 from experiments.diagnose.core.effect_texts import advice
 from experiments.diagnose.fit.fitting import SCAN
-from experiments.diagnose.fit.forms import shapes_of
-from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.forms import OwnEffect, shapes_of
 from experiments.diagnose.fit.problem import Array, Finding, Form, Parameter, Problem, Samples, TrialInfo, Values
 from experiments.diagnose.fit.together import each
 from experiments.diagnose.noise.jitter import Shaken
@@ -70,17 +69,16 @@ class TumbleProblem(Problem):
         self.trials = self._trials()
         self.base = self._base()
         self.scatter = {
-            kind: tuple(
-                Parameter(name=f"{kind}[{trial.id}]", unit="1", value=0.0, std=_SCATTER_STD, scale=0.02, lowest=-0.5,
-                          highest=1.0, trial=trial.id, kind=kind, step=1e-3)
-                for trial in data.trials
-            )
+            kind: Parameter(
+                name=kind, unit="1", value=0.0, std=_SCATTER_STD, scale=0.02, lowest=-0.5, highest=1.0, step=1e-3
+            ).in_each(trial.id for trial in data.trials)
             for kind in OWN_TO_A_TRIAL[1:]
-        }  # fmt: skip
+        }
         self.forms: tuple[Form, ...] = self._forms()
         self.shapes = shapes_of(self.forms)
         self.design = self._design()
         self._index = {trial.id: k for k, trial in enumerate(data.trials)}
+        self._data = {trial.id: trial for trial in data.trials}
         self._shaken: dict[str, Shaken] = {}
         self._along: Mapping[str, Array] = {}
         self._switches: dict[str, Array] = {}
@@ -141,7 +139,7 @@ class TumbleProblem(Problem):
 
     def samples(self, trial: str) -> Samples:
         """Times, channels and std of a trial's samples."""
-        data = self.data.trials[self._index[trial]]
+        data = self._data[trial]
         return Samples(time=data.time, channel=np.array(CHANNELS)[data.channel], std=data.std)
 
     def evaluate_together(
@@ -151,7 +149,7 @@ class TumbleProblem(Problem):
         found = self._predict(asked, trials, states=False, horizon=share)
 
         def whitened(place: int) -> Array:
-            data, value = self.data.trials[self._index[trials[place]]], found[place].value
+            data, value = self._data[trials[place]], found[place].value
             until = share * data.end if share < 1 else np.inf
             if (shaken := self._shaken.get(data.id)) is None:
                 return whiten(data, value, until=until)
@@ -184,7 +182,7 @@ class TumbleProblem(Problem):
         for trial in trials:
             after, before = late[trial] - now[trial], now[trial] - early[trial]
             jumps = np.abs(after - before) > np.maximum(_SEEN, 0.5 * np.abs(after + before))
-            imu = np.isin(self.data.trials[self._index[trial]].channel, _IMU)
+            imu = np.isin(self._data[trial].channel, _IMU)
             found[trial] = np.where(jumps & imu & np.isfinite(after + before), after + before, 0.0)
         return found
 
@@ -193,10 +191,7 @@ class TumbleProblem(Problem):
         moved = replace(self.data, trials=tuple(replace(trial, time=trial.time + late) for trial in self.data.trials))
         forward = Forward(moved, threads=self.forward.threads, own=self.forward.own) if late else self.forward
         found = self._predict([([values], forms)], trials, states=False, forward=forward)
-        return {
-            trial: one.value[0] / self.data.trials[self._index[trial]].std
-            for trial, one in zip(trials, found, strict=True)
-        }
+        return {id: one.value[0] / self._data[id].std for id, one in zip(trials, found, strict=True)}
 
     def shake(self, along: Mapping[str, Array]) -> None:
         """See `Problem`; readings of one clock with one time share an error."""
@@ -207,7 +202,7 @@ class TumbleProblem(Problem):
         """Times that jitter and readings at a switch into the whitening."""
         self._shaken = {}
         for id in self._index:
-            data = self.data.trials[self._index[id]]
+            data = self._data[id]
             own = self._along.get(id, np.zeros(len(data.time)))
             jump = self._switches.get(id, np.zeros(len(data.time)))
             own = np.where(np.abs(jump) > np.abs(own), jump, own)
@@ -220,14 +215,14 @@ class TumbleProblem(Problem):
 
     def sensor_std(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """As stated; endless where a contact switches."""
-        channel = np.array(CHANNELS)[self.data.trials[self._index[trial]].channel]
+        channel = np.array(CHANNELS)[self._data[trial].channel]
         doubtful = self.switches(values, forms, [trial])[trial] != 0
         found = super().sensor_std(values, forms, trial)
         return {name: np.where(doubtful[channel == name], np.inf, std) for name, std in found.items()}
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
         """With the camera's zero at its most probable value; readings at a switch of the contact say nothing."""
-        data = self.data.trials[self._index[trial]]
+        data = self._data[trial]
         residual = self._residual(values, forms, trial)
         valid = self.switches(values, forms, [trial])[trial] == 0
         residual = (residual - self._zero(data.channel, residual))[valid]
@@ -241,8 +236,10 @@ class TumbleProblem(Problem):
         """The term's parameters under the fixed names of docs/diagnose.md."""
         term = self.own[form.effect].term if form.effect in self.own else EFFECTS[form.effect]
         units = {f"{form.effect}.{p.name}": p.unit for p in term.parameters}
-        physical = self._physical(values, form)
-        return {name.partition(".")[2]: (value, units[name]) for name, value in physical.items()}
+        return {
+            name.partition(".")[2]: (float(array[0]), units[name])
+            for name, array in physical_at(form, [values]).items()
+        }
 
     def form_std(self, form: Form) -> dict[str, float]:
         """Relative uncertainty of what is reported of a form, for nature's law is not the form's: name -> std."""
@@ -273,7 +270,7 @@ class TumbleProblem(Problem):
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """Force and torque that the model lacks, and what they might depend on (`latent_columns`)."""
-        data = self.data.trials[self._index[trial]]
+        data = self._data[trial]
         prediction = self._predict([([values], forms)], [trial], motion=True)[0]
         mass = values.get("mass", self.forward.nominal["mass"])
         inertia = values.get("inertia", self.forward.nominal["inertia"])
@@ -281,7 +278,7 @@ class TumbleProblem(Problem):
 
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """Measured and modelled, by channel, the camera's zero put right in the model."""
-        data = self.data.trials[self._index[trial]]
+        data = self._data[trial]
         value = self._predict([([values], forms)], [trial])[0].value[0]
         value = value + self._zero(data.channel, (data.value - value) / data.std) * data.std
         told = {}
@@ -322,7 +319,7 @@ class TumbleProblem(Problem):
     def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
         """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
         where that is no good part of it (`followed_until`)."""
-        data, sigma = self.data.trials[self._index[trial]], self.data.tables.uncertainty.gravity_sim
+        data, sigma = self._data[trial], self.data.tables.uncertainty.gravity_sim
         scan = 1 + sigma * SCAN if sigma > 0 else np.ones(1)
         points = [values, *({**values, f"gravity_sim[{trial}]": data.gravity_sim * float(g)} for g in scan)]
         found = self._predict([(points, forms)], [trial])[0]
@@ -350,13 +347,13 @@ class TumbleProblem(Problem):
         at = 0
         for own, forms in asked:
             for name, array in [pair for form in forms for pair in physical_at(form, own).items()]:
-                columns.setdefault(name, np.full(len(points), self.forward.neutral(name)))[at : at + len(own)] = array
+                columns.setdefault(name, np.full(len(points), self.forward.neutral[name]))[at : at + len(own)] = array
             at += len(own)
         chosen = [self._index[trial] for trial in trials]
         return (forward or self.forward).predict(columns, trials=chosen, states=states, motion=motion, horizon=horizon)
 
     def _residual(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
-        data = self.data.trials[self._index[trial]]
+        data = self._data[trial]
         residual = (data.value - self._predict([([values], forms)], [trial])[0].value[0]) / data.std
         return np.where(np.isfinite(residual), residual, LOST)
 
@@ -370,10 +367,6 @@ class TumbleProblem(Problem):
                 most = len(mine) / (len(mine) + ZERO_STD**-2)
                 zero[mine] = np.clip(most * residual[mine].mean(), -3.0, 3.0)
         return zero
-
-    @staticmethod
-    def _physical(values: Mapping[str, float], form: Form) -> dict[str, float]:
-        return {name: float(array[0]) for name, array in physical_at(form, [values]).items()}
 
 
 def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> TumbleProblem:
