@@ -379,7 +379,7 @@ def _groups(parameters: Sequence[Parameter]) -> list[list[int]]:
 
 
 def _begun(model: Model, start: Values | None) -> Values:
-    """Where to begin: as told, and what is not told by the problem's own search, where it has one (`guess`)."""
+    """Where to begin: `start`, and for what it does not name the problem's own search, where it has one."""
     known, contacts = dict(start or {}), model.problem.contacts
     scatter = {p.name for p in model.scatter}  # a small thing beside the rest: it begins at none
     if contacts is None or all(p.name in known or p.name in scatter for p in model.parameters):

@@ -138,28 +138,28 @@ class OwnEffect:
 def load_own(file: str | Path) -> OwnEffect:
     """The effect in `file`. Raises ValueError, naming the file and the key, for what cannot be fitted."""
     term = load_effect(file)
-    said = f"effect_file = {str(file)!r}"
-    candidate, told = LOADED[term.id]
+    where = f"effect_file = {str(file)!r}"
+    candidate, fit = LOADED[term.id]
     if not term.parameters or not (term.hooks or (candidate is not None and candidate.push is not None)):
-        raise ValueError(f"{said}: TERM has no {'hooks' if not term.hooks else 'parameters'}: there is nothing to fit")
+        raise ValueError(f"{where}: TERM has no {'hooks' if not term.hooks else 'parameters'}: there is nothing to fit")
     first = term.parameters[0]
-    if told is None and candidate is not None:
+    if fit is None and candidate is not None:
         return OwnEffect(term=term, file=Path(file).resolve(), off=first.default, typical={}, candidate=candidate)
     names = [p.name for p in term.parameters]
-    if not isinstance(told, dict) or set(told) != set(names):
-        found = "none" if not isinstance(told, dict) else f"one of {', '.join(map(str, told)) or 'nothing'}"
+    if not isinstance(fit, dict) or set(fit) != set(names):
+        found = "none" if not isinstance(fit, dict) else f"one of {', '.join(map(str, fit)) or 'nothing'}"
         wanted = f"FIT = {{name: {{'typical': number}}}} of {', '.join(names)}"
-        raise ValueError(f"{said}: {wanted} was expected, found {found}")
+        raise ValueError(f"{where}: {wanted} was expected, found {found}")
     typical = {}
     for name in names:
-        size = told[name].get("typical")
+        size = fit[name].get("typical")
         number = isinstance(size, int | float) and not isinstance(size, bool) and math.isfinite(size) and size != 0
-        if set(told[name]) - {"typical", "off"} or not number:
-            raise ValueError(f"{said}: FIT[{name!r}] = {told[name]!r}: 'typical', a number other than 0, was expected")
+        if set(fit[name]) - {"typical", "off"} or not number:
+            raise ValueError(f"{where}: FIT[{name!r}] = {fit[name]!r}: 'typical', a number other than 0, was expected")
         typical[name] = float(size)
-    off = told[first.name].get("off", first.default)
+    off = fit[first.name].get("off", first.default)
     if not isinstance(off, int | float) or not math.isfinite(off):
-        raise ValueError(f"{said}: FIT[{first.name!r}]: off = {off!r}: the value that changes nothing was expected")
+        raise ValueError(f"{where}: FIT[{first.name!r}]: off = {off!r}: the value that changes nothing was expected")
     path = Path(file).resolve()
     return OwnEffect(term=term, file=path, off=float(off), typical=typical, candidate=candidate)
 

@@ -211,12 +211,12 @@ def _gate_of(parts: Sequence[Mapping[str, Array]], more: Mapping[str, Array] | N
 def _key(found: Fit, signature_count: int, seed: int, draws: int) -> str:
     """Digest of what decides the null: design, noise, what is fitted; not the measured numbers."""
     model = found.model
-    told = [
+    null = [
         _FORMAT, model.problem.kind, model.problem.design, model.trials, [form.id for form in model.forms],
         [(p.name, p.std) for p in model.scatter], signature_count, seed, draws, _LEVEL, LOW_MODES,
         [np.round(model.whitener.weights[trial], 6).tobytes().hex() for trial in model.trials],
     ]  # fmt: skip
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:24]
+    return hashlib.sha256(json.dumps(null).encode()).hexdigest()[:24]
 
 
 def _read(path: Path | None) -> Gate | None:
@@ -224,20 +224,20 @@ def _read(path: Path | None) -> Gate | None:
     if path is None or not path.exists():
         return None
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        return Gate(tuple(told["names"]), np.array(told["mean"]), np.array(told["variance"]), float(told["threshold"]))
+        null = json.loads(path.read_text(encoding="utf-8"))
+        return Gate(tuple(null["names"]), np.array(null["mean"]), np.array(null["variance"]), float(null["threshold"]))
     except (OSError, ValueError, KeyError) as problem:
         warnings.warn(f"the gate {path.name} cannot be read and is made anew: {problem}", stacklevel=2)
         return None
 
 
 def _write(path: Path, gate: Gate) -> None:
-    told = {"names": gate.names, "mean": gate.mean.tolist(), "variance": gate.variance.tolist(),
+    null = {"names": gate.names, "mean": gate.mean.tolist(), "variance": gate.variance.tolist(),
             "threshold": gate.threshold}  # fmt: skip
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = path.with_suffix(f".{os.getpid()}")
-        unfinished.write_text(json.dumps(told), encoding="utf-8")
+        unfinished.write_text(json.dumps(null), encoding="utf-8")
         unfinished.replace(path)
     except OSError as problem:
         warnings.warn(f"the gate could not be kept: {problem}", stacklevel=2)

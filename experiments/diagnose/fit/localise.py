@@ -120,12 +120,12 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
             share = _explained(x[good], y[good])
             shares[name] = max(shares.get(name, 0.0), share)
     ranked = sorted(shares.items(), key=lambda pair: -pair[1])
-    told = [(_WORDS.get(name, name), share) for name, share in ranked if share > 0.1]
-    if not told:
+    named = [(_WORDS.get(name, name), share) for name, share in ranked if share > 0.1]
+    if not named:
         return "nothing that was recorded: no column explains a tenth of it", shares
-    best = told[0]
+    best = named[0]
     sentence = f"{best[0]} (explains {100 * best[1]:.0f} % of it)"
-    more = [f"{name} ({100 * share:.0f} %)" for name, share in told[1:3]]
+    more = [f"{name} ({100 * share:.0f} %)" for name, share in named[1:3]]
     return sentence + (f", then {', '.join(more)}" if more else ""), shares
 
 

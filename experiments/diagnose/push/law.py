@@ -166,9 +166,9 @@ def _changes(own: _Own) -> list[Any]:
     for place, (effect, columns) in enumerate(parts):
         for hook, function in effect.law.items():
             asked = inspect.signature(function).parameters
-            told = ", ".join(name if name in _VALUES[hook] else f"n[k, {columns[name]}]" for name in asked)
+            arguments = ", ".join(name if name in _VALUES[hook] else f"n[k, {columns[name]}]" for name in asked)
             hooks[f"{hook}_{place}"] = function
-            calls[hook].append(f"{hook}_{place}({told})")
+            calls[hook].append(f"{hook}_{place}({arguments})")
     n = "n: ti.template(), k"
     return _compiled({
         f"loading_changed(before, depth, x, {n})":
@@ -197,13 +197,13 @@ def _own_changes(own: _Own) -> list[Any]:
         at += len(term.parameters)
         for hook, function in term.hooks.items():
             hooks[f"{hook}_{place}"] = function
-            told = "".join(f", {column[argument]}" for argument in term.arguments(hook))
+            arguments = "".join(f", {column[argument]}" for argument in term.arguments(hook))
             if hook == "stiffen":
-                spring.append(f"force, work = stiffen_{place}(z, force, 0.0{told})")
+                spring.append(f"force, work = stiffen_{place}(z, force, 0.0{arguments})")
             elif hook == "rate_force":
-                force.append(f"total = total + rate_force_{place}(s, z, v{told})")
+                force.append(f"total = total + rate_force_{place}(s, z, v{arguments})")
             else:
-                force += [f"pull, held = hold_{place}(s, z, most{told})", "total = total - pull"]
+                force += [f"pull, held = hold_{place}(s, z, most{arguments})", "total = total - pull"]
     return _compiled({
         "own_spring(s, z, spring, n: ti.template(), k)": [*spring, "return force"],
         "own_force(s, z, v, most, n: ti.template(), k)": [*force, "return total"],

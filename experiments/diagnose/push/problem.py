@@ -281,16 +281,14 @@ class PenetrationProblem(Problem):
         this = self._trials[trial]
         ((_, by_depth, by_row, _),) = self._slopes(values, forms, [this])
         doubt = np.linalg.norm(path_error(this.path, by_depth, by_row), axis=1) / this.path.inflation
-        touch = touching(this)
-        if touch.any():  # the force begins with a jump: half of what it may be over what the depth leaves open
-            most = float(off_surface(this)[touch].max())
-            deep, shallow = (self._run([values], forms, [this], (shift, 0.0, 0.0))[0][0] for shift in (most, -most))
-            doubt = np.where(touch, np.maximum(doubt, 0.5 * np.abs(deep - shallow)), doubt)
-        turn = reversing(this)
-        if turn.any():  # and so it does where the direction of motion is another, which friction goes with
-            most = float(np.maximum(off_rest(this), np.abs(this.path.speed))[turn].max())
-            fast, slow = (self._run([values], forms, [this], (0.0, shift, 0.0))[0][0] for shift in (most, -most))
-            doubt = np.where(turn, np.maximum(doubt, 0.5 * np.abs(fast - slow)), doubt)
+        # The force jumps at the surface, and with friction where the motion turns: half of what the path leaves open.
+        turn = np.maximum(off_rest(this), np.abs(this.path.speed))
+        for rows, off, speed in ((touching(this), off_surface(this), 0.0), (reversing(this), turn, 1.0)):
+            if rows.any():
+                ways = [side * float(off[rows].max()) for side in (1, -1)]
+                shifts = [(way * (1 - speed), way * speed, 0.0) for way in ways]
+                up, down = (self._run([values], forms, [this], shift)[0][0] for shift in shifts)
+                doubt = np.where(rows, np.maximum(doubt, 0.5 * np.abs(up - down)), doubt)
         return np.hypot(stds(self.tables, True)[1], doubt[this.has_other])
 
     def samples(self, trial: str) -> Samples:
@@ -396,7 +394,7 @@ class PenetrationProblem(Problem):
         write_model(Path(path), model)
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> list[str]:
-        """Sentences on K, its spread, and whether C can be told, where it was not known beforehand; none with drops."""
+        """Sentences on K, its spread, and whether C can be determined, where it was not known; none with drops."""
         if self.tables.uncertainty.damping < 1 or not all(trial.driven for trial in self._trials.values()):
             return []
         still = {**values, **{named("damping", diameter, self._diameters): 0.0 for diameter in self._diameters}}

@@ -22,7 +22,7 @@ __all__ = ["ForceZeros", "find_force_zeros"]
 _FEWEST = 8  # rows above the surface that tell a zero
 _CLEAR = 4.0  # standard errors of the smoothed depth by which such a row is above
 _SURE = 1e-4  # chance below which zeros differ
-_EDGE = 0.5  # pushes must be told to this share of all for their spread to be that of all of them
+_EDGE = 0.5  # this share of all pushes must be read for their spread to be that of all of them
 _WITHIN = 4.0  # spreads within which a zero is one of them
 
 

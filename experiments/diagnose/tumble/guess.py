@@ -128,10 +128,8 @@ class Guesser:
         to keep it there, for all trials, and what else is known by then finds the measured one without them.
         """
         rubs = {p.name: p for p in self._shared if p.name in ("mu_s", "mu_d")}
-        known = {**begun, **found.values, **{name: p.value for name, p in rubs.items()}}
-        if "mu_s" not in rubs:
-            return [known]
-        return [{**known, "mu_s": rubs["mu_s"].value + z * rubs["mu_s"].std} for z in _AWAY]
+        known, sticks = {**begun, **found.values, **{name: p.value for name, p in rubs.items()}}, rubs.get("mu_s")
+        return [{**known, "mu_s": sticks.value + z * sticks.std} for z in _AWAY] if sticks else [known]
 
     def _candidates(self, model: Model, forms: Sequence[Form], begun: Values) -> dict[str, Fit]:
         """The best fit found for each form added to those of `model`."""
@@ -155,7 +153,7 @@ class Guesser:
         places = {
             form.id: (model.with_forms([form]), point, replace(SEARCH, rounds=2)) for form, point in reversed(starts)
         }
-        left = [form.id for form in forms if form.id not in best]  # given up on the way: told as they stand
+        left = [form.id for form in forms if form.id not in best]  # given up on the way: reported as they are
         keep(fits([places[id] for id in left]))
         return best
 

@@ -128,14 +128,14 @@ class TumbleProblem(Problem):
 
     def _design(self) -> str:
         tables = self.data.tables
-        told = {
+        content = {
             "tables": tables.model_dump(mode="json", exclude={"name", "notes", "trial"}),
             "trials": [
                 [*map(str, trial.condition), trial.end] + np.bincount(trial.channel, minlength=len(CHANNELS)).tolist()
                 for trial in self.data.trials
             ],
         }
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
     def samples(self, trial: str) -> Samples:
         """Times, channels and std of a trial's samples."""
@@ -247,7 +247,7 @@ class TumbleProblem(Problem):
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> tuple[str, ...]:
         """What of the forms' numbers no rig and no platform has, a sentence each."""
-        said = []
+        sentences = []
         for form in forms:
             if form.effect != "rig-friction" or form.effect in self.own:
                 continue
@@ -255,12 +255,12 @@ class TumbleProblem(Problem):
             trial = min(self.data.tables.trial, key=self.data.tables.weight_of)
             weight = self.data.tables.weight_of(trial)
             if force > weight:
-                said.append(
+                sentences.append(
                     f"rig-friction of {force:.3g} N is more than the {weight:.3g} N that stand on the surface (trial "
                     f"{trial.id}): a rig with it would hold the platform up wherever it is. So it is hardly the "
                     f"pulleys, but something that resists when the platform rises and falls"
                 )
-        return tuple(said)
+        return tuple(sentences)
 
     def prepare(self, tell: Callable[[str, float], None]) -> None:
         """Compile the kernels, which takes a while where that was not done before, and says so."""
@@ -281,12 +281,12 @@ class TumbleProblem(Problem):
         data = self._data[trial]
         value = self._predict([([values], forms)], [trial])[0].value[0]
         value = value + self._zero(data.channel, (data.value - value) / data.std) * data.std
-        told = {}
+        channels = {}
         for number, name in enumerate(CHANNELS):
             mine = data.channel == number
             if mine.any():
-                told[name] = {"t_s": data.time[mine], "measured": data.value[mine], "model": value[mine]}
-        return told
+                channels[name] = {"t_s": data.time[mine], "measured": data.value[mine], "model": value[mine]}
+        return channels
 
     def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
         """model.toml, which `hedgebed tumble --model` runs."""
