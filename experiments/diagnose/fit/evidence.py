@@ -73,7 +73,7 @@ def tempered(left: float, modes: float) -> float:
 
 
 def inflation(found: Fit) -> float:
-    """Factor on standard errors: a misfit of form, E in M slow modes, makes each of them as loud as 1 + E / M.
+    """Factor on standard errors: a misfit of form, E in M slow modes, makes the power of each 1 + E / M.
 
     What chance alone brings, two standard deviations of chi-square, does not count.
     """
@@ -107,8 +107,8 @@ _FIRST = 0.2
 def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> Fit:
     """The best fit of `model` (which holds `form`) over the form's starts, in several sizes of the amplitude.
 
-    The other values are those given, and those of the priors: a base model that lacks an effect bends its parameters,
-    and what replicates differ by first of all.
+    The other values are those given, and those of the priors: a base model from which an effect is missing bends its
+    parameters, and what replicates differ by first of all.
     `rounds`: steps, where the problem looks for the best start itself.
     """
     if model.problem.contacts is not None:

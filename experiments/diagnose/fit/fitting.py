@@ -62,7 +62,7 @@ class Rule:
     scan: bool = False  # whether each trial's own numbers are scanned before the first step
     shares: tuple[float, ...] = (1.0,)
     """Shares of the trials' time that are fitted one after another, the last is 1: what happens early is smooth in the
-    parameters and tells most of them, so that later contacts are met on the right branch."""
+    parameters and determines most of them, so that later contacts are met on the right branch."""
     early: float = 1e-3 / (1 + 1e-3)  # share of chi-square below which a fit to less than all has ended
     keeps: bool = True  # whether the result holds the Jacobian, which is large where many fits go together
 
@@ -331,9 +331,9 @@ def settled(found: Fit) -> Fit:
 def settled_slopes(model: Model, values: Values) -> tuple[Array, Array]:
     """As `Linear` has them, over steps that are worth a standard deviation of the data, both ways.
 
-    A fit's own steps are hundredths of what was stated or of a typical size. Where data tell a thousand times more,
-    such a step reaches over the next branch of sticking and slipping, and a jump is taken for a slope: standard errors
-    would come out far too small, and what is uncertain far too loud.
+    A fit's own steps are hundredths of what was stated or of a typical size. Where data determine a number a thousand
+    times better, such a step reaches over the next branch of sticking and slipping, and a jump is taken for a slope:
+    standard errors would come out far too small.
     """
     parameters = model.parameters
     names = [p.name for p in parameters]
@@ -363,7 +363,7 @@ def settled_slopes(model: Model, values: Values) -> tuple[Array, Array]:
                     if moved:
                         sides.append((modes[where] - now[where]) / moved)
                 sizes = [float(np.linalg.norm(side)) for side in sides]
-                # A jump on one side is that side's: the other one tells the slope.
+                # A jump on one side is that side's: the other one has the slope.
                 slope = np.mean(sides, axis=0) if max(sizes) < 2 * min(sizes) else sides[int(np.argmin(sizes))]
                 slopes[where, k] = slope * parameters[k].scale
                 steps[k] = min(steps[k], 1.0 / max(min(sizes), 1e-300))

@@ -92,7 +92,7 @@ class OwnEffect:
 
     @property
     def push(self) -> Push | None:
-        """What it adds to the law of a push; None where its term's hooks say it."""
+        """What it adds to the law of a push; None where its term's hooks do."""
         return self.candidate.push if self.candidate is not None else None
 
     @property

@@ -37,7 +37,7 @@ _LEVEL = 0.005  # chance that a right model is refused, of each of the two round
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the gate says of one fit."""
+    """The gate's result for one fit."""
 
     passed: bool
     score: float  # the most surprising statistic, as standard deviations of a normal law
@@ -107,7 +107,7 @@ def open_gate(
     tell: Callable[[float], None] | None = None,
     folder: Path | None = None,
 ) -> tuple[Gate, Verdict]:
-    """The null for this fit, and what it says of it.
+    """The null for this fit, and the verdict.
 
     `signatures`: unit vectors of what candidate effects would change, the fit's own parameters projected out, shape
     [n, k]. `refit`: make data and fit them in full, `draws` times, instead of projecting. `folder`: where nulls made by

@@ -62,7 +62,7 @@ def places_in(problem: Problem, values: Values, forms: Sequence[Form], residuals
 
 
 def phases_of(problem: Problem, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
-    """The phase at each sample; a platform stands until the torque starts, whatever a model says of then."""
+    """The phase at each sample; a platform stands until the torque starts, whatever a model predicts."""
     phases = problem.phases(values, forms, trial)
     return np.where(problem.samples(trial).time < 0, "stand", phases) if problem.kind == "tumble" else phases
 
@@ -85,7 +85,7 @@ def _core(rest: Array) -> tuple[int, int]:
 
 
 def latent_table(problem: Problem, values: Values, forms: Sequence[Form]) -> dict[str, NDArray[np.generic]]:
-    """Columns of latent.csv: trial, then what the problem says, trial after trial."""
+    """Columns of latent.csv: trial, then the problem's columns, trial after trial."""
     parts: dict[str, list[NDArray[np.generic]]] = {"trial": []}
     for trial in problem.trials:
         columns = problem.latent(values, forms, trial.id)
@@ -99,10 +99,10 @@ def latent_table(problem: Problem, values: Values, forms: Sequence[Form]) -> dic
 
 
 def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str, float]]:
-    """A sentence on what the latent columns go with, and the share of their variance that each column explains.
+    """A sentence on what the latent columns depend on, and the share of their variance that each column explains.
 
     The share is that of a mean in twenty bins of equal count, judged on every second sample after being made on the
-    others, so that noise explains nothing. A column that only says which trial it is counts as the trial.
+    others, so that noise explains nothing. A column that only identifies the trial counts as the trial.
     """
     shares: dict[str, float] = {}
     if not len(table["trial"]):
@@ -130,7 +130,7 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
 
 
 def _labels(column: NDArray[np.generic], which: NDArray[np.intp]) -> bool:
-    """Whether a column only says which trial it is: another single value in each of three trials or more."""
+    """Whether a column only identifies the trial: another single value in each of three trials or more."""
     count = int(which.max()) + 1
     values = np.asarray(column, dtype=float)
     single = all(np.ptp(values[which == k]) == 0 for k in range(count))

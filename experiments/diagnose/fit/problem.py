@@ -65,7 +65,7 @@ class Parameter:
     step: float | None = None
     """Step of finite differences, in units of the parameter; for models whose contacts make small steps rough."""
     least: float | None = None
-    """Of what may differ between replicates: the std below which it says nothing; None: the problem's own."""
+    """Of what may differ between replicates: the std below which it is negligible; None: the problem's own."""
 
     def in_each(self, trials: Iterable[str]) -> tuple[Parameter, ...]:
         """Nuisances of this name, one for each trial."""
@@ -153,7 +153,7 @@ class Problem(Protocol):
     design: str  # digest of what decides the gate: sampling, conditions, noise, priors; not of the measured numbers
     granular: bool = True  # whether replicates differ because grains lie otherwise in each bed
     by_path: bool = False
-    """Whether trials follow a measured path: its error goes with the model (`rewhiten`), and replicates are compared
+    """Whether trials follow a measured path: its error depends on the model (`rewhiten`), and replicates are compared
     row by row (`calm`)."""
     contacts: Contacts | None = None  # of a motion with contacts; None where the likelihood is smooth
     rough: Sequence[str] = ()  # trials whose motion bounces: the likelihood is the rougher the longer they are
@@ -173,11 +173,11 @@ class Problem(Protocol):
     lone_scatter: tuple[tuple[str, ...], ...] = ()
     """What is asked for, one after the other, where no trial repeats another (`lone_beds`)."""
     known_std: Mapping[str, float] = MappingProxyType({})
-    """What differs from trial to trial as the readings themselves tell: kind -> std, in its unit."""
+    """What differs from trial to trial as the readings themselves show: kind -> std, in its unit."""
     calmed: Mapping[str, Array] = MappingProxyType({})  # weights of modes as `calm` was given them last
 
     def prepare(self, tell: Callable[[str, float], None]) -> None:
-        """What takes long the first time, and says so."""
+        """What takes long the first time; `tell` reports it."""
         return
 
     def samples(self, trial: str) -> Samples:
@@ -223,7 +223,7 @@ class Problem(Protocol):
         self.calmed = dict(weights)
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
-        """Sum of squared residuals with the std that docs/diagnose.md says for `gap`; number of samples."""
+        """Sum of squared residuals with the std that docs/diagnose.md states for `gap`; number of samples."""
 
     def sensor_std(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """Noise of each reading as `gap` takes it, by channel: of a driven force with the error of its depth; endless
@@ -238,7 +238,7 @@ class Problem(Protocol):
         """The state at each sample: stand, pivot, slip, hop; for penetration free, in, rest, out."""
 
     def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
-        """What diagnosis.json says of a form: name -> (value, unit), under the fixed names where there are such.
+        """What diagnosis.json reports of a form: name -> (value, unit), under the fixed names where there are such.
 
         A smooth function of the form's parameters: the core carries uncertainties through it by differences.
         """
@@ -252,12 +252,12 @@ class Problem(Protocol):
         return False
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> Sequence[str]:
-        """What else an engineer says of the forms' numbers, a sentence each."""
+        """Remarks on the forms' numbers, a sentence each."""
         return ()
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """Columns of latent.csv: ``t_s`` first, then ``latent_...`` (the force, torque or error of a sensor that the
-        model lacks, by time), then what it might depend on (``depth_m``, ``velocity_m_s``, ...); all of one shape."""
+        model misses, by time), then what it might depend on (``depth_m``, ``velocity_m_s``, ...); all of one shape."""
 
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """Channel -> {"t_s", "measured", "model"} for plots, at the samples; units those of the channel."""
@@ -266,7 +266,7 @@ class Problem(Protocol):
         """model.toml: the tables with the fitted values, and [[effect]] tables."""
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
-        """One sentence: the trial or bench measurement that would tell the two apart."""
+        """One sentence: the trial or bench measurement that would distinguish the two."""
 
 
 @dataclass(frozen=True)

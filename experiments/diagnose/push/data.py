@@ -23,7 +23,7 @@ from .drive import Holds, Weights
 __all__ = ["Prepared", "prepare"]
 
 _FEWEST = 12  # rows that a trial must have to be used
-_AROUND = 20  # rows on either side of a gap that tell whether the clock has jumped
+_AROUND = 20  # rows on either side of a gap that show whether the clock has jumped
 _LONG = 0.02  # share of a recording from which on a stretch without rows is reported
 _SMOOTH, _ROUGH = 1.7, 3.0
 """Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
@@ -115,8 +115,8 @@ def _noisier(tables: PenetrationCampaign, recordings: Mapping[str, Recording]) -
     """How noisy the depth sensor of the pushes is, where it is noisier than stated; else None.
 
     Third differences know nothing of a smooth motion: those of white noise s have the variance 20 s^2. A curve smoothed
-    at a noise that is too small would follow the noise, and what it leaves would tell too little of it. Of noise that
-    is correlated they tell less than there is: that is looked for in what is left (`_recoloured`).
+    at a noise that is too small would follow the noise, and what it leaves would show too little of it. Of noise that
+    is correlated they show less than there is: that is looked for in what is left (`_recoloured`).
     """
     sizes, count = [], 0
     for table in tables.trial:
@@ -162,7 +162,7 @@ def _recoloured(
     for rate, alike in rates.items():
         if any(trial.info.id in colours for trial in alike) or not colours:
             continue
-        # Few rows tell little of it, least of all where a curve has followed the noise: then as at the rate next to
+        # Few rows show little of it, least of all where a curve has followed the noise: then as at the rate next to
         # it, unless what is left is not that.
         near = min((r for r in rates if rates[r][0].info.id in colours), key=lambda r: abs(r - rate))
         known = colours[rates[near][0].info.id]
@@ -394,7 +394,7 @@ def _clock_jump(time: Array, values: Array, std: float) -> int | None:
 
     One polynomial is laid through the rows on both sides of a gap, once with the times as they stand and once with the
     gap closed, of the lowest degree up to 3 that fits the second: where the clock jumped, it does not fit the first.
-    A few rows tell that of a fast motion, as many as the gap is long of a slow one.
+    A few rows show that of a fast motion, as many as the gap is long of a slow one.
     """
     known = np.flatnonzero(np.isfinite(values))
     t, v = time[known], values[known]

@@ -11,7 +11,7 @@ from .depth import SmoothDepth
 
 __all__ = ["off_rest", "off_surface", "path_error", "reversing", "touching", "turning"]
 
-_BESIDE = 5  # rows before and after a turn that tell the force there
+_BESIDE = 5  # rows before and after a turn that show the force there
 _AT_TURN = 6
 """Rows that a turn may last; where a spike is slow for longer it is held, or eased, and its direction is what it is."""
 
@@ -19,8 +19,8 @@ _AT_TURN = 6
 def path_error(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:
     """What the error of a smoothed depth makes of the force [N], shape [n, error_count].
 
-    A force on the way back goes with two depths, where the spike is and how deep it has been, whose errors are not one:
-    a crater that is steep on the way out sees their difference.
+    A force on the way back depends on two depths, where the spike is and how deep it has been, whose errors are not
+    one: a crater that is steep on the way out sees their difference.
     """
     so_far = np.maximum.accumulate(smooth.depth)
     deepest = np.maximum.accumulate(np.where(smooth.depth >= so_far, np.arange(len(so_far)), 0))
@@ -62,7 +62,7 @@ def reversing(trial: Prepared) -> NDArray[np.bool_]:
 def turning(speed: Array, std: Array, force: Array, noise: float) -> Array:
     """How far the force is in doubt where the direction of motion is: by its jump from before to after [N].
 
-    Dry friction changes sign where a spike turns; the smoothed depth tells when to within some rows only.
+    Dry friction changes sign where a spike turns; the smoothed depth shows when to within some rows only.
     """
     doubt = np.zeros(len(speed))
     for low, high in spells(np.abs(speed) < 3 * std):

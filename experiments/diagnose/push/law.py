@@ -70,7 +70,7 @@ _STEP = 5e-4
 `fall` takes shorter ones where a lane is stiffer."""
 
 _SETTLED = 1e-3
-"""Speed [m/s] at which a spike that comes back to a surface that bears it stays there: it would hop by 5e-8 m."""
+"""Speed [m/s] at which a spike that comes back to a surface that supports it stays there: it would hop by 5e-8 m."""
 
 
 def slot_places(own: Sequence[OwnEffect] = ()) -> dict[str, int]:
@@ -137,7 +137,7 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
 
 
 _Own = tuple[tuple[Term, Push | None], ...]
-"""Effects from files: the term, and what its file says of the law of a push in the place of the term's hooks."""
+"""Effects from files: the term, and the law of a push that its file declares in the place of the term's hooks."""
 
 
 def _compiled(lines: Mapping[str, Sequence[str]], hooks: Mapping[str, Callable[..., Any]], name: str) -> list[Any]:
@@ -338,7 +338,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                                     inside, top = 0, 0.0
                                 else:
                                     inside, way = 1, 1.0
-                                    # On what bears it at the surface it would hop for ever, ever less.
+                                    # On what supports it at the surface it would hop for ever, ever less.
                                     bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, numbers, k)
                                     if v < SETTLED and bears > m * g:
                                         v, resting = 0.0, 1

@@ -14,7 +14,7 @@ from .forms import Scales
 __all__ = ["base_parameters", "comes_back", "diameters_of", "find_scales", "named", "scatter_parameters", "speeds_of"]
 
 _ZERO_DEPTH = 0.1  # how far a depth's zero may differ between pushes while it is asked whether it does, over D
-_LEAST_ZERO = 0.2  # zeros that differ by less than this share of the noise say nothing
+_LEAST_ZERO = 0.2  # zeros that differ by less than this share of the noise are negligible
 _BED_STD = 0.5  # how far the bed may differ between replicates while it is asked whether it does [1]
 
 

@@ -335,7 +335,7 @@ class PenetrationProblem(Problem):
         return found
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-        """The force [N] that the model lacks; of a drop m (g - a) over the model's, at the accelerometer's rows, or
+        """The force [N] that the model misses; of a drop m (g - a) over the model's, at the accelerometer's rows, or
         from its depth where it has none."""
         this = self._trials[trial]
         depth, speed, _, model = self._state(values, forms, trial)
@@ -365,7 +365,7 @@ class PenetrationProblem(Problem):
             for name, measured, rows, column in (
                 ("depth", this.depth, this.has_depth, 0), ("accel", this.other, this.has_other, 2),
             )
-            if rows.any()  # a sensor that this trial lacks is none of its channels
+            if rows.any()  # a sensor without readings here is none of its channels
         }  # fmt: skip
 
     def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:

@@ -13,7 +13,7 @@ __all__ = ["Push", "remarks"]
 
 @dataclass(frozen=True)
 class Push:
-    """One driven trial: where it was, what it felt, and what the model without a damper says; shapes [n]."""
+    """One driven trial: where it was, what it felt, and what the model without a damper gives; shapes [n]."""
 
     diameter: float
     depth: Array

@@ -22,7 +22,7 @@ __all__ = ["checked"]
 
 _FAR = 12.0  # stds of the sensor: white noise does not get there
 _SHARE = 0.5  # of a channel's rows; more of them are not set aside
-_NEAR = 8  # rows on either side that tell how much a row usually changes
+_NEAR = 8  # rows on either side that show how much a row usually changes
 _STEEP = 6.0  # times the usual change
 _AROUND = 8  # rows at least, on either side of a gap, from which a slope is taken
 _SPAN = 0.08  # s that they cover
@@ -180,7 +180,7 @@ def _surprise(
 ) -> tuple[float, float]:
     """Squared standard deviations by which the value after a gap is off, for a clock that is right and one that jumped.
 
-    NaN where the slopes on either side differ: then the gap tells nothing.
+    NaN where the slopes on either side differ: then the gap shows nothing.
     """
     time, value, std = trial.time[mine], trial.value[mine], float(trial.std[mine[0]])
     around = max(_AROUND, int(_SPAN / usual))

@@ -160,7 +160,7 @@ class Guesser:
     def _race(self, model: Model, starts: Sequence[tuple[Form, Values]], keep: Callable[[Sequence[Fit]], None]) -> None:
         """Every form from all its starts and nominal numbers, over growing horizons; on the way most drop out.
 
-        A base model that lacks something plain stands on branches of its own, from which no effect is found: so all
+        A base model that misses something plain stands on branches of its own, from which no effect is found: so all
         begin where every branch is the same.
         """
         rule = replace(SEARCH, rounds=_ROUNDS, shares=_GROWING[:1])

@@ -34,7 +34,7 @@ __all__ = ["TumbleProblem", "make_problem"]
 
 _UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
 _COARSE = 1e-3  # step of the integration of a search [s]; what follows is finer
-_THIN = 5  # every fifth reading of the wheel, which is fast and says little, is enough for a search
+_THIN = 5  # every fifth reading of the wheel, which is fast and shows little, is enough for a search
 _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
 _SWITCH = 5e-4
 """From the moment of a reading [s] within which a model that jumps leaves it in doubt: one step of the integration."""
@@ -167,7 +167,7 @@ class TumbleProblem(Problem):
 
     def doubt(self, values: Values, forms: Sequence[Form]) -> bool:
         """Count readings of the IMU next to which the model jumps, where a spike touches or a slip ends, with an error
-        as large as the jump: on which side of it they were taken no fit can tell. Says whether any has changed."""
+        as large as the jump: on which side of it they were taken no fit can know. Returns whether any has changed."""
         before = self._switches
         self._switches = self.switches(values, forms, tuple(self._index))
         self._take_in()
@@ -221,7 +221,7 @@ class TumbleProblem(Problem):
         return {name: np.where(doubtful[channel == name], np.inf, std) for name, std in found.items()}
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
-        """With the camera's zero at its most probable value; readings at a switch of the contact say nothing."""
+        """With the camera's zero at its most probable value; readings at a switch of the contact do not count."""
         data = self._data[trial]
         residual = self._residual(values, forms, trial)
         valid = self.switches(values, forms, [trial])[trial] == 0
@@ -263,13 +263,13 @@ class TumbleProblem(Problem):
         return tuple(sentences)
 
     def prepare(self, tell: Callable[[str, float], None]) -> None:
-        """Compile the kernels, which takes a while where that was not done before, and says so."""
+        """Compile the kernels, which takes a while the first time; `tell` reports it."""
         tell("compiling the kernels (kept for the next time)", 0.0)
         self.forward.predict({}, trials=[0], horizon=0.01)
         self.forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-        """Force and torque that the model lacks, and what they might depend on (`latent_columns`)."""
+        """Force and torque that the model misses, and what they might depend on (`latent_columns`)."""
         data = self._data[trial]
         prediction = self._predict([([values], forms)], [trial], motion=True)[0]
         mass = values.get("mass", self.forward.nominal["mass"])
@@ -313,7 +313,7 @@ class TumbleProblem(Problem):
         write_model(path, model)
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
-        """What would tell two effects apart."""
+        """What would distinguish two effects."""
         return advice(first.effect, second.effect)
 
     def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:

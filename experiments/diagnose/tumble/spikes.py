@@ -72,7 +72,7 @@ def _apart(trial: TrialData, name: str) -> tuple[NDArray[np.intp], NDArray[np.fl
     beside = value[inner[:, None] + _OFFSETS]
     law = beside @ _PARABOLA.T
     left = beside - law @ np.vander(_OFFSETS, 3, increasing=True).T
-    loud = np.sqrt((left**2).sum(axis=1) / (len(_OFFSETS) - 3))
+    scatter = np.sqrt((left**2).sum(axis=1) / (len(_OFFSETS) - 3))
     usual = float(np.median(np.diff(time)))
     if name in ("ax", "ay") and usual > _SLOWEST:
         return rows, off
@@ -80,7 +80,7 @@ def _apart(trial: TrialData, name: str) -> tuple[NDArray[np.intp], NDArray[np.fl
     for moment in (0.0, trial.torque_until):
         even &= np.abs(time[inner] - moment) > _SETS_IN
     here = value[inner] - law[:, 0]
-    sure = even & (loud < _QUIET * std) & (np.abs(here) > _BESIDE * loud)
+    sure = even & (scatter < _QUIET * std) & (np.abs(here) > _BESIDE * scatter)
     off[inner[sure]] = here[sure] / std
     return rows, off
 

@@ -175,6 +175,18 @@ def test_every_effect_off_is_the_base_model_to_rounding():
         np.testing.assert_allclose(bare[trial], dressed[trial], rtol=0, atol=1e-9)
 
 
+def test_fits_that_are_carried_out_together_end_where_each_ends_alone():
+    """To the bit, for lanes share nothing; one starts at growing shares of the time, one with a scan at all of it."""
+    found = make_problem(campaign(seed=1, off=1.0, conditions=CONDITIONS[:2]))
+    bare = Model(found, Whitener.none(found), ("001", "002"))
+    rules = (replace(SEARCH, rounds=3, shares=(0.4, 1.0)), replace(SEARCH, rounds=2, scan=True))
+    starts = [(bare, {"mu_s": 0.5}, rule) for rule in rules]
+    for one, start in zip(fits(starts), starts, strict=True):
+        (alone,) = fits([start])
+        assert one.values == alone.values and one.objective == alone.objective
+        np.testing.assert_array_equal(one.modes, alone.modes)
+
+
 def test_a_pendulum_is_found_with_its_length_and_beats_a_slope():
     length = 1.5
     found = make_problem(campaign(effects=(Effect(id="pendulum", parameters={"length": length}),), seed=4, off=0.5))
