@@ -7,10 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .fitting import Model
 from .problem import Array, Form, Problem, Values
 
-__all__ = ["Place", "acceleration", "depends_on", "latent_table", "phases_of", "places", "places_in", "slope"]
+__all__ = ["Place", "acceleration", "depends_on", "latent_table", "phases_of", "places", "slope"]
 
 _SURE = 4.0  # standard deviations by which the energy of a stretch must exceed that of noise
 _MOST = 24
@@ -31,14 +30,11 @@ class Place:
     excess: float  # chi-square beyond the number of its samples
 
 
-def places(model: Model, values: Values, trials: Sequence[str]) -> list[Place]:
-    """Stretches of one phase in which residuals are beyond noise, the worst first."""
-    (found,) = model.problem.evaluate([values], model.forms, trials)
-    return places_in(model.problem, values, model.forms, found)
+def places(problem: Problem, values: Values, forms: Sequence[Form], residuals: Mapping[str, Array]) -> list[Place]:
+    """Stretches of one phase in which residuals are beyond noise, the worst first.
 
-
-def places_in(problem: Problem, values: Values, forms: Sequence[Form], residuals: Mapping[str, Array]) -> list[Place]:
-    """The same of given residuals over the noise: trial -> shape [sample_count]."""
+    `residuals`: over the noise, by trial, shape [sample_count].
+    """
     out = []
     for trial, found in residuals.items():
         samples = problem.samples(trial)
