@@ -5,14 +5,17 @@ Imports nothing of ours. The packages import this file, so that the old names wo
 
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar, cast
 
-__all__ = ["MOVED", "RENAMED", "renamed"]
+__all__ = ["MOVED", "RENAMED", "renamed", "renamed_keywords", "renamed_names"]
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 _MODULES = {
     "coupling": {
@@ -49,7 +52,7 @@ _MODULES = {
         ),
         "experiments.diagnose": "diagnose_settings=settings inspection",
         "experiments.grains": (
-            "bed_box=box bed_graded=graded bed_progress bed_sizes=sizes bed_staged=staged following kept_material "
+            "bed_box=sizes bed_graded=graded bed_progress bed_sizes=sizes bed_staged=staged following kept_material "
             "softening spells tracked_frames tumble_bed_settings=settings tumble_flight=flight where"
         ),
         "experiments.hop": (
@@ -67,18 +70,18 @@ _MODULES = {
             "tumble_platform=numbers"
         ),
         "experiments.runs": (
-            "cli_streams=streams kept_results kernel_cache memory progress reading registry reporting "
+            "cli_streams=streams kept_results kernel_cache memory progress reading registry reporting=whole_runs "
             "runfolder=folder stopping strict whole_runs"
         ),
         "experiments.spatial": (
-            "spatial_frames=frames spatial_result=result spatial_settings=settings spatial_trial=trial"
+            "spatial_frames=result spatial_result=result spatial_settings=settings spatial_trial=trial"
         ),
         "experiments.suite": "suite_commands=commands suite_cost=cases",
         "experiments.tumble": (
             "campaign_settings footfalls sweep_ranges synthesis tumble_coupled=coupled tumble_grains=on_grains "
-            "tumble_grains_frames=on_grains_frames tumble_grains_result=on_grains_result tumble_opening=opening "
+            "tumble_grains_frames=on_grains_result tumble_grains_result=on_grains_result tumble_opening=opening "
             "tumble_recorded=recorded tumble_settings=settings tumble_steppers=steppers tumble_sweep=sweep "
-            "tumble_tables=campaign_tables tumble_trial=trial tumble_words=words"
+            "tumble_tables=synthesis tumble_trial=trial tumble_words=result"
         ),
         "experiments.validate": "validate_settings=settings",
     },
@@ -90,7 +93,8 @@ _MODULES = {
             "tumble_advice=effect_texts"
         ),
         "experiments.diagnose.fit": (
-            "bounds evidence fitting gaps gate localise own problem slopes together tumble_shapes=forms"
+            "bounds evidence fitting gaps gate localise own=forms problem slopes=localise together tumble_fit=fitting "
+            "tumble_shapes=forms tumble_steps=fitting"
         ),
         "experiments.diagnose.noise": (
             "astray=diverging colour jitter lone_beds noise_words=colour replicates spectrum stuck unrest=wander"
@@ -101,9 +105,9 @@ _MODULES = {
         ),
         "experiments.diagnose.report": "candidates document sizes=document summary telling",
         "experiments.diagnose.tumble": (
-            "tumble_checks=checks tumble_data=data tumble_fit=fit tumble_follow=latent tumble_forms=forms "
+            "tumble_checks=checks tumble_data=data tumble_follow=latent tumble_forms=forms "
             "tumble_forward=forward tumble_guess=guess tumble_latent=latent tumble_problem=problem "
-            "tumble_readings=readings tumble_spikes=spikes tumble_steps=steps"
+            "tumble_readings=readings tumble_spikes=spikes"
         ),
     },
     "experiments.plausible": {
@@ -122,7 +126,7 @@ _MODULES = {
     "rigid": {
         "rigid.batch": "batch_kernel=kernel runtime",
         "rigid.ground": "grounds law_functions laws reaction rft",
-        "rigid.model": "mechanics trial",
+        "rigid.model": "mechanics=model trial",
         "rigid.planar": (
             "dormand_prince=methods dynamics implicit=methods modes=events planar_events=events planar_located=located "
             "planar_paper=paper rest=statics statics trajectory"
@@ -131,7 +135,7 @@ _MODULES = {
         "rigid.spatial": "quaternions spatial_motion=motion spatial_steps=steps",
     },
     "rigid.batch_kernel": {
-        "rigid.batch.kernel": "advance changes=events columns=parts dry=forces parts samples stand",
+        "rigid.batch.kernel": "advance changes=events columns=parts dry=forces parts samples=advance stand",
     },
     "rigid.terms": {
         "rigid.terms.body": "wires=wire_compliance",
@@ -225,7 +229,7 @@ _NAMES = {
         "experiments.campaign.files": "place_campaign",
     },
     "experiments.penetrate.settings": {
-        "experiments.grains.box": "expected_grain_count",
+        "experiments.grains.sizes": "expected_grain_count",
     },
     "experiments.platform.numbers": {
         "experiments.tumble.trial": "Spikes spikes_of",
@@ -239,7 +243,7 @@ _NAMES = {
     "experiments.tumble.campaign_settings": {
         "experiments.diagnose.settings": "CheckSettings",
     },
-    "experiments.tumble.words": {
+    "experiments.tumble.result": {
         "experiments.grains.bed_result": "residual_warning reversal_warning unsettled_warning",
     },
     "rigid.batch": {
@@ -330,6 +334,35 @@ def renamed(old: str, new: str) -> Any:
         return getattr(owner, new)
 
     return property(get, doc=f"Old name of `{new}`.")
+
+
+def renamed_keywords(**today: str) -> Callable[[F], F]:
+    """A decorator: the method takes a keyword by its old name too, with a DeprecationWarning."""
+
+    def decorate(method: F) -> F:
+        @wraps(method)
+        def call(owner: object, *args: Any, **options: Any) -> Any:
+            for old in today.keys() & options.keys():
+                warnings.warn(f"{old} of {type(owner).__name__} is now {today[old]}", DeprecationWarning, stacklevel=2)
+                options[today[old]] = options.pop(old)
+            return method(owner, *args, **options)
+
+        return cast(F, call)
+
+    return decorate
+
+
+def renamed_names(module: str, **today: Any) -> Callable[[str], Any]:
+    """The `__getattr__` of a package at the top: its old names, with a DeprecationWarning."""
+
+    def find(name: str) -> Any:
+        if name not in today:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        text = f"{module}.{name} is now {module}.{today[name].__name__}"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return today[name]
+
+    return find
 
 
 class _Renamed(MetaPathFinder, Loader):

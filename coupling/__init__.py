@@ -7,10 +7,7 @@ any body.
 Imports `dem`, `rigid`.
 """
 
-from typing import Any
-from warnings import warn
-
-import hedgebed_renamed  # noqa: F401  (old names of modules)
+import hedgebed_renamed
 
 from .bed_ground import BedGround, LeftTheBedError
 from .ground import Ground
@@ -31,12 +28,4 @@ __all__ = [
     "TumblesInARow", "drive", "drop", "overdamped_below", "platform_members", "set_down", "spatial_members",
 ]  # fmt: skip
 
-_RENAMED = {"BedFooting": BedGround, "Footing": Ground, "LawFooting": LawGround}
-
-
-def __getattr__(name: str) -> Any:
-    """Old names, for one version."""
-    if name not in _RENAMED:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warn(f"coupling.{name} is now coupling.{_RENAMED[name].__name__}", DeprecationWarning, stacklevel=2)
-    return _RENAMED[name]
+__getattr__ = hedgebed_renamed.renamed_names(__name__, BedFooting=BedGround, Footing=Ground, LawFooting=LawGround)

@@ -3,6 +3,8 @@
 docs/coupling.md explains the terms.
 """
 
+from typing import Any
+
 import numpy as np
 
 from rigid.ground.reaction import State
@@ -16,75 +18,85 @@ __all__ = ["EnergyBalance"]
 
 
 class EnergyBalance:
-    """Samples of the ground's energies beside the rows of a run, and their balance.
+    """The rows of a run, samples of the ground's energies beside them, and their balance.
 
-    A run gives `columns` (`time`, `kinetic_energy`, `potential_energy`, `torque_work`, `given`, `taken`, one
-    entry a macro step) and `energy_scale`, and calls `_start_balance` where time begins, `_sample` now and then.
+    A run has `time`, `kinetic_energy`, `potential_energy`, `torque_work`, `given` and `taken` among its columns. It
+    calls `_start_balance` where time begins, `_record_moment` after every macro step, `_sample` now and then.
     """
 
+    COLUMNS: tuple[str, ...]  # Of a row
     ground: Ground
     master: Master
+    body: Any
+    _pull: Vector  # Weight as a force on the body [N], shape (3,)
     _free: tuple[int, ...] = (0, 1, 2)  # Along which axes the body can move
     _turns: tuple[int, ...] = (0, 1, 2)  # About which axes it can turn
 
-    def _no_samples(self) -> None:
+    def __init__(self) -> None:
+        super().__init__()
+        self._rows: list[list[float]] = []  # One a macro step
         self._samples: list[list[float]] = []
         self.energy_names: tuple[str, ...] = ()  # What the ground's energies are, in the order of `samples`
         self.work_names: tuple[str, ...] = ()  # Likewise of what a bed's contacts took (`Bed.contact_work`)
         self._momentum, self._angular_momentum = np.zeros(3), np.zeros(3)
-        self._moment = np.zeros(3)
-        """Angular impulse on the body from elsewhere than the ground since the balance began [N m s]."""
+        self._moment = np.zeros(3)  # Angular impulse from elsewhere than the ground since the balance began [N m s]
 
     @property
     def columns(self) -> dict[str, Vector]:
-        """The rows so far, by name."""
-        raise NotImplementedError
+        """The rows so far, by COLUMNS."""
+        return dict(zip(self.COLUMNS, self._row_table.T, strict=True))
+
+    @property
+    def _row_table(self) -> Vector:
+        return np.array(self._rows, dtype=float).reshape(-1, len(self.COLUMNS))
 
     @property
     def energy_scale(self) -> float:
         """What residuals are relative to [J]."""
         raise NotImplementedError
 
-    def _start_balance(self, moving: Vector, turning: Vector) -> None:
-        """Count from here; `moving`, `turning`: the body's own momentum [N s] and its angular momentum about its
-        (0, 0, 0), wheels included or not [N m s], shape (3,) both."""
+    @property
+    def _turning(self) -> Vector:
+        """Angular momentum of the body about (0, 0, 0), less what a torque gave that is not of its wheels [N m s]."""
+        raise NotImplementedError
+
+    def _start_balance(self) -> None:
+        """Count from here."""
         self.master.start_balance()
         self._samples.clear()
-        self._momentum, self._angular_momentum = moving.copy(), turning.copy()
+        self._momentum, self._angular_momentum = self.body.momentum.copy(), self._turning.copy()
         self._moment = np.zeros(3)
         if isinstance(self.ground, BedGround):
-            self.ground.keep_book()
+            self.ground.bed.track_contact_work()
             self._momentum = self._momentum + self.ground.momentum()
             self._angular_momentum = self._angular_momentum + self.ground.angular_momentum()
 
-    def _pull(self, before: Vector, after: Vector, weight: Vector, masses: Vector) -> None:
-        """A macro step on which the body went from `before` to `after` [m]: weight about (0, 0, 0), and the rig.
+    def _record_moment(self, before: Vector) -> None:
+        """A macro step from the position `before` [m]: the moments of the weight about (0, 0, 0), and of the rig.
 
         In a rig the momentum is not along the velocity v, since it is heavier upwards, and v x P is the moment of the
         wires. By the middle of the step, half the ground's lag later as momentum is: of second order in it.
         """
-        dt = self.master.macro_step
+        dt, after = self.master.macro_step, self.body.pose.position
         velocity = (after - before) / dt
         middle = 0.5 * (before + after + self.ground.lag * velocity)
-        self._moment = self._moment + dt * (np.cross(middle, weight) + np.cross(velocity, masses * velocity))
+        moment = np.cross(middle, self._pull) + np.cross(velocity, self.body.masses * velocity)
+        self._moment = self._moment + dt * moment
 
-    def _sample(self, time: float, moving: Vector, turning: Vector) -> None:
-        """What the ground holds, by how much the momenta of all are off, and the grains computed.
-
-        `moving`: the body's momentum less the impulse of its weight since the balance began [N s], `turning` its
-        angular momentum less what a torque gave that is not of its wheels [N m s], shape (3,) both.
-        """
+    def _sample(self) -> None:
+        """What the ground holds, by how much the momenta of all are off, and the grains computed."""
         found = self.ground.energies()
         self.energy_names = tuple(found)
         off, turned, computed, taken = 0.0, 0.0, 0, dict[str, float]()
         if isinstance(self.ground, BedGround):
             computed, taken = self.ground.grain_steps, self.ground.work_taken()
+            moving = self.body.momentum - self._pull * self.body.time
             gained = self.ground.momentum() + moving - self._momentum
             off = float(np.linalg.norm(gained[list(self._free)]))
-            about = self.ground.angular_momentum() + turning - self._moment - self._angular_momentum
+            about = self.ground.angular_momentum() + self._turning - self._moment - self._angular_momentum
             turned = float(np.linalg.norm(about[list(self._turns)]))
         self.work_names = tuple(f"{name}_work" for name in taken)
-        self._samples.append([time, off, turned, computed, *found.values(), *taken.values()])
+        self._samples.append([self.body.time, off, turned, computed, *found.values(), *taken.values()])
 
     @property
     def samples(self) -> dict[str, Vector]:
@@ -175,17 +187,33 @@ class EnergyBalance:
             worst = max(worst, float(np.abs(balance[at] + gap).max()))
         return worst / self.energy_scale
 
-    def _balance_state(self) -> State:
+    @property
+    def balance_numbers(self) -> dict[str, tuple[float, str]]:
+        """Numbers of the balance that a result quotes, each the largest: name -> value and unit.
+
+        The residual of body and exchange, and of the exchange alone, over `energy_scale`; what the ground made, by how
+        much the momenta of all are off, and what a bed lost by the end.
+        """
+        gap, errors = self.columns["given"] - self.columns["taken"], self.samples
         return {
-            "books.samples": self._sample_table,
-            "books.energies": np.array(self.energy_names, dtype=str),
-            "books.works": np.array(self.work_names, dtype=str),
-            "books.momentum": np.concatenate([self._momentum, self._angular_momentum, self._moment]),
+            "coupling_residual": (float(np.abs(self.balance).max()) / self.energy_scale, "1"),
+            "exchange_residual": (float(np.abs(gap - gap[0]).max()) / self.energy_scale, "1"),
+            "dissipation_reversal": (self.dissipation_reversal, "1"),
+            "momentum_residual": (float(errors["momentum_error"].max()), "N s"),
+            "angular_momentum_residual": (float(errors["angular_momentum_error"].max()), "N m s"),
+            **{f"dissipated_{name}": (float(lost[-1]), "J") for name, lost in self.losses.items()},
         }
 
-    def _restore_balance(self, state: State) -> None:
-        self._samples = np.asarray(state["books.samples"]).tolist()
-        self.energy_names = tuple(str(name) for name in np.asarray(state["books.energies"]))
-        self.work_names = tuple(str(name) for name in np.asarray(state["books.works"]))
-        numbers = np.array(state["books.momentum"], dtype=float)
+    def _balance_state(self) -> State:
+        return {
+            "samples": self._sample_table,
+            "energies": np.array(self.energy_names, dtype=str),
+            "works": np.array(self.work_names, dtype=str),
+            "momentum": np.concatenate([self._momentum, self._angular_momentum, self._moment]),
+        }
+
+    def _restore_balance(self, own: State) -> None:
+        self._samples = np.asarray(own["samples"]).tolist()
+        self.energy_names, self.work_names = (tuple(map(str, np.asarray(own[name]))) for name in ("energies", "works"))
+        numbers = np.array(own["momentum"], dtype=float)
         self._momentum, self._angular_momentum, self._moment = (part.copy() for part in np.split(numbers, 3))

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dem.engine.values import Grains
-from hedgebed_renamed import renamed
+from hedgebed_renamed import renamed, renamed_keywords
 from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 from rigid.platform.spike import Spike
 from rigid.spatial.quaternions import multiply, to_matrix
 
-from .deprecated import renamed_keywords
+from .ground import part_of, prefixed
 from .members import HULL, Member, spike_member
 from .poses import Pose, Twist, Vector, chord_share, matrices
 
@@ -101,10 +101,8 @@ class BedGround:
         self._height = float(bed.surface)
         self.origin = np.array([*origin, self._height])  # Where the body's (0, 0, 0) is in the bed [m], shape (3,)
         self.surface, self.centre, self.clearance = 0.0, (0.0, 0.0), 0.0
-        self._slots = [
-            [index for index, member in enumerate(self.members) if member.slot == slot]
-            for slot in sorted({member.slot for member in self.members})
-        ]
+        slots = sorted({member.slot for member in self.members})
+        self._slots = [[k for k, member in enumerate(self.members) if member.slot == slot] for slot in slots]
         if isinstance(body, Spike):
             self.bodies = [self._put_in(body, at)]
         else:
@@ -120,8 +118,7 @@ class BedGround:
         self._turns = np.array([member.turn for member in self.members])
         self._mass = float(bed.grains().mass.sum())
         self.impulse = np.zeros(3)  # Of gravity and floor on the grains since the start [N s]
-        self.drag_time = math.inf
-        """Of a drag that calms the grains before time begins (`Bed.advance`) [s]; no energy balance has it."""
+        self.drag_time = math.inf  # Of a drag that calms the grains before time begins (`Bed.advance`) [s]
         self.grain_steps = 0  # Grains computed since the start, summed over the bed's steps (fewer where grains sleep)
 
     def _put_in(self, spike: Spike, at: tuple[float, float] | None) -> int:
@@ -139,11 +136,9 @@ class BedGround:
         start = (*self.centre, surface + self.clearance)
         placed = _placed.setdefault(bed, {})
         for other, body in placed.items():
-            if other != spike:
-                bed.move_body(body, position=(*self.centre, surface + AWAY), velocity=(0.0, 0.0, 0.0))
-        if spike in placed:
-            bed.move_body(placed[spike], position=start, velocity=(0.0, 0.0, 0.0))
-        else:
+            position = start if other == spike else (*self.centre, surface + AWAY)
+            bed.move_body(body, position=position, velocity=(0.0, 0.0, 0.0))
+        if spike not in placed:
             placed[spike] = bed.add_body(
                 self.members[0].shapes(), position=start, friction=spike.friction, restitution=spike.restitution
             )
@@ -169,8 +164,7 @@ class BedGround:
         found: Facts = {"material": material.name if material is not None else None}
         for name in ("size", "grain_count", "packing_fraction", "gravity", "surface", "seed", "time_step", "precision"):
             value = getattr(self.bed, name, None)
-            if value is not None:
-                found[name] = value if isinstance(value, str) else np.asarray(value).tolist()
+            found[name] = value if isinstance(value, str | None) else np.asarray(value).tolist()
         found |= {name: recipe.get(name) for name in ("grain", "spread", "packing", "young", "max_overlap", "code")}
         return {name: value for name, value in found.items() if value is not None}
 
@@ -188,10 +182,6 @@ class BedGround:
     def gravity(self) -> float:
         """Of the grains [m/s2]."""
         return math.hypot(*self.bed.gravity)
-
-    def set_gravity(self, gravity: float) -> None:
-        """See `dem.Bed.set_gravity`; those asleep wake for good."""
-        self.bed.set_gravity(gravity)
 
     @property
     def grain(self) -> float:
@@ -223,11 +213,9 @@ class BedGround:
         """A body is to start at `pose`. Raises ValueError where it overlaps grains, with the height that would do."""
         overlap, row = self._deepest_overlap(self.bed.grains(), pose)
         if overlap > 0:
-            what = "the hull" if row == HULL else f"spike {row}"
-            higher = self.clear_height(pose)
             raise ValueError(
-                f"the body, its centre at a height of {pose.position[2]:.6g} m, starts in overlap with a grain: {what} "
-                f"by {overlap:.3g} m; {higher:.6g} m higher would do"
+                f"the body, its centre at a height of {pose.position[2]:.6g} m, starts in overlap with a grain: "
+                f"{_called(row)} by {overlap:.3g} m; {self.clear_height(pose):.6g} m higher would do"
             )
 
     def _deepest_overlap(self, grains: Grains, pose: Pose, lift: float = 0.0) -> tuple[float, int]:
@@ -244,7 +232,7 @@ class BedGround:
     def step(
         self, position: ArrayLike, velocity: ArrayLike, dt: float, turn: Turned = None, spin: Turned = None
     ) -> Reaction:
-        """See `Ground.step`. Raises LeftTheBedError, ValueError where dt is no multiple of the bed's step, and what the
+        """Raises LeftTheBedError, ValueError where dt is no multiple of the bed's step, and what the
         bed raises."""
         pose, twist = Pose.of(position, turn), Twist.of(velocity, spin)
         steps = round(dt / self.time_step)
@@ -287,7 +275,7 @@ class BedGround:
         return Reaction(force_on, torque_on, tuple(contacts), sinkage)
 
     def _check_inside(self, member: Member, end: Vector, lowest: float) -> None:
-        what = "the hull" if member.row == HULL else f"spike {member.row}"
+        what = _called(member.row)
         sides = ((self.bounded, self._begin, "ahead of", "behind"), (self._bounded_across, 0.0, "left of", "right of"))
         for axis, (bounded, begin, beyond, before) in enumerate(sides):
             at, length = self.origin[axis] + float(end[axis]) - begin, float(self.bed.size[axis])
@@ -315,10 +303,6 @@ class BedGround:
 
         found = bed_energies(self.bed, bodies=self._surfaces())
         return {name: self.copies * value for name, value in found.items()}
-
-    def keep_book(self) -> None:
-        """See `Bed.track_contact_work`."""
-        self.bed.track_contact_work()
 
     def work_taken(self) -> dict[str, float]:
         """`Bed.contact_work`, `copies` times [J]."""
@@ -367,25 +351,21 @@ class BedGround:
         return distance, normal @ matrix.T, curvature
 
     def momentum(self) -> Vector:
-        """Momentum of the grains less the impulse of gravity and floor on them, `copies` times [N s], shape (3,).
+        """Of the grains less the impulse of gravity and floor on them, `copies` times [N s], shape (3,).
 
-        With the velocities half a step ahead of the positions, which the impulses so far have made: what changes it is
-        the body, to round-off.
+        With the velocities half a step ahead of the positions: what changes it is the body, to round-off.
         """
         return np.asarray(self.copies * (self.bed.momentum() - self.impulse))
 
     def angular_momentum(self) -> Vector:
-        """Of the grains about the body's (0, 0, 0), less what they got from elsewhere than the body, `copies` times.
+        """Of the grains about the body's (0, 0, 0), less what they got from elsewhere, `copies` times [N m s].
 
-        [N m s], shape (3,), as `momentum` has the velocities; since `keep_book`. What changes it is the body, to
-        round-off: weight, floor, what goes across the periodic sides and sleepers are separate
-        (`dem.engine.dissipation`).
+        Shape (3,), counted since `Bed.track_contact_work`. What changes it is the body, to round-off: weight, floor,
+        what crosses the periodic sides and sleepers are separate (`dem.engine.dissipation`).
         """
         found = self.bed.angular_momentum()
-        others = found["outside"]
-        if self.bodies[0] > 0:  # the floor is the first
-            others = others - found["first_body"]
-        about_bed = found["grains"] - others
+        floor = found["first_body"] if self.bodies[0] > 0 else 0.0  # the floor is the first body
+        about_bed = found["grains"] - (found["outside"] - floor)
         return np.asarray(self.copies * about_bed - np.cross(self.origin, self.momentum()))
 
     def checkpoint(self) -> Any:
@@ -400,7 +380,7 @@ class BedGround:
 
     def state(self) -> State:
         """The bed's, which contains the bodies and their contacts."""
-        return {f"bed.{key}": value for key, value in self.bed.state().items()} | {
+        return prefixed("bed", self.bed.state()) | {
             "impulse": self.impulse.copy(),
             "used": np.array(self._used),
             "grain_steps": np.array(self.grain_steps),
@@ -408,7 +388,7 @@ class BedGround:
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
-        self.bed.restore({key[4:]: np.asarray(value) for key, value in state.items() if key.startswith("bed.")})
+        self.bed.restore({key: np.asarray(value) for key, value in part_of(state, "bed").items()})
         self.impulse = np.array(state["impulse"], dtype=float)
         self._used = [int(index) for index in np.asarray(state["used"])]
         self.grain_steps = int(np.asarray(state["grain_steps"]))
@@ -439,6 +419,10 @@ def _clear_height(grains: Grains, spike: Spike, centre: tuple[float, float], siz
             if under.any():
                 heights.append(float(np.max(height[under] + grain_radius[under])) - float(level))
     return max(heights) + 0.01 * float(radius.mean())
+
+
+def _called(row: int) -> str:
+    return "the hull" if row == HULL else f"spike {row}"
 
 
 def _left(turn: Vector) -> Vector:

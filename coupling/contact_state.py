@@ -1,21 +1,16 @@
 """Pivot, slip or hop, read off the forces of grains by stated rules, so that it compares with the planar model's.
 
-Over a window of 5 ms the means of each row's normal force N, of its horizontal force F and of the horizontal velocity u
-of its lowest material point are taken. In the plane of motion F and u have one component and a row is one of spikes
-side by side; in space they have two and a row is a single spike. A row
+Of each row the normal force N, the horizontal force F and the horizontal velocity u of its lowest material point are
+averaged over 5 ms: F and u have one component in the plane, where a row is one of spikes side by side, two in space,
+where it is a single spike. A row *touches* while N and F together are above 1 % of the weight. It *slides* while |F| is
+at least mu_d N, F is against u (F . u < 0) and |u| is above 2 mm/s; what touches and does not slide sticks.
 
-- *touches* while the force on it, N and F together, is above 1 % of the weight on the surface: sand pushes a spike that
-  is in it sideways where nothing bears it any more;
-- *slides* while |F| is at least mu_d N, F is against u (F . u < 0) and |u| is above 2 mm/s; what touches and does not
-  slide sticks. mu_d is the surface's, as the spring-damper has it.
-
-Then as in the planar model: hop (none touches), slip (all that touch slide), pivot (one sticks), stand (more do). A row
-of spikes side by side is a line about which the platform can turn; so in space it is a pivot while those that stick
-lie in one line, and it stands on three that do not. A grain's knocks are shorter than the window and a torque's
-changes longer. Changes come late by half the window.
+Then as in the planar model: hop (none touches), slip (all that touch slide), pivot (one sticks), stand (more do). In
+space it is a pivot while those that stick lie in one line. docs/coupling.md says why. Changes come late by 2.5 ms.
 """
 
 from collections.abc import Iterable
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +26,7 @@ __all__ = [
 WINDOW = 5e-3  # Over which forces and speeds are averaged [s]
 TOUCH_SHARE = 0.01  # Force on a row that touches, over the weight [1]
 CREEP = 2e-3  # Horizontal speed up to which a row counts as held [m/s]
-LINE = 0.05
-"""Spikes lie in a line where none is farther off than this, over the largest distance of any from the centre [1]."""
+LINE = 0.05  # Largest distance of spikes from their line, over that of any from the centre [1]
 
 Array = NDArray[np.float64]
 
@@ -62,13 +56,10 @@ def in_a_line(places: Array, within: float) -> bool:
 
 
 def feet_of(reaction: Reaction | None, centre: Vector, twist: Twist, count: int, *, hull: bool = False) -> Array:
-    """What each row feels: N [N], F along x and y [N], u along x and y [m/s], depth [m]; shape [6, row].
+    """What each of `count` rows feels: N [N], F along x and y [N], u along x and y [m/s], depth [m]; shape [6, row].
 
-    Parameters
-    ----------
-    reaction : of the step before; None before the first.
-    centre, twist : where the body's origin was in the step's middle [m], and how it moves at its end.
-    count : of the rows; `hull`: whether one more, the last, is what is no spike.
+    `reaction` is of the step before, None before the first. `centre` is where the body's origin was in the step's
+    middle [m], `twist` how it moves at its end. `hull`: whether one more row, the last, is what is no spike.
     """
     feet = np.zeros((6, count + hull))
     if reaction is None:
@@ -92,11 +83,9 @@ def changes_of(
     times: Iterable[float], states: Iterable[str], angles: Iterable[float]
 ) -> tuple[tuple[float, str, float], ...]:
     """(time [s], state entered, angle [rad]) where the state changes; the first is the one it begins with."""
-    found: list[tuple[float, str, float]] = []
-    for time, state, angle in zip(times, states, angles, strict=True):
-        if not found or state != found[-1][1]:
-            found.append((float(time), state, float(angle)))
-    return tuple(found)
+    rows = zip(times, states, angles, strict=True)
+    firsts = (next(group) for _, group in groupby(rows, key=lambda row: row[1]))
+    return tuple((float(time), state, float(angle)) for time, state, angle in firsts)
 
 
 class ContactReader:

@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike
 
 from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 
-__all__ = ["Contact", "Described", "Ground", "Reaction", "State"]
+__all__ = ["Contact", "Described", "Ground", "Reaction", "State", "part_of", "prefixed"]
+
+_BEFORE = {"balance": "books", "ground": "footing"}  # Names in checkpoints of earlier versions
 
 
 @runtime_checkable
@@ -86,3 +88,14 @@ class Described(Protocol):
 
     def describe(self) -> Facts:
         """What it is, in plain numbers."""
+
+
+def prefixed(name: str, state: State) -> State:
+    """A part of a whole state: its keys after ``name.``."""
+    return {f"{name}.{key}": value for key, value in state.items()}
+
+
+def part_of(state: State, name: str) -> State:
+    """What `prefixed` was given, out of a whole state; of an earlier version, too."""
+    prefixes = tuple(f"{each}." for each in (name, _BEFORE.get(name, name)))
+    return {key.partition(".")[2]: value for key, value in state.items() if key.startswith(prefixes)}

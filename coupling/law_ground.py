@@ -12,6 +12,7 @@ from rigid.ground.reaction import Contact, Reaction, State, Turned
 from rigid.model.trial import Trial
 from rigid.spatial.spatial import SpatialTrial
 
+from .ground import part_of, prefixed
 from .poses import Pose, Twist, Vector, chord_share, matrices
 
 __all__ = ["LawGround", "row_tips"]
@@ -73,7 +74,6 @@ class LawGround:
 
     @property
     def name(self) -> str:
-        """The law's."""
         return self.grounds[0].name
 
     @property
@@ -125,24 +125,19 @@ class LawGround:
         return {"springs": float(sum(held))}
 
     def checkpoint(self) -> State:
-        """See `Ground.checkpoint`."""
         return self.state()
 
     def rollback(self, kept: State) -> None:
-        """See `Ground.rollback`."""
         self.restore(kept)
 
     def state(self) -> State:
         """Depths of the tips, and what the laws remember."""
         kept: State = {"depths": self._depths.copy()}
         for row, ground in enumerate(self.grounds):
-            kept |= {f"{row}.{key}": value for key, value in ground.state().items()}
+            kept |= prefixed(str(row), ground.state())
         return kept
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
         self._depths = np.array(state["depths"], dtype=float)
         for row, ground in enumerate(self.grounds):
-            prefix = f"{row}."
-            own = {key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)}
-            ground.restore(own)
+            ground.restore(part_of(state, str(row)))

@@ -1,16 +1,11 @@
 """Gravity that falls while a platform is being placed on grains: from the one it was set down under to the run's.
 
-Grains without cohesion are the same problem under any gravity g, lengths in grains d, times in sqrt(d / g) and
-moduli in rho g d (tests/coupling/test_lowered_gravity.py has it to the bit). So what is rained and set down under a
-larger g lies as it would under the small one, and is there sooner by the root of their ratio. Only springs remember:
-overlaps go with (g / E)^(2/3), some micrometres here. They are let out while g falls by a factor of e every `EFOLD`
-sqrt(d / g1), g1 the first one, from when the grains are calm. The bed rises by as little as that, but what it throws up
-meanwhile would be long in coming down again (at 1e-6 g: minutes), so a drag of time `DRAG` sqrt(d / g1) holds it.
-What the fall leaves behind is lateral stress, that of a bed which was loaded more before (overconsolidated).
-
-At rest the drag ends, and at rest without it the placement ends: by what is left of their speeds and by the weight that
-is missing, neither platform nor grains would go further than `NEAR` d in the shorter of sqrt(d / g) and the time that
-the run lasts.
+Grains without cohesion are the same problem under any gravity g, lengths in grains d, times in sqrt(d / g) and moduli
+in rho g d: a bed that was set down under a larger g1 lies as it would under the small one, and is there sooner. Only
+overlaps remember, as (g / E)^(2/3). They are let out while g falls by a factor of e every `EFOLD` sqrt(d / g1), from
+when the grains are calm, under a drag of time `DRAG` sqrt(d / g1). At rest the drag ends, and at rest without it the
+placement ends: by their speeds and the weight that is missing, neither platform nor grains would go further than `NEAR`
+d in the shorter of sqrt(d / g) and the run's duration. docs/coupling.md says more.
 """
 
 import math
@@ -69,7 +64,7 @@ class LoweredGravity:
 
     @property
     def calm(self) -> bool:
-        """Whether the grains, under the first gravity, would go less than NEAR d in sqrt(d / g1): what moves flies."""
+        """Whether the grains, under the first gravity, would go less than NEAR d in sqrt(d / g1)."""
         return self.ground.grain_speed() * math.sqrt(self.grain / self.first) < NEAR * self.grain
 
     def begin(self, time: float) -> None:
@@ -89,12 +84,12 @@ class LoweredGravity:
         if due <= self.done:
             return False
         self.done = due
-        self.ground.set_gravity(self.now)
+        self.ground.bed.set_gravity(self.now)
         return True
 
-    def far(self, speeds: Sequence[float], lacking: Sequence[float]) -> float:
-        """How far what has these speeds [m/s] and lacks these accelerations [m/s2] would go, over NEAR d [1]."""
-        way = max(self.sees * max(speeds), 0.5 * self.sees**2 * max(lacking))
+    def far(self, speeds: Sequence[float], missing: Sequence[float]) -> float:
+        """How far what has these speeds [m/s] and misses these accelerations [m/s2] would go, over NEAR d [1]."""
+        way = max(self.sees * max(speeds), 0.5 * self.sees**2 * max(missing))
         return float(way / (NEAR * self.grain))
 
     def numbers(self) -> np.ndarray:

@@ -1,24 +1,17 @@
 """The master: steps a body and its ground together, and records the work that passes between them.
 
 Over one macro step H the body's twist is held and the ground answers with its mean wrench. The twist is that of the
-step's middle, guessed with a wrench that is extrapolated from the steps before (`extrapolation` 0: the last one, 1: on
-the straight line through the last two, 2: on the parabola through three). With `iterations` above 1 the step is
-repeated, from the ground's checkpoint, until the wrench that comes out is the one that went in, within `tolerance` of
-the largest force met. Handing back what came out contracts by K H^2 / 4m, K the contacts' stiffness: no better than the
-explicit step, which is stable up to K H^2 / m = 4, and of no use to a light body. So what goes in is what the
-differences between the times before, or in the step before, say would come out unchanged (interface quasi-Newton with
-an inverse Jacobian from least squares; Degroote et al. 2009, Comput. Struct. 87:793). What is found is the implicit
-midpoint rule, stable at any K H^2 / m.
+step's middle, under a wrench extrapolated from the steps before. With `iterations` above 1 the step is repeated from
+the ground's checkpoint until the wrench that comes out is the one that went in: the implicit midpoint rule, stable at
+any K H^2 / m, K the contacts' stiffness; the explicit step is stable up to K H^2 / m = 4. What goes in is found by
+interface quasi-Newton with an inverse Jacobian from least squares (Degroote et al. 2009, Comput. Struct. 87:793).
 
-Either side may be sub-cycled: the ground takes `substeps` of its own steps in H, the body `body_steps` of its own. The
-wrench is exchanged once all the same. With the guess the body goes through its steps H / body_steps, the ground under
-each with the twist held over it; then the body goes through them once more, from where it was and along the same
-twists, with what the ground answered to each. So what the body does by itself within H (it nutates, its wheels run
-up) is followed at H / body_steps; the bound on K H^2 / m stays.
+Either side may take several steps within H: the ground `substeps`, the body `body_steps`. The wrench is exchanged once
+all the same: the body goes through its steps with the guess, then again along the same twists with what was answered.
 
-The energy balance is in docs/coupling.md. The ground takes its wrench times the twist it saw, the body gives the wrench
-times the mean of its rates before and after; the difference is the error of the exchange, of second order in H
-(Sadjina et al. 2016, Eng. Comput. 33:607, call it the residual of a power bond).
+The difference between the ground's work (its wrench times the held twist) and the body's (times the mean of its rates
+before and after) is the error of the exchange, of second order in H (Sadjina et al. 2016, Eng. Comput. 33:607: the
+residual of a power bond). docs/coupling.md has the equations and the energy balance.
 """
 
 from collections import deque
@@ -27,17 +20,16 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from hedgebed_renamed import renamed
+from hedgebed_renamed import renamed, renamed_keywords
 from rigid.ground.reaction import Contact, Reaction, State
 
-from .deprecated import renamed_keywords
-from .ground import Ground
+from .ground import Ground, part_of, prefixed
 from .poses import Pose, Twist, Vector, Wrench
 
 __all__ = ["Body", "Exchange", "Master"]
 
 _WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))  # Of the last wrenches, the newest first, by order of extrapolation
-_MOST_PAIRS = 6  # Repeats of a step that the next one is told from: as many as a wrench has components
+_MOST_PAIRS = 6  # Repeats of a step that the next one is computed from: as many as a wrench has components
 
 
 @runtime_checkable
@@ -75,8 +67,7 @@ class Body(Protocol):
 class Exchange:
     """What passed between body and ground since the energy balance began [J]."""
 
-    given: float = 0.0
-    """Work of the body on the ground, as the body sees it: by the mean of its rates before and after each step."""
+    given: float = 0.0  # Work on the ground as the body sees it: by the mean of its rates before and after a step
     taken: float = 0.0  # The same as the ground sees it: by the twist that was held
     worst_guess: float = 0.0  # Largest |force guessed - force found| [N]
     largest_force: float = 0.0  # Largest force of one step [N]
@@ -141,8 +132,7 @@ class Master:
         self.count = 0  # Macro steps done
         self._wrenches: deque[Wrench] = deque([first_guess] if first_guess is not None else [], maxlen=3)
         self._held: Twist | None = None
-        self._learnt: list[tuple[Vector, Vector]] = []
-        """How the wrench that came out changed with the one that went in, when a step was last repeated."""
+        self._changes: list[tuple[Vector, Vector]] = []  # Of the wrench in and out, when a step was last repeated
         self.exchange = Exchange()
         self.last: Reaction | None = None  # The ground's answer in the last step
         self.wrench = Wrench.none()  # The whole wrench of the body's last step, friction included
@@ -162,9 +152,8 @@ class Master:
         if not self._wrenches:
             return Wrench.none()
         weights = _WEIGHTS[min(self.extrapolation, len(self._wrenches) - 1)]
-        force = sum(w * past.force for w, past in zip(weights, self._wrenches, strict=False))
-        torque = sum(w * past.torque for w, past in zip(weights, self._wrenches, strict=False))
-        return Wrench(np.asarray(force), np.asarray(torque))
+        rows = (w * _row(past) for w, past in zip(weights, self._wrenches, strict=False))
+        return _unpack(np.asarray(sum(rows)))
 
     def step(self) -> Reaction:
         """One macro step; the ground's answer, its mean over the step."""
@@ -182,16 +171,16 @@ class Master:
             pieces = self._answered(trial, before)
             self._take(pieces, trial)
             wrench = _mean_wrench([piece.wrench for piece in pieces])
-            passed.largest_force = max(passed.largest_force, _size(wrench))
+            passed.largest_force = max(passed.largest_force, float(np.linalg.norm(wrench.force)))
             if _apart(wrench, trial) <= self.tolerance * passed.largest_force:
                 break
             if self.iterations > 1:
                 tried.append((_row(trial), _row(wrench)))
-                trial = _unpack(_unchanged(tried[-1], _differences(tried) or self._learnt))
+                trial = _unpack(_unchanged(tried[-1], _differences(tried) or self._changes))
         else:
             passed.unsettled += self.iterations > 1
         if len(tried) > 1:
-            self._learnt = _differences(tried)
+            self._changes = _differences(tried)
         for piece in pieces:
             self._record(piece)
         passed.worst_guess = max(passed.worst_guess, _apart(wrench, expected))
@@ -253,30 +242,31 @@ class Master:
         past = [_row(wrench) for wrench in self._wrenches]
         held = self._held
         own: State = {
-            "master.count": np.array(self.count),
-            "master.wrenches": np.array(past).reshape(-1, 6),
-            "master.wrench": _row(self.wrench),
-            "master.held": np.concatenate([held.velocity, held.spin]) if held is not None else np.zeros(0),
-            "master.books": np.array(astuple(self.exchange), dtype=float),
-            "master.learnt": np.array(self._learnt, dtype=float).reshape(-1, 2, 6),
+            "count": np.array(self.count),
+            "wrenches": np.array(past).reshape(-1, 6),
+            "wrench": _row(self.wrench),
+            "held": np.concatenate([held.velocity, held.spin]) if held is not None else np.zeros(0),
+            "exchange": np.array(astuple(self.exchange), dtype=float),
+            "learnt": np.array(self._changes, dtype=float).reshape(-1, 2, 6),
         }
-        own |= {f"body.{key}": value for key, value in self.body.state().items()}
-        return own | {f"footing.{key}": value for key, value in self.ground.state().items()}
+        return prefixed("master", own) | prefixed("body", self.body.state()) | prefixed("ground", self.ground.state())
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
-        self.count = int(state["master.count"])
+        own = part_of(state, "master")
+        self.count = int(own["count"])
         self._wrenches.clear()
-        self._wrenches.extend(_unpack(row) for row in np.asarray(state["master.wrenches"], dtype=float))
-        self.wrench = _unpack(np.asarray(state["master.wrench"], dtype=float))
-        held = np.asarray(state["master.held"], dtype=float)
+        self._wrenches.extend(_unpack(row) for row in np.asarray(own["wrenches"], dtype=float))
+        self.wrench = _unpack(np.asarray(own["wrench"], dtype=float))
+        held = np.asarray(own["held"], dtype=float)
         self._held = Twist(held[:3].copy(), held[3:].copy()) if held.size else None
-        learnt = np.asarray(state.get("master.learnt", ()), dtype=float).reshape(-1, 2, 6)
-        self._learnt = [(into.copy(), out.copy()) for into, out in learnt]
-        given, taken, worst, largest, *counts = (float(number) for number in state["master.books"])
+        learnt = np.asarray(own.get("learnt", ()), dtype=float).reshape(-1, 2, 6)
+        self._changes = [(into.copy(), out.copy()) for into, out in learnt]
+        exchange = own["exchange"] if "exchange" in own else own["books"]  # as an earlier version has it
+        given, taken, worst, largest, *counts = (float(number) for number in exchange)
         self.exchange = Exchange(given, taken, worst, largest, *(int(count) for count in counts))
-        for name, part in (("body.", self.body), ("footing.", self.ground)):
-            part.restore({key[len(name) :]: value for key, value in state.items() if key.startswith(name)})
+        self.body.restore(part_of(state, "body"))
+        self.ground.restore(part_of(state, "ground"))
 
 
 def _differences(tried: list[tuple[Vector, Vector]]) -> list[tuple[Vector, Vector]]:
@@ -333,10 +323,6 @@ def _joined(reactions: list[Reaction]) -> Reaction:
 
 def _mean(one: Twist, other: Twist) -> Twist:
     return Twist(0.5 * (one.velocity + other.velocity), 0.5 * (one.spin + other.spin))
-
-
-def _size(wrench: Wrench) -> float:
-    return float(np.linalg.norm(wrench.force))
 
 
 def _apart(one: Wrench, other: Wrench) -> float:

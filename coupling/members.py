@@ -1,8 +1,7 @@
 """The pieces of a body that grains can touch: balls and rods of a platform, the sections of a spike.
 
-A row of spikes of a planar platform is one spike in the bed, `copies` of them side by side in the platform: the bed is
-periodic across (y), so it is a slice of the sand as wide as a spike has for itself. Rows that face each other share one
-body of the bed (`slot`), since only the lower one can be near the sand.
+A row of spikes of a planar platform is one spike in the bed, which is periodic across (y) and as wide as a spike has
+for itself. Rows that face each other share one body of the bed (`slot`), since only the lower can be near the sand.
 """
 
 import math

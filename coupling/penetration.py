@@ -1,19 +1,15 @@
 """A spike that goes straight down into a ground: driven, dropped or set down.
 
 One macro step H is a whole number of the ground's own steps. Over it the spike moves at a constant velocity and the
-ground answers with its mean force F, so what passes between them is the exact impulse F H and the exact work
-F (velocity) H, whatever the ground does inside the step. A free spike of mass m under the load W is stepped
+ground answers with its mean force F, so that F H and F (velocity) H are exact. A free spike of mass m under the load W:
 
     u     = v + (W - F_before) H / (2 m)       the velocity held during the step, a guess at its middle
     z'    = z + u H
     v'    = v + (W - F) H / m                  F: the mean force of the step just done
 
-which is explicit and staggered (the ground moves first), of second order in H, and exact in free fall. Time is 0 where
-the tip meets the undisturbed surface, depth 0; before that the spike is carried at its speed (phase "free"), from just
-clear of the grains that stick out.
-
-Each run is a stepper: `advance` once or `run` to the end, `state` and `restore` at any time between macro steps, the
-ground's memory included, so that a run taken up again is bitwise the same.
+which is of second order in H, and exact in free fall. Time is 0 where the tip meets the undisturbed surface, depth 0;
+before that the spike is carried at its speed (phase "free"), from just clear of the grains that stick out. `state` and
+`restore` work between any two macro steps: a run goes on to the same bits.
 """
 
 import math
@@ -27,14 +23,14 @@ from rigid.ground.reaction import Facts, State
 from rigid.platform.spike import Spike
 
 from .bed_ground import BedGround, GrainBed
-from .ground import Described, Ground
+from .ground import Described, Ground, part_of, prefixed
+from .planar_body import PLACEMENT_TIME
 from .stepper import Reporting, Stepper
 from .trajectory import PHASES, Penetration
 
 __all__ = ["Drive", "Drop", "Run", "SetDown", "drive", "drop", "overdamped_below", "set_down"]
 
 SUBSTEPS = 10  # Steps of the ground in a macro step, by default
-PLACEMENT_TIME = 0.002  # Mass over drag of a spike that is set down [s]
 AT_REST = 0.003  # What of its load may still be missing at rest, and the mean speed there over the lowering speed [1]
 FREE, IN, REST, OUT = range(4)
 
@@ -43,8 +39,7 @@ class Run(Stepper):
     """A spike that goes into `ground` (or a bed): what all three runs share, clock, rows and saved state."""
 
     kind = ""
-    lets_go_at_touch = False
-    """Whether the prescribed approach ends where the ground is first felt, if that is above its surface."""
+    lets_go_at_touch = False  # Whether the approach ends where the ground is first felt, above its surface
 
     def __init__(
         self,
@@ -162,27 +157,27 @@ class Run(Stepper):
     def state(self) -> State:
         """All that the rest of the run depends on: a flat dict of numpy arrays, the ground's under "ground.*"."""
         own = {
-            "run.kind": np.array(self.kind),
-            "run.numbers": np.array([self.depth, self.velocity, *self._memory()], dtype=float),
-            "run.counts": np.array([self.count, self._approach, self._frames], dtype=np.int64),
-            "run.ended": np.array(self.ended),
-            "run.rows": np.array(self._rows, dtype=float).reshape(-1, 4),
-            "run.phases": np.array(self._phases, dtype=np.int8),
+            "kind": np.array(self.kind),
+            "numbers": np.array([self.depth, self.velocity, *self._memory()], dtype=float),
+            "counts": np.array([self.count, self._approach, self._frames], dtype=np.int64),
+            "ended": np.array(self.ended),
+            "rows": np.array(self._rows, dtype=float).reshape(-1, 4),
+            "phases": np.array(self._phases, dtype=np.int8),
         }
-        return own | {f"ground.{key}": value for key, value in self.ground.state().items()}
+        return prefixed("run", own) | prefixed("ground", self.ground.state())
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave. Raises ValueError for the state of another kind of run."""
-        if str(state["run.kind"]) != self.kind:
-            raise ValueError(f"the state is of a {state['run.kind']} run, this one is {self.kind}")
-        self.depth, self.velocity, *memory = (float(number) for number in state["run.numbers"])
-        self.count, self._approach, self._frames = (int(number) for number in state["run.counts"])
+        own = part_of(state, "run")
+        if str(own["kind"]) != self.kind:
+            raise ValueError(f"the state is of a {own['kind']} run, this one is {self.kind}")
+        self.depth, self.velocity, *memory = (float(number) for number in own["numbers"])
+        self.count, self._approach, self._frames = (int(number) for number in own["counts"])
         self._recall(memory)
-        self.ended = str(state["run.ended"])
-        self._rows = [tuple(row) for row in np.asarray(state["run.rows"]).tolist()]
-        self._phases = [int(code) for code in state["run.phases"]]
-        prefix = "ground."
-        self.ground.restore({key[len(prefix) :]: value for key, value in state.items() if key.startswith(prefix)})
+        self.ended = str(own["ended"])
+        self._rows = [tuple(row) for row in np.asarray(own["rows"]).tolist()]
+        self._phases = [int(code) for code in own["phases"]]
+        self.ground.restore(part_of(state, "ground"))
 
     def _held_velocity(self) -> float:
         """Velocity of the step to come [m/s]."""
@@ -410,8 +405,7 @@ def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any
     (10), start_depth [m, negative] (just clear of the grains), and `on_step`, `on_frame`, `frame_interval`, `progress`
     of `Stepper.follow`. Raises ValueError, naming key and value, for what cannot be; and what the ground raises.
     """
-    reporting = _reporting(options)
-    return Drive(spike, into, speed=speed, depth=depth, **options).run(**reporting)
+    return _done(Drive, spike, into, speed=speed, depth=depth, **options)
 
 
 def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetration:
@@ -420,8 +414,7 @@ def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetratio
     Options: mass [kg] (the spike's), load [N] (mass * gravity), gravity [m/s2] (9.80665), rest_time [s],
     rest_tolerance [1], max_depth [m], max_time [s], and those of `drive` that are not about the way out.
     """
-    reporting = _reporting(options)
-    return Drop(spike, into, speed=speed, **options).run(**reporting)
+    return _done(Drop, spike, into, speed=speed, **options)
 
 
 def set_down(spike: Spike, *, onto: Any, load: float, **options: Any) -> Penetration:
@@ -429,10 +422,9 @@ def set_down(spike: Spike, *, onto: Any, load: float, **options: Any) -> Penetra
 
     Options: lowering_speed [m/s] (0.03), mass [kg] that counts during placement, and those of `drop`.
     """
-    reporting = _reporting(options)
-    return SetDown(spike, onto, load=load, **options).run(**reporting)
+    return _done(SetDown, spike, onto, load=load, **options)
 
 
-def _reporting(options: dict[str, Any]) -> Reporting:
-    found = {key: options.pop(key) for key in Reporting.__annotations__ if key in options}
-    return Reporting(**found)  # type: ignore[typeddict-item]
+def _done(kind: type[Run], spike: Spike, ground: Any, **options: Any) -> Penetration:
+    reporting = {key: options.pop(key) for key in Reporting.__annotations__ if key in options}
+    return kind(spike, ground, **options).run(**reporting)

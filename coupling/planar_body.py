@@ -9,10 +9,9 @@ A macro step of length H from the velocity v, s the ground's lag (0 for a law, i
     q' = q + H u
     v' = v + H M^-1 (G + F)                      F: the mean force of the step just done
 
-v belongs to a time s / 2 later than q, as in the grains' leapfrog; with H = s it is that leapfrog. Where the ground
-gives Coulomb bounds, F holds the friction that these leave open: sticking rows share the horizontal force in proportion
-to their loads, and their mean slip is zero at the step's end; beyond mu_s N they slide with mu_d N until the slip
-passes through zero. Events of friction are found to the step, so they are of first order in H.
+v belongs to a time s / 2 later than q. Where the ground gives Coulomb bounds, sticking rows share the horizontal force
+in proportion to their loads, and their mean slip is zero at the step's end; beyond mu_s N they slide with mu_d N until
+the slip passes through zero. Events of friction are found to the step, so they are of first order in H.
 """
 
 import math
@@ -20,25 +19,57 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from hedgebed_renamed import renamed
 from rigid.ground.reaction import Contact, Reaction, State
 from rigid.model.trial import Trial
 
-from .deprecated import PlacedBody
 from .poses import Pose, Twist, Vector, Wrench
 
 __all__ = ["PLACEMENT_STEP", "PLACEMENT_TIME", "PlanarBody", "placement_time"]
 
-PLACEMENT_TIME = 0.002  # Mass over drag of a body during placement [s], as in `coupling.SetDown`
-PLACEMENT_STEP = 4e-4
-"""Macro step up to which that mass is stable [s]; beyond, mass goes with the square of the step, as K H^2 / m does."""
+PLACEMENT_TIME = 0.002  # Mass over drag of a body during placement [s]
+PLACEMENT_STEP = 4e-4  # Macro step up to which that mass is stable [s]; beyond, mass goes with its square
 _OPEN = 9  # Mode of a row that does not touch
 
 
+class PlacedBody:
+    """What bodies share: the old names of their placement, and the checks and states of their steps."""
+
+    take_in_hand, let_go = renamed("take_in_hand", "begin_placement"), renamed("let_go", "release")
+    hold_more_firmly = renamed("hold_more_firmly", "slow_placement")
+    held_by_hand = renamed("held_by_hand", "in_placement")
+    _next_touching = False
+    _ARRAYS: tuple[str, ...]  # What a state has as numbers, in its order: arrays,
+    _NUMBERS: tuple[str, ...]  # then numbers and flags
+
+    @staticmethod
+    def _spare(dt: float, lag: float) -> float:
+        """Half of what of a step `dt` is beyond the ground's lag [s]. Raises ValueError for a shorter step."""
+        if lag > dt * (1 + 1e-9):
+            raise ValueError(f"dt = {dt} s is shorter than the footing's own step of {lag} s")
+        return 0.5 * max(dt - lag, 0.0)
+
+    def _numbers(self) -> Vector:
+        numbers = [float(getattr(self, name)) for name in self._NUMBERS]
+        return np.concatenate([*(getattr(self, name) for name in self._ARRAYS), numbers])
+
+    def _restore_numbers(self, numbers: Vector) -> None:
+        ends = np.cumsum([getattr(self, name).size for name in self._ARRAYS])
+        *arrays, rest = np.split(np.asarray(numbers, dtype=float), ends)
+        for name, array in zip(self._ARRAYS, arrays, strict=True):
+            setattr(self, name, array.copy())
+        for name, number in zip(self._NUMBERS, rest, strict=True):
+            setattr(self, name, bool(number) if isinstance(getattr(self, name), bool) else float(number))
+
+
 class PlanarBody(PlacedBody):
-    """The platform of `trial`, at rest at (`x`, `z`) [m] and `theta` [rad].
+    """The platform of `trial`, at rest at (`x`, `z`) [m] and `theta` [rad]; a `coupling.Body`.
 
     Raises ValueError for a trial with effects: the master has the base model only.
     """
+
+    _ARRAYS = ("place", "rates", "acceleration", "inertia", "_drag")
+    _NUMBERS = ("wheel_speed", "time", "torque_work", "touching", "in_placement", "_at_limit")
 
     def __init__(self, trial: Trial, *, z: float, x: float = 0.0, theta: float = 0.0) -> None:
         if trial.effects:
@@ -51,8 +82,7 @@ class PlanarBody(PlacedBody):
         self.time = 0.0
         self.torque_work = 0.0  # Work of the torque since its release [J]
         self.max_wheel_speed = math.inf
-        self.wheel_at_limit: float | None = None
-        """When a motor's wheel came to `max_wheel_speed` [s], counted as `time`; None if it has not."""
+        self._at_limit = math.nan
         self.modes: NDArray[np.int8] = np.full(trial.spike_count, _OPEN, dtype=np.int8)
         """Of each row under a Coulomb bound: 0 sticks, +1 and -1 slides towards +x and -x, 9 does not touch."""
         self.touching = False  # Whether anything touched in the last step, which is when the torque acts
@@ -63,6 +93,11 @@ class PlanarBody(PlacedBody):
         self.inertia = np.array([trial.mass, trial.mass + trial.counterweight, trial.inertia])
         self._drag = np.zeros(3)
         self.in_placement = False
+
+    @property
+    def wheel_at_limit(self) -> float | None:
+        """When a motor's wheel came to `max_wheel_speed` [s], counted as `time`; None if it has not."""
+        return None if math.isnan(self._at_limit) else self._at_limit
 
     def begin_placement(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
         """It is lowered from here on: c = W / lowering_speed [m/s] resists, and its mass is 2 ms c.
@@ -102,17 +137,13 @@ class PlanarBody(PlacedBody):
         return Pose(np.array([x, 0.0, z]), np.array([math.cos(0.5 * theta), 0.0, math.sin(0.5 * theta), 0.0]))
 
     def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
-        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
-        if lag > dt * (1 + 1e-9):
-            raise ValueError(f"dt = {dt} s is shorter than the footing's own step of {lag} s")
-        half = 0.5 * max(dt - lag, 0.0)
+        half = self._spare(dt, lag)
         self._torque = self._mean_torque(dt)
         push = self._applied() + _generalised(guess)
         held = (self.inertia * self.rates + half * push) / (self.inertia + half * self._drag)
         return _twist(held)
 
     def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
-        """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
         bounded = {row: contact for row, contact in reaction.by_member.items() if contact.tangential_force is None}
         self._next_modes = np.full(len(self.modes), _OPEN, dtype=np.int8)
         self._next_touching = bool(reaction.contacts)
@@ -122,7 +153,6 @@ class PlanarBody(PlacedBody):
         return Wrench(reaction.force + force[0], reaction.torque + force[1])
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
-        """Take the step: along `twist`, with the impulse of `wrench`."""
         held = np.array([twist.velocity[0], twist.velocity[2], twist.spin[1]])
         push = self._applied() + _generalised(wrench)
         self.place = self.place + dt * held
@@ -130,7 +160,7 @@ class PlanarBody(PlacedBody):
         self.acceleration = push / self.inertia
         self.torque_work += self._torque * held[2] * dt
         if self.wheel_at_limit is None and self._until_limit <= dt:
-            self.wheel_at_limit = self.time + max(0.0, self._until_limit)
+            self._at_limit = self.time + max(0.0, self._until_limit)
         sign = 1.0 if self.trial.actuator == "motor" else -1.0
         self.wheel_speed += sign * self._torque * dt / self.trial.wheel_inertia
         self.modes, self.touching = self._next_modes, self._next_touching
@@ -175,33 +205,15 @@ class PlanarBody(PlacedBody):
         return self.trial.weight * float(self.place[1])
 
     def state(self) -> State:
-        """All that its next steps depend on."""
-        return {
-            "numbers": np.concatenate(
-                [
-                    self.place, self.rates, self.acceleration, self.inertia, self._drag,
-                    [self.wheel_speed, self.time, self.torque_work, self.touching, self.in_placement],
-                    [math.nan if self.wheel_at_limit is None else self.wheel_at_limit],
-                ]
-            ),
-            "modes": self.modes.copy(),
-        }  # fmt: skip
+        return {"numbers": self._numbers(), "modes": self.modes.copy()}
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
-        numbers = np.asarray(state["numbers"], dtype=float)
-        parts = numbers[:15].reshape(5, 3)
-        self.place, self.rates, self.acceleration, self.inertia, self._drag = (part.copy() for part in parts)
-        self.wheel_speed, self.time, self.torque_work = (float(number) for number in numbers[15:18])
-        self.touching, self.in_placement = bool(numbers[18]), bool(numbers[19])
-        self.wheel_at_limit = None if math.isnan(numbers[20]) else float(numbers[20])
+        self._restore_numbers(state["numbers"])
         self.modes = np.array(state["modes"], dtype=np.int8)
 
     acceleration: Vector = np.zeros(3)  # Of x, z and theta, the mean of the last step
     _torque = 0.0
-    _until_limit = math.inf
-    """From the start of this step until a motor's wheel is at its limit, if the torque lasts [s]."""
-    _next_touching = False
+    _until_limit = math.inf  # From the start of this step until a motor's wheel is at its limit [s]
     _next_modes: NDArray[np.int8] = np.zeros(0, dtype=np.int8)
 
     def _applied(self) -> Vector:

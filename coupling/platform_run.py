@@ -16,7 +16,7 @@ from rigid.planar.trajectory import STATES
 from .balance import EnergyBalance
 from .bed_ground import BedGround
 from .contact_state import ContactReader, feet_of
-from .ground import Ground
+from .ground import Ground, part_of, prefixed
 from .law_ground import LawGround
 from .lowered_gravity import pace_under
 from .master import Master
@@ -26,13 +26,10 @@ from .stepper import Stepper
 __all__ = ["AT_REST", "REST_TIME", "PlatformRun"]
 
 AT_REST = 0.005  # What of its weight may still be missing at rest, and the mean speed there over the lowering speed [1]
-SWINGS = math.sqrt(AT_REST)
-"""Root of the mean square of the same in the last quarter of the time, at most [1]: what comes to rest from one side
-has less once its mean is at rest; what bounces does not."""
+SWINGS = math.sqrt(AT_REST)  # Of the same, largest root mean square in the last quarter of the time [1]
 FIRMER = 4.0  # Factor on drag and mass of the placement of what swings [1]
 REST_TIME = 0.04  # For how long the signs of rest must hold [s]
-PLACING_WAY = 0.02
-"""Lowering speed times the time that setting down took in the first runs, without REST_TIME [m]; for progress only."""
+PLACING_WAY = 0.02  # Lowering speed times the usual time of a placement [m]; for progress only
 LONGEST_PLACING = 3.0  # A platform that has not come to rest after this [s] is an error
 
 
@@ -43,14 +40,15 @@ class PlatformRun(EnergyBalance, Stepper):
 
     Parameters
     ----------
+    duration : how long it is followed from where time begins [s].
     lift : whether the body is lifted until it is clear of grains. Raises ValueError for a start in overlap with grains.
+    weight : as a force on the body [N], shape (3,).
+    members : of the body, where each is about its origin [m], shape [member, 3], in space; in the plane their number.
     lowering_speed : of a placement before time begins [m/s]; None: none.
     energy_interval : between measurements of what the ground holds [s].
-    members : of the body, where each is about its origin [m], shape [member, 3], in space; in the plane their number.
     options : of `Master`.
     """
 
-    COLUMNS: tuple[str, ...]  # Of a row
     _prefix: str  # Of the keys of a state
     _hull = 0  # Members that are no spikes
     trial: Any
@@ -64,12 +62,17 @@ class PlatformRun(EnergyBalance, Stepper):
         *,
         duration: float,
         lift: bool,
-        lowering_speed: float | None,
-        energy_interval: float,
+        weight: Vector,
         members: Vector | int,
+        lowering_speed: float | None = None,
+        energy_interval: float = 0.02,
         **options: Any,
     ) -> None:
         super().__init__()
+        check_above_zero("in s", duration=duration, energy_interval=energy_interval)
+        if lowering_speed is not None:
+            check_above_zero("in m/s", lowering_speed=lowering_speed)
+        self._pull = weight
         self.trial, self.ground, self.body, self.duration = trial, ground, body, float(duration)
         if isinstance(ground, BedGround | LawGround):
             if lift:
@@ -88,10 +91,8 @@ class PlatformRun(EnergyBalance, Stepper):
         self.placing_steps = 0  # Macro steps that the placement took
         self._members = count
         self._settling: list[Vector] = []
-        self._rows: list[list[float]] = []
         self._states: list[int] = []
         self._feet: list[Vector] = []
-        self._no_samples()
         self._order()
 
     held_long, footing = renamed("held_long", "placement_is_long"), renamed("footing", "ground")
@@ -99,12 +100,6 @@ class PlatformRun(EnergyBalance, Stepper):
     def __repr__(self) -> str:
         when = f"{self.time:.4g} of {self.duration:g} s" if self.placed else f"being placed for {self.body.time:.4g} s"
         return f"{type(self).__name__}({self.body!r} on {self.ground!r}, {when})"
-
-    @staticmethod
-    def _check(duration: float, energy_interval: float, lowering_speed: float | None) -> None:
-        check_above_zero("in s", duration=duration, energy_interval=energy_interval)
-        if lowering_speed is not None:
-            check_above_zero("in m/s", lowering_speed=lowering_speed)
 
     @property
     def done(self) -> bool:
@@ -138,7 +133,7 @@ class PlatformRun(EnergyBalance, Stepper):
         return self.pace * REST_TIME + PLACING_WAY / self.lowering_speed if self.lowering_speed is not None else 0.0
 
     def _order(self) -> None:
-        """During placement, where the body is light, the guess at the next force is the last one, whatever is asked."""
+        """During placement, where the body is light, the guess at the next force is the last one."""
         self.master.extrapolation = self._extrapolation if self.placed else 0
 
     def advance(self) -> None:
@@ -150,19 +145,15 @@ class PlatformRun(EnergyBalance, Stepper):
         if not self.placed:
             self._lower(reaction)
             return
-        self._pull(before, self.body.pose.position, self._pull_of_weight, self.body.masses)
+        self._record_moment(before)
         self._keep(reaction)
         if (self.master.count - self.placing_steps) % self._every == 0 or self.done:
-            self._measure()
+            self._sample()
 
     def _begin(self) -> None:
-        self._start_balance(self.body.momentum, self._turning)
+        self._start_balance()
         self._keep(self.master.last)
-        self._measure()
-
-    def _measure(self) -> None:
-        body = self.body
-        self._sample(body.time, body.momentum - self._pull_of_weight * body.time, self._turning)
+        self._sample()
 
     def _keep(self, reaction: Reaction | None) -> None:
         now = self.body.twist_now(self.ground.lag)
@@ -180,19 +171,9 @@ class PlatformRun(EnergyBalance, Stepper):
     @property
     def _weight(self) -> float:
         """[N]"""
-        raise NotImplementedError
+        return float(np.linalg.norm(self._pull))
 
-    @property
-    def _pull_of_weight(self) -> Vector:
-        """Weight as a force [N], shape (3,)."""
-        raise NotImplementedError
-
-    @property
-    def _turning(self) -> Vector:
-        """Angular momentum of the body about (0, 0, 0) [N m s], for the balance."""
-        raise NotImplementedError
-
-    def _unrest(self) -> tuple[Vector, Vector]:
+    def _out_of_balance(self) -> tuple[Vector, Vector]:
         """What of the weight the ground does not carry yet [N], and the speeds [m/s]."""
         raise NotImplementedError
 
@@ -209,15 +190,6 @@ class PlatformRun(EnergyBalance, Stepper):
         raise NotImplementedError
 
     @property
-    def columns(self) -> dict[str, Vector]:
-        """The rows so far, by COLUMNS."""
-        return dict(zip(self.COLUMNS, self._row_table.T, strict=True))
-
-    @property
-    def _row_table(self) -> Vector:
-        return np.array(self._rows, dtype=float).reshape(-1, len(self.COLUMNS))
-
-    @property
     def states(self) -> list[str]:
         """The state at every row: on grains as `coupling.contact_state` reads it, on a law by who sticks and slides."""
         return [STATES[code] for code in self._states]
@@ -229,7 +201,7 @@ class PlatformRun(EnergyBalance, Stepper):
 
     def state(self) -> State:
         """All that the rest of the run depends on: a flat dict of numpy arrays."""
-        width = sum(part.size for part in self._unrest())
+        width = sum(part.size for part in self._out_of_balance())
         own: State = {
             "counts": np.array([self.placed, self.placing_steps, self._frames], dtype=np.int64),
             "settling": np.array(self._settling, dtype=float).reshape(-1, width),
@@ -237,42 +209,44 @@ class PlatformRun(EnergyBalance, Stepper):
             "states": np.array(self._states, dtype=np.int8),
             "feet": self._feet_table,
         }
-        own = {f"{self._prefix}.{key}": value for key, value in own.items()}
-        own |= {f"reader.{key}": value for key, value in self.reader.state().items()}
-        return own | self._balance_state() | self.master.state()
+        parts = {self._prefix: own, "reader": self.reader.state(), "balance": self._balance_state()}
+        found = self.master.state()
+        for name, part in parts.items():
+            found |= prefixed(name, part)
+        return found
 
     def restore(self, state: State) -> None:
         """Go back to what `state` gave."""
-        own = {key.partition(".")[2]: value for key, value in state.items() if key.startswith(f"{self._prefix}.")}
+        own = part_of(state, self._prefix)
         placed, self.placing_steps, self._frames = (int(number) for number in own["counts"])
         self.placed = bool(placed)
         self._settling = list(np.array(own["settling"], dtype=float))
         self._rows = np.asarray(own["rows"]).tolist()
         self._states = [int(code) for code in own["states"]]
         self._feet = list(np.array(own["feet"], dtype=float))
-        self._restore_balance(state)
-        self.reader.restore({key[7:]: value for key, value in state.items() if key.startswith("reader.")})
+        self._restore_balance(part_of(state, "balance"))
+        self.reader.restore(part_of(state, "reader"))
         self.master.restore(state)
         self._order()
 
     def _lower(self, reaction: Reaction) -> None:
-        self._settle(reaction, *self._unrest())
+        """A step of the placement, which ends at rest.
 
-    def _settle(self, reaction: Reaction, lacking: Vector, moving: Vector) -> None:
-        """A step of the placement, which ends at rest: what of the weight the ground does not carry yet [N], and the
-        speeds [m/s]. A body that bounces (its mass during placement is small against the contacts' stiffness), so that
-        it rests on the mean alone or not for half the time there is, is placed more slowly. Raises RuntimeError where
-        it takes too long."""
+        A body that bounces (its mass during placement is small against the contacts' stiffness), so that it rests on
+        the mean alone or not for half the time there is, is placed more slowly. Raises RuntimeError where it takes too
+        long.
+        """
         assert self.lowering_speed is not None
-        mean = self._mean_of_late(lacking, moving)
+        missing, moving = self._out_of_balance()
+        mean = self._mean_of_late(missing, moving)
         longest = self.pace * LONGEST_PLACING
         if mean is not None:
-            scale = np.array([self._weight] * len(lacking) + [self.lowering_speed] * len(moving))
+            scale = np.array([self._weight] * len(missing) + [self.lowering_speed] * len(moving))
             rests = bool(reaction.contacts) and bool((mean <= AT_REST * scale).all())
             late = self._settling[-max(2, len(self._settling) // 4) :]
             calm = bool((np.sqrt(np.mean(np.square(late), axis=0)) <= SWINGS * scale).all())
             if rests and calm:
-                self._lies()
+                self._end_placement()
             elif rests or (
                 self.body.time > 0.5 * longest and bool((np.std(self._settling, axis=0) > SWINGS * scale).any())
             ):
@@ -284,14 +258,14 @@ class PlatformRun(EnergyBalance, Stepper):
                 f"{self.master.wrench.force[2]:.3g} of {self._weight:.3g} N at the end"
             )
 
-    def _mean_of_late(self, lacking: Vector, moving: Vector) -> Vector | None:
-        """Size of the mean over the last REST_TIME of what lacks and moves; None as long as there is less of it."""
+    def _mean_of_late(self, missing: Vector, moving: Vector) -> Vector | None:
+        """Size of the mean over the last REST_TIME of missing weight and speeds; None while there is less time."""
         self.placing_steps = self.master.count
         count = max(2, round(self.pace * REST_TIME / self.master.macro_step))
-        self._settling = [*self._settling, np.concatenate([lacking, moving])][-count:]
+        self._settling = [*self._settling, np.concatenate([missing, moving])][-count:]
         return np.abs(np.mean(self._settling, axis=0)) if len(self._settling) == count else None
 
-    def _lies(self) -> None:
+    def _end_placement(self) -> None:
         """It lies where it was set down: the placement ends."""
         self.body.release()
         self.placed = True

@@ -1,17 +1,17 @@
 """A platform with six degrees of freedom and up to three flywheels as a body that a ground pushes.
 
-World axes, z up from the undisturbed surface; the origin is the centre of mass. Momentum P and angular momentum L about
-it (platform and wheels) are what a step changes, so flight keeps both to round-off; I omega = L - sum h_i a_i, as in
-`rigid.spatial.motion`. A macro step of length H, s the ground's lag (0 for a law, its own step for a bed):
+World axes, z up from the undisturbed surface; the origin is the centre of mass. A step changes momentum P and angular
+momentum L about it (platform and wheels); I omega = L - sum h_i a_i, as in `rigid.spatial.motion`. A macro step of
+length H, s the ground's lag (0 for a law, its own step for a bed):
 
     u, w  of  P + (H - s) / 2 (W + F_guess),  L + (H - s) / 2 T_guess,  turned half way     held during the step
     r' = r + H u,   q' = exp(H w) q
     P' = P + H (W + F),   L' = L + H T,   h_i' = h_i - H tau_i
 
-P and L belong to a time s / 2 later than r and q, as `coupling.planar_body` has it. Under a Coulomb bound the tips that
-stick share what holds them in proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)), so that at the
-step's end their mean slip, and turning about the vertical, are zero; one beyond mu_s N_k slides with mu_d N_k until its
-slip turns back (docs/platform.md). Events of friction are found to the step: of first order in H.
+P and L belong to a time s / 2 later than r and q. Under a Coulomb bound the tips that stick share what holds them in
+proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)), so that at the step's end their mean slip, and
+turning about the vertical, are zero; one beyond mu_s N_k slides with mu_d N_k until its slip turns back
+(docs/platform.md). Events of friction are of first order in H.
 """
 
 import math
@@ -23,18 +23,18 @@ from rigid.ground.reaction import Contact, Reaction, State
 from rigid.spatial.quaternions import from_turn, multiply, to_matrix
 from rigid.spatial.spatial import SpatialTrial
 
-from .deprecated import PlacedBody
-from .planar_body import placement_time
+from .planar_body import PlacedBody, placement_time
 from .poses import Pose, Twist, Vector, Wrench, moved
 
 __all__ = ["SpatialBody"]
 
-_ROUNDS = 20
-"""Of the spin of a step's middle, which turns the axes that it is made from: each leaves H |w| of the error."""
+_ROUNDS = 20  # Iterations for the spin of a step's middle: each leaves H |w| of the error
 
 
 class SpatialBody(PlacedBody):
-    """The platform of `trial` at `position` [m] with the turn `quaternion`; of the trial, the ground is not used.
+    """The platform of `trial` at `position` [m] with the turn `quaternion`; a `coupling.Body`.
+
+    Of the trial, the ground is not used.
 
     Parameters
     ----------
@@ -45,6 +45,11 @@ class SpatialBody(PlacedBody):
 
     Raises ValueError, naming the key, for what is not finite or no unit quaternion.
     """
+
+    _ARRAYS = (
+        "place", "turn", "momentum", "angular_momentum", "wheels", "_force", "_moment", "_torques", "_masses", "_drag",
+    )  # fmt: skip
+    _NUMBERS = ("time", "torque_work", "_lag", "touching", "in_placement")
 
     def __init__(
         self,
@@ -102,7 +107,6 @@ class SpatialBody(PlacedBody):
         self.momentum, self.angular_momentum = self._masses * velocity, self._spin_to_momentum(spin)
 
     def slow_placement(self, factor: float) -> None:
-        """As `PlanarBody.slow_placement`."""
         wheels = self._wheels_at(self.wheels, self.turn)
         self._masses, self._inertia, self._drag = (factor * held for held in (self._masses, self._inertia, self._drag))
         self.momentum = factor * self.momentum
@@ -116,7 +120,6 @@ class SpatialBody(PlacedBody):
         self.time = self.torque_work = 0.0
 
     def lift(self, height: float) -> None:
-        """Put it higher by this [m]."""
         self.place[2] += height
 
     def start(self, lag: float) -> None:
@@ -131,14 +134,10 @@ class SpatialBody(PlacedBody):
 
     @property
     def pose(self) -> Pose:
-        """Where it is."""
         return Pose(self.place, self.turn)
 
     def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
-        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench."""
-        if lag > dt * (1 + 1e-9):
-            raise ValueError(f"dt = {dt} s is shorter than the footing's own step of {lag} s")
-        self._lag, half = lag, 0.5 * max(dt - lag, 0.0)
+        self._lag, half = lag, self._spare(dt, lag)
         self._torques = self._mean_torques(dt)
         drag = self._drag
         momentum = (self.momentum + half * (self.trial.weight + guess.force)) / (1 + half * drag[0] / self._masses)
@@ -155,7 +154,6 @@ class SpatialBody(PlacedBody):
         return Twist(momentum / self._masses, spin)
 
     def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
-        """The whole wrench of the ground: `reaction` with the friction that its Coulomb bounds leave open."""
         bounded = {tip: contact for tip, contact in reaction.by_member.items() if contact.tangential_force is None}
         self._next_sliding, self._next_sticking = dict[int, Vector](), frozenset[int]()
         self._next_touching = bool(reaction.contacts)
@@ -167,7 +165,6 @@ class SpatialBody(PlacedBody):
         return Wrench(reaction.force + force, reaction.torque + torque)
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
-        """Take the step: along `twist`, with the impulse of `wrench`."""
         middle = to_matrix(moved(self.pose, twist, 0.5 * dt).turn)
         self.torque_work += dt * float(self._torques @ (self.axes @ (middle.T @ twist.spin)))
         end = moved(self.pose, twist, dt)
@@ -223,30 +220,16 @@ class SpatialBody(PlacedBody):
         return self.wheels / np.array(inertias[:3])
 
     def state(self) -> State:
-        """All that its next steps depend on."""
         slides = sorted(self.sliding)
         return {
-            "numbers": np.concatenate(
-                [
-                    self.place, self.turn, self.momentum, self.angular_momentum, self.wheels, self._force, self._moment,
-                    self._torques, self._masses, self._drag,
-                    [self.time, self.torque_work, self._lag, self.touching, self.in_placement],
-                ]
-            ),
+            "numbers": self._numbers(),
             "inertia": self._inertia.copy(),
             "sliding": np.array([[tip, *self.sliding[tip]] for tip in slides], dtype=float).reshape(-1, 3),
             "sticking": np.array(sorted(self.sticking), dtype=np.int64),
-        }  # fmt: skip
+        }
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
-        numbers = np.asarray(state["numbers"], dtype=float)
-        ends = np.cumsum([3, 4, 3, 3, 3, 3, 3, 3, 3, 2])
-        parts = [part.copy() for part in np.split(numbers, ends)]
-        self.place, self.turn, self.momentum, self.angular_momentum, self.wheels = parts[:5]
-        self._force, self._moment, self._torques, self._masses, self._drag = parts[5:10]
-        self.time, self.torque_work, self._lag = (float(number) for number in parts[10][:3])
-        self.touching, self.in_placement = bool(parts[10][3]), bool(parts[10][4])
+        self._restore_numbers(state["numbers"])
         self._inertia = np.array(state["inertia"], dtype=float)
         rows = np.asarray(state["sliding"], dtype=float).reshape(-1, 3)
         self.sliding = {int(row[0]): row[1:].copy() for row in rows}
@@ -256,7 +239,6 @@ class SpatialBody(PlacedBody):
     _force: Vector = np.zeros(3)
     _moment: Vector = np.zeros(3)
     _torques: Vector = np.zeros(3)
-    _next_touching = False
     _next_sliding: dict[int, Vector]
     _next_sticking: frozenset[int]
 

@@ -8,13 +8,13 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from hedgebed_renamed import renamed_keywords
 from rigid.ground.reaction import Reaction, State
 from rigid.planar.trajectory import Transition
 from rigid.spatial.quaternions import angle_between, to_matrix
 from rigid.spatial.spatial import SpatialTrial
 
 from .contact_state import changes_of, state_of
-from .deprecated import renamed_keywords
 from .ground import Ground
 from .platform_run import PlatformRun
 from .poses import Twist, Vector, Wrench
@@ -41,9 +41,7 @@ class SpatialRun(PlatformRun):
     position : of the centre of mass at the start [m], z from the undisturbed surface; None: level above (0, 0), its
         lowest tips at the surface, on a bed lifted until it is clear of the grains.
     quaternion, velocity, angular_velocity : as `SpatialBody` has them; a platform that is placed starts at rest.
-    lowering_speed : of a placement before time begins [m/s]; None: none.
-    substeps, body_steps, extrapolation, iterations : as `Master` has them.
-    energy_interval : between measurements of what the ground holds [s].
+    options : `duration`, `lowering_speed` and `energy_interval` of `PlatformRun`, and those of `Master`.
 
     Raises ValueError for a start in overlap with grains, and for what `Master` and `SpatialBody` refuse.
     """
@@ -57,17 +55,13 @@ class SpatialRun(PlatformRun):
         trial: SpatialTrial,
         ground: Ground,
         *,
-        duration: float,
         position: Sequence[float] | None = None,
         quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
         velocity: Sequence[float] = (0.0, 0.0, 0.0),
         angular_velocity: Sequence[float] = (0.0, 0.0, 0.0),
-        lowering_speed: float | None = None,
-        energy_interval: float = 0.02,
-        **master: Any,
+        **options: Any,
     ) -> None:
-        self._check(duration, energy_interval, lowering_speed)
-        if lowering_speed is not None:
+        if options.get("lowering_speed") is not None:
             if np.any(velocity) or np.any(angular_velocity):
                 raise ValueError("lowering_speed is given with a velocity: a platform that is placed starts at rest")
             if not trial.weight[2] < 0:
@@ -80,8 +74,8 @@ class SpatialRun(PlatformRun):
         )  # fmt: skip
         self._places = np.vstack([tips, -trial.platform.centre_of_mass])  # the hull last
         super().__init__(
-            trial, ground, body, duration=duration, lift=position is None, lowering_speed=lowering_speed,
-            energy_interval=energy_interval, members=self._places, first_guess=Wrench.none(), **master,
+            trial, ground, body, lift=position is None, weight=np.asarray(trial.weight), members=self._places,
+            first_guess=Wrench.none(), **options,
         )  # fmt: skip
         if self.placed:
             self.body.start(ground.lag)
@@ -89,23 +83,15 @@ class SpatialRun(PlatformRun):
         else:
             self._start_placement()
 
-    @property
-    def _weight(self) -> float:
-        return float(np.linalg.norm(self.trial.weight))
-
-    @property
-    def _pull_of_weight(self) -> Vector:
-        return np.asarray(self.trial.weight)
-
     def run(self, **reporting: Unpack[Reporting]) -> dict[str, Vector]:
         """Go on to the end, with the reports of `Stepper.follow`; `columns`."""
         self.follow(**reporting)
         return self.columns
 
-    def _unrest(self) -> tuple[Vector, Vector]:
+    def _out_of_balance(self) -> tuple[Vector, Vector]:
         wrench, twist, reach = self.master.wrench, self.body.twist, self.trial.platform.reach
-        lacking = np.concatenate([wrench.force + self.trial.weight, wrench.torque / reach])
-        return lacking, np.concatenate([twist.velocity, twist.spin * reach])
+        missing = np.concatenate([wrench.force + self.trial.weight, wrench.torque / reach])
+        return missing, np.concatenate([twist.velocity, twist.spin * reach])
 
     def _row(self, reaction: Reaction | None, now: Twist) -> list[float]:
         body = self.body
@@ -131,7 +117,6 @@ class SpatialRun(PlatformRun):
 
     @property
     def _turning(self) -> Vector:
-        """Angular momentum of platform and wheels about (0, 0, 0) [N m s]."""
         return np.asarray(np.cross(self.body.place, self.body.momentum) + self.body.angular_momentum)
 
     @property
@@ -163,12 +148,11 @@ class SpatialRun(PlatformRun):
 
     @property
     def energy_scale(self) -> float:
-        """max(|work of the torques|, W reach, the kinetic energy at the start) [J], which residuals are relative to."""
+        """max(|work of the torques|, W reach, the kinetic energy at the start) [J]."""
         rows = self.columns
-        weight = float(np.linalg.norm(self.trial.weight)) * self.trial.platform.reach
-        return max(float(np.abs(rows["torque_work"]).max()), weight, float(rows["kinetic_energy"][0]), 1e-300)
+        lifted = self._weight * self.trial.platform.reach
+        return max(float(np.abs(rows["torque_work"]).max()), lifted, float(rows["kinetic_energy"][0]), 1e-300)
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
         super().restore(state)
         self._feet = [np.array(state["run.feet"], dtype=float)]

@@ -5,8 +5,7 @@ from typing import Any, Protocol, TypedDict
 
 __all__ = ["Progress", "Reporters", "Reporting", "Stepper"]
 
-Reporters = Callable[[Any], None] | Iterable[Callable[[Any], None]] | None
-"""What is called with the run: one, several or none."""
+Reporters = Callable[[Any], None] | Iterable[Callable[[Any], None]] | None  # Called with the run
 
 
 class Progress(Protocol):
@@ -50,7 +49,7 @@ class Stepper:
 
     @property
     def at_bottom(self) -> bool:
-        """Whether the step just done ended the way in, at the deepest point."""
+        """Whether the step just done ended the loading, at the deepest point."""
         return False
 
     @property

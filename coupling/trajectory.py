@@ -1,18 +1,17 @@
 """What a penetration leaves behind: one row per macro step, and the numbers read off it."""
 
 import itertools
-import json
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid.series import RESULT_FORMAT, read_series, write_series
+from rigid.result import Result, quantities_of, toml_value, write_text
+from rigid.series import __version__, read_series, write_series
 
 __all__ = ["PHASES", "Penetration"]
 
@@ -127,19 +126,17 @@ class Penetration:
 
     def quantities(self) -> dict[str, dict[str, Any]]:
         """The numbers a person would quote, as in result.json: name -> value, std (unknown), unit."""
-        values = {
-            "peak_force": (self.peak_force, "N"),
-            "max_depth": (self.max_depth, "m"),
-            "work_in": (self.work_in, "J"),
-            "work_out": (self.work_out, "J"),
-        }
+        values: dict[str, tuple[float | None, str, str]] = {
+            "peak_force": (self.peak_force, "N", ""), "max_depth": (self.max_depth, "m", ""),
+            "work_in": (self.work_in, "J", ""), "work_out": (self.work_out, "J", ""),
+        }  # fmt: skip
         if self.ended == "rest":
-            values["final_depth"] = (self.final_depth, "m")
+            values["final_depth"] = (self.final_depth, "m", "")
             if self.kind == "set_down":
-                values["sinkage"] = (self.final_depth, "m")
+                values["sinkage"] = (self.final_depth, "m", "")
         if self.kind == "drop" and self.stop_time is not None:
-            values["stop_time"] = (self.stop_time, "s")
-        return {name: {"value": value, "std": None, "unit": unit} for name, (value, unit) in values.items()}
+            values["stop_time"] = (self.stop_time, "s", "")
+        return quantities_of(values, std=None)
 
     def save(self, folder: str | Path) -> Path:
         """Write a run folder: run.toml, result.json and the series; returns it (`vis.write_report` makes the report).
@@ -147,69 +144,46 @@ class Penetration:
         What was computed is not lost to a name: where the folder is in use, the next free one of folder-2, folder-3
         and so on is taken, with a warning.
         """
-        wanted = Path(folder)
-        folder = next(path for path in _numbered(wanted) if not _in_use(path))
+        wanted = folder = Path(folder)
+        for number in itertools.count(2):
+            if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+                break
+            folder = wanted.with_name(f"{wanted.name}-{number}")
         if folder != wanted:
             warnings.warn(f"{str(wanted)!r} is in use: the run is in {str(folder)!r}", stacklevel=2)
-        (folder / "series").mkdir(parents=True, exist_ok=True)
-        try:
-            version = metadata.version("hedgebed")
-        except metadata.PackageNotFoundError:
-            version = "unknown"
-        (folder / "run.toml").write_text(self._toml(version), encoding="utf-8")
-        series = f"series/{self.kind}.csv"
+        write_text(folder / "run.toml", self._toml())
+        series, settings = f"series/{self.kind}.csv", self.settings
         self.write_csv(folder / series)
-        remarks = {
-            "max_time": "its time was over before it had come to rest",
-            "max_depth": "it went as deep as it was allowed and was ended there",
-            "stopped": "it was still bobbing when it was ended",
-            "unfinished": "these are the rows of a run under way",
-        }
-        result = {
-            "format": RESULT_FORMAT,
-            "experiment": self.kind,
-            "version": version,
-            "title": f"A {self.kind.replace('_', ' ')} spike",
-            "status": "stopped" if self.ended == "unfinished" else "done",
+        run = {
+            "id": self.kind, "kind": self.kind, "speed": settings.get("speed"), "series": series, "ended": self.ended,
             "quantities": self.quantities(),
-            "runs": [
-                {
-                    "id": self.kind,
-                    "kind": self.kind,
-                    "speed": self.settings.get("speed"),
-                    "series": series,
-                    "ended": self.ended,
-                    "quantities": self.quantities(),
-                }
-            ],
-            "bed": self.settings.get("ground_settings", {}),
-            "spike": self.settings.get("spike", {}),
-            "warnings": [remarks[self.ended]] if self.ended in remarks else [],
-        }
-        (folder / "result.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        }  # fmt: skip
+        Result.make(
+            self.kind, title=f"A {self.kind.replace('_', ' ')} spike",
+            status="stopped" if self.ended == "unfinished" else "done", quantities=self.quantities(), runs=[run],
+            bed=settings.get("ground_settings", {}), spike=settings.get("spike", {}),
+            warnings=[REMARKS[self.ended]] if self.ended in REMARKS else [],
+        ).write(folder)  # fmt: skip
         return folder
 
-    def _toml(self, version: str) -> str:
+    def _toml(self) -> str:
         tables = {key: value for key, value in self.settings.items() if isinstance(value, dict)}
         plain = {key: value for key, value in self.settings.items() if key not in tables}
-        lines = [f"# A {self.kind.replace('_', ' ')} spike: what was run, SI units.", f'experiment = "{self.kind}"']
-        lines += [f'version = "{version}"', f'ended = "{self.ended}"']
-        lines += _toml_lines({"macro_step": self.macro_step} | plain)
+        lines = [f"# A {self.kind.replace('_', ' ')} spike: what was run, SI units."]
+        facts = {"experiment": self.kind, "version": __version__, "ended": self.ended, "macro_step": self.macro_step}
+        lines += _toml_lines(facts | plain)
         for name, table in tables.items():
             lines += ["", f"[{'bed' if name == 'ground_settings' else name}]", *_toml_lines(table)]
         return "\n".join(lines) + "\n"
 
 
-def _in_use(folder: Path) -> bool:
-    return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
-
-
-def _numbered(folder: Path) -> Iterator[Path]:
-    yield folder
-    for number in itertools.count(2):
-        yield folder.with_name(f"{folder.name}-{number}")
-
-
+REMARKS = {
+    "max_time": "its time was over before it had come to rest",
+    "max_depth": "it went as deep as it was allowed and was ended there",
+    "stopped": "it was still bobbing when it was ended",
+    "unfinished": "these are the rows of a run under way",
+}
+"""What a result warns of, by how the run ended."""
 UNITS = {
     "macro_step": "s", "speed": "m/s", "start_depth": "m", "depth": "m", "hold": "s", "retreat_speed": "m/s",
     "mass": "kg", "load": "N", "rest_time": "s", "rest_tolerance": "1", "after_stop": "s", "max_time": "s",
@@ -222,9 +196,5 @@ UNITS = {
 
 def _toml_lines(values: dict[str, Any]) -> list[str]:
     """One line each, with its unit; what is not set is left out."""
-    lines = []
-    for key, value in values.items():
-        if value is not None:
-            unit = f"  # {UNITS[key]}" if key in UNITS else ""
-            lines.append(f"{key} = {json.dumps(value)}{unit}")
-    return lines
+    units = {key: f"  # {UNITS[key]}" if key in UNITS else "" for key in values}
+    return [f"{key} = {toml_value(value)}{units[key]}" for key, value in values.items() if value is not None]

@@ -1,10 +1,8 @@
 """Several tumbles in a row on one ground, and a landing: `CoupledTumble` with another beginning or end.
 
 Several tumbles: the torque acts until the platform has turned by `turn` times half the angle between two rows (1: its
-middle is over the leading row, from where it falls by itself); then it waits until the platform lies at rest, which is
-noted, and begins anew. The wheel goes on from the speed that it has. Over how many rows a tumble goes is as it comes.
-
-A landing: no placement and no torque; the platform starts just clear of the ground with the velocities of its fall.
+middle is over the leading row, from where it falls by itself); then the platform comes to rest, which is noted, and the
+next begins. The wheel keeps its speed. A landing starts just clear of the ground with the velocities of its fall.
 """
 
 import math
@@ -13,21 +11,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hedgebed_renamed import renamed_keywords
 from rigid.ground.reaction import State
 from rigid.model.trial import Trial
 from rigid.planar.trajectory import STATES
 
 from .bed_ground import BedGround
-from .deprecated import renamed_keywords
-from .ground import Ground
+from .ground import Ground, part_of, prefixed
 from .law_ground import LawGround
 from .lowered_gravity import pace_under
 from .tumbling import CoupledTumble
 
 __all__ = ["Landing", "Rest", "TumblesInARow"]
 
-REST_SPEED = 2e-3
-"""A platform whose centre and tips are slower is at rest [m/s]: the speed above which a row is said to slide."""
+REST_SPEED = 2e-3  # Centre and tips of a platform at rest are slower [m/s]: as fast as a row that slides
 REST_LASTS = 0.1  # For how long [s]
 LONGEST_WAIT = 3.0  # After the torque's end the next begins at the latest [s], at rest or not, which is noted
 
@@ -67,7 +64,6 @@ class TumblesInARow(CoupledTumble):
         self.rest = Rest.of(trial)
         self._rests: list[list[float]] = []
         self._on, self._from, self._quiet_since, self._ended, self._seen = True, 0.0, 0.0, 0.0, 0
-        self.tip_radius = float(options.get("tip_radius", 0.0))
         super().__init__(trial, ground, **options)
 
     @property
@@ -116,7 +112,7 @@ class TumblesInARow(CoupledTumble):
     def _note(self, *, at_rest: bool) -> None:
         body, feet = self.body, np.array(self._feet[self._seen :])
         carried = feet[-1, 0] > 0.05 * self.trial.weight
-        sinkage = self._depths()
+        sinkage = np.maximum(0.0, self._reach(float(body.place[2])) - float(body.place[1]))
         mean = float(sinkage[carried].mean()) if carried.any() else 0.0
         before = self._rests[-1][3] if self._rests else float(body.place[2])
         turned = round((float(body.place[2]) - before) / (2 * math.pi / self.trial.spike_count))
@@ -124,29 +120,20 @@ class TumblesInARow(CoupledTumble):
         self._rests.append([body.time, *body.place.tolist(), mean, deepest, float(at_rest), float(turned)])
         self._seen = len(self._feet)
 
-    def _depths(self) -> np.ndarray:
-        """Depth of each row's lowest point now [m], 0 above the surface, shape [row]."""
-        count, radius = self.trial.spike_count, self.tip_radius
-        angles = float(self.body.place[2]) + math.pi / count * (1 + 2 * np.arange(count))
-        return np.maximum(0.0, (self.trial.spike_length - radius) * np.cos(angles) + radius - float(self.body.place[1]))
-
     def _switch(self, on: bool) -> None:
         self._on = on
         self.body.trial = replace(self.trial, torque_until=math.inf if on else self.body.time)
 
     def state(self) -> State:
-        """See `CoupledTumble.state`."""
-        return super().state() | {
-            "row.numbers": np.array([self._on, self._from, self._quiet_since, self._ended, self._seen], dtype=float),
-            "row.rests": np.array(self._rests, dtype=float).reshape(-1, len(NOTED)),
-        }
+        numbers = [self._on, self._from, self._quiet_since, self._ended, self._seen]
+        rests = np.array(self._rests, dtype=float).reshape(-1, len(NOTED))
+        return super().state() | prefixed("row", {"numbers": np.array(numbers, dtype=float), "rests": rests})
 
     def restore(self, state: State) -> None:
-        """See `CoupledTumble.restore`."""
         super().restore(state)
-        on, self._from, self._quiet_since, self._ended, seen = (float(value) for value in state["row.numbers"])
-        self._seen, self._rests = int(seen), np.asarray(state["row.rests"], dtype=float).tolist()
-        self._on = bool(on)
+        own = part_of(state, "row")
+        on, self._from, self._quiet_since, self._ended, seen = (float(value) for value in own["numbers"])
+        self._on, self._seen, self._rests = bool(on), int(seen), np.asarray(own["rests"], dtype=float).tolist()
         self.body.trial = replace(self.trial, torque_until=math.inf if on else self._ended)
 
 
@@ -171,15 +158,13 @@ class Landing(CoupledTumble):
         if not (math.isfinite(speed) and speed > 0):
             raise ValueError(f"drop_speed is {speed}: it must be above 0 (in m/s, downwards)")
         self._comes = np.array([along, -speed, spin])
-        self._turned, self.tip_radius = theta, float(options.get("tip_radius", 0.0))
+        self._turned = theta
         high = trial.spike_length + 0.05  # above the grains, whatever is turned down; `_begin` takes it to them
         super().__init__(replace(trial, torque=0.0), ground, height=high, **options)
 
     def _begin(self) -> None:
-        body, count = self.body, self.trial.spike_count
-        angles = self._turned + math.pi / count * (1 + 2 * np.arange(count))
-        reach = (self.trial.spike_length - self.tip_radius) * float(np.cos(angles).max()) + self.tip_radius
-        body.place = np.array([0.0, reach, self._turned])
+        body = self.body
+        body.place = np.array([0.0, self._reach(self._turned).max(), self._turned])
         if isinstance(self.ground, BedGround | LawGround):
             body.lift(self.ground.clear_height(body.pose))
             self.ground.place(body.pose)

@@ -1,9 +1,7 @@
 """A tumble of the planar platform on any ground: placed, released, turned over by its flywheel.
 
-A stepper as those of `coupling.penetration`: `advance` makes one macro step, `state` and `restore` work between any
-two. On a bed the platform is first lowered until the sand carries it (`PlanarBody.begin_placement`), under a larger
-gravity if asked to, which then is lowered (`coupling.lowered_gravity`); then time is 0, the torque begins and the
-energy balance starts. Every macro step leaves one row.
+On a bed the platform is first lowered until the sand carries it, under a larger gravity if asked to, which then falls
+to the run's (`coupling.lowered_gravity`); then time is 0, the torque begins and the energy balance starts.
 """
 
 import math
@@ -12,14 +10,14 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from hedgebed_renamed import renamed_keywords
 from rigid.ground.reaction import Reaction, State
 from rigid.model.trial import Trial
-from rigid.planar.trajectory import Tally, Trajectory, Transition
+from rigid.planar.trajectory import Tally, Trajectory
 
 from .bed_ground import BedGround
 from .contact_state import changes_of, state_of
-from .deprecated import renamed_keywords
-from .ground import Ground
+from .ground import Ground, prefixed
 from .law_ground import LawGround
 from .lowered_gravity import LoweredGravity
 from .planar_body import PlanarBody
@@ -30,12 +28,8 @@ from .stepper import Reporting
 __all__ = ["MOST_REVERSAL", "CoupledTumble"]
 
 MOST_REVERSAL = 1e-3
-"""A larger `CoupledTumble.dissipation_reversal` is worth a warning [1].
-
-What the grains' integrator and the coupling leave of a lossless collision is 3e-4 to 7e-4 of its energy
-(tests/coupling); here it is set against the energy of the whole tumble. One on grains that dissipate has shown less
-than 1e-6.
-"""
+"""A larger `CoupledTumble.dissipation_reversal` is worth a warning [1]: a lossless collision leaves 3e-4 to 7e-4 of its
+energy (tests/coupling), a tumble on grains that dissipate less than 1e-6."""
 GRAINS_EVERY = 100  # Macro steps between two measurements of how fast the grains are that wait under a lowered gravity
 LONGEST_CALM = 10.0  # A platform that does not come to rest there for longer is an error [of the time watched]
 COLUMNS = (
@@ -50,13 +44,12 @@ class CoupledTumble(PlatformRun):
 
     Parameters
     ----------
-    substeps, body_steps, extrapolation, iterations : as `Master` has them.
     tip_radius : of the balls that its spikes end with [m]; 0 for a surface law.
-    lowering_speed : of the placement [m/s]; None: none, the platform starts at `height`.
     height : of the centre at the start [m]; None: on a law where the law carries it, on a bed just clear of the grains.
-    energy_interval : between measurements of what the ground holds [s].
     max_wheel_speed : where a motor has no torque left [rad/s].
     lower_gravity : whether the placement goes on until gravity has fallen from the bed's to the trial's.
+    options : `duration`, `lowering_speed` (None: no placement, the platform starts at `height`) and `energy_interval`
+        of `PlatformRun`, and those of `Master`.
 
     Raises ValueError for a start in overlap with grains, a gravity to be lowered where there is no placement, no bed or
     a rig, and for what `Master`, `PlanarBody` and `LoweredGravity` refuse.
@@ -72,33 +65,30 @@ class CoupledTumble(PlatformRun):
         trial: Trial,
         ground: Ground,
         *,
-        duration: float,
         tip_radius: float = 0.0,
-        lowering_speed: float | None = None,
         height: float | None = None,
-        energy_interval: float = 0.02,
         max_wheel_speed: float = math.inf,
         lower_gravity: bool = False,
-        **master: Any,
+        **options: Any,
     ) -> None:
-        self._check(duration, energy_interval, lowering_speed)
+        self.tip_radius = tip_radius
         half = math.pi / trial.spike_count
         self.level = (trial.spike_length - tip_radius) * math.cos(half) + tip_radius
         """Height of the centre with the lowest tips at the surface [m]."""
         start = self.level if height is None else float(height)
         if height is None and isinstance(ground, LawGround):
             start -= _sinkage(ground, 0.5 * trial.weight)
-        rests = lowering_speed is None and height is None
-        weight = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
+        placed = options.get("lowering_speed") is not None
+        rests = not placed and height is None
+        carried = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
         super().__init__(
-            trial, ground, PlanarBody(trial, z=start), duration=duration, lift=height is None,
-            lowering_speed=lowering_speed, energy_interval=energy_interval, members=trial.spike_count,
-            first_guess=weight, **master,
+            trial, ground, PlanarBody(trial, z=start), lift=height is None, weight=np.array([0.0, 0.0, -trial.weight]),
+            members=trial.spike_count, first_guess=carried, **options,
         )  # fmt: skip
         self.body.max_wheel_speed = max_wheel_speed
         self.lowered: LoweredGravity | None = None
         if lower_gravity:
-            if not isinstance(ground, BedGround) or lowering_speed is None or trial.counterweight > 0:
+            if not isinstance(ground, BedGround) or not placed or trial.counterweight > 0:
                 raise ValueError("lower_gravity is for a platform that is placed on a bed, without a rig")
             self.lowered = LoweredGravity(ground, last=trial.gravity_sim, duration=self.duration)
         if self.placed:
@@ -113,10 +103,6 @@ class CoupledTumble(PlatformRun):
         return float(self.body.trial.weight)
 
     @property
-    def _pull_of_weight(self) -> Vector:
-        return np.array([0.0, 0.0, -self.trial.weight])
-
-    @property
     def _placement_time(self) -> float:
         lowered = self.lowered
         return super()._placement_time + (lowered.steps * lowered.every + 3 * self.pace * REST_TIME if lowered else 0.0)
@@ -126,16 +112,16 @@ class CoupledTumble(PlatformRun):
         self.follow(**reporting)
         return self.trajectory()
 
-    def _unrest(self) -> tuple[Vector, Vector]:
+    def _out_of_balance(self) -> tuple[Vector, Vector]:
         wrench, rates, length = self.master.wrench, self.body.rates, self.trial.spike_length
-        lacking = np.array([wrench.force[2] - self._weight, wrench.torque[1] / length])
-        return lacking, np.array([rates[1], rates[2] * length])
+        missing = np.array([wrench.force[2] - self._weight, wrench.torque[1] / length])
+        return missing, np.array([rates[1], rates[2] * length])
 
     def _lower(self, reaction: Reaction) -> None:
         if self.lowered is None or self.lowered.begun is None:
             super()._lower(reaction)
         elif self.lowered.at_last:
-            self._calm(*self._unrest())
+            self._calm(*self._out_of_balance())
         elif self.lowered.fall(self.body.time):
             self._weigh()
             self._settling = []
@@ -145,16 +131,16 @@ class CoupledTumble(PlatformRun):
             now = self.lowered.now
             self.body.trial = self.trial if self.lowered.at_last else replace(self.trial, gravity_sim=now)
 
-    def _lies(self) -> None:
+    def _end_placement(self) -> None:
         """It lies: gravity falls, if it is to fall and has not yet, once the grains are calm; else placement ends."""
         if self.lowered is None or self.lowered.begun is not None:
-            super()._lies()
+            super()._end_placement()
         elif self.master.count % GRAINS_EVERY == 0 and self.lowered.calm:
             self.lowered.begin(self.body.time)
 
-    def _calm(self, lacking: Vector, moving: Vector) -> None:
+    def _calm(self, missing: Vector, moving: Vector) -> None:
         """A step of the placement under the run's own gravity: it ends at rest (see `coupling.lowered_gravity`)."""
-        mean, lowered = self._mean_of_late(lacking, moving), self.lowered
+        mean, lowered = self._mean_of_late(missing, moving), self.lowered
         assert lowered is not None and lowered.begun is not None and isinstance(self.ground, BedGround)
         if mean is None or self.master.count % GRAINS_EVERY:
             return
@@ -164,7 +150,7 @@ class CoupledTumble(PlatformRun):
         speeds = *mean[2:], self.ground.grain_speed()
         if lowered.far(speeds, lack) <= 1:
             if not lowered.dragged:
-                self._lies()
+                self._end_placement()
             lowered.drag(False)
             self._settling = []
         elif self.body.time > lowered.begun + lowered.steps * lowered.every + LONGEST_CALM * lowered.sees:
@@ -181,6 +167,12 @@ class CoupledTumble(PlatformRun):
             body.kinetic_energy(lag), body.potential_energy, body.torque_work, *self.master.exchanged(),
         ]  # fmt: skip
 
+    def _reach(self, theta: float) -> Vector:
+        """How far below the centre each row's lowest point is with the platform turned by `theta` [rad]; [m]."""
+        count = self.trial.spike_count
+        angles = theta + math.pi / count * (1 + 2 * np.arange(count))
+        return np.asarray((self.trial.spike_length - self.tip_radius) * np.cos(angles) + self.tip_radius)
+
     def _keep_feet(self, feet: Vector) -> None:
         self._feet.append(feet[[0, 1, 3, 5]])
 
@@ -192,7 +184,6 @@ class CoupledTumble(PlatformRun):
 
     @property
     def _turning(self) -> np.ndarray:
-        """Angular momentum of the platform about (0, 0, 0), less what the wheel gave it [N m s]."""
         body, trial = self.body, self.trial
         given = trial.wheel_inertia * (body.wheel_speed - trial.wheel_speed_0)
         own = body.inertia[2] * body.rates[2] - (given if trial.actuator == "motor" else -given)
@@ -203,13 +194,11 @@ class CoupledTumble(PlatformRun):
         """Normal and horizontal force [N], slip speed [m/s] and sinkage [m] of each row, shape [step, 4, row]."""
         return np.array(self._feet).reshape(-1, 4, self.trial.spike_count)
 
-    @property
-    def _feet_table(self) -> Vector:
-        return self.feet
+    _feet_table = feet
 
     @property
     def energy_scale(self) -> float:
-        """max(|work of the torque|, W l) [J], which residuals are relative to."""
+        """max(|work of the torque|, W l) [J]."""
         return max(float(np.abs(self.columns["torque_work"]).max()), self.trial.weight * self.trial.spike_length)
 
     def trajectory(self) -> Trajectory:
@@ -234,7 +223,7 @@ class CoupledTumble(PlatformRun):
             state=np.array(self._states, dtype=np.int8),
             stored_energy=self.stored_by_row,
             dissipated=self.dissipated_by_row,
-            transitions=self._transitions(),
+            transitions=changes_of(rows["time"], self.states, rows["theta"]),
             trajectory_angle=tally.angle,
             max_speed=tally.max_speed,
             time_of_max_speed=tally.time_of_max_speed,
@@ -244,16 +233,11 @@ class CoupledTumble(PlatformRun):
             **shared,
         )
 
-    def _transitions(self) -> tuple[Transition, ...]:
-        return changes_of((row[0] for row in self._rows), self.states, (row[3] for row in self._rows))
-
     def state(self) -> State:
-        """See `PlatformRun.state`."""
-        own = {"tumble.lowered": self.lowered.numbers()} if self.lowered is not None else {}
-        return own | super().state()
+        own = {"lowered": self.lowered.numbers()} if self.lowered is not None else {}
+        return prefixed("tumble", own) | super().state()
 
     def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
         if self.lowered is not None:
             self.lowered.restore(np.asarray(state["tumble.lowered"], dtype=float))
             self._weigh()

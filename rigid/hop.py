@@ -36,7 +36,7 @@ __all__ = [
     "launch_speed_for", "least_viable_angle",
 ]  # fmt: skip
 
-PHASES = 60  # A launch with more changes between stick and slip than this is given up
+PHASES = 60  # A launch with more changes between stick and slip than this fails
 
 
 @dataclass(frozen=True, kw_only=True)

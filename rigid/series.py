@@ -13,8 +13,18 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RESULT_FORMAT", "ResultFormat", "Series", "pandas", "read_series", "replacing", "write_series"]
+__all__ = [
+    "RESULT_FORMAT",
+    "ResultFormat",
+    "Series",
+    "__version__",
+    "pandas",
+    "read_series",
+    "replacing",
+    "write_series",
+]
 
+__version__ = "0.1.0"  # Of hedgebed
 ResultFormat = Literal["hedgebed-result/1"]
 RESULT_FORMAT: ResultFormat = get_args(ResultFormat)[0]
 """`format` of every result.json."""

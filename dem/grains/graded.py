@@ -72,12 +72,14 @@ class Graded:
     spread: float = 0.15
 
     def __post_init__(self):
-        for key in ("fine", "coarse"):
-            _positive(key, getattr(self, key))
+        for key in ("fine", "coarse", "depth"):
+            value: Any = getattr(self, key)
+            if key == "depth" and value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
+                raise ValueError(f"Graded: {key} = {value!r} must be a positive length [m]")
         if self.coarse < self.fine:
             raise ValueError(f"Graded: coarse = {self.coarse} m is below fine = {self.fine} m: that or more would do")
-        if self.depth is not None:
-            _positive("depth", self.depth)
         most = steepest(self.spread)
         if not 0 < self.growth <= most:
             raise ValueError(
@@ -173,7 +175,10 @@ class Graded:
         """
         top = volume / (_START * size[0] * size[1])
         count = round(volume / (math.pi / 6 * self.fine**3 * (1 + self.spread**2)))
-        steps = np.arange(count)[:, None] * _recurrence(4)
+        phi = 2.0
+        for _ in range(60):
+            phi = (1 + phi) ** (1 / 5)
+        steps = np.arange(count)[:, None] * phi ** -np.arange(1.0, 5.0)
         even = (steps + rng.uniform(0, 1, 4)) % 1.0
         homes = even[:, :3] * (size[0], size[1], top)
         diameters = self.diameter(homes[:, 0], homes[:, 2] * _START / _RESTED, size)
@@ -185,24 +190,11 @@ class Graded:
         return positions[order], radii[order]
 
 
-def _positive(key: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (math.isfinite(value) and value > 0):
-        raise ValueError(f"Graded: {key} = {value!r} must be a positive length [m]")
-
-
 def middles(step: float, length: float, height: float) -> tuple[np.ndarray, np.ndarray]:
     """Middles of the squares of half of ``step`` or less that cut up a length and a height [m]; two flat arrays."""
     nx, nz = (math.ceil(2 * side / step) for side in (length, height))
     x, z = np.meshgrid((np.arange(nx) + 0.5) * length / nx, (np.arange(nz) + 0.5) * height / nz)
     return x.ravel(), z.ravel()
-
-
-def _recurrence(dimensions: int) -> np.ndarray:
-    """The steps of Roberts' sequence in so many dimensions [1]."""
-    phi = 2.0
-    for _ in range(60):
-        phi = (1 + phi) ** (1 / (dimensions + 1))
-    return phi ** -np.arange(1.0, dimensions + 1)
 
 
 def _within(places: np.ndarray, radii: np.ndarray, period: tuple[float, float]) -> np.ndarray:

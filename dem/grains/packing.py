@@ -48,19 +48,22 @@ def rain_column(sizes: Sizes) -> float:
     return RAIN_COLUMN * max(1.0, (sizes.bounds[1] ** 3 / sizes.mean_cube) / (like.bounds[1] ** 3 / like.mean_cube))
 
 
-def rain_positions(rng: np.random.Generator, radii: np.ndarray, period: Sequence[float]) -> np.ndarray:
+def rain_positions(
+    rng: np.random.Generator, radii: np.ndarray, period: Sequence[float], *, sites: tuple[float, float] = (1.02, 1.5)
+) -> np.ndarray:
     """Centres of grains in a loose jittered column above z = 0, none touching, periodic in x and y.
 
     Layers are one and a half of the largest diameters apart, so that the grains fall as rain rather than as a block.
 
     Args:
         radii: [m], shape [grain_count]. period: (x, y) [m].
+        sites: least distance of the lattice's sites aside, and their distance upwards [largest diameters].
 
     Returns centres [m], shape [grain_count, 3].
     """
     largest = 2 * float(radii.max())
-    nx, ny = (max(1, int(length / (1.02 * largest))) for length in period)
-    cell = (period[0] / nx, period[1] / ny, 1.5 * largest)
+    nx, ny = (max(1, int(length / (sites[0] * largest))) for length in period)
+    cell = (period[0] / nx, period[1] / ny, sites[1] * largest)
     k, rest = np.divmod(np.arange(len(radii)), nx * ny)
     j, i = np.divmod(rest, nx)
     lattice = np.column_stack([i + 0.5, j + 0.5, k + 0.5]) * cell

@@ -28,7 +28,7 @@ from dem.engine.core import BedCore
 from dem.engine.stress import stress_profile
 from dem.engine.values import BedFailure
 from dem.grains.materials import Facing, Material
-from dem.grains.packing import draw_radii
+from dem.grains.packing import draw_radii, rain_positions
 from dem.grains.profile import packing_profile
 from dem.grains.sizes import Uniform
 
@@ -159,7 +159,7 @@ def press_element(
     period = (size[0] * grain, size[1] * grain)
     rng = np.random.default_rng(seed)
     radii = draw_radii(rng, _PACKING * period[0] * period[1] * size[2] * grain, sizes)
-    positions = _column(rng, radii, period)
+    positions = rain_positions(rng, radii, period, sites=(_SITES, _SITES))
     runtime.start(threads=threads)
     top = float((positions[:, 2] + radii).max())
     bed = BedCore.from_grains(
@@ -183,17 +183,6 @@ def press_element(
         _touch(bed, body)
         _rest(bed, wall, grain)
     return bed, body
-
-
-def _column(rng: np.random.Generator, radii: np.ndarray, period: tuple[float, float]) -> np.ndarray:
-    """Centres on a jittered lattice above z = 0, none touching [m], shape [grain_count, 3]: the rain's, but closer."""
-    largest = 2 * float(radii.max())
-    nx, ny = (max(1, int(length / (_SITES * largest))) for length in period)
-    cell = np.array([period[0] / nx, period[1] / ny, _SITES * largest])
-    k, rest = np.divmod(np.arange(len(radii)), nx * ny)
-    j, i = np.divmod(rest, nx)
-    play = 0.49 * (cell - 2 * radii[:, None])
-    return (np.column_stack([i, j, k]) + 0.5) * cell + rng.uniform(-1, 1, (len(radii), 3)) * play
 
 
 def _touch(bed: BedCore, body: int, *, friction: float | None = None, adhesive: bool = True) -> None:

@@ -14,7 +14,7 @@ from dem.prepare.bedfile import load_prepared, save_prepared, shelf_path
 from dem.prepare.prepare import prepare_as
 from dem.prepare.report import Prepared, StageReport
 from experiments.grains.bed_progress import Stages
-from experiments.grains.box import expected_grain_count
+from experiments.grains.sizes import expected_grain_count
 from experiments.grains.where import check_memory
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress

@@ -78,12 +78,11 @@ def redraw_old_report(folder: RunFolder, *, quiet: bool) -> None:
     result, report = folder.path / "result.json", folder.path / "report.html"
     if not report.exists() or report.stat().st_mtime_ns >= result.stat().st_mtime_ns:
         return
-    from experiments.runs.reporting import write_report
+    from experiments.runs.whole_runs import draw_report
 
     say("its report is older than result.json and is made anew")
     with folder.lock(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:
-        progress.stage("report", total=1.0)
-        write_report(folder.path, progress)
+        draw_report(folder, progress)
 
 
 def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> int:

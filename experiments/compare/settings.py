@@ -15,10 +15,8 @@ say = Sentences(__package__)
 class CompareSettings(StrictSettings):
     """Two finished runs side by side: numbers with their differences, curves, pictures."""
 
-    runs: tuple[str, str] = Field(
-        description="Folders of two finished runs of one kind: tumble, tumble spatial or penetrate."
-    )
-    colour: Literal["displacement", "speed", "force", "coordination"] = Field(
-        "displacement", description="What grains are coloured by in pictures."
-    )
+    runs: tuple[str, str]
+    """Folders of two finished runs of one kind: tumble, tumble spatial or penetrate."""
+    colour: Literal["displacement", "speed", "force", "coordination"] = "displacement"
+    """What grains are coloured by in pictures."""
     pictures: bool = Field(True, description="Whether to draw the runs side by side, stills and film; only of tumbles.")

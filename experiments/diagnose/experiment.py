@@ -21,7 +21,7 @@ from experiments.runs.whole_runs import computed_run
 from .core.diagnosis import diagnose
 from .core.outcome import Diagnosis
 from .fit.bounds import is_strained
-from .fit.own import OwnEffect, load_own
+from .fit.forms import OwnEffect, load_own
 from .fit.problem import Problem
 from .noise.colour import together
 from .report.document import write_diagnosis

@@ -2,3 +2,9 @@
 
 Imports `coupling`, `dem`, `experiments.platform`, `experiments.runs`, `rigid`, `vis`.
 """
+
+from vis.page.sentences import Sentences
+
+__all__ = ["say"]
+
+say = Sentences(__package__)

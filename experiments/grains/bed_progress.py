@@ -6,14 +6,10 @@ from experiments.runs.progress import Progress, as_expected
 
 __all__ = ["BedProgress", "Stages"]
 
-_SHARES = {"rain": 0.30, "calm": 0.12, "settle": 0.32, "rest": 0.26}
-"""Of the time, as measured on 20,000 grains, compiling left out [1]."""
-_TAPPED = 0.1
-"""What all of that is where the bed is tapped to a packing fraction: 15 taps took ten times as long [1]."""
-_DOWN = 0.82
-"""Share of the fall from the top at which the grains are down: what lies is 1 / 2.5 as high as what fell [1]."""
-_CALM, _REST = 4, 14
-"""Updates of a bed until it is cut level, and while it rests without drag: two to thirty of these were seen."""
+_SHARES = {"rain": 0.30, "calm": 0.12, "settle": 0.32, "rest": 0.26}  # Of the time, on 20,000 grains
+_TAPPED = 0.1  # What all of that is where the bed is tapped to a packing fraction: 15 taps took ten times as long [1]
+_DOWN = 0.82  # Share of the fall at which the grains are down: what lies is 1 / 2.5 as high as what fell [1]
+_CALM, _REST = 4, 14  # Updates of a bed until it is cut level, and while it rests without drag: 2 to 30 were seen
 
 
 class Stages:

@@ -10,7 +10,7 @@ from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import write_series
 from experiments.runs.types import Json
 
-from .sentences import say
+from . import say
 from .settings import GrainsSettings
 from .softening import Softening, stable_overlap
 
@@ -19,10 +19,8 @@ __all__ = [
     "write_bed_series",
 ]  # fmt: skip
 
-PACKING_OFF = 0.02
-"""A bed whose packing differs by more from that at which its grains were calibrated is worth a warning [1]."""
-MOST_RESIDUAL = 0.01
-"""A larger energy_residual is worth a warning [1]."""
+PACKING_OFF = 0.02  # Difference of the packing from that of the grains' calibration that is worth a warning [1]
+MOST_RESIDUAL = 0.01  # A larger energy_residual is worth a warning [1]
 BED_COLUMNS = {
     "time": "t_s", "momentum_error": "momentum_error_N_s", "angular_momentum_error": "angular_momentum_error_N_m_s",
     "grain_steps": "grain_steps",

@@ -19,29 +19,21 @@ from experiments.platform.surfaces import find_surface
 from rigid.model.trial import Trial
 from rigid.platform.rig import STANDARD_GRAVITY
 
-from .sentences import say
-from .softening import bearing_gradient
+from . import say
+from .softening import PACKING, bearing_gradient
 
 __all__ = ["Lying", "lies_in_flight"]
-
-PACKING = 0.6
-"""Of the bed, for its bulk density [1], as `soften` has it."""
 
 
 @dataclass(frozen=True)
 class Lying:
     """How a platform lies on grains in flight."""
 
-    sunk: float
-    """Depth of the tips that it stands on [m]."""
-    deepest: float
-    """Depth of a tip that points straight down, the centre as high as at rest [m]."""
-    reach: float
-    """How far ahead of the centre, and behind it, tips go through the surface [m]."""
-    fastest: float
-    """Largest speed of a tip, the platform spinning freely [m/s]."""
-    on_hull: bool
-    """Whether its spikes alone do not carry it."""
+    sunk: float  # Depth of the tips that it stands on [m]
+    deepest: float  # Depth of a tip that points straight down, the centre as high as at rest [m]
+    reach: float  # How far ahead of the centre, and behind it, tips go through the surface [m]
+    fastest: float  # Largest speed of a tip, the platform spinning freely [m/s]
+    on_hull: bool  # Whether its spikes alone do not carry it
 
 
 def lies_in_flight(

@@ -15,7 +15,7 @@ from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
-from .sentences import say
+from . import say
 from .spells import spells
 
 __all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched", "tips_in_ground"]
@@ -23,13 +23,14 @@ __all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched",
 
 def grading_told(prepared: Prepared) -> Json:
     """Tables, quantities and warnings of a graded bed, for `finish_bed`; from the notes of its last stage."""
-    found = prepared.reports[-1].notes["grading"]
-    last = prepared.reports[-1].stage
+    found, last = prepared.reports[-1].notes["grading"], prepared.reports[-1].stage
     zones = [
-        [zone["name"], str(zone["grain_count"]), f"{100 * zone['share']:.1f}", *(_mm(zone[key]) for key in _DIAMETERS)]
-        + [_or_none(zone["packing"], ".4f")]
+        [
+            zone["name"], str(zone["grain_count"]), f"{100 * zone['share']:.1f}",
+            *(_mm(zone[key]) for key in ("wanted", "mean", "smallest", "largest")), _or_none(zone["packing"], ".4f"),
+        ]
         for zone in found["zones"]
-    ]
+    ]  # fmt: skip
     layers = [
         [f"{1e3 * layer['bottom']:.3g} to {1e3 * layer['top']:.3g}", _mm(layer["under"]), _mm(layer["elsewhere"])]
         for layer in reversed(found["layers"])
@@ -67,9 +68,6 @@ def grading_told(prepared: Prepared) -> Json:
     }
 
 
-_DIAMETERS = ("wanted", "mean", "smallest", "largest")
-
-
 def _or_none(value: float | None, form: str) -> str:
     return "-" if value is None else format(value, form)
 
@@ -79,18 +77,15 @@ def _mm(value: float | None) -> str:
 
 
 def places_touched(trajectory: Trajectory, *, reach: float) -> list[tuple[float, float]]:
-    """Where the tips of a planar platform are in the ground, along the motion from its start.
+    """Where the tips of a planar platform are in the ground along the motion, from its start: (from, to) [m], in order.
 
-    ``reach``: a tip counts from this height above the surface on [m]. Returns (from, to) of each stretch [m],
-    ascending, none meeting another.
+    A tip counts from the height `reach` above the surface on [m]. No two stretches meet.
     """
-    trial = trajectory.trial
-    count, length = trial.spike_count, trial.spike_length
+    count, length = trajectory.trial.spike_count, trajectory.trial.spike_length
     x = trajectory.x[:, None] - length * np.sin(tip_angles(count, trajectory.theta))
-    low, stretches = tip_depth(trajectory.theta, trajectory.y, count=count, length=length) > -reach, []
-    for tip in range(trial.spike_count):
-        stretches += [(float(x[a:b, tip].min()), float(x[a:b, tip].max())) for a, b in spells(low[:, tip])]
-    return merged(stretches)
+    low = tip_depth(trajectory.theta, trajectory.y, count=count, length=length) > -reach
+    ways = [x[a:b, tip] for tip in range(count) for a, b in spells(low[:, tip])]
+    return merged([(float(way.min()), float(way.max())) for way in ways])
 
 
 def merged(stretches: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -118,10 +113,10 @@ def graded_under(
 ) -> Graded:
     """Fine grains where the tips of a forecast come down, coarse ones elsewhere.
 
-    ``length``: of the bed [m]. ``origin``: x in the bed of the platform's start [m]. ``grain``, ``spread``, ``coarse``:
-    as ``fine``, ``spread`` and ``coarse`` of ``dem.Graded``. ``margin``: fine sand on either side of a tip's way, from
-    its axis, over the spike's diameter [1]. ``options``: ``depth`` and ``growth`` of ``dem.Graded``. Raises ValueError
-    for grains of more than a fifth of the spike; what ``dem.Graded`` refuses.
+    `length` of the bed [m]; `origin`: x in it of the platform's start [m]; `grain`, `spread`, `coarse` as `fine`,
+    `spread` and `coarse` of `dem.Graded`; `margin`: fine sand on either side of a tip's axis, over the spike's diameter
+    [1]; `options`: `depth` and `growth` of `dem.Graded`. Raises ValueError for grains of more than a fifth of the
+    spike, and for what `dem.Graded` refuses.
     """
     if grain > spike_diameter / 5 * (1 + 1e-9):
         raise ValueError(say("fine_for_footprints", grain=grain, spike=spike_diameter, fifth=spike_diameter / 5))
@@ -132,10 +127,7 @@ def graded_under(
 
 
 def coarsest_touched(run: CoupledTumble, graded: Graded, *, size: Sequence[float]) -> float:
-    """The largest mean diameter that belongs where tips of a tumble on such a bed were [m].
-
-    ``size``: of the bed, both widths and the depth [m].
-    """
+    """The largest mean diameter that belongs where tips of a tumble on such a bed were [m]; `size` of the bed [m]."""
     ground: Any = run.ground
     x, depth = tips_in_ground(run)
     return float(graded.diameter(ground.origin[0] + x, ground.origin[2] - depth, size).max(initial=graded.fine))

@@ -6,14 +6,12 @@ from experiments.runs.folder import write_text
 
 __all__ = ["BASE_COPY", "MATERIAL_COPY", "keep_material"]
 
-MATERIAL_COPY = "material.toml"
-"""The copy's name in the run's folder."""
-BASE_COPY = "base.toml"
-"""Its name in that of a calibration, whose material.toml is what it found."""
+MATERIAL_COPY = "material.toml"  # The copy's name in the run's folder
+BASE_COPY = "base.toml"  # Its name in that of a calibration, whose material.toml is what it found
 
 
 def keep_material(name: str, folder: Path, *, copy: str = MATERIAL_COPY) -> str:
-    """What the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made if it lacks.
+    """Where the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made once.
 
     Raises ValueError for a name that is none and a file that will not do, unless the copy is there.
     """

@@ -5,14 +5,13 @@ that follow the size of the bed, the stiffness of its grains, the prepared bed, 
 on the spring-damper is computed first: its `Forecast` says how far and how deep the bed must reach.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from coupling import BedGround, CoupledTumble, SpatialRun
+from coupling import BedGround
 from coupling.members import Member
 from dem import Bed, Graded, Sleep
 from dem.grains.materials import Material
@@ -23,73 +22,55 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import publish
 from rigid.platform.rig import STANDARD_GRAVITY
 
+from . import say
 from .bed_progress import BedProgress
-from .box import carried_height, expected_grain_count
-from .following import CHECKPOINT, Frames, follow
-from .sentences import say
+from .following import Followed, Run
 from .settings import GrainsSettings
+from .sizes import carried_height, expected_grain_count
 from .softening import Softening, check_young, run_limit, soften_material
 from .staged import staged_bed
 from .where import check_where
 
-__all__ = ["MARGIN", "RAIN", "TOUCH", "Forecast", "PlatformOnBed", "PlatformRun", "finish_run"]
+__all__ = ["MARGIN", "RAIN", "TOUCH", "Forecast", "PlatformOnBed"]
 
-MARGIN = 3.0
-"""Sand beyond the outermost footprint, over a spike's diameter [1]."""
-RAIN = 2.5
-"""Height of the loose column that a bed is rained from, over the bed's depth [1]."""
-TOUCH = 1e-3
-"""Force on a row, or in space on all spikes, that counts as touching for the torque, over the weight [1]."""
-MOST_GRAINS = 3e6
-"""More are refused: the run would take days."""
+MARGIN = 3.0  # Sand beyond the outermost footprint, over a spike's diameter [1]
+RAIN = 2.5  # Height of the loose column that a bed is rained from, over the bed's depth [1]
+TOUCH = 1e-3  # Force on a row, or in space on all spikes, that counts as touching for the torque, over the weight [1]
+MOST_GRAINS = 3e6  # More are refused: the run would take days
 
-PlatformRun = CoupledTumble | SpatialRun
-Run = TypeVar("Run", bound=PlatformRun)
 Settings = TypeVar("Settings", bound=GrainsSettings)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Forecast:
-    """What the same trial on the spring-damper says of the bed."""
+    """The demands on the bed of the same trial on the spring-damper."""
 
-    deepest: float
-    """Depth of the deepest tip [m]."""
-    fastest: float
-    """Largest speed of a tip in the ground [m/s]."""
-    rise: float
-    """Of the centre above its start, at most [m]."""
-    margin: float = 1.5
-    """What grains may do beyond it: depth and speed for which their modulus is chosen, over these [1]."""
-    on: str = "on the spring-damper"
-    """What the forecast is computed on, for refusals."""
+    deepest: float  # Depth of the deepest tip [m]
+    fastest: float  # Largest speed of a tip in the ground [m/s]
+    rise: float  # Of the centre above its start, at most [m]
+    margin: float = 1.5  # Depth and speed on grains for which their modulus is chosen, over those here [1]
+    on: str = "on the spring-damper"  # What the forecast is computed on, for refusals
 
 
 Expected = TypeVar("Expected", bound=Forecast)
 
 
-class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
+class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     """One run of a platform on a bed of grains; the abstract members are what differs in the plane and in space."""
 
     settings: Settings
-    duration: float
-    """How long the run lasts [s]."""
-    surface: str
-    """Name of the surface whose grains the bed is made of."""
-    gravity: float
-    """Gravity of the platform [m/s2]."""
-    counterweight: float
-    """Of the rig [kg]; 0 in flight."""
-    spike_diameter: float
-    """[m]."""
-    reach: float
-    """From the centre to the farthest tip [m]."""
-    repeats = 1
-    """How often the prepared bed is laid end to end [1]."""
-    stages: tuple[str, ...] | None = None
-    """How the bed is prepared; None: rained and levelled."""
+    duration: float  # How long the run lasts [s]
+    surface: str  # Name of the surface whose grains the bed is made of
+    gravity: float  # Gravity of the platform [m/s2]
+    counterweight: float  # Of the rig [kg]; 0 in flight
+    weight: float  # On the surface [N]
+    copies = 1.0  # Members side by side in the platform for one on the bed [1]
+    spike_diameter: float  # [m]
+    reach: float  # From the centre to the farthest tip [m]
+    repeats = 1  # How often the prepared bed is laid end to end [1]
+    stages: tuple[str, ...] | None = None  # How the bed is prepared; None: rained and levelled
 
     # What differs
 
@@ -117,8 +98,8 @@ class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
         """Raise ValueError for a bed too short or too narrow for the forecast."""
 
     @abstractmethod
-    def ground(self, bed: Bed) -> BedGround:
-        """The platform on the prepared bed, the expected footprints in its middle."""
+    def layout(self, bed: Bed) -> Mapping[str, Any]:
+        """Options of `BedGround`: where the platform starts, so that the expected footprints lie in the middle."""
 
     @abstractmethod
     def run_on(self, ground: BedGround) -> Run:
@@ -127,14 +108,6 @@ class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
     @abstractmethod
     def announce(self, progress: Progress) -> None:
         """State settings, defaults and warnings before the bed is made."""
-
-    @abstractmethod
-    def frames(self, run: Run, folder: Path, resumed: bool) -> Frames | None:
-        """What writes the frames; None where none are wanted."""
-
-    @abstractmethod
-    def conclude(self, run: Run, softening: Softening, folder: RunFolder) -> Result:
-        """The result, its series written."""
 
     @property
     def graded(self) -> Graded | None:
@@ -235,6 +208,14 @@ class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
         top = bed.surface + max(self.thrown(), carried)
         return bed.repeated(self.repeats, height=top) if self.repeats > 1 or top > bed.height else bed
 
+    def ground(self, bed: Bed) -> BedGround:
+        """The platform on the prepared bed."""
+        s, copies = self.settings, self.copies
+        return BedGround(
+            bed, self.members(), copies=copies, touch=TOUCH * self.weight / copies, friction=s.spike_friction,
+            restitution=s.spike_restitution, **self.layout(bed),
+        )  # fmt: skip
+
     def stepper(self, bed: Bed) -> Run:
         """The run on the prepared bed, its bound on overlaps set and, with `sleep`, its grains let sleep."""
         s = self.settings
@@ -246,49 +227,11 @@ class PlatformOnBed(ABC, Generic[Settings, Run, Expected]):
         return self.run_on(ground)
 
     def stepping(self) -> Mapping[str, Any]:
-        """How the master steps the run, as every stepper takes it."""
-        s = self.settings
-        return {
-            "duration": self.duration, "substeps": s.substeps, "body_steps": s.body_steps,
-            "extrapolation": s.extrapolation, "iterations": s.iterations, "lowering_speed": self.lowering_speed,
-        }  # fmt: skip
+        """How the run is stepped, as every stepper takes it."""
+        return {"duration": self.duration, "lowering_speed": self.lowering_speed, **self.settings.stepping()}
 
-    def carry_out(
-        self,
-        folder: RunFolder,
-        progress: Progress,
-        *,
-        sinkage: Callable[[Run], float],
-        write_series: Callable[[Path, Run], Any],
-    ) -> Result:
+    def carry_out(self, folder: RunFolder, progress: Progress) -> Result:
         """Prepare the bed, follow the run in `folder`, from its checkpoint where there is one; the result."""
         self.announce(progress)
-        progress.plan({"bed": 1.0, "tumble": self.duration + 0.3}, seconds={"report": 10.0})  # with the setting down
-        softening = self.softening()
-        run = self.stepper(self.bed(softening, progress))
-        return finish_run(
-            run, folder, progress, checkpoint_interval=self.settings.checkpoint_interval,
-            frames=lambda resumed: self.frames(run, folder.path, resumed), sinkage=sinkage, write_series=write_series,
-            conclude=lambda: self.conclude(run, softening, folder),
-        )  # fmt: skip
-
-
-def finish_run(
-    run: Run,
-    folder: RunFolder,
-    progress: Progress,
-    *,
-    checkpoint_interval: float,
-    frames: Callable[[bool], Frames | None],
-    sinkage: Callable[[Run], float],
-    write_series: Callable[[Path, Run], Any],
-    conclude: Callable[[], Result],
-) -> Result:
-    """Follow `run` to its end, write result and report, and drop the checkpoint; the result."""
-    follow(
-        run, folder, progress, frames=frames, checkpoint_interval=checkpoint_interval, sinkage=lambda: sinkage(run),
-        write_series=lambda: write_series(folder.path, run),
-    )  # fmt: skip
-    result = publish(folder, conclude(), progress)
-    folder.drop_checkpoint(CHECKPOINT)
-    return result
+        progress.plan({"bed": 1.0, "tumble": self.duration + 0.3}, seconds={"report": 10.0})  # with the placement
+        return self.finish(self.stepper(self.bed(self.softening(), progress)), folder, progress)

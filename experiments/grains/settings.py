@@ -1,14 +1,15 @@
 """Settings of runs on grains: the bed, how it is coupled; and of a tumble the spikes in it. They belong to
 ``ground = "bed"``."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from pydantic import Field
 
 from experiments.platform.settings import NotNegative, Positive
 from experiments.runs.strict import StrictSettings
 
-from .sentences import say
+from . import say
 
 __all__ = ["OF_THE_MASTER", "GrainsSettings", "TumbleBedSettings"]
 
@@ -27,55 +28,41 @@ _ONCE = {"spike_diameter": 0.012, "spike_clear": 0.04}
 class GrainsSettings(StrictSettings):
     """What a bed of grains under any platform is made of, and how it is coupled; SI units."""
 
-    bed_size: tuple[Positive, Positive, Positive] = Field(
-        (0.7, 0.7, 0.05), description="On a bed: its size along x and y (both periodic) and its depth [m]."
-    )
+    bed_size: tuple[Positive, Positive, Positive] = (0.7, 0.7, 0.05)
+    """On a bed: its size along x and y (both periodic) and its depth [m]."""
     grain: Positive = Field(0.003, description="On a bed: mean grain diameter [m].")
     spread: float = Field(0.15, ge=0, le=0.5, description="On a bed: grain diameters are uniform within 1 +- this [1].")
     seed: int = Field(1, ge=0, lt=2**31, description="On a bed: seed of its grains.")
-    young: Positive | None = Field(
-        None, description="On a bed: Young's modulus of the softened grains [Pa]; from max_overlap if not given."
-    )
-    max_overlap: float = Field(
-        0.05, gt=0, le=0.2,
-        description="On a bed: overlap over diameter that the step is made for [1]; past twice it, or 0.2, a run ends.",
-    )  # fmt: skip
+    young: Positive | None = None
+    """On a bed: Young's modulus of the softened grains [Pa]; from max_overlap if not given."""
+    max_overlap: float = Field(0.05, gt=0, le=0.2)
+    """On a bed: overlap over diameter that the step is made for [1]; past twice it, or 0.2, a run ends."""
     spike_friction: NotNegative = Field(0.5, description="On a bed: friction of spike and grains [1].")
     spike_restitution: float = Field(0.5, ge=0.01, le=1, description="On a bed: restitution of spike and grains [1].")
-    lowering_speed: Positive | None = Field(
-        None, description="On a bed: speed at which the platform is set down [m/s]; sqrt(g grain) if not given."
-    )
-    substeps: int = Field(
-        10,
-        ge=1,
-        le=200,
-        description="On a bed, or coupled: steps of the ground from one exchange of forces to the next [1].",
-    )
-    body_steps: int = Field(
-        1,
-        ge=1,
-        le=200,
-        description="On a bed, or coupled: steps of the platform from one exchange of forces to the next; it "
-        "divides substeps [1].",
-    )
-    extrapolation: int = Field(
-        0, ge=0, le=2, description="On a bed, or coupled: order of the guess at the next force [1]."
-    )
-    iterations: int = Field(
-        1, ge=1, le=50, description="On a bed, or coupled: how often a step is computed at most; 1: explicit."
-    )
-    sleep: bool = Field(
-        False, description="On a bed: whether grains at rest are left out until something reaches them (docs/bed.md)."
-    )
-    sleep_force: Positive = Field(
-        1.0, description="Of sleep: change of a contact's force that wakes a grain, over its weight [1], and"
-    )
+    lowering_speed: Positive | None = None
+    """On a bed: speed at which the platform is set down [m/s]; sqrt(g grain) if not given."""
+    substeps: int = Field(10, ge=1, le=200)
+    """On a bed, or coupled: steps of the ground from one exchange of forces to the next [1]."""
+    body_steps: int = Field(1, ge=1, le=200)
+    """On a bed, or coupled: steps of the platform from one exchange of forces to the next; it divides substeps [1]."""
+    extrapolation: int = Field(0, ge=0, le=2)
+    """On a bed, or coupled: order of the guess at the next force [1]."""
+    iterations: int = Field(1, ge=1, le=50)
+    """On a bed, or coupled: how often a step is computed at most; 1: explicit."""
+    sleep: bool = False
+    """On a bed: whether grains at rest are left out until something reaches them (docs/bed.md)."""
+    sleep_force: Positive = 1.0
+    """Of sleep: change of a contact's force that wakes a grain, over its weight [1], and"""
     sleep_share: Positive = Field(0.5, description="Of sleep: the least of it over the force itself [1].")
     frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
     arch: Literal["cpu", "cuda"] = Field("cpu", description="On a bed: where it is computed.")
     threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
     cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
+
+    def stepping(self) -> Mapping[str, Any]:
+        """How the master steps the run."""
+        return {name: getattr(self, name) for name in ("substeps", "body_steps", "extrapolation", "iterations")}
 
     def stepping_fault(self) -> str | None:
         """Steps that do not go into one another, in words."""
@@ -93,56 +80,32 @@ class GrainsSettings(StrictSettings):
 class TumbleBedSettings(GrainsSettings):
     """The same of a tumble in the plane, whose bed is a slice as wide as one spike has for itself."""
 
-    bed_size: tuple[Positive, Positive, Positive] = Field(
-        (0.5, 0.06, 0.046),
-        description="On a bed: its length along the motion, its width for one spike (both periodic) and its depth [m].",
-    )
-    bed_repeats: int = Field(
-        1, ge=1, le=100, description="On a bed: how often the prepared bed is laid end to end along the motion [1]."
-    )
-    coarse: Positive | None = Field(
-        None,
-        description="On a bed: graded: `grain` is the mean diameter under the expected footprints, this the largest "
-        "away from them [m]; one size throughout if not given.",
-    )
-    bed_stages: tuple[str, ...] | None = Field(
-        None,
-        description="On a bed: how it is prepared, as `hedgebed bed make --stages` has it (rain:dry compact:0.57 stick "
-        "level, for grains that stick); rained and levelled if not given.",
-    )
-    place: float = Field(
-        0.0,
-        allow_inf_nan=False,
-        description="On a bed: how far along it from its middle the platform is set down [m]; the bed goes on "
-        "periodically, so other grains lie there.",
-    )
-    spike_diameter: Positive | None = Field(
-        None,
-        description="On a bed: diameter of shaft and ball tip of a spike [m]; the platform's if not given (hedgehog: "
-        "0.012).",
-    )
-    spike_clear: Positive | None = Field(
-        None,
-        description="On a bed: how far a spike stands out of the hull [m]; the platform's if not given (hedgehog: "
-        "0.04).",
-    )
-    settle_gravity: Positive | None = Field(
-        None,
-        description="On a bed, in flight: gravity under which the bed is rained and the platform set down, lowered to "
-        "`gravity` before the torque begins [m/s2]: the same sooner; `gravity` itself if not given.",
-    )
-    tumbles: int = Field(
-        1,
-        ge=1,
-        le=20,
-        description="On a bed, or coupled: tumbles in a row; a torque begins when the platform lies [1].",
-    )
-    tumble_turn: Positive = Field(
-        1.0, le=4, description="On a bed, or coupled: where each torque of a row of tumbles ends, over pi / rows [1]."
-    )
-    drop_speed: Positive | None = Field(
-        None, description="On a bed, or coupled: a landing in place of a tumble, at this speed downwards [m/s]."
-    )
+    bed_size: tuple[Positive, Positive, Positive] = (0.5, 0.06, 0.046)
+    """On a bed: its length along the motion, its width for one spike (both periodic) and its depth [m]."""
+    bed_repeats: int = Field(1, ge=1, le=100)
+    """On a bed: how often the prepared bed is laid end to end along the motion [1]."""
+    coarse: Positive | None = None
+    """On a bed: graded: `grain` is the mean diameter under the expected footprints, this the largest away from them
+    [m]; one size throughout if not given."""
+    bed_stages: tuple[str, ...] | None = None
+    """On a bed: how it is prepared, as `hedgebed bed make --stages` has it (rain:dry compact:0.57 stick level, for
+    grains that stick); rained and levelled if not given."""
+    place: float = Field(0.0, allow_inf_nan=False)
+    """On a bed: how far along it from its middle the platform is set down [m]; the bed goes on periodically, so other
+    grains lie there."""
+    spike_diameter: Positive | None = None
+    """On a bed: diameter of shaft and ball tip of a spike [m]; the platform's if not given (hedgehog: 0.012)."""
+    spike_clear: Positive | None = None
+    """On a bed: how far a spike stands out of the hull [m]; the platform's if not given (hedgehog: 0.04)."""
+    settle_gravity: Positive | None = None
+    """On a bed, in flight: gravity under which the bed is rained and the platform set down, lowered to `gravity` before
+    the torque begins [m/s2]: the same sooner; `gravity` itself if not given."""
+    tumbles: int = Field(1, ge=1, le=20)
+    """On a bed, or coupled: tumbles in a row; a torque begins when the platform lies [1]."""
+    tumble_turn: Positive = Field(1.0, le=4)
+    """On a bed, or coupled: where each torque of a row of tumbles ends, over pi / rows [1]."""
+    drop_speed: Positive | None = None
+    """On a bed, or coupled: a landing in place of a tumble, at this speed downwards [m/s]."""
     drop_along: float = Field(0.0, allow_inf_nan=False, description="Of a landing: speed along the surface [m/s].")
     drop_spin: float = Field(0.0, allow_inf_nan=False, description="Of a landing: spin, clockwise [rad/s].")
     drop_theta: float = Field(0.0, allow_inf_nan=False, description="Of a landing: theta at the first touch [rad].")

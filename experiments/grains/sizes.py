@@ -1,5 +1,6 @@
-"""How large the grains of `bed make` are, what adhesion becomes in grains of another size, and what reports say."""
+"""Sizes of grains and beds: how many grains fill a bed, what adhesion becomes in other grains, what reports say."""
 
+import math
 from dataclasses import replace
 from typing import Literal
 
@@ -9,9 +10,12 @@ from dem.grains.materials import Material
 from dem.grains.sizes import Sieve, Sizes
 from experiments.runs.types import Json
 
-from .sentences import say
+from . import say
 
-__all__ = ["KEPT", "Distribution", "Kept", "bond_number", "in_grains_of", "scaling_told", "sizes_table"]
+__all__ = [
+    "KEPT", "Distribution", "Kept", "bond_number", "carried_height", "expected_grain_count", "in_grains_of",
+    "scaling_told", "sizes_table",
+]  # fmt: skip
 
 Distribution = Literal["uniform", "normal", "log-normal", "sieve"]
 Kept = Literal["strength", "bond", "surface-energy"]
@@ -46,10 +50,7 @@ def scaling_told(before: Material, now: Material, *, diameter: float, gravity: f
 
 
 def sizes_table(radii: np.ndarray, sizes: Sizes) -> Json:
-    """The bed's grading by mass: beside the sieve table where there is one, else D10 to D90.
-
-    ``radii``: of the bed's grains [m], shape [grain_count].
-    """
+    """The bed's grading by mass, from the grains' `radii` [m]: beside the sieve table if there is one, or D10-D90."""
     diameters = np.sort(2 * np.asarray(radii, dtype=float))
     mass = np.cumsum(diameters**3)
     mass /= mass[-1]
@@ -66,3 +67,18 @@ def sizes_table(radii: np.ndarray, sizes: Sizes) -> Json:
     rows = [[f"D{100 * share:.0f} [mm]", f"{1e3 * value:.4g}"] for share, value in at.items()]
     rows.append(["D60 / D10", f"{at[0.6] / at[0.1]:.3g}"])
     return {"title": "Grading by mass", "head": ["finer by mass", ""], "rows": rows}
+
+
+def carried_height(material: Material, *, reach: float, rise: float, grain: float) -> float:
+    """How high over the surface grains that stick ride up on a platform that turns [m]; 0 for those that do not.
+
+    `reach` from the platform's centre to its farthest point [m], `rise` of the centre, hops included, at most [m];
+    `grain`: mean diameter [m]; two lie on the tip. In JSC-1A at 0.22 N m grains hung on a spike 0.15 m over the surface
+    (grains1-jsc1a-0.0085-0.22, 2026-11-23).
+    """
+    return 0.0 if material.cohesion == "none" else 2 * reach + max(rise, 0.0) + 2 * grain
+
+
+def expected_grain_count(bed_size: tuple[float, float, float], grain: float, spread: float) -> float:
+    """About how many grains fill the bed, at a packing fraction of 0.6; diameters uniform within 1 +- spread."""
+    return 0.57 * math.prod(bed_size) / (math.pi / 6 * grain**3 * (1 + spread**2))

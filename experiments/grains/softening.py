@@ -31,48 +31,39 @@ from typing import Any
 
 from dem.contact.timestep import CHAIN
 
-from .sentences import say
+from . import say
 
 __all__ = [
-    "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit", "soften",
+    "PACKING", "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit",
     "soften_material", "stable_overlap",
 ]  # fmt: skip
 
-RAIN_OVERLAP = 0.05
-"""Overlap that a grain may have with the floor at the end of its fall, while the bed is made [of a diameter]."""
-INERTIA = 1.1
-"""lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)."""
+RAIN_OVERLAP = 0.05  # Of a grain with the floor at the end of its fall, while the bed is made [of a diameter]
+INERTIA = 1.1  # lambda: dynamic pressure over rho v^2 [1] (Agarwal et al. 2023)
 
 PUSHED = {"motor": 1.0, "brake": 3.0}
 """Force on a platform's rows in flight that grains are made stiff enough for, over the spring-damper's largest [1].
 
-There a bed's own weight says nothing of what a torque presses with. 0.7 to 0.8 (motor) and 2.9 to 4.9 (brake, whose
-spring-damper is not yet pressed in when a tip has its speed in grains) were met (docs/results/grains2-flight-*)."""
+0.7 to 0.8 (motor) and 2.9 to 4.9 (brake, whose spring-damper is not yet pressed in when a tip has its speed in grains)
+were met (docs/results/grains2-flight-*)."""
 SMALL = 0.05
-"""Overlap that grains meant to be hard may have [of a diameter]: the default of `max_overlap`, past which a drive of
-a spike fails, and a platform's run at `run_limit`. A run that had more is told so."""
-STIFF, STIFF_CHAIN = 0.01, 7.4
-"""Overlap [of a diameter] at and below which a chain of grains carries as much as it does among stiff ones [1]."""
+"""Overlap that is small [of a diameter]: the default of `max_overlap`. A run that had more gets a warning."""
+STIFF, STIFF_CHAIN = 0.01, 7.4  # Overlap [of a diameter] up to which chains carry as among stiff grains [1]
 SOFTEST = 0.1
-"""Of the modulus chosen for `max_overlap`, below which one that is set is refused [1]: grains would overlap by
-10^(2/3) = 4.6 times as much. The estimate has a factor of some 3 to spare in the modulus (`chain`, and depth and speed
-beyond the forecast), and the softest case that ships has half of what is chosen."""
-SOFT = 0.05
-"""Overlap at and above which grains share the load: `CHAIN`, as `dem` has it."""
+"""A modulus that is set below this share of the chosen one is refused [1]: grains would overlap 10^(2/3) = 4.6 times as
+much. The estimate is some 3 times too stiff, and the softest case that ships has half of what is chosen."""
+PACKING = 0.6  # Of a bed, for its bulk density [1]
+SOFT = 0.05  # Overlap at and above which grains share the load: `CHAIN`, as `dem` has it
 
 
 @dataclass(frozen=True)
 class Softening:
     """What was chosen and why."""
 
-    young: float
-    """Young's modulus of the softened grains [Pa]."""
-    pressure: float
-    """Largest pressure expected under the tip [Pa]."""
-    speed: float
-    """Largest speed of the spike [m/s]."""
-    real: float
-    """Young's modulus of the real grains [Pa]."""
+    young: float  # Young's modulus of the softened grains [Pa]
+    pressure: float  # Largest pressure expected under the tip [Pa]
+    speed: float  # Largest speed of the spike [m/s]
+    real: float  # Young's modulus of the real grains [Pa]
 
     @property
     def factor(self) -> float:
@@ -102,12 +93,9 @@ class Softening:
 def run_limit(max_overlap: float) -> float:
     """Overlap past which a platform's run on a bed made for `max_overlap` ends [of a diameter]: twice it, at most 0.2.
 
-    The step is chosen for grains all of whose contacts are at `max_overlap` (`dem.contact.timestep`); that holds up to
-    `stable_overlap`, some 1.2 times it. Beyond, single contacts are still followed: at twice the bound the step is
-    1/6.7 of the half-period of a grain on a wall, which is lost at 1/1.6 (`dem.contact.timestep.stable_step`, a pair
-    alone).
-    Whether more than a few were there, and made energy, the books tell (`energy_residual`, `dissipation_reversal`): the
-    result warns.
+    The step is stable for a whole lattice up to `stable_overlap`, some 1.2 times `max_overlap`. Beyond, single contacts
+    are still followed: at twice the bound the step is 1/6.7 of the half-period of a grain on a wall, which is lost at
+    1/1.6 (`dem.contact.timestep.stable_step`). The result warns where more of them made energy.
     """
     return max(max_overlap, min(2 * max_overlap, 0.2))
 
@@ -152,85 +140,52 @@ def chain(max_overlap: float) -> float:
     return CHAIN + (STIFF_CHAIN - CHAIN) * min(1.0, max(0.0, share))
 
 
-def soften(
+def soften_material(
+    material: Any,
     *,
+    young: float | None = None,
     max_overlap: float,
     grain: float,
-    density: float,
-    poisson: float,
-    friction: float,
-    real_young: float,
+    spread: float,
     gravity: float,
     bed_height: float,
     depth: float,
     speed: float,
     pressure: float = 0.0,
     fall: float = 0.0,
-    packing: float = 0.6,
-    surface_energy: float = 0.0,
     fastest: str = "speed",
 ) -> Softening:
-    """Young's modulus that keeps overlaps below `max_overlap` (see the module). All SI; `grain` is the mean diameter.
+    """Young's modulus of the grains of a material that keeps overlaps below `max_overlap` (see the module). All SI.
 
-    `depth` is the deepest the tip goes, `speed` its fastest, `pressure` what the load alone presses with, `fall` how
-    deep a grain fell when the bed was made, `surface_energy` that of the grains [J/m2], 0 without cohesion; `fastest`
-    is the key that set the speed. Raises ValueError for an overlap that is no share of a diameter, and where the real
-    grains, `real_young`, are too soft to keep it.
-    """
-    if not 0 < max_overlap <= 0.2:
-        raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
-    bulk = packing * density
-    under_tip = bearing_gradient(bulk, gravity, friction) * depth + INERTIA * bulk * speed**2
-    highest = max(under_tip, pressure) + bulk * gravity * bed_height
-    pulled = 2 * math.pi * surface_energy / grain
-    pair = 1.5 * (chain(max_overlap) * highest + pulled) / max_overlap**1.5
-    static = 2 * (1 - poisson**2) * pair
-    mass = density * math.pi * grain**3 / 6
-    struck, landed = (
-        0.75 * 1.25 * mass * squared / (bound * grain) ** 2.5 / math.sqrt(0.5 * grain) * (1 - poisson**2)
-        for squared, bound in ((speed**2, max_overlap), (2 * gravity * fall, max(max_overlap, RAIN_OVERLAP)))
-    )
-    if struck > real_young:
-        most = 0.99 * speed * math.sqrt(real_young / struck)
-        raise ValueError(
-            say("too_fast", fastest=fastest, speed=speed, max_overlap=max_overlap, real=real_young, most=most)
-        )
-    if static > real_young:
-        would = max_overlap * (static / real_young) ** (2 / 3)
-        raise ValueError(
-            say("too_deep", max_overlap=max_overlap, highest=highest, static=static, real=real_young, would=would)
-        )
-    return Softening(min(real_young, max(static, struck, landed)), highest, speed, real_young)
-
-
-def soften_material(
-    material: Any,
-    *,
-    young: float | None,
-    max_overlap: float,
-    grain: float,
-    spread: float,
-    fastest: str = "speed",
-    **case: float,
-) -> Softening:
-    """`soften` for the grains of a material; where `young` [Pa] is set, that, with what presses and how fast.
-
-    Diameters are uniform within 1 +- `spread`: where that is wide, the mean grain is held to less than `max_overlap`,
-    so that the smallest keep it (`dem.prepare.prepare.bound_of_mean`). `case` are the options of `soften` that are
-    not the material's. Raises ValueError as `soften` does.
+    Diameters are uniform around `grain` within 1 +- `spread`: where that is wide, the mean grain is held to less than
+    `max_overlap`, so that the smallest keep it (`dem.prepare.prepare.bound_of_mean`). `depth` is the deepest the tip
+    goes, `speed` its fastest, `pressure` of the load alone, `fall` how deep a grain fell when the bed was made;
+    `fastest` is the key that set the speed. Where `young` [Pa] is set, the result has that, with the pressure and the
+    speed. Raises ValueError for an overlap that is no share of a diameter, and where the real grains are too soft.
     """
     from dem.grains.sizes import Uniform
     from dem.prepare.prepare import bound_of_mean
 
-    chosen = soften(
-        max_overlap=bound_of_mean(Uniform(grain, spread), max_overlap),
-        grain=grain,
-        density=material.density,
-        poisson=material.poisson,
-        friction=material.friction,
-        real_young=material.young,
-        surface_energy=material.surface_energy,
-        fastest=fastest,
-        **case,
+    max_overlap = bound_of_mean(Uniform(grain, spread), max_overlap)
+    if not 0 < max_overlap <= 0.2:
+        raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
+    poisson, real = material.poisson, material.young
+    bulk = PACKING * material.density
+    under_tip = bearing_gradient(bulk, gravity, material.friction) * depth + INERTIA * bulk * speed**2
+    highest = max(under_tip, pressure) + bulk * gravity * bed_height
+    pulled = 2 * math.pi * material.surface_energy / grain
+    pair = 1.5 * (chain(max_overlap) * highest + pulled) / max_overlap**1.5
+    static = 2 * (1 - poisson**2) * pair
+    mass = material.density * math.pi * grain**3 / 6
+    struck, landed = (
+        0.75 * 1.25 * mass * squared / (bound * grain) ** 2.5 / math.sqrt(0.5 * grain) * (1 - poisson**2)
+        for squared, bound in ((speed**2, max_overlap), (2 * gravity * fall, max(max_overlap, RAIN_OVERLAP)))
     )
-    return chosen if young is None else Softening(young, chosen.pressure, chosen.speed, material.young)
+    given = {"max_overlap": max_overlap, "real": real}
+    if struck > real:
+        most = 0.99 * speed * math.sqrt(real / struck)
+        raise ValueError(say("too_fast", **given, fastest=fastest, speed=speed, most=most))
+    if static > real:
+        would = max_overlap * (static / real) ** (2 / 3)
+        raise ValueError(say("too_deep", **given, highest=highest, static=static, would=would))
+    return Softening(min(real, max(static, struck, landed)) if young is None else young, highest, speed, real)

@@ -11,8 +11,8 @@ from dem.prepare.recipe import check_stages, parse_stage
 from experiments.platform.surfaces import Surface
 from experiments.runs.progress import Progress
 
+from . import say
 from .bed_progress import Stages
-from .sentences import say
 
 __all__ = ["check_bed_stages", "packing_warning", "staged_bed"]
 
@@ -35,10 +35,7 @@ def check_bed_stages(
 
 
 def packing_warning(surface: Surface, material: Material, stages: Sequence[str] | None) -> str | None:
-    """That a bed without `stages` will not have the packing its grains were calibrated at, and which stages would do.
-
-    None where stages are given, or that packing is not known. `material` is that of the surface's grains.
-    """
+    """That a bed without `stages` will not have the packing its grains were calibrated at, and which stages give it."""
     if stages is not None or surface.packing is None:
         return None
     compact = f"compact:{surface.packing:g}"
@@ -66,8 +63,7 @@ def staged_bed(
 ) -> Bed:
     """The bed that `hedgebed bed make` with these stages would make; kept under ``HEDGEBED_CACHE``, as rained ones are.
 
-    ``options``: those of ``dem.prepare.prepare.prepare_as``. Raises RuntimeError where it cannot be made as asked for,
-    and what that does.
+    `options` of `dem.prepare.prepare.prepare_as`. Raises RuntimeError where the bed cannot be made, and what that does.
     """
     shown = _OneStage(progress, "bed", len(stages), asked_to_stop)
     try:

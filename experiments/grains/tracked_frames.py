@@ -33,21 +33,21 @@ Run = TypeVar("Run", bound=CoupledTumble | SpatialRun)
 
 
 class PlatformFrames(ABC, Generic[Run]):
-    """Writes frames/tumble.pvd, and goes on with it where it was stopped. `meshes`, in body axes, are the variant's."""
+    """Writes frames/tumble.pvd, and goes on with it where it was stopped."""
 
-    meshes: dict[str, Mesh]
-
-    def __init__(self, run: Run, folder: Path, settings: GrainsSettings, *, duration: float, resumed: bool) -> None:
-        self.interval = max(duration / max(1, settings.frame_count), run.master.macro_step)
+    def __init__(self, run: Run, folder: Path, settings: GrainsSettings, *, resumed: bool) -> None:
+        self.interval = max(run.duration / max(1, settings.frame_count), run.master.macro_step)
+        self.meshes = self.body_meshes(run)
         self._untouched: HeightMap | None = None
         self._spacing = 0.5 * settings.grain
-        if resumed:
-            half = 0.5 * run.master.macro_step
-            self.writer = FrameWriter(folder, name=NAME, resume=True, keep_until=max(run.time, 0.0) - half)
-            if self.writer.times:
-                self._untouched = read_frames(folder, NAME)[0].maps.get("surface")
-        else:
-            self.writer = FrameWriter(folder, name=NAME)
+        keep_until = max(run.time, 0.0) - 0.5 * run.master.macro_step if resumed else None
+        self.writer = FrameWriter(folder, name=NAME, resume=resumed, keep_until=keep_until)
+        if resumed and self.writer.times:
+            self._untouched = read_frames(folder, NAME)[0].maps.get("surface")
+
+    @abstractmethod
+    def body_meshes(self, run: Run) -> dict[str, Mesh]:
+        """`spikes` and `hull`, as far as there are any, in body axes."""
 
     @abstractmethod
     def values(self, run: Run) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from experiments.runs.memory import cores_there, memory_there
 
-from .sentences import say
+from . import say
 
 __all__ = ["check_memory", "check_where"]
 
@@ -21,11 +21,7 @@ def check_memory(count: float, grain: float, key: str) -> None:
 
 
 def check_where(*, arch: str, threads: int | None, precision: str = "float64") -> None:
-    """Start what is not on every machine, so that it is missed before there is a folder.
-
-    ``arch``: "cpu" or "cuda". ``threads``: of the CPU; all when None. ``precision``: "float64" or "float32". Raises
-    ValueError for more threads than cores; a backend that does not start here.
-    """
+    """Raise ValueError for more threads than cores (None: all), and where the backend `arch` does not start here."""
     cores = cores_there()
     if threads is not None and threads > cores:
         raise ValueError(say("few_cores", threads=threads, cores=cores))

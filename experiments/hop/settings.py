@@ -20,25 +20,17 @@ class _Question(StrictSettings):
     """What is asked of a hop: the means for a distance, or how far given means go."""
 
     gravity: Positive = Field(1e-3, description="Gravity at the surface [m/s2].")
-    distance: Positive | None = Field(
-        None,
-        description="How far to hop, along the ground [m]; 5 if neither it nor wheel_speed_0, nor a motor's torque, is "
-        "given.",
-    )
-    wheel_speed_0: Positive | None = Field(
-        None, description="In place of a distance: speed of the wheel before the brake [rad/s]; says how far that goes."
-    )
-    body_radius: Positive | None = Field(
-        None, description="Radius of the body [m]; a flat ground, and nothing said of escape, if not given."
-    )
-    actuator: Literal["brake", "motor"] = Field(
-        "brake", description="A brake on a spinning wheel, or a motor from rest."
-    )
-    torque: Positive | None = Field(
-        None,
-        description="Torque on the platform [N m]: of a brake its largest if not given; of a motor, given in place of "
-        "a distance, says how far that goes.",
-    )
+    distance: Positive | None = None
+    """How far to hop, along the ground [m]; 5 if neither it nor wheel_speed_0, nor a motor's torque, is given."""
+    wheel_speed_0: Positive | None = None
+    """In place of a distance: speed of the wheel before the brake [rad/s]; says how far that goes."""
+    body_radius: Positive | None = None
+    """Radius of the body [m]; a flat ground, and nothing said of escape, if not given."""
+    actuator: Literal["brake", "motor"] = "brake"
+    """A brake on a spinning wheel, or a motor from rest."""
+    torque: Positive | None = None
+    """Torque on the platform [N m]: of a brake its largest if not given; of a motor, given in place of a distance, says
+    how far that goes."""
 
 
 class HopSettings(PlatformSettings, _Question):

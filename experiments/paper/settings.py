@@ -16,41 +16,31 @@ class PaperSettings(StrictSettings):
     """Figures 5 to 8 of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) with our model, beside what the text states."""
 
     # The trials
-    rigs: tuple[Positive, ...] = Field(
-        (0.0085, 0.015),
-        min_length=1,
-        description="g_sim of the rig [9.80665 m/s2]; the first is that of Figures 5 and 6.",
-    )
+    rigs: tuple[Positive, ...] = Field((0.0085, 0.015), min_length=1)
+    """g_sim of the rig [9.80665 m/s2]; the first is that of Figures 5 and 6."""
     motor_torques: tuple[Positive, ...] = Field((0.125, 0.22), min_length=1, description="Torques of motors [N m].")
     brake_torques: tuple[Positive, ...] = Field((6.0,), description="Torques of brakes [N m].")
-    surfaces: tuple[str, ...] = Field(
-        ("steel", "brick", "sand", "jsc1a"), min_length=1, description="Materials; Figures 5 to 7 take steel and brick."
-    )
+    surfaces: tuple[str, ...] = Field(("steel", "brick", "sand", "jsc1a"), min_length=1)
+    """Materials; Figures 5 to 7 take steel and brick."""
     friction_band: float = Field(0.1, gt=0, lt=1, description="Friction is varied by this, relative, up and down [1].")
-    measured_angles: tuple[str, ...] = Field(
-        (),
-        description="Transition angles read off Figure 6, SURFACE-TORQUE-STATE=DEGREES with slip or hop for the state "
-        "(steel-0.125-hop=18), to be compared with ours; the paper prints none as a number.",
-    )
+    measured_angles: tuple[str, ...] = ()
+    """Transition angles read off Figure 6, SURFACE-TORQUE-STATE=DEGREES with slip or hop for the state
+    (steel-0.125-hop=18), to be compared with ours; the paper prints none as a number."""
     rig_reading: Literal["pair", "weight"] = Field("pair", description="What rig means; see tumble.")
 
     # What the paper does not give
     platform: str = Field("hedgehog", description="Platform: one that ships, or its TOML file.")
-    brake_wheel_speed: Positive = Field(
-        300.0, description="Speed of the wheel at the start of a brake trial [rad/s]; ours, the paper gives none."
-    )
-    sweep: bool = Field(
-        True,
-        description="Halve and double the numbers that the paper does not give, one at a time, vary mu_d / mu_s, and "
-        "put other grounds under the brake trials on grains.",
-    )
+    brake_wheel_speed: Positive = 300.0
+    """Speed of the wheel at the start of a brake trial [rad/s]; ours, the paper gives none."""
+    sweep: bool = True
+    """Halve and double the numbers that the paper does not give, one at a time, vary mu_d / mu_s, and put other grounds
+    under the brake trials on grains."""
 
     # How it is computed
     duration: Positive = Field(5.0, le=60, description="How long a motor trial lasts [s].")
     brake_duration: Positive = Field(2.0, le=60, description="How long a brake trial lasts [s].")
-    trusted: Positive = Field(
-        0.04, description="Speeds are the largest before the centre is this far away [m]; the paper trusts 40 mm."
-    )
+    trusted: Positive = 0.04
+    """Speeds are the largest before the centre is this far away [m]; the paper trusts 40 mm."""
     workers: int | None = Field(None, ge=1, le=256, description="Processes; as many as there are cores if not given.")
 
     @model_validator(mode="after")

@@ -22,7 +22,7 @@ from coupling import Penetration
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.files import MODEL_COPY, keep_model
 from experiments.campaign.tables import EffectTable
-from experiments.diagnose.fit.own import OwnEffect, load_own
+from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, push, slot_places, slot_table
 from experiments.runs.folder import RunFolder

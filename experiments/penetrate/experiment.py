@@ -20,10 +20,9 @@ from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import PictureCosts
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
-from experiments.runs.whole_runs import draw_report, whole_run
+from experiments.runs.whole_runs import PictureCosts, draw_report, whole_run
 
 from . import beds
 from .amended import run_without_bed

@@ -3,7 +3,7 @@
 import math
 
 from experiments.campaign.files import check_target
-from experiments.grains.box import expected_grain_count
+from experiments.grains.sizes import expected_grain_count
 from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.where import check_memory, check_where
 

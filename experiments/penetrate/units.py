@@ -11,11 +11,11 @@ from statistics import fmean
 from typing import Any, Literal
 
 from coupling import Drive, Drop, Run, SetDown
-from experiments.grains.box import expected_grain_count
+from experiments.grains.sizes import expected_grain_count
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress, as_expected
-from experiments.runs.reporting import PictureCosts
 from experiments.runs.types import Json
+from experiments.runs.whole_runs import PictureCosts
 from rigid import Spike
 
 from .settings import PenetrateSettings

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.runs.folder import write_text
-from rigid.model.mechanics import contact_arms
+from rigid.model.model import contact_arms
 from rigid.model.trial import Trial
 from rigid.planar.dynamics import System
 from rigid.planar.simulate import simulate
@@ -146,7 +146,7 @@ def tip_angles(count: int, theta: Array) -> Array:
 def tip_depth(theta: Array, y: Array, *, count: int, length: float, radius: float = 0.0) -> Array:
     """Depth of each row's lowest point below the undisturbed surface [m], negative above it, shape [step, row].
 
-    The model's own (`rigid.model.mechanics`), on a slope too, whose y is normal to the surface. theta [rad] and y
+    The model's own (`rigid.model.model`), on a slope too, whose y is normal to the surface. theta [rad] and y
     [m] have shape [step]; `radius` [m] is that of balls which spikes of `length` end in, 0 where they end in points.
     """
     angles = tip_angles(count, theta)

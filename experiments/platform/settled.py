@@ -5,8 +5,10 @@ Each keeps where it comes from, so that a run can print every default.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
+
+from pydantic import BaseModel
 
 from rigid.platform.rig import STANDARD_GRAVITY
 
@@ -14,7 +16,7 @@ from . import say
 from .numbers import PlatformNumbers
 from .surfaces import DEFAULT_SURFACE, find_surface
 
-__all__ = ["Number", "Settled", "check_lengths", "check_spike_length", "defaults_said", "of_earth", "rig_fault"]
+__all__ = ["Number", "Plan", "Settled", "at_default", "check_lengths", "check_spike_length", "of_earth", "rig_fault"]
 
 OTHER_BODY = 0.2
 """A mass, inertia or spike length that is off the platform's by more than this share is another body's."""
@@ -97,8 +99,12 @@ class Settled(dict[str, Number]):
         for name in ("max_wheel_speed", "max_motor_torque"):
             self.settle(name, getattr(platform, name) if known else math.inf, origin)
 
-    def settle_surface(self, surface: str | None, *, model: Any = None) -> tuple[str, list[str]]:
+    def settle_surface(
+        self, surface: str | None, *, model: Any = None, spikes_per_row: float = 1.0
+    ) -> tuple[str, list[str]]:
         """Settle K, C and friction; return the material's name and warnings about it. `model`: a `TumbleModel`.
+
+        K and C are of a row, or of one of its `spikes_per_row`, half a row's where that is 2.
 
         Raises ValueError for an unknown surface, and for more sliding than static friction.
         """
@@ -110,8 +116,10 @@ class Settled(dict[str, Number]):
             material = found = find_surface(surface or DEFAULT_SURFACE)
             name, origin = found.name, f"surface {found.name}"
             warnings = [say("guess", surface=found)] if found.guess else []
-        for key in ("stiffness", "damping", "mu_s"):
-            self.settle(key, getattr(material, key), origin)
+        shared = origin if spikes_per_row == 1 else f"{origin}, a row's halved"
+        for key in ("stiffness", "damping"):
+            self.settle(key, getattr(material, key) / spikes_per_row, shared)
+        self.settle("mu_s", material.mu_s, origin)
         if self["mu_s"].origin == "given":
             self.settle("mu_d", 0.5 * self.value("mu_s"), "default: half of mu_s")
         else:
@@ -142,6 +150,38 @@ class Settled(dict[str, Number]):
         if actuator == "brake" and own and torque > platform.brake_torque * (1 + 1e-9):
             return [say("beyond_brake", torque=torque, brake=platform.brake_words, platform=platform)]
         return []
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """A trial, its numbers and where they come from."""
+
+    trial: Any
+    numbers: Mapping[str, Number]
+    surface: str  # Name of the material
+    choices: Mapping[str, str]  # What else was left at its default: name -> value, as a person would type it
+    warnings: tuple[str, ...] = ()
+
+    def sentences(self) -> list[str]:
+        """One line for each number and choice that was not given."""
+        return defaults_said(self.choices, self.numbers)
+
+    def announcement(self) -> list[str]:
+        """What was not given, then the warnings, as they are shown before the run."""
+        return [*self.sentences(), *(f"warning: {warning}" for warning in self.warnings)]
+
+    def trial_table(self, weight: float) -> dict[str, Mapping[str, Any]]:
+        """The numbers as entries of a result, the `weight` [N] last."""
+        numbers = {**self.numbers, "weight": Number(weight, "N", "(m + m_b) g_sim")}
+        return {name: asdict(number) for name, number in numbers.items()}
+
+
+def at_default(settings: BaseModel, units: Mapping[str, str]) -> dict[str, str]:
+    """Those settings that were not given, in the order of `units`: name -> value with its unit."""
+    return {
+        name: f"{getattr(settings, name)}{unit}" for name, unit in units.items()
+        if name not in settings.model_fields_set
+    }  # fmt: skip
 
 
 def defaults_said(choices: Mapping[str, str], numbers: Mapping[str, Number]) -> list[str]:

@@ -14,7 +14,6 @@ checkpoint/<name>.npz     arrays to carry on from; checkpoint/<name>.done.json s
 """
 
 import json
-import math
 import os
 import re
 import tomllib
@@ -28,8 +27,8 @@ import numpy as np
 from filelock import FileLock, Timeout
 from pydantic import BaseModel
 
-from experiments.runs.version import __version__
-from rigid.series import read_series, replacing, write_series
+from rigid.result import plain, read_json, toml_value, write_json, write_text
+from rigid.series import __version__, read_series, replacing, write_series
 
 __all__ = [
     "RunFolder",
@@ -52,59 +51,6 @@ RUN_FORMAT = "hedgebed-run/1"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write `text` to `path` (UTF-8), all of it or nothing."""
-    with replacing(Path(path)) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def plain(value: Any) -> Any:
-    """`value` in terms of what JSON knows; a number that is not finite becomes null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, BaseModel):
-        return plain(value.model_dump())
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(item) for item in value]
-    if isinstance(value, Path):
-        return str(value)
-    return value
-
-
-def write_json(path: Path, data: Any) -> None:
-    """Write `data` to `path` as JSON, all of it or nothing.
-
-    Takes numpy scalars and arrays, paths and pydantic models as well; NaN and infinities become null. Raises TypeError
-    for what JSON cannot hold.
-    """
-    write_text(path, json.dumps(plain(data), indent=2, allow_nan=False, ensure_ascii=False) + "\n")
-
-
-def read_json(path: Path) -> Any:
-    """The contents of the JSON file `path`."""
-    return json.loads(Path(path).read_text(encoding="utf-8"))
-
-
-def toml_value(value: Any) -> str:
-    """`value` as TOML writes it."""
-    import tomlkit  # where the first file is written: the command line starts without it
-
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(toml_value(item) for item in value) + "]"
-    if isinstance(value, Mapping):  # keys in quotes; tomlkit writes them bare
-        return "{" + ", ".join(f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items()) + "}"
-    try:
-        return tomlkit.item(value).as_string()
-    except (TypeError, ValueError):
-        raise TypeError(f"a setting of type {type(value).__name__} cannot be written to run.toml: {value!r}") from None
-
-
 def settings_toml(command: str, settings: BaseModel, version: str, code: str = "") -> str:
     """The text of run.toml: each field of `settings` with its description as a comment above it."""
     values = settings.model_dump(mode="python")
@@ -122,10 +68,7 @@ def settings_toml(command: str, settings: BaseModel, version: str, code: str = "
     ]
     for name, field in type(settings).model_fields.items():
         lines += [f"# {line}" for line in (field.description or "").splitlines()]
-        value = values[name]
-        if isinstance(value, Path):
-            value = str(value)
-        lines += [f"# {name} is not set" if value is None else f"{name} = {toml_value(value)}"]
+        lines += [f"# {name} is not set" if values[name] is None else f"{name} = {toml_value(values[name])}"]
     return "\n".join(lines) + "\n"
 
 
@@ -170,7 +113,7 @@ def _checked(name: str) -> str:
 
 
 class RunFolder:
-    """The folder of one run. Make one with `create`, take up an old one with `open`, or let `ensure` choose."""
+    """The folder of one run: `create` makes one, `open` takes an old one, `ensure` does either."""
 
     def __init__(self, path: Path, command: str, version: str, settings: dict[str, Any], code: str = ""):
         self.path = Path(path)
@@ -197,29 +140,23 @@ class RunFolder:
         written; and if the settings would not read back from run.toml as they are.
         """
         path = Path(path)
-        text = settings_toml(command, settings, version, code)
+        text, where = settings_toml(command, settings, version, code), f"out = {str(path)!r}"
         if type(settings)(**settings_in(tomllib.loads(text))) != settings:
             raise ValueError(
                 f"the settings of {command} cannot be kept: they do not read back from run.toml as they are"
             )
-        if path.exists():
-            if not path.is_dir():
-                raise ValueError(f"out = {str(path)!r} is a file: name a folder that is empty or does not exist yet")
-            held = sorted(item.name for item in path.iterdir())
-            if held:
-                what = ", ".join(held[:3]) + (", ..." if len(held) > 3 else "")
-                remedy = _what_else(path) if "run.toml" in held else ""
-                raise ValueError(
-                    f"out = {str(path)!r} is in use (it holds {what}): "
-                    f"name a folder that is empty or does not exist yet{remedy}"
-                )
+        if path.exists() and not path.is_dir():
+            raise ValueError(f"{where} is a file: name a folder that is empty or does not exist yet")
+        if held := sorted(item.name for item in path.glob("*")):
+            what = ", ".join(held[:3]) + (", ..." if len(held) > 3 else "")
+            remedy = _what_else(path) if "run.toml" in held else ""
+            raise ValueError(
+                f"{where} is in use (it holds {what}): name a folder that is empty or does not exist yet{remedy}"
+            )
         try:
-            path.mkdir(parents=True, exist_ok=True)
             write_text(path / "run.toml", text)
         except OSError as error:
-            raise ValueError(
-                f"out = {str(path)!r} cannot be written ({error.strerror}): name a folder that can be"
-            ) from error
+            raise ValueError(f"{where} cannot be written ({error.strerror}): name a folder that can be") from error
         folder = cls.open(path)
         folder.set_status("running")
         return folder
@@ -298,9 +235,9 @@ class RunFolder:
 
     @property
     def processor_time(self) -> float:
-        """Of this process and its children that have ended, since the folder was taken up, and of earlier spells [s].
+        """Of this process and its children that have ended, since the folder was opened, and of earlier ones [s].
 
-        Of a spell that was killed what its last checkpoint knew.
+        Of an earlier process that was killed, until its last checkpoint.
         """
         return round(self._spent_before + _processor_time() - self._began, 2)
 
@@ -308,8 +245,8 @@ class RunFolder:
         """Write status.json. `reason` says why a run stopped or failed."""
         if status not in get_args(Status):
             raise ValueError(f"status = {status!r} is none of {', '.join(get_args(Status))}")
-        told = {"status": status, "reason": reason, "updated": _now(), "processor_time": self.processor_time}
-        write_json(self.path / "status.json", told)
+        now = {"status": status, "reason": reason, "updated": _now(), "processor_time": self.processor_time}
+        write_json(self.path / "status.json", now)
 
     # What it holds
 

@@ -7,8 +7,7 @@ from .folder import RunFolder
 
 __all__ = ["PATH_AND_MOTION", "drawn_from", "require_files", "require_whole"]
 
-PATH_AND_MOTION = ("trajectory.csv", "series/motion.csv")
-"""What every run of a platform has written."""
+PATH_AND_MOTION = ("trajectory.csv", "series/motion.csv")  # What every run of a platform has written
 
 
 def drawn_from(folder: RunFolder) -> list[str]:

@@ -12,8 +12,7 @@ from pathlib import Path
 
 __all__ = ["free_kernel_cache"]
 
-_STALE = 600.0
-"""Seconds after which a lock is nobody's: it is held for some milliseconds."""
+_STALE = 600.0  # Seconds after which a lock is nobody's: it is held for some milliseconds
 
 
 def free_kernel_cache(folder: Path | None = None) -> bool:

@@ -42,21 +42,15 @@ def memory_there() -> Memory:
         limit = _number(folder / most)
         if limit is not None and limit < total:
             # Pages of files count as used until somebody wants them.
-            used = max(0, (_number(folder / now) or 0) - _inactive_files(folder / "memory.stat"))
+            used = max(0, (_number(folder / now) or 0) - (_number(folder / "memory.stat", "inactive_file") or 0))
             return Memory(total, min(free, max(0, limit - used)), limit)
     return Memory(total, free, None)
 
 
-def _number(path: Path) -> int | None:
+def _number(path: Path, name: str = "") -> int | None:
+    """The number in a file, or the one behind `name` in it; None where there is none."""
     try:
-        return int(path.read_text(encoding="ascii"))
-    except (OSError, ValueError):
+        text = path.read_text(encoding="ascii")
+        return int(dict(line.split(maxsplit=1) for line in text.splitlines())[name] if name else text)
+    except (OSError, ValueError, KeyError):
         return None
-
-
-def _inactive_files(path: Path) -> int:
-    try:
-        words = dict(line.split(maxsplit=1) for line in path.read_text(encoding="ascii").splitlines())
-        return int(words.get("inactive_file", 0))
-    except (OSError, ValueError):
-        return 0

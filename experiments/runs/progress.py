@@ -17,9 +17,9 @@ import math
 import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self, TextIO
+from typing import TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, ProgressColumn, Task, TaskID, TextColumn
@@ -29,16 +29,11 @@ from rich.text import Text
 __all__ = ["LineProgress", "LiveProgress", "Progress", "as_expected", "duration", "make_progress"]
 
 
-_SAYS_SOMETHING = 0.03
-"""Share of a stage from which on its pace so far is taken for its pace."""
-_A_MOMENT = 1.0
-"""A stage that told its first share sooner has gone on from an earlier one's, or does little at a time [s]."""
-_GUESSED = 15.0
-"""A first guess of the rate weighs as much as so much work done [s]."""
-_MOST_SLOWER = 3.0
-"""Times known in seconds follow the machine's pace over the one guessed up to so much, either way [1]."""
-_LATE = 0.15
-"""What a stage that is late is said to take yet, over how late it is [1]."""
+_LEAST_SHARE = 0.03  # Share of a stage from which on its pace so far is taken for its pace
+_QUICK_START = 1.0  # A stage that reports its first share sooner has gone on from an earlier one's [s]
+_GUESSED = 15.0  # A first guess of the rate weighs as much as so much work done [s]
+_MOST_SLOWER = 3.0  # Most by which the machine's pace scales times that are known in seconds [1]
+_LATE = 0.15  # What a stage that is late is said to take yet, over how late it is [1]
 
 
 def duration(seconds: float | None) -> str:
@@ -71,32 +66,32 @@ def as_expected(passed: float) -> float:
 
 @dataclass
 class _Pace:
-    """How fast one stage goes, read off the shares of it that were told."""
+    """How fast one stage goes, from the shares of it that were reported."""
 
     began: float
-    first: tuple[float, float] | None = None  # when it told its first share [s], and that
-    last: float = 0.0  # when it told its last [s]
+    first: tuple[float, float] | None = None  # when it reported its first share [s], and that
+    last: float = 0.0  # when it reported its last [s]
     share: float = 0.0
 
-    def tell(self, now: float, share: float) -> None:
+    def report(self, now: float, share: float) -> None:
         self.first = self.first or (now, share)
         self.last, self.share = now, share
 
     @property
     def gained(self) -> float:
-        """What was done since the first share was told, which may have waited for compilers or a file."""
+        """What was done since the first share was reported, which may have waited for compilers or a file."""
         return self.share - self.first[1] if self.first else 0.0
 
     def work(self) -> float | None:
         """How long the whole stage takes at its pace, without what it waited for at first [s]."""
-        if self.first is None or self.gained < _SAYS_SOMETHING:
+        if self.first is None or self.gained < _LEAST_SHARE:
             return None
         return (self.last - self.first[0]) / self.gained
 
     def so_far(self) -> float | None:
         """As `work`, where there was hardly more than one share to go by: with what it may have waited for."""
-        told = self.first is not None and self.share >= _SAYS_SOMETHING and self.first[0] - self.began >= _A_MOMENT
-        return (self.last - self.began) / self.share if told else None
+        known = self.first is not None and self.share >= _LEAST_SHARE and self.first[0] - self.began >= _QUICK_START
+        return (self.last - self.began) / self.share if known else None
 
     def over(self, now: float) -> float:
         """`work` of a stage that ends now."""
@@ -105,7 +100,7 @@ class _Pace:
         return (now - self.first[0]) / (1.0 - self.first[1])
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """Keeps count, shows nothing. Also the interface that work reports to.
 
     `stage_fraction`, `fraction` are in 0..1, or None where a total was not given; `remaining()` is in seconds.
@@ -117,21 +112,23 @@ class Progress:
     """
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic):
-        self._clock = clock
-        self._began = self._planned = clock()
-        self._costs: dict[str, float] = {}
-        self._seconds: dict[str, float] = {}
-        self._unit: float | None = None
-        self._over: set[str] = set()  # stages of the plan that are over
-        self._work: dict[str, float] = {}  # those of them that had something to do -> how long it took [s]
-        self._open = ""  # the stage of the plan that is under way
-        self._opened = _Pace(clock())
-        self._waited = 0.0  # until the first share of all was told [s]
-        self._reached = 0.0  # the largest share of the whole that was told
+        self._clock, self._began = clock, clock()
         self.stage_name = ""
-        self._pace = self._opened
         self._total: float | None = None
         self._done = 0.0
+        self._start_reckoning({}, {}, None)
+        self._pace = self._opened
+
+    def _start_reckoning(self, costs: Mapping[str, float], seconds: Mapping[str, float], unit: float | None) -> None:
+        self._costs, self._seconds, self._unit = dict(costs), dict(seconds), unit
+        self._over: set[str] = set()  # stages of the plan that are over
+        self._work: dict[str, float] = {}  # those of them that had something to do -> how long it took [s]
+        self._open = self.stage_name if self.stage_name in {*costs, *seconds} else ""
+        """The stage of the plan that is under way."""
+        self._waited = 0.0  # until the first share of all was reported [s]
+        self._reached = 0.0  # the largest share of the whole that was reported
+        self._planned = self._clock()
+        self._opened = _Pace(self._planned)
 
     def plan(
         self, costs: Mapping[str, float], *, seconds: Mapping[str, float] | None = None, unit: float | None = None
@@ -145,11 +142,7 @@ class Progress:
         every = dict(costs) | dict(seconds or {})
         if any(not cost >= 0 for cost in every.values()):
             raise ValueError(f"a stage cannot cost less than nothing: {every}")
-        self._costs, self._seconds, self._unit = dict(costs), dict(seconds or {}), unit
-        self._over, self._work, self._waited, self._reached = set(), {}, 0.0, 0.0
-        self._open = self.stage_name if self.stage_name in every else ""
-        self._planned = self._clock()
-        self._opened = _Pace(self._planned)
+        self._start_reckoning(costs, seconds or {}, unit)
 
     def expect(self, costs: Mapping[str, float]) -> None:
         """Stages of the plan that have not begun cost this after all; others are left as they are."""
@@ -171,11 +164,11 @@ class Progress:
         """`done` of the stage's total is done (not: more than last time). Less than before is not believed."""
         self._done = max(self._done, float(done))
         share, now = self.stage_fraction, self._clock()
-        if not self._counts_down() and (share or 0.0) < _SAYS_SOMETHING:
+        if not self._counts_down() and (share or 0.0) < _LEAST_SHARE:
             self._waited = now - self._opened.began
-        self._pace.tell(now, share or 0.0)
+        self._pace.report(now, share or 0.0)
         if self._opened is not self._pace and self._opened.first is None:
-            self._opened.tell(now, 0.0)  # something is done within it
+            self._opened.report(now, 0.0)  # something is done within it
 
     def message(self, text: str) -> None:
         """Tell the person something: a warning, a finding."""
@@ -192,12 +185,7 @@ class Progress:
                 self._work[self._open] = self._opened.over(self._clock())
         self._open = ""
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
@@ -213,9 +201,7 @@ class Progress:
     @property
     def stage_fraction(self) -> float | None:
         """How much of the stage is done, 0..1; None if its total is unknown."""
-        if self._total is None or self._total <= 0:
-            return None
-        return min(max(self._done / self._total, 0.0), 1.0)
+        return min(max(self._done / self._total, 0.0), 1.0) if self._total is not None and self._total > 0 else None
 
     @property
     def fraction(self) -> float | None:
@@ -274,7 +260,7 @@ class Progress:
         return left - passed if (1.0 + _LATE) * passed < left else _LATE * passed
 
     def _counts_down(self) -> bool:
-        """Whether time that passes is work done: before anything has told a share, compilers are waited for."""
+        """Whether time that passes is work done: before anything has reported a share, compilers run."""
         return self._opened.first is not None or self._open not in self._costs or bool(self._work)
 
     def _rate(self) -> float | None:
@@ -303,42 +289,33 @@ class LineProgress(Progress):
         self._every = every
         self._last = float("-inf")
 
-    def _write(self, text: str) -> None:
-        print(f"[{duration(self.elapsed):>7}] {text}", file=self._stream, flush=True)
-        self._last = self._clock()
-
-    def _where(self) -> str:
-        parts = []
-        if (fraction := self.stage_fraction) is not None:
-            parts.append(_percent(fraction))
-        if (rest := self.stage_remaining()) is not None:
-            parts.append(_to_go(rest))
-        if (whole := self.fraction) is not None:
-            parts.append(f"all {_percent(whole)}")
-            if (rest := self.remaining()) is not None:
-                parts.append(_to_go(rest))
-        return ", ".join(parts)
+    def _of_all(self) -> list[str]:
+        """The share of the whole and its time to go, as far as they are known."""
+        if (whole := self.fraction) is None:
+            return []
+        return [f"all {_percent(whole)}", *([] if (rest := self.remaining()) is None else [_to_go(rest)])]
 
     def stage(self, name: str, total: float | None = None) -> None:
         super().stage(name, total)
-        where = "" if (whole := self.fraction) is None else f" (all {_percent(whole)}"
-        if where:
-            where += ")" if (rest := self.remaining()) is None else f", {_to_go(rest)})"
-        self._write(f"{name}{where}")
+        where = ", ".join(self._of_all())
+        self.message(f"{name} ({where})" if where else name)
+        self._last = self._clock()
 
     def update(self, done: float) -> None:
         super().update(done)
         if self._clock() - self._last >= self._every:
-            self._write(f"{self.stage_name}: {self._where() or f'{done:g}'}")
+            share, rest = self.stage_fraction, self.stage_remaining()
+            where = [] if share is None else [_percent(share)]
+            where += [] if rest is None else [_to_go(rest)]
+            self.message(f"{self.stage_name}: {', '.join([*where, *self._of_all()]) or f'{done:g}'}")
+            self._last = self._clock()
 
     def message(self, text: str) -> None:
-        last = self._last
-        self._write(text)
-        self._last = last
+        print(f"[{duration(self.elapsed):>7}] {text}", file=self._stream, flush=True)
 
 
 class _ToGo(ProgressColumn):
-    """The time to go, counted down where nothing new is told for a while; never to nothing."""
+    """The time to go, counted down while nothing new is reported; never to nothing."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         super().__init__()
@@ -346,10 +323,10 @@ class _ToGo(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         """See the class."""
-        rest, told = task.fields["rest"], task.fields["told"]
+        rest, reported = task.fields["rest"], task.fields["reported"]
         if rest is None:
             return Text("")
-        passed = max(self._clock() - told, 0.0)
+        passed = max(self._clock() - reported, 0.0)
         return Text(_to_go(rest - passed if passed < (1 - _LATE) * rest else _LATE * rest))
 
 
@@ -378,7 +355,7 @@ class LiveProgress(Progress):
             completed=fraction or 0.0,
             percent="" if fraction is None else _percent(fraction),
             rest=rest,
-            told=self._clock() if self._counts_down() else math.inf,
+            reported=self._clock() if self._counts_down() else math.inf,
         )
 
     def _refresh(self) -> None:
@@ -393,7 +370,7 @@ class LiveProgress(Progress):
     ) -> None:
         super().plan(costs, seconds=seconds, unit=unit)
         if self._whole is None:
-            self._whole = self._bars.add_task("all", total=1.0, percent="", rest=None, told=0.0)
+            self._whole = self._bars.add_task("all", total=1.0, percent="", rest=None, reported=0.0)
         self._refresh()
 
     def stage(self, name: str, total: float | None = None) -> None:
@@ -406,7 +383,7 @@ class LiveProgress(Progress):
             )
         if self._stage is not None:
             self._bars.remove_task(self._stage)
-        self._stage = self._bars.add_task(name, total=None, percent="", rest=None, told=0.0)
+        self._stage = self._bars.add_task(name, total=None, percent="", rest=None, reported=0.0)
         self._refresh()
 
     def update(self, done: float) -> None:

@@ -21,8 +21,7 @@ __all__ = ["Layer", "find_case", "nearest", "option", "read_case", "settings_fro
 
 Settings = TypeVar("Settings", bound=BaseModel)
 
-_NEAR = 4
-"""Names that are told at most of those that are spelt like one there is not."""
+_NEAR = 4  # Most names that a message suggests for one that does not exist
 
 
 @dataclass(frozen=True)

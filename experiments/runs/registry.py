@@ -70,12 +70,9 @@ class Experiment:
     settings: str  # "module:Class", a frozen pydantic model; every field with a description that gives the unit
     module: str
     presets: tuple[Preset, ...] = ()
-    subject: str = ""
-    """The setting that the command's first argument is (its first two, of a setting of two), instead of a case file."""
-    example: str = ""
-    """Of what has no default because its case is the question: one that ships, a file in experiments/cases."""
-    headline: str = ""
-    """"module:function" from a result to the `Headline` that is shown in the end; all there is where it is empty."""
+    subject: str = ""  # Setting that the first argument is (the first two, of a setting of two)
+    example: str = ""  # File in experiments/cases, of an experiment whose case has no default
+    headline: str = ""  # "module:function" from a result to its `Headline`; empty: all is shown
 
     def settings_class(self) -> type[BaseModel]:
         """The settings class. Quick: it imports no Taichi."""

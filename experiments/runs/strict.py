@@ -16,9 +16,17 @@ Threads = Annotated[int | None, Field(ge=1, le=1024, description="CPU threads; a
 
 
 class StrictSettings(BaseModel):
-    """Settings of an experiment: frozen, no unknown keys, text is no number, true is not 1."""
+    """Settings of an experiment: frozen, no unknown keys, text is no number, true is not 1.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    A setting's description is the docstring below it, or the one given to `Field`.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        for field in cls.model_fields.values():
+            field.description = " ".join((field.description or "").split()) or None
 
     @field_validator("*", mode="before")
     @classmethod

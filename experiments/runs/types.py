@@ -4,5 +4,4 @@ from typing import Any
 
 __all__ = ["Json"]
 
-Json = dict[str, Any]
-"""A table as JSON and TOML hold it: text to numbers, text, lists and further tables."""
+Json = dict[str, Any]  # A table as JSON and TOML hold it: text to numbers, text, lists and further tables

@@ -1,5 +1,5 @@
-"""The version of hedgebed, in a module that imports nothing."""
+"""The version of hedgebed, which `rigid.series` has."""
+
+from rigid.series import __version__
 
 __all__ = ["__version__"]
-
-__version__ = "0.1.0"

@@ -1,31 +1,87 @@
-"""A platform in space on a bed of grains; what a run in the plane does alike is in `experiments.grains.on_bed`."""
+"""A platform in space, followed on the spring-damper or on a bed of grains.
+
+What a run in the plane does alike is in `experiments.grains.on_bed`. On a bed the same trial on the spring-damper is
+stepped first: it says how far and how deep the bed must reach, and stands beside the result.
+"""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from coupling import BedGround, SpatialRun, spatial_members
+from coupling import BedGround, LawGround, SpatialRun, spatial_members
 from coupling.members import Member
 from dem import Bed
-from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
-from experiments.grains.softening import PUSHED, Softening
+from experiments.grains.following import Followed
+from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
+from experiments.grains.softening import PUSHED
 from experiments.platform.settled import check_lengths
-from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
-from rigid.spatial.quaternions import to_matrix
+from experiments.runs.types import Json
+from experiments.tumble.coupled import STEP
+from rigid.spatial.quaternions import from_turn, to_matrix
 
 from . import say
-from .frames import SpatialFrames
-from .on_law import feet_count, run_on_law, start_of
-from .result import conclude
+from .result import SpatialFrames, conclude, sinkage_start, write_series_of
 from .settings import SpatialSettings
 from .trial import SpatialPlan
 
-__all__ = ["SpatialForecast", "SpatialOnBed"]
+__all__ = ["SpatialFollowed", "SpatialForecast", "SpatialOnBed"]
+
+LAW_LOWERING, LAW_REST = 0.05, 0.11
+"""Of the placement on a law, where it is not set: its least speed [m/s], and the longest time constant with which a
+platform comes to rest, W / (K speed) on all tips that it stands on [s]; on one of four it still rests within 3 s."""
+
+
+class SpatialFollowed(Followed[SpatialRun]):
+    """A platform in space; its run on the spring-damper."""
+
+    settings: SpatialSettings
+    frames, write_series, sinkage = SpatialFrames, staticmethod(write_series_of), staticmethod(sinkage_start)
+
+    def __init__(self, settings: SpatialSettings, plan: SpatialPlan) -> None:
+        self.settings, self.plan, self.trial = settings, plan, plan.trial
+        self.platform, self.weight = plan.trial.platform, float(np.linalg.norm(plan.trial.weight))
+        stance = self.platform.stance()
+        self.feet_count = len(stance.row) + len(stance.rear)  # Spikes that the platform stands on
+
+    def run_on_law(self) -> SpatialRun:
+        """The trial on the spring-damper, ready to be stepped; beside a bed explicitly, ten steps at a time."""
+        settings = self.settings
+        ground = LawGround.of_spatial(self.trial)
+        ground.grounds = [replace(ground, time_step=STEP) for ground in ground.grounds]
+        # Heavier on softer ground is set down faster.
+        slow = self.weight / (self.feet_count * self.plan.numbers["stiffness"].value * LAW_REST)
+        lowering = settings.lowering_speed or max(LAW_LOWERING, slow)
+        return SpatialRun(
+            self.trial, ground, duration=settings.duration, lowering_speed=lowering if settings.placed else None,
+            energy_interval=1e-3, **({} if settings.ground == "bed" else settings.stepping()), **self.start(),
+        )  # fmt: skip
+
+    def start(self) -> Mapping[str, Any]:
+        """Where it starts and how it moves there, as `SpatialRun` takes it."""
+        settings, platform = self.settings, self.platform
+        turn = from_turn(settings.turn)
+        start: Json = {
+            "quaternion": tuple(turn), "velocity": settings.velocity, "angular_velocity": settings.angular_velocity,
+        }  # fmt: skip
+        if settings.height is not None:
+            lowest = float(((platform.tips - platform.centre_of_mass) @ to_matrix(turn)[2]).min())
+            start["position"] = (0.0, 0.0, settings.height - lowest)
+        return start
+
+    def announce(self, progress: Progress) -> None:
+        """Every default, and the warnings."""
+        for sentence in self.plan.announcement():
+            progress.message(sentence)
+
+    def conclude(self, run: SpatialRun, folder: Path) -> Result:
+        return conclude(self.settings, self.plan, run, folder)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,22 +93,20 @@ class SpatialForecast(Forecast):
     high: tuple[float, float]  # corners of where tips come down, x and y from the start [m]
 
 
-class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
+class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
     """A platform in space on a bed."""
 
     def __init__(self, settings: SpatialSettings, plan: SpatialPlan) -> None:
-        self.settings, self.plan, self.trial = settings, plan, plan.trial
-        self.platform = platform = plan.trial.platform
+        super().__init__(settings, plan)
+        platform = self.platform
         self.duration, self.surface = settings.duration, plan.surface
-        self.weight = float(np.linalg.norm(plan.trial.weight))
         self.gravity = -float(plan.trial.weight[2]) / platform.mass
         self.counterweight = plan.trial.counterweight
         self.spike_diameter, self.reach = 2 * platform.tip_radius, platform.reach
 
     @cached_property
     def forecast(self) -> SpatialForecast:
-        """The same trial on the spring-damper."""
-        run = run_on_law(self.settings, self.plan)
+        run = self.run_on_law()
         rows = run.run()
         tips = self.platform.tips - self.platform.centre_of_mass
         centre = np.column_stack([rows[name] for name in "xyz"])
@@ -80,7 +134,6 @@ class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
             raise ValueError(say("forecast_fails", error=error)) from error
 
     def check_extent(self) -> None:
-        """Raise ValueError for a bed too short along x or y for the forecast."""
         margin, s, forecast = MARGIN * self.spike_diameter, self.settings, self.forecast
         for axis, (name, low, high) in enumerate(zip("xy", forecast.low, forecast.high, strict=True)):
             need = high - low + 2 * margin
@@ -94,7 +147,7 @@ class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
     @property
     def pressure(self) -> float:
         """Of the weight, in flight of what the torque presses with too, under one of the spikes that carry [Pa]."""
-        load = self.weight / feet_count(self.plan)
+        load = self.weight / self.feet_count
         if self.counterweight == 0:
             pushed = PUSHED[self.settings.actuator] * self.plan.numbers["stiffness"].value * self.forecast.deepest
             load = max(load, pushed)
@@ -111,28 +164,13 @@ class SpatialOnBed(PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
         """All spikes and the ball inside the hull."""
         return spatial_members(self.platform)
 
-    def ground(self, bed: Bed) -> BedGround:
-        """All of the platform on the bed, which is periodic along both sides."""
-        low, high, s = self.forecast.low, self.forecast.high, self.settings
+    def layout(self, bed: Bed) -> Mapping[str, Any]:
+        low, high = self.forecast.low, self.forecast.high
         x, y = (0.5 * (bed.size[k] - low[k] - high[k]) for k in range(2))
-        return BedGround(
-            bed, self.members(), origin=(x, y), bounded_across=True, touch=TOUCH * self.weight,
-            friction=s.spike_friction, restitution=s.spike_restitution,
-        )  # fmt: skip
+        return {"origin": (x, y), "bounded_across": True}
 
     def run_on(self, ground: BedGround) -> SpatialRun:
-        """Set down or let fall."""
-        return SpatialRun(self.trial, ground, **self.stepping(), **start_of(self.settings, self.platform))
+        return SpatialRun(self.trial, ground, **self.stepping(), **self.start())
 
-    def announce(self, progress: Progress) -> None:
-        """Every default, and the warnings."""
-        for sentence in self.plan.announcement():
-            progress.message(sentence)
-
-    def frames(self, run: SpatialRun, folder: Path, resumed: bool) -> SpatialFrames | None:
-        """Of all of the platform."""
-        return SpatialFrames(self.settings, run, folder, resumed=resumed) if self.settings.frame_count else None
-
-    def conclude(self, run: SpatialRun, softening: Softening, folder: RunFolder) -> Result:
-        """The result, its series written."""
-        return conclude(self.settings, self.plan, run, self.forecast.run, softening, folder.path)
+    def conclude(self, run: SpatialRun, folder: Path) -> Result:
+        return conclude(self.settings, self.plan, run, folder, beside=self.forecast.run, softening=self.softening())

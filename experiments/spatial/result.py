@@ -1,39 +1,34 @@
-"""What comes of a platform in space: its series and its result."""
+"""What a run of a platform in space leaves: its frames, its series and its result."""
 
 import math
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling import BedGround, SpatialRun
+from coupling.members import HULL, spatial_members
 from dem.prepare.prepare import fingerprint
-from experiments.grains.bed_result import (
-    bed_numbers,
-    bed_warnings,
-    overlap_warning,
-    residual_warning,
-    reversal_warning,
-    unsettled_warning,
-    write_bed_series,
-)
+from experiments.grains import bed_result as grains
 from experiments.grains.softening import Softening
+from experiments.grains.spells import spells
+from experiments.grains.tracked_frames import PlatformFrames, member_mesh
 from experiments.runs.folder import write_series
 from experiments.runs.result import Result
 from experiments.runs.result import quantities_of as as_quantities
 from experiments.runs.types import Json
-from experiments.tumble.words import way_through
+from experiments.tumble.result import way_through
+from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .settings import SpatialSettings
 from .trial import SpatialPlan
 
-__all__ = ["conclude", "sinkage_start", "write_series_of"]
+__all__ = ["SpatialFrames", "conclude", "sinkage_start", "write_series_of"]
 
-APART = 5e-3
-"""For how long nothing must touch that it counts as a hop [s]: sand that is only grazed lets go and takes hold."""
-SLOW = 2e-3
-"""Centre and tips of what has settled are slower [m/s]."""
+APART = 5e-3  # A hop lasts at least that long [s]: grazed sand loses and regains contact
+SLOW = 2e-3  # Centre and tips of what has settled are slower [m/s]
 UNITS = {
     "time": "t_s", "vx": "vx_m_s", "vy": "vy_m_s", "vz": "vz_m_s", "wx": "wx_rad_s", "wy": "wy_rad_s",
     "wz": "wz_rad_s", "wheel_x": "wheel_x_rad_s", "wheel_y": "wheel_y_rad_s", "wheel_z": "wheel_z_rad_s",
@@ -47,9 +42,40 @@ FEET = ("normal", "N"), ("along_x", "N"), ("along_y", "N"), ("slip_x", "m_s"), (
 """Of each spike in series/feet.csv, as `SpatialRun.feet` has them."""
 
 
-def write_series_of(folder: Path, run: SpatialRun) -> None:
+Array = NDArray[np.float64]
+
+
+class SpatialFrames(PlatformFrames[SpatialRun]):
+    """All spikes and the hull (grains meet the ball inside); `row_forces` are of each spike that touches."""
+
+    def body_meshes(self, run: SpatialRun) -> dict[str, Mesh]:
+        platform = run.trial.platform
+        hull = platform.hull()
+        found = {"hull": Mesh(hull.vertices - platform.centre_of_mass, hull.faces)}
+        if platform.tip_radius > 0:
+            spikes = [member for member in spatial_members(platform) if member.row != HULL]
+            found["spikes"] = merge([member_mesh(spike, segments=16) for spike in spikes])
+        return found
+
+    def values(self, run: SpatialRun) -> dict[str, float]:
+        """The ground's force on the platform [N]."""
+        return {f"force_{axis}": float(run.master.wrench.force[k]) for k, axis in enumerate("xyz")}
+
+    def row_forces(self, run: SpatialRun, origin: Array) -> tuple[Array, dict[str, Array]]:
+        """At the points of the last step's contacts; under a Coulomb bound the normal force alone."""
+        contacts = run.master.last.by_member if run.master.last is not None else {}
+        at = [origin + contact.point for contact in contacts.values()]
+        force = [
+            np.array([0.0, 0.0, contact.normal_force])
+            + (contact.tangential_force if contact.tangential_force is not None else 0.0)
+            for contact in contacts.values()
+        ]
+        numbers = np.array([float(row) for row in contacts])
+        return np.array(at).reshape(-1, 3), {"force": np.array(force).reshape(-1, 3), "row": numbers}
+
+
+def write_series_of(run: SpatialRun, folder: Path) -> None:
     """trajectory.csv and the series of a run, as far as it has come."""
-    (folder / "series").mkdir(exist_ok=True)
     write_series(folder / "trajectory.csv", path_columns(run))
     rows = run.columns
     stored = run.stored_by_row
@@ -59,7 +85,7 @@ def write_series_of(folder: Path, run: SpatialRun) -> None:
     write_series(folder / "series" / "motion.csv", rest)
     write_series(folder / "series" / "feet.csv", feet_columns(run))
     if isinstance(run.ground, BedGround):
-        write_bed_series(folder, run)
+        grains.write_bed_series(folder, run)
 
 
 def sinkage_start(run: SpatialRun) -> float:
@@ -77,16 +103,16 @@ def path_columns(run: SpatialRun) -> Json:
 def feet_columns(run: SpatialRun) -> Json:
     """The columns of series/feet.csv: force, slip and depth of the spikes that came down, and of the hull if it did.
 
-    Those that never did are left out; so are the hull's depth, which no footing tells, and friction on a law, which
-    says only how large it may be.
+    Those that never did are left out; so are the hull's depth, which no ground gives, and friction on a law,
+    which gives only its bound.
     """
     columns: Json = {"t_s": run.columns["time"]}
     feet, hull = run.feet, len(run.trial.platform.tips)
     for spike in np.flatnonzero(feet.any(axis=(0, 1))):
         name = "hull" if spike == hull else str(spike)
         for k, (what, unit) in enumerate(FEET):
-            told = name != "hull" if what == "sinkage" else run.ground.gives_friction or not what.startswith("along")
-            if told:
+            known = name != "hull" if what == "sinkage" else run.ground.gives_friction or not what.startswith("along")
+            if known:
                 columns[f"{what}_{name}_{unit}"] = feet[:, k, spike]
     return columns
 
@@ -95,33 +121,42 @@ def conclude(
     settings: SpatialSettings,
     plan: SpatialPlan,
     run: SpatialRun,
-    beside: SpatialRun | None,
-    softening: Softening | None,
     folder: Path,
+    *,
+    beside: SpatialRun | None = None,
+    softening: Softening | None = None,
 ) -> Result:
-    """The result, its series written. `beside`: the trial on the spring-damper, where the run is on grains."""
-    write_series_of(folder, run)
-    numbers, trial = quantities_of(run), plan.trial
-    where, what = "rig" if trial.counterweight > 0 else "free", "bed of " if settings.ground == "bed" else ""
+    """The result, its series written. On grains `beside` is the trial on the spring-damper."""
+    write_series_of(run, folder)
+    numbers, trial, in_rig = quantities_of(run), plan.trial, plan.trial.counterweight > 0
+    where, what = "rig" if in_rig else "free", "bed of " if settings.ground == "bed" else ""
     title = say("title", plan=plan, what=what, where=where, gravity=plan.numbers["gravity_sim"].value)
-    said = [residual_warning(run.energy_residual), unsettled_warning(run.master)]
-    warnings = [*plan.warnings, *(warning for warning in said if warning)]
+    warnings = [*plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master)]
     result: Json = {
         "title": title, "status": "done",
         "quantities": numbers, "departures": {"sentences": _sentences(run)},
-        "trial": {
-            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
-            for name, number in plan.numbers.items()
-        } | {"weight": {"value": float(np.linalg.norm(trial.weight)), "unit": "N", "origin": "(m + m_b) g_sim"}},
+        "trial": plan.trial_table(float(np.linalg.norm(trial.weight))),
         "surface": plan.surface, "ground": settings.ground, "actuator": settings.actuator,
         "duration": settings.duration, "spike_count": len(trial.platform.tips),
         "transitions": passages(run), "warnings": warnings,
         "macro_step": run.master.macro_step, "steps": run.master.count,
         "lowering_time": run.placing_steps * run.master.macro_step,
     }  # fmt: skip
-    if softening is not None and beside is not None:
+    if softening is not None and beside is not None and isinstance(run.ground, BedGround):
         write_series(folder / "series" / "spring-damper.csv", path_columns(beside))
-        _add_grains(result, settings, plan, run, beside, softening)
+        bed = run.ground.bed
+        result["code"] = fingerprint()
+        result["grains"] = grains.bed_numbers(settings, run, bed, softening, in_rig=in_rig) | {
+            "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
+            "beside_transitions": passages(beside),
+        }  # fmt: skip
+        warnings += [
+            grains.reversal_warning(run.dissipation_reversal),
+            grains.overlap_warning(bed, softening, settings.max_overlap),
+            *grains.bed_warnings(bed, plan.surface, across=2 * trial.platform.tip_radius / settings.grain),
+            say("one_bed"),
+        ]  # fmt: skip
+    result["warnings"] = [warning for warning in warnings if warning]
     return Result.make("tumble spatial", **result)
 
 
@@ -139,9 +174,7 @@ def quantities_of(run: SpatialRun) -> dict[str, Json]:
     spin = np.linalg.norm([rows[name] for name in ("wx", "wy", "wz")], axis=0)
     turns = np.column_stack([rows[f"q{k}"] for k in range(4)])
     force = np.linalg.norm([rows[name] for name in ("fx", "fy", "fz")], axis=0)
-    up = float(to_matrix(turns[-1])[2, 2])
-    gap = rows["given"] - rows["taken"]
-    bed = isinstance(run.ground, BedGround)
+    up, balance = float(to_matrix(turns[-1])[2, 2]), run.balance_numbers
     found: dict[str, tuple[float | None, str, str]] = {
         "displacement_x": (float(way[0]), "m", say("displacement")),
         "displacement_y": (float(way[1]), "m", "likewise"),
@@ -157,17 +190,14 @@ def quantities_of(run: SpatialRun) -> dict[str, Json]:
         "largest_spike_force": (float(run.feet[:, 0].max()), "N", say("spike_force")),
         "largest_force": (float(force.max()), "N", say("whole_force")),
         "energy_residual": (run.energy_residual, "1", say("residual")),
-        "coupling_residual": (float(np.abs(run.balance).max()) / run.energy_scale, "1", say("coupling")),
-        "exchange_residual": (float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1", say("exchange")),
     }
-    if bed:
-        errors = run.samples
-        found["dissipation_reversal"] = (run.dissipation_reversal, "1", say("reversal"))
-        found["momentum_residual"] = (float(errors["momentum_error"].max()), "N s", say("momentum"))
-        angular = float(errors["angular_momentum_error"].max())
-        found["angular_momentum_residual"] = (angular, "N m s", say("angular_momentum"))
-        for name, values in run.losses.items():
-            found[f"dissipated_{name}"] = (float(values[-1]), "J", say("by_grains"))
+    notes = {"coupling_residual": say("coupling"), "exchange_residual": say("exchange")}
+    if isinstance(run.ground, BedGround):
+        notes |= {
+            "dissipation_reversal": say("reversal"), "momentum_residual": say("momentum"),
+            "angular_momentum_residual": say("angular_momentum"),
+        } | {f"dissipated_{name}": say("by_grains") for name in run.losses}  # fmt: skip
+    found |= {name: (*balance[name], note) for name, note in notes.items()}
     return as_quantities(found, std=None)
 
 
@@ -190,12 +220,7 @@ def _landing(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
     if touched is not None:
         came = max(float(-rows["vz"][touched]), 0.0) if touched else None
         lasting = max(1, round(APART / step))
-        run_length = 0
-        for k in range(touched, len(free)):
-            run_length = run_length + 1 if free[k] else 0
-            if run_length == lasting:
-                left = k - lasting + 1
-                break
+        left = next((touched + low for low, high in spells(free[touched:]) if high - low >= lasting), None)
         if left is not None and came and rows["vz"][left] > 0:
             share = float(rows["vz"][left]) / came
     speed = np.linalg.norm([rows[name] for name in ("vx", "vy", "vz")], axis=0)
@@ -217,42 +242,19 @@ def _landing(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
 def _sentences(run: SpatialRun) -> list[str]:
     """What happened, in words."""
     rows = run.columns
-    said = []
+    sentences = []
     if run.placing_steps:
         held = run.placing_steps * run.master.macro_step
-        said.append(say("placed", held=held, depth=1e3 * rows["sinkage"][0]))
+        sentences.append(say("placed", held=held, depth=1e3 * rows["sinkage"][0]))
     landing = _landing(run)
     touch, hop, rest = (landing[name][0] for name in ("first_touch", "first_hop", "settling_time"))
     if touch is None:
-        said.append(say("touches_nothing"))
+        sentences.append(say("touches_nothing"))
     elif touch > 0:
-        said.append(say("comes_down", touch=touch, speed=landing["impact_speed"][0]))
-    said.append(way_through(run.transitions))
+        sentences.append(say("comes_down", touch=touch, speed=landing["impact_speed"][0]))
+    sentences.append(way_through(run.transitions))
     if hop is not None:
-        said.append(say("lets_go", hop=hop))
+        sentences.append(say("lets_go", hop=hop))
     if rest:
-        said.append(say("at_rest", rest=rest))
-    return said
-
-
-def _add_grains(
-    result: Json,
-    settings: SpatialSettings,
-    plan: SpatialPlan,
-    run: SpatialRun,
-    beside: SpatialRun,
-    softening: Softening,
-) -> None:
-    """What a run on grains has beyond: the bed's numbers, warnings, the spring-damper's beside."""
-    assert isinstance(run.ground, BedGround)
-    bed, platform = run.ground.bed, plan.trial.platform
-    result["code"] = fingerprint()
-    result["grains"] = bed_numbers(settings, run, bed, softening, in_rig=plan.trial.counterweight > 0) | {
-        "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
-        "beside_transitions": passages(beside),
-    }  # fmt: skip
-    warnings = [
-        reversal_warning(run.dissipation_reversal), overlap_warning(bed, softening, settings.max_overlap),
-        *bed_warnings(bed, plan.surface, across=2 * platform.tip_radius / settings.grain), say("one_bed"),
-    ]  # fmt: skip
-    result["warnings"] += [warning for warning in warnings if warning]
+        sentences.append(say("at_rest", rest=rest))
+    return sentences

@@ -25,61 +25,46 @@ class SpatialSettings(GrainsSettings):
     """A platform in space, driven by its wheels or thrown, on a bed of grains or on the spring-damper."""
 
     # The surface
-    surface: str | None = Field(
-        None, description="Material: steel, brick, sand, sand-calibrated or jsc1a; brick if not given."
-    )
-    ground: Literal["spring-damper", "bed"] = Field(
-        "spring-damper", description="What computes the surface's force: the spring-damper, or a bed of grains."
-    )
-    stiffness: Positive | None = Field(
-        None, description="K of one spike [N/m]; half of the surface's, which are of a row of two, if not given."
-    )
-    damping: NotNegative | None = Field(
-        None, description="C of one spike, while going in [N s/m]; half of the surface's if not given."
-    )
+    surface: str | None = None
+    """Material: steel, brick, sand, sand-calibrated or jsc1a; brick if not given."""
+    ground: Literal["spring-damper", "bed"] = "spring-damper"
+    """What computes the surface's force: the spring-damper, or a bed of grains."""
+    stiffness: Positive | None = None
+    """K of one spike [N/m]; half of the surface's, which are of a row of two, if not given."""
+    damping: NotNegative | None = None
+    """C of one spike, while going in [N s/m]; half of the surface's if not given."""
     mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (brick: 0.5).")
-    mu_d: NotNegative | None = Field(
-        None, description="Sliding friction [1]; the surface's if not given (brick: 0.25), half of mu_s where that is."
-    )
+    mu_d: NotNegative | None = None
+    """Sliding friction [1]; the surface's if not given (brick: 0.25), half of mu_s where that is."""
 
     # The platform, and what carries part of it
     platform: str = Field("hedgehog", description="The platform: one that ships, or its TOML file.")
-    rig: Positive | None = Field(
-        None, description="g_sim of the offloading rig [9.80665 m/s2]; 0.0085 if neither it nor gravity is given."
-    )
-    rig_reading: Literal["pair", "weight"] = Field(
-        "pair",
-        description="What rig means: free-fall acceleration of platform and counterweight (pair), or the weight left "
-        "per mass of the platform (weight).",
-    )
+    rig: Positive | None = None
+    """g_sim of the offloading rig [9.80665 m/s2]; 0.0085 if neither it nor gravity is given."""
+    rig_reading: Literal["pair", "weight"] = "pair"
+    """What rig means: free-fall acceleration of platform and counterweight (pair), or the weight left per mass of the
+    platform (weight)."""
     gravity: Positive | None = Field(None, description="Gravity of a free platform, without a rig [m/s2].")
 
     # What drives it
-    torque: Vector | None = Field(
-        None,
-        description="Torque on the platform about its own x, y and z, while a spike touches [N m]; 0.22 about y, or "
-        "the motor's most, if neither it nor a motion at the start is given.",
-    )
+    torque: Vector | None = None
+    """Torque on the platform about its own x, y and z, while a spike touches [N m]; 0.22 about y, or the motor's most,
+    if neither it nor a motion at the start is given."""
     torque_until: Positive | None = Field(None, description="End of the torques [s]; they do not end if not given.")
     torque_in_flight: bool = Field(False, description="Whether the wheels are driven while nothing touches, too.")
-    actuator: Literal["motor", "brake"] = Field(
-        "motor", description="What makes the torques: motors that speed wheels up, or brakes that slow them to rest."
-    )
-    wheel_speed_0: tuple[NotNegative, NotNegative, NotNegative] = Field(
-        ZERO, description="Speeds of the wheels about x, y and z at the start [rad/s]; a brake must be given its own."
-    )
+    actuator: Literal["motor", "brake"] = "motor"
+    """What makes the torques: motors that speed wheels up, or brakes that slow them to rest."""
+    wheel_speed_0: tuple[NotNegative, NotNegative, NotNegative] = ZERO
+    """Speeds of the wheels about x, y and z at the start [rad/s]; a brake must be given its own."""
 
     # How it starts
-    turn: Vector = Field(
-        ZERO, description="How it is turned at the start: about this vector, by its length, from level [rad]."
-    )
+    turn: Vector = ZERO
+    """How it is turned at the start: about this vector, by its length, from level [rad]."""
     velocity: Vector = Field(ZERO, description="Velocity of the centre of mass at the start [m/s].")
     angular_velocity: Vector = Field(ZERO, description="Angular velocity at the start, axes of the ground [rad/s].")
-    height: NotNegative | None = Field(
-        None,
-        description="Height of the lowest tip over the surface at the start [m]: it is let fall. If not given it is "
-        "put just clear of the ground, and set down by a hand where it has no motion.",
-    )
+    height: NotNegative | None = None
+    """Height of the lowest tip over the surface at the start [m]: it is let fall. If not given it is put just clear of
+    the ground, and set down by a hand where it has no motion."""
     duration: Positive = Field(1.0, le=3600, description="How long it is followed [s].")
 
     @property

@@ -13,7 +13,7 @@ __all__ = ["CANDIDATE", "TERM"]
 
 
 def resists(s, depth, rate, force, speed):
-    """f (1 - exp(-v / w)) on the way in."""
+    """f (1 - exp(-v / w)) while the tip sinks."""
     return force * (1.0 - exp(-max(rate, 0.0) / speed))
 
 

@@ -21,13 +21,10 @@ class CampaignSettings(TrialSettings):
     name: str = Field("made up", min_length=1, description="Name of the campaign.")
 
     # The conditions
-    rig: tuple[Positive, ...] = Field(
-        (0.0085, 0.015),
-        description="g_sim of the offloading rig [9.80665 m/s2], one after another; not asked where gravity is given.",
-    )
-    gravity: tuple[Positive, ...] = Field(
-        (), description="Gravities of a free platform, without a rig [m/s2], one after another."
-    )
+    rig: tuple[Positive, ...] = (0.0085, 0.015)
+    """g_sim of the offloading rig [9.80665 m/s2], one after another; not asked where gravity is given."""
+    gravity: tuple[Positive, ...] = ()
+    """Gravities of a free platform, without a rig [m/s2], one after another."""
     motor_torques: tuple[Positive, ...] = Field((0.125, 0.22), description="Torques of motor trials [N m].")
     brake_torques: tuple[Positive, ...] = Field((6.0,), description="Torques of brake trials [N m].")
     brake_wheel_speed: Positive = Field(300.0, description="Speed of the wheel at the start of a brake trial [rad/s].")
@@ -35,18 +32,16 @@ class CampaignSettings(TrialSettings):
 
     # What is true
     seed: SeedNumber = Field(1, description="Seed of every draw.")
-    exact: bool = Field(
-        False, description="The stated numbers are the true ones; else the truth is drawn within their uncertainties."
-    )
+    exact: bool = False
+    """The stated numbers are the true ones; else the truth is drawn within their uncertainties."""
     sigma_mass: Relative = Field(0.002, description="One sigma of the mass, relative [1].")
     sigma_inertia: Relative = Field(0.03, description="One sigma of the inertia, relative [1].")
     sigma_stiffness: Relative = Field(0.1, description="One sigma of the stiffness, relative [1].")
     sigma_damping: Relative = Field(0.2, description="One sigma of the damping, relative [1].")
     sigma_mu_s: Relative = Field(0.05, description="One sigma of static friction, relative [1].")
     sigma_mu_d: Relative = Field(0.05, description="One sigma of sliding friction, relative [1].")
-    sigma_gravity_sim: Relative = Field(
-        0.02, description="One sigma of the simulated gravity, relative, drawn anew for each trial [1]."
-    )
+    sigma_gravity_sim: Relative = 0.02
+    """One sigma of the simulated gravity, relative, drawn anew for each trial [1]."""
 
     # The sensors
     pose_std: Triple = Field((0.0005, 0.0005, 0.003), description="Noise of the camera's x, y, theta [m, m, rad].")

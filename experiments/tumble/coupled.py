@@ -1,16 +1,13 @@
 """`hedgebed tumble --method coupled`: the spring-damper through the coupling's master, as a bed of grains is stepped.
 
-What comes out is that of `rigid.planar.simulate` to its tolerance (docs/coupling.md); what it is for is a
-spring-damper that is stepped, booked and read as grains are, so that only the ground differs between two runs.
+What comes out is that of `rigid.planar.simulate` to its tolerance (docs/coupling.md). It is for a spring-damper that is
+stepped, recorded and read as grains are, so that only the ground differs between two runs.
 """
 
 from dataclasses import replace
 
-import numpy as np
-
 from coupling import CoupledTumble, LawGround
 from experiments.grains.bed_result import unsettled_warning
-from experiments.platform.numbers import tip_depth
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import quantities_of
@@ -18,18 +15,16 @@ from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
 from . import say
-from .result import title_of
+from .result import result_of, title_of
 from .settings import TumbleSettings
-from .steppers import own_quantities, own_warning, stepper_of, words
+from .steppers import own_quantities, own_warning, row_feet, sinkage_start, stepper_of, words
 from .trial import TumblePlan
 
-__all__ = ["check_coupled", "compute_coupled", "coupled_quantities", "coupled_tumble", "feet_columns", "law_feet"]
+__all__ = ["STEP", "check_coupled", "compute_coupled", "feet_columns", "row_quantities"]
 
 STEP = 4e-5
-"""The law's own step [s]: with ten of them, the default, every channel is within the planar model's tolerance.
-
-At 1 ms omega is off by twice of that after 0.9 s, as the torque ends with the step in which the last tip lifts off.
-"""
+"""The law's own step [s]: with ten of them every channel is within the planar model's tolerance; at 1 ms omega is off
+by twice of that after 0.9 s, as the torque ends with the step in which the last tip lifts off."""
 
 
 def check_coupled(settings: TumbleSettings, plan: TumblePlan) -> None:
@@ -43,71 +38,48 @@ def check_coupled(settings: TumbleSettings, plan: TumblePlan) -> None:
         raise ValueError(say("long_step", s=settings, step=1e3 * step, most=int(1e-3 / STEP + 1e-9)))
 
 
-def coupled_tumble(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> CoupledTumble:
-    """The trial on the spring-damper, ready to be stepped."""
-    ground = LawGround.of_trial(plan.trial)
-    ground.grounds = [replace(ground, time_step=STEP) for ground in ground.grounds]
-    return stepper_of(
-        settings, plan.trial, ground, duration=duration, substeps=settings.substeps,
-        body_steps=settings.body_steps, extrapolation=settings.extrapolation, iterations=settings.iterations,
-        max_wheel_speed=plan.max_wheel_speed, energy_interval=1e-3,
-    )  # fmt: skip
-
-
 def compute_coupled(
     settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress
-) -> tuple[Trajectory, float | None, Json, Json, tuple[str, ...]]:
-    """The trial by the master, series/feet.csv written.
-
-    The trajectory, when the wheel comes to its limit [s], quantities and other entries of the result, and warnings.
-    """
-    run = coupled_tumble(settings, plan, duration=settings.duration)
+) -> tuple[Trajectory, Json]:
+    """The trial by the master, series/feet.csv written: the trajectory, and the entries of the result."""
+    ground = LawGround.of_trial(plan.trial)
+    ground.grounds = [replace(ground, time_step=STEP) for ground in ground.grounds]
+    run = stepper_of(
+        settings, plan.trial, ground, **settings.stepping(), duration=settings.duration,
+        max_wheel_speed=plan.max_wheel_speed, energy_interval=1e-3,
+    )  # fmt: skip
     trajectory = run.run(on_step=lambda run: progress.update(run.fraction))
     folder.write_series("feet", feet_columns(run))
-    quantities, more = coupled_quantities(run)
-    warnings = tuple(warning for warning in (unsettled_warning(run.master), own_warning(run)) if warning)
-    return trajectory, run.body.wheel_at_limit, quantities, more | {"title": words(settings, title_of(plan))}, warnings
+    result = result_of(settings, plan, trajectory, run.body.wheel_at_limit)
+    own, more = own_quantities(run)
+    result["quantities"] |= quantities_of(row_quantities(run, start=say("of_sinkage_start"), ground="ground")) | own
+    result["warnings"] += [warning for warning in (unsettled_warning(run.master), own_warning(run)) if warning]
+    return trajectory, result | more | {"title": words(settings, title_of(plan))}
 
 
-def coupled_quantities(run: CoupledTumble) -> tuple[dict[str, Json], Json]:
-    """What it has beyond the planar model's numbers; and what a row of tumbles adds to the result besides."""
-    sinkage, normal = law_feet(run)
-    gap = run.columns["given"] - run.columns["taken"]
-    found = {
-        "sinkage_start": (float(sinkage[0][[0, -1]].mean()), "m", say("of_sinkage_start")),
+def row_quantities(run: CoupledTumble, *, start: str, ground: str) -> dict[str, tuple[float, str, str]]:
+    """Sinkage, load and error of the exchange: name -> value, unit, note. `start`: note of the sinkage at the start;
+    `ground`: name of the ground in a note."""
+    sinkage, load = row_feet(run)
+    return {
+        "sinkage_start": (sinkage_start(run), "m", start),
         "sinkage_largest": (float(sinkage.max()), "m", say("of_any_row")),
-        "largest_row_force": (float(normal.max()), "N", say("of_row_force")),
-        "exchange_residual": (
-            float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1", say("of_exchange", ground="ground"),
-        ),
-    }  # fmt: skip
-    own, more = own_quantities(run, sinkage, normal)
-    return quantities_of(found) | own, more
+        "largest_row_force": (float(load.max()), "N", say("of_row_force")),
+        "exchange_residual": (*run.balance_numbers["exchange_residual"], say("of_exchange", ground=ground)),
+    }
 
 
 def feet_columns(run: CoupledTumble) -> Json:
-    """The columns of series/feet.csv: work given and taken; load, slip and sinkage of each row.
+    """The columns of series/feet.csv: work given and taken; load, friction, slip and sinkage of each row.
 
-    Friction is not among them: rows that stick share it, and the law itself says only how large it may be.
+    On a law friction is not among them: rows that stick share it, and the law gives only its bound.
     """
-    rows = run.columns
-    sinkage, normal = law_feet(run)
+    rows, feet = run.columns, run.feet
+    sinkage, load = row_feet(run)
     columns: Json = {"t_s": rows["time"], "given_J": rows["given"], "taken_J": rows["taken"]}
     for row in range(run.trial.spike_count):
-        columns[f"normal_{row}_N"] = normal[:, row]
-        columns[f"slip_{row}_m_s"] = run.feet[:, 2, row]
-        columns[f"sinkage_{row}_m"] = sinkage[:, row]
+        columns[f"normal_{row}_N"] = load[:, row]
+        if run.ground.gives_friction:
+            columns[f"along_{row}_N"] = feet[:, 1, row]
+        columns |= {f"slip_{row}_m_s": feet[:, 2, row], f"sinkage_{row}_m": sinkage[:, row]}
     return columns
-
-
-def law_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
-    """Depth of each row's tip [m], 0 above the surface, and its load [N], shape [step, row] both.
-
-    The load is the mean over the step before; at the start, before any, it is what the spring carries at rest.
-    """
-    rows, trial = run.columns, run.trial
-    depth = tip_depth(rows["theta"], rows["y"], count=trial.spike_count, length=trial.spike_length)
-    sinkage = np.maximum(0.0, depth)
-    normal = run.feet[:, 0].copy()
-    normal[0] = trial.stiffness * sinkage[0]
-    return sinkage, normal

@@ -5,49 +5,35 @@ on the spring-damper (`coupled`), or the planar model, for which a sweep and a c
 trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json, figures and a report.
 """
 
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Literal
 
 from experiments.campaign.files import keep_model
-from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
+from experiments.platform.numbers import keep_platform, platform_numbers, torque_within_limit
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
-from experiments.runs.types import Json
 from experiments.runs.whole_runs import publish, whole_run
 from rigid.planar.simulate import PAPER_STEP, check_step, simulate
 from rigid.planar.trajectory import Trajectory
 
 from .result import motion_columns, result_of, trajectory_columns
 from .settings import TumbleSettings
-from .sweep import check_sweep, middle_of_sweep, run_sweep
+from .sweep import Sweep
 from .synthesis import check_tumble_campaign, write_tumble_campaign
 from .trial import TumblePlan, plan_tumble
 
 __all__ = ["check", "resume", "run"]
 
 
-@dataclass(frozen=True)
-class _Computed:
-    """A trajectory, when the wheel comes to its limit [s], and what the result has beyond the planar model's."""
-
-    trajectory: Trajectory
-    full: float | None
-    quantities: Json = field(default_factory=dict)
-    more: Json = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
-
-
 def check(settings: TumbleSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
     if settings.ground == "bed":
-        from .on_grains import check_on_grains  # loads Taichi
+        from .on_grains import PlanarOnBed  # loads Taichi
 
-        check_on_grains(settings)
+        PlanarOnBed(settings).check()
         return
-    check_sweep(settings)
-    plan = plan_tumble(middle_of_sweep(settings))
+    sweep = Sweep(settings) if settings.sweep else None
+    plan = sweep.plans[sweep.shown] if sweep else plan_tumble(settings)
     check_tumble_campaign(settings)
     if settings.method == "coupled":
         from .coupled import check_coupled  # loads Taichi
@@ -58,20 +44,13 @@ def check(settings: TumbleSettings) -> None:
 
 
 def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
-    if settings.ground == "bed":
-        from .on_grains import tumble_on_grains  # loads Taichi
-
-        return tumble_on_grains(settings, folder, progress)
     with folder.lock():
-        return _on_law(settings, folder, progress)
+        if settings.ground != "bed":
+            return _on_law(settings, folder, progress)
+        from .on_grains import PlanarOnBed  # loads Taichi
 
-
-def _compute(settings: TumbleSettings, plan: TumblePlan, folder: RunFolder, progress: Progress) -> _Computed:
-    if settings.method == "coupled":
-        from .coupled import compute_coupled  # loads Taichi
-
-        return _Computed(*compute_coupled(settings, plan, folder, progress))
-    return _Computed(*_integrate(settings, plan, duration=settings.duration))
+        copied = keep_platform(settings.platform, folder.path, progress.message)
+        return PlanarOnBed(settings, copied).carry_out(folder, progress)
 
 
 def _check_planar(settings: TumbleSettings, plan: TumblePlan) -> None:
@@ -97,36 +76,31 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     """A tumble on the spring-damper or another law, with its sweep and its campaign where they are asked for."""
     copied = keep_model(settings.model, folder.path)
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
-    middle = middle_of_sweep(settings, model_file=copied, platform=platform)
-    plan = plan_tumble(middle, model_file=copied, platform=platform)
-    for sentence in (*plan.sentences(), *(f"warning: {warning}" for warning in plan.warnings)):
+    sweep = Sweep(settings, model_file=copied, platform=platform) if settings.sweep else None
+    plan = sweep.plans[sweep.shown] if sweep else plan_tumble(settings, model_file=copied, platform=platform)
+    for sentence in plan.announcement():
         progress.message(sentence)
     progress.stage("tumble", total=1.0)
-    computed = _compute(settings, plan, folder, progress)
+    if settings.method == "coupled":
+        from .coupled import compute_coupled  # loads Taichi
+
+        trajectory, result = compute_coupled(settings, plan, folder, progress)
+    else:
+        trajectory, full = _integrate(settings, plan, duration=settings.duration)
+        result = result_of(settings, plan, trajectory, full)
     progress.update(1.0)
-    write_series(folder.path / "trajectory.csv", trajectory_columns(computed.trajectory))
-    folder.write_series("motion", motion_columns(computed.trajectory))
-    result = result_of(settings, plan, computed.trajectory, computed.full)
-    result["quantities"] |= computed.quantities
-    result["warnings"] += computed.warnings
-    result |= computed.more
-    if settings.sweep:
+    write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
+    folder.write_series("motion", motion_columns(trajectory))
+    if sweep:
         progress.message("the numbers above are those of one trial of the sweep, in its middle or nearest to it")
         progress.stage("sweep")
-        _add_sweep(result, settings, folder, copied, platform)
+        swept = sweep.run(folder)
+        result["departures"]["sentences"] += swept["sweep"]["sentences"]
+        result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
+        result |= swept
     made = write_tumble_campaign(settings, plan, folder.path, progress)
     result |= {"campaign": made} if made is not None else {}
     return publish(folder, Result.make("tumble", **result), progress)
-
-
-def _add_sweep(
-    result: Json, settings: TumbleSettings, folder: RunFolder, model: Path | None, platform: PlatformNumbers
-) -> None:
-    """Integrate the sweep and put what came out beside the trial in its middle."""
-    swept = run_sweep(settings, folder, model_file=model, platform=platform)
-    result["departures"]["sentences"] += swept["sweep"]["sentences"]
-    result["title"] += ", one trial of a sweep of " + " and ".join(settings.sweep)
-    result |= swept
 
 
 run, resume = whole_run("tumble", TumbleSettings, _carry_out, check=check)

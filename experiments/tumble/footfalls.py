@@ -15,24 +15,19 @@ from . import say
 
 __all__ = ["Footfall", "Sinking", "find_footfalls", "footfall_quantities", "footfall_table", "sinking_over"]
 
-GRAZE = 1e-3
-"""A row that goes less deep [m] has not come down."""
+GRAZE = 1e-3  # A row that goes less deep [m] has not come down
 
 
 @dataclass(frozen=True)
 class Footfall:
-    """One row of spikes, from where it touches to where it is out again: `time` [s], `deepest` [m], `load` [N].
-
-    `load` is the largest upward force on it (mean of one macro step); `set_down`: it was there when the record
-    began, placed; `open`: it was still going down when the record ended.
-    """
+    """One row of spikes, from where it touches to where it is out again."""
 
     row: int
-    time: float
-    deepest: float
-    load: float
-    set_down: bool
-    open: bool
+    time: float  # When it touches [s]
+    deepest: float  # [m]
+    load: float  # Largest upward force on it, mean of one macro step [N]
+    set_down: bool  # It was there when the record began, placed
+    open: bool  # It was still going down when the record ended
 
     @property
     def counts(self) -> bool:
@@ -42,18 +37,14 @@ class Footfall:
 
 @dataclass(frozen=True)
 class Sinking:
-    """By how much each footfall goes deeper than the one before.
+    """By how much each footfall goes deeper than the one before."""
 
-    `slope` and its standard error `error` in m a footfall, `low` and `high` the 95 % interval; `depth` the mean [m],
-    `count` footfalls on `beds` beds.
-    """
-
-    slope: float
-    error: float
-    low: float
+    slope: float  # [m a footfall]
+    error: float  # Its standard error; its 95 % interval is from
+    low: float  # to
     high: float
-    depth: float
-    count: int
+    depth: float  # Mean [m]
+    count: int  # Footfalls
     beds: int
 
     @property
@@ -87,33 +78,24 @@ def find_footfalls(
 
 
 def sinking_over(beds: Sequence[Sequence[Footfall]]) -> Sinking | None:
-    """Least squares over all beds: one slope, a mean depth for each bed. None where fewer than three are left.
+    """Least squares over all beds: one slope, a mean depth for each bed. None where too few are left.
 
     What was placed and what was still going down at the end are left out. The interval is Student's, with
     a degree of freedom less for the slope and for every bed.
     """
-    slopes: list[NDArray[np.float64]] = []
-    depths: list[NDArray[np.float64]] = []
-    means = []
-    for falls in beds:
-        own = [(k, fall.deepest) for k, fall in enumerate(falls) if fall.counts]
-        if len(own) < 2:
-            continue
-        number, depth = np.array(own).T
-        slopes.append(number - number.mean())
-        depths.append(depth - depth.mean())
-        means.append(depth)
-    if not slopes:
-        return None
-    x, y = np.concatenate(slopes), np.concatenate(depths)
-    free = len(x) - len(slopes) - 1
+    counted = [[(k, fall.deepest) for k, fall in enumerate(falls) if fall.counts] for falls in beds]
+    tables = [np.array(own).T for own in counted if len(own) >= 2]
+    free = sum(table.shape[1] for table in tables) - len(tables) - 1
     if free < 1:
         return None
+    x = np.concatenate([number - number.mean() for number, _ in tables])
+    y = np.concatenate([depth - depth.mean() for _, depth in tables])
+    mean = float(np.concatenate([depth for _, depth in tables]).mean())
     slope = float(x @ y / (x @ x))
     left = y - slope * x
     error = float(np.sqrt(left @ left / free / (x @ x)))
     half = float(student.ppf(0.975, free)) * error
-    return Sinking(slope, error, slope - half, slope + half, float(np.concatenate(means).mean()), len(x), len(slopes))
+    return Sinking(slope, error, slope - half, slope + half, mean, len(x), len(tables))
 
 
 def footfall_table(falls: Sequence[Footfall]) -> Json:

@@ -5,9 +5,11 @@ run in space does alike is in `experiments.grains.on_bed`.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,36 +18,30 @@ from coupling.members import FEWEST_SLOTS, Member, slots_of
 from dem import Bed, Graded
 from experiments.grains.flight import lies_in_flight
 from experiments.grains.graded import graded_under
-from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
+from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
 from experiments.grains.softening import PUSHED, Softening
 from experiments.grains.staged import check_bed_stages, packing_warning
-from experiments.platform.numbers import keep_platform, platform_numbers, tip_angles, tip_depth, torque_within_limit
+from experiments.platform.numbers import platform_numbers, tip_angles, tip_depth, torque_within_limit
 from experiments.platform.settled import check_lengths
 from experiments.platform.surfaces import find_surface
-from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.planar.simulate import simulate
 from rigid.planar.trajectory import Trajectory
 
 from . import say
-from .on_grains_frames import TumbleFrames
-from .on_grains_result import conclude, sinkage_start, write_trajectory
+from .on_grains_result import TumbleFrames, conclude, write_trajectory
 from .opening import opening, short_of_way
 from .settings import TumbleSettings
-from .steppers import is_plain, stepper_of
+from .steppers import is_plain, sinkage_start, stepper_of
 from .trial import plan_tumble, spikes_of
 
-__all__ = ["PlanarForecast", "PlanarOnBed", "check_on_grains", "tumble_on_grains"]
+__all__ = ["PlanarForecast", "PlanarOnBed"]
 
-COPIES = 2.0
-"""Spikes in a row: the bed holds one of them and the sand that it has for itself."""
 ROLLED = {"motor": 0.8, "brake": 0.4}
 """Way on grains over that of rolling without slip or loss: 0.64 to 0.78 and 0.3 were met (docs/experiments.md) [1]."""
-THROW = 2.0
-"""Speed of a grain that a spike throws up, over the spike's [1]: an elastic ball has twice the wall's."""
-HULL_SHARE = 0.95
-"""The hull's cylinder over the distance of its sides from the axis, so that it never stands out of the hull [1]."""
+THROW = 2.0  # Speed of a grain that a spike throws up, over the spike's [1]: an elastic ball has twice the wall's
+HULL_SHARE = 0.95  # The hull's cylinder over the distance of its sides: it stays inside the hull [1]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +53,7 @@ class PlanarForecast(Forecast):
     ahead: float  # where the tips come down, from the start [m]
     sunk: float  # depth of the tips that it stands on before it moves [m]
     pushed: float  # largest force of the rows together [N]
-    farthest: float
-    """Where tips may come down on grains, which hold a row and the torque with it as long as it acts [m]."""
+    farthest: float  # Where tips may come down on grains, which hold a row and the torque with it [m]
 
     @property
     def length(self) -> float:
@@ -66,20 +61,11 @@ class PlanarForecast(Forecast):
         return self.ahead - self.behind
 
 
-def check_on_grains(settings: TumbleSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for a bed that does not suit this trial."""
-    PlanarOnBed(settings).check()
-
-
-def tumble_on_grains(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
-    """Carry it out in `folder`, from its checkpoint where there is one; the result."""
-    with folder.lock():
-        on_bed = PlanarOnBed(settings, keep_platform(settings.platform, folder.path, progress.message))
-        return on_bed.carry_out(folder, progress, sinkage=sinkage_start, write_series=write_trajectory)
-
-
 class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
     """A tumble in the plane on a slice of a bed. `plan` has the numbers of the spring-damper beside it."""
+
+    copies = 2.0  # Spikes in a row: the bed holds one of them and the sand that it has for itself
+    frames, write_series, sinkage = TumbleFrames, staticmethod(write_trajectory), staticmethod(sinkage_start)
 
     def __init__(self, settings: TumbleSettings, platform_file: Path | None = None) -> None:
         """`platform_file` stands in for ``settings.platform``, where that was copied."""
@@ -89,6 +75,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         self.plan = plan_tumble(_beside(settings), platform=platform, spikes=spikes)
         self.trial = trial = self.plan.trial
         self.surface, self.gravity, self.counterweight = self.plan.surface, trial.gravity_sim, trial.counterweight
+        self.weight = trial.weight
         self.spike_diameter, self.reach = spikes.diameter, trial.spike_length
         self.repeats, self.stages = settings.bed_repeats, settings.bed_stages
         check_lengths(settings, self.reach, spike_diameter=spikes.diameter, spike_clear=spikes.clear)
@@ -144,7 +131,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         settings, trial = self.settings, self.trial
         lying = lies_in_flight(
             trial, surface=self.surface, material=self.material, hull_radius=self.hull_radius,
-            width=COPIES * settings.bed_size[1], duration=self.duration, max_wheel_speed=self.plan.max_wheel_speed,
+            width=self.copies * settings.bed_size[1], duration=self.duration, max_wheel_speed=self.plan.max_wheel_speed,
         )  # fmt: skip
         pushed = 0.5 * trial.gravity_sim * self.duration**2  # by sand that pushes ahead with the weight, as at 1e-2 g
         ahead = lying.reach + max(pushed, float(law.trajectory.x.max()))
@@ -179,7 +166,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         load = self.trial.weight
         if self.counterweight == 0:
             load = max(load, PUSHED[self.trial.actuator] * self.forecast.pushed)
-        return load / COPIES / (0.25 * math.pi * self.spike_diameter**2)
+        return load / self.copies / (0.25 * math.pi * self.spike_diameter**2)
 
     @property
     def hull_radius(self) -> float:
@@ -226,7 +213,6 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         return 2 * (forecast.farthest + MARGIN * self.spike_diameter) - forecast.behind - forecast.ahead
 
     def check_extent(self) -> None:
-        """Raise ValueError for a bed too short or too narrow for the forecast."""
         s, forecast, spike = self.settings, self.forecast, self.spike_diameter
         margin = MARGIN * spike
         need, on_grains = forecast.length + 2 * margin, self._length_on_grains()
@@ -257,7 +243,6 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
     # The run
 
     def announce(self, progress: Progress) -> None:
-        """What was set and what follows from it, then what may go wrong."""
         settings, plan = self.settings, self.plan
         for sentence in opening(
             settings, plan, grains=self.grain_count(), softening=self.softening(), lowering_speed=self.lowering_speed
@@ -270,7 +255,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
                 progress.message(f"warning: {warning}")
 
     def bed(self, softening: Softening, progress: Progress) -> Bed:
-        """As `PlatformOnBed` has it; of a bed laid end to end it states whether tips meet the same sand again."""
+        """The bed; for one laid end to end, a message whether tips meet the same sand again."""
         bed = super().bed(softening, progress)
         if self.repeats > 1:
             piece, way = self.settings.bed_size[0], self.forecast.length + self.spike_diameter
@@ -312,31 +297,19 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
             clear=self.spikes.clear, hull_radius=self.hull_radius, width=self.settings.bed_size[1],
         )  # fmt: skip
 
-    def ground(self, bed: Bed) -> BedGround:
-        """The slice on the bed, half of the platform's weight on it."""
-        settings = self.settings
-        return BedGround(
-            bed, self.members(), origin=(self.origin, 0.5 * bed.size[1]), begin=settings.place, copies=COPIES,
-            touch=TOUCH * self.trial.weight / COPIES, friction=settings.spike_friction,
-            restitution=settings.spike_restitution,
-        )  # fmt: skip
+    def layout(self, bed: Bed) -> Mapping[str, Any]:
+        return {"origin": (self.origin, 0.5 * bed.size[1]), "begin": self.settings.place}
 
     def run_on(self, ground: BedGround) -> CoupledTumble:
-        """One tumble, several in a row, or a landing."""
         lowered = {"lower_gravity": True} if self.settings.settle_gravity is not None else {}
         return stepper_of(
             self.settings, self.trial, ground, **lowered, **self.stepping(), tip_radius=0.5 * self.spikes.diameter,
             max_wheel_speed=self.plan.max_wheel_speed,
         )  # fmt: skip
 
-    def frames(self, run: CoupledTumble, folder: Path, resumed: bool) -> TumbleFrames | None:
-        """Of the slice."""
-        return TumbleFrames(self.settings, run, folder, resumed=resumed) if self.settings.frame_count else None
-
-    def conclude(self, run: CoupledTumble, softening: Softening, folder: RunFolder) -> Result:
-        """The result, its series written."""
+    def conclude(self, run: CoupledTumble, folder: Path) -> Result:
         law = self.forecast.trajectory
-        result = conclude(self.settings, self.plan, run, law, softening, folder, self.graded)
+        result = conclude(self.settings, self.plan, run, law, self.softening(), folder, self.graded)
         result["warnings"] += [warning for warning in (self.whose_spikes(),) if warning]
         return Result.make("tumble", **result)
 

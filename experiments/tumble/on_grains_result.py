@@ -1,58 +1,83 @@
-"""What comes of a tumble on grains: its series, and the result that stands beside the spring-damper's."""
+"""What a tumble on grains leaves: its frames, its series, and the result that stands beside the spring-damper's."""
 
+import math
 from pathlib import Path
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling import MOST_REVERSAL, BedGround, CoupledTumble
-from dem import Bed, Graded
+from coupling.members import HULL
+from dem import Graded
 from dem.prepare.prepare import fingerprint
-from experiments.grains.bed_result import (
-    bed_numbers,
-    bed_warnings,
-    overlap_warning,
-    residual_warning,
-    reversal_warning,
-    unsettled_warning,
-    write_bed_series,
-)
+from experiments.grains import bed_result as grains
 from experiments.grains.graded import coarsest_touched, tips_in_ground
 from experiments.grains.softening import Softening
+from experiments.grains.tracked_frames import PlatformFrames, member_mesh
 from experiments.platform.surfaces import find_surface
-from experiments.runs.folder import RunFolder, write_series
+from experiments.runs.folder import write_series
 from experiments.runs.result import quantities_of as as_quantities
 from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
+from rigid.platform.solids import Mesh, merge
+from rigid.spatial.quaternions import to_matrix
 from vis.tumble.beside import HEAD, beside_rows, beside_words
 
 from . import say
+from .coupled import feet_columns, row_quantities
 from .result import motion_columns, passages, quantities_of, result_of, trajectory_columns
 from .settings import TumbleSettings
 from .steppers import own_quantities, own_warning, words
 from .trial import TumblePlan
 
-__all__ = ["conclude", "sinkage_start", "write_trajectory"]
+__all__ = ["TumbleFrames", "conclude", "write_trajectory"]
 
 SERIES = {
     "own": "trajectory.csv", "feet": "series/feet.csv", "bed": "series/bed.csv", "beside": "series/spring-damper.csv",
 }  # fmt: skip
-FEET = (("normal", "N"), ("along", "N"), ("slip", "m_s"), ("sinkage", "m"))
-"""Of each row in series/feet.csv, as `CoupledTumble.feet` has them."""
+Array = NDArray[np.float64]
 
 
-def write_trajectory(folder: Path, run: CoupledTumble) -> Trajectory:
+class TumbleFrames(PlatformFrames[CoupledTumble]):
+    """The slice on the bed: one spike a row and the hull's cylinder; `row_forces` are of all spikes of a row."""
+
+    def body_meshes(self, run: CoupledTumble) -> dict[str, Mesh]:
+        parts = {
+            name: [member_mesh(member, segments=24) for member in _ground(run).members if (member.row == HULL) == hull]
+            for name, hull in (("spikes", False), ("hull", True))
+        }
+        return {name: merge(meshes) for name, meshes in parts.items() if meshes}
+
+    def values(self, run: CoupledTumble) -> dict[str, float]:
+        """The angle, and the ground's force on the platform [N]."""
+        force = run.master.wrench.force
+        return {"theta_deg": math.degrees(float(run.body.place[2])), "force_x": force[0], "force_z": force[2]}
+
+    def row_forces(self, run: CoupledTumble, origin: Array) -> tuple[Array, dict[str, Array]]:
+        """At the lowest points of the rows that touch: means of the last macro step."""
+        pose = run.body.pose
+        place, turn = origin + pose.position, to_matrix(pose.turn).T
+        members = {member.row: member for member in _ground(run).members}
+        normal, along, _, _ = run.feet[-1]
+        rows = np.flatnonzero(normal)
+        touching = [members[int(row)] for row in rows]
+        at = [place + member.at @ turn - [0.0, 0.0, member.radius] for member in touching]
+        force = np.column_stack([along[rows], np.zeros(len(rows)), normal[rows]])
+        return np.array(at).reshape(-1, 3), {"force": force, "row": rows.astype(float)}
+
+
+def _ground(run: CoupledTumble) -> BedGround:
+    return cast(BedGround, run.ground)
+
+
+def write_trajectory(run: CoupledTumble, folder: Path) -> Trajectory:
     """trajectory.csv and the series of a run, as far as it has come."""
     found = run.trajectory()
-    (folder / "series").mkdir(exist_ok=True)
     write_series(folder / "trajectory.csv", trajectory_columns(found))
     write_series(folder / "series" / "motion.csv", motion_columns(found))
-    rows = run.columns
-    columns: Json = {"t_s": rows["time"], "given_J": rows["given"], "taken_J": rows["taken"]}
-    for row in range(run.trial.spike_count):
-        columns |= {f"{name}_{row}_{unit}": run.feet[:, k, row] for k, (name, unit) in enumerate(FEET)}
-    write_series(folder / "series" / "feet.csv", columns)
-    write_bed_series(folder, run)
+    write_series(folder / "series" / "feet.csv", feet_columns(run))
+    grains.write_bed_series(folder, run)
     return found
 
 
@@ -62,17 +87,17 @@ def conclude(
     run: CoupledTumble,
     beside: Trajectory,
     softening: Softening,
-    folder: RunFolder,
+    folder: Path,
     graded: Graded | None = None,
 ) -> Json:
     """The result, its series written. `beside`: the trial on the spring-damper; `graded`: the bed's sizes by place."""
-    series = write_trajectory(folder.path, run)
-    write_series(folder.path / "series" / "spring-damper.csv", trajectory_columns(beside))
+    series = write_trajectory(run, folder)
+    write_series(folder / "series" / "spring-damper.csv", trajectory_columns(beside))
     result = result_of(settings, plan, series, run.body.wheel_at_limit)
-    bed, spikes = _bed(run), plan.spikes
+    bed, spikes = _ground(run).bed, plan.spikes
     result["title"] = words(settings, say("title_on_grains", plan=plan, rest=result["title"].partition(": ")[2]))
     result["code"] = fingerprint()
-    added, tables = own_quantities(run, run.feet[:, 3], run.feet[:, 0])
+    added, tables = own_quantities(run)
     result["quantities"] |= _own_quantities(run) | added
     result |= tables
     next_to = quantities_of(beside)
@@ -97,24 +122,16 @@ def conclude(
             coarser = say("coarser_than_expected", coarsest=1e3 * coarsest, fine=1e3 * settings.grain)
     surface = find_surface(plan.surface)
     warnings = [
-        residual_warning(run.energy_residual), reversal_warning(run.dissipation_reversal),
-        unsettled_warning(run.master), own_warning(run), overlap_warning(bed, softening, settings.max_overlap),
+        grains.residual_warning(run.energy_residual), grains.reversal_warning(run.dissipation_reversal),
+        grains.unsettled_warning(run.master), own_warning(run),
+        grains.overlap_warning(bed, softening, settings.max_overlap),
         _same_sand_again(settings, run, spikes.diameter), coarser,
-        *bed_warnings(bed, plan.surface, across=spikes.diameter / coarsest),
+        *grains.bed_warnings(bed, plan.surface, across=spikes.diameter / coarsest),
         say("law_in_flight", plan=plan) if surface.granular and plan.trial.counterweight == 0 else None,
         say("one_bed") if surface.granular else None,
     ]  # fmt: skip
     result["warnings"] += [warning for warning in warnings if warning]
     return result
-
-
-def _bed(run: CoupledTumble) -> Bed:
-    return cast(BedGround, run.ground).bed
-
-
-def sinkage_start(run: CoupledTumble) -> float:
-    """Mean depth of the two rows that it stands on when the torque begins [m]."""
-    return float(run.feet[0, 3, [0, -1]].mean())
 
 
 def _same_sand_again(settings: TumbleSettings, run: CoupledTumble, spike: float) -> str | None:
@@ -131,7 +148,7 @@ def _same_sand_again(settings: TumbleSettings, run: CoupledTumble, spike: float)
 
 def _grains(settings: TumbleSettings, plan: TumblePlan, run: CoupledTumble, softening: Softening) -> Json:
     """The bed and how it was stepped, for ``grains`` of result.json."""
-    found = bed_numbers(settings, run, _bed(run), softening, in_rig=plan.trial.counterweight > 0)
+    found = grains.bed_numbers(settings, run, _ground(run).bed, softening, in_rig=plan.trial.counterweight > 0)
     own, whole = found["grain_steps"], found["grain_steps_all_awake"]
     return found | {
         "series": SERIES, "macro_step": run.master.macro_step, "arch": settings.arch, "steps": run.master.count,
@@ -146,24 +163,12 @@ def _grains(settings: TumbleSettings, plan: TumblePlan, run: CoupledTumble, soft
 
 def _own_quantities(run: CoupledTumble) -> dict[str, Json]:
     """What a tumble on grains has beyond the planar model's numbers."""
-    sinkage = run.feet[:, 3]
-    gap = run.columns["given"] - run.columns["taken"]
-    found: dict[str, tuple[float, str, str]] = {
-        "sinkage_start": (sinkage_start(run), "m", say("of_sinkage_start_on_grains")),
-        "sinkage_largest": (float(sinkage.max()), "m", say("of_any_row")),
-        "largest_row_force": (float(run.feet[:, 0].max()), "N", say("of_row_force")),
-        "exchange_residual": (
-            float(np.abs(gap - gap[0]).max()) / run.energy_scale, "1", say("of_exchange", ground="bed")
-        ),
-        "dissipation_reversal": (run.dissipation_reversal, "1", say("of_reversal", limit=MOST_REVERSAL)),
-        "momentum_residual": (float(run.samples["momentum_error"].max()), "N s", say("of_momentum")),
-        "angular_momentum_residual": (
-            float(run.samples["angular_momentum_error"].max()), "N m s", say("of_angular_momentum"),
-        ),
+    numbers = run.balance_numbers
+    found = row_quantities(run, start=say("of_sinkage_start_on_grains"), ground="bed")
+    notes = {
+        "dissipation_reversal": say("of_reversal", limit=MOST_REVERSAL), "momentum_residual": say("of_momentum"),
+        "angular_momentum_residual": say("of_angular_momentum"),
+        **{f"dissipated_{name}": say("dissipated_by_grains", what=say(f"to_{name}")) for name in run.losses},
+        "coupling_residual": say("of_coupling"),
     }  # fmt: skip
-    notes = {"damping": say("to_damping"), "friction": say("to_friction"), "rolling": say("to_rolling")}
-    for name, values in run.losses.items():
-        found[f"dissipated_{name}"] = float(values[-1]), "J", say("dissipated_by_grains", what=notes[name])
-    coupled = float(np.abs(run.balance).max()) / run.energy_scale
-    found["coupling_residual"] = coupled, "1", say("of_coupling")
-    return as_quantities(found, std=None)
+    return as_quantities(found | {name: (*numbers[name], note) for name, note in notes.items()}, std=None)

@@ -1,4 +1,4 @@
-"""What is said of a tumble on grains before its bed is made: what was set, what follows from it, what it may lack."""
+"""Messages before the bed of a tumble on grains is made: what was set, what follows from it, what may be missing."""
 
 import math
 import re
@@ -20,36 +20,31 @@ from .trial import TumblePlan
 
 __all__ = ["opening", "short_of_way"]
 
-LONGER = (2.0, 4.0, 8.0)
-"""Times the duration for which the spring-damper is followed until it is LAUNCH_DISTANCE away [1]."""
-STRONGER = (2.0, 4.0, 8.0)
-"""Times the wheel's speed, or the torque, of a brake that does not bring the platform that far [1]."""
+LONGER = (2.0, 4.0, 8.0)  # Durations that are tried, over the one that is set [1]
+STRONGER = (2.0, 4.0, 8.0)  # Likewise the wheel's speed, or the torque, of a brake [1]
 
 
 def opening(
     settings: TumbleSettings, plan: TumblePlan, *, grains: float, softening: Softening, lowering_speed: float
 ) -> list[str]:
-    """What was set and what follows from it; how many settings are at their defaults, and where those stand.
-
-    `grains`: about how many the bed will have; lowering_speed [m/s].
-    """
+    """What was set and what follows from it; how many settings are at their defaults. `grains`: about how many."""
     fields = TumbleSettings.model_fields
     # A run that is taken up again has all of them set, by its run.toml.
     given = [name for name, field in fields.items() if name in settings.model_fields_set
              and getattr(settings, name) not in (None, (), field.get_default(call_default_factory=True))]  # fmt: skip
     said = ["set: " + ", ".join(f"{name} = {_shown(settings, name)}" for name in given)]
     numbers: dict[str, list[str]] = {}
-    told = {*given, "bed_size", "grain", "seed", "young", "duration", "lowering_speed"}
+    shown = {*given, "bed_size", "grain", "seed", "young", "duration", "lowering_speed"}
     for name, number in plan.numbers.items():
         if number.origin == "given" or number.origin.startswith("default"):
             continue
-        told.add(name)
+        shown.add(name)
         unit = "" if number.unit == "1" else f" {number.unit}"
         numbers.setdefault(number.origin, []).append(f"{name} = {number.value:.6g}{unit}")
     spikes = plan.spikes
     for name, length in (("spike_diameter", spikes.diameter), ("spike_clear", spikes.clear)):
         if name in spikes.of_platform:
-            told.add(name)
+            shown.add(name)
             numbers.setdefault(f"platform {settings.platform}", []).append(f"{name} = {length:.6g} m")
     said += [f"{listed[0]} ({origin})" if len(listed) == 1 else f"{origin}: {', '.join(listed)}"
              for origin, listed in numbers.items()]  # fmt: skip
@@ -58,7 +53,7 @@ def opening(
     return [
         *said, say("the_bed", s=settings, grains=count, grain=grain, young=softening, chosen=chosen),
         say("duration_and_lowering", s=settings, speed=lowering_speed), say("stiffness_beside"),
-        say("rest_at_default", count=sum(name not in told for name in fields)),
+        say("rest_at_default", count=sum(name not in shown for name in fields)),
     ]  # fmt: skip
 
 
@@ -86,10 +81,10 @@ def short_of_way(settings: TumbleSettings, plan: TumblePlan, law: Trajectory) ->
 
 
 def _stronger_brake(plan: TumblePlan, duration: float) -> str:
-    """What would bring it LAUNCH_DISTANCE away on the spring-damper, in words.
+    """The brake that would bring it LAUNCH_DISTANCE away on the spring-damper, in words.
 
-    A brake gives J_w wheel_speed_0 and no more, however long it lasts, and may be too weak to tip it over: the wheel's
-    speed, within its limit, is tried alone, then the torque, then both.
+    A brake gives J_w wheel_speed_0 and no more, and may be too weak to tip it over: the wheel's speed, within its
+    limit, is tried alone, then the torque, then both.
     """
     trial = plan.trial
     for times in STRONGER:

@@ -16,37 +16,33 @@ from pydantic import Field
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign, write_campaign
 from experiments.campaign.files import check_target
-from experiments.campaign.tables import RigTable, TumbleSurface, TumbleUncertainty, WheelTable
+from experiments.campaign.tables import RigTable, TumbleUncertainty
 from experiments.runs.folder import RunFolder, read_series
 from experiments.runs.kept_results import PATH_AND_MOTION, require_files
 from experiments.runs.strict import StrictSettings
-from experiments.runs.types import Json
 from experiments.runs.version import __version__
-from rigid.sensors import Motion, SensorSet, measure, sensor_times
+from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
 
 from . import say
 from .campaign_settings import CampaignSettings
-from .campaign_tables import platform_table, sensor_set, sensor_tables, trial_table
+from .synthesis import sensor_set, shared_tables, trial_table
 
 __all__ = ["TumbleRecording", "campaign_of_tumbles", "write_tumbles_campaign"]
 
 SPIKES_PER_ROW = 2.0
 SHARED = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d", "gravity")
 """Numbers that all trials of a campaign have in common."""
-FEWEST = 0.1
-"""A shorter run has too few rows of the camera to be diagnosed [s]."""
+FEWEST = 0.1  # A shorter run has too few rows of the camera to be diagnosed [s]
 
 
 class TumbleRecording(StrictSettings):
     """What goes into a campaign made of tumbles beside the first run, and how noisy it is."""
 
     also: tuple[str, ...] = Field((), description="Of tumbles: folders of further runs, each a trial of the campaign.")
-    fitted: str | None = Field(
-        None, description="Of tumbles: folder of a run of penetrate in the same grains, whose K and C are stated."
-    )
-    noise: Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(
-        1.0, description="Of tumbles: noise of the sensors over that of `hedgebed campaign` [1]."
-    )
+    fitted: str | None = None
+    """Of tumbles: folder of a run of penetrate in the same grains, whose K and C are stated."""
+    noise: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+    """Of tumbles: noise of the sensors over that of `hedgebed campaign` [1]."""
 
 
 def write_tumbles_campaign(
@@ -69,102 +65,94 @@ def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = 
     short, or of another platform, rig or surface than the first.
     """
     recording = recording if recording is not None else TumbleRecording()
-    folders = [Path(run), *map(Path, recording.also)]
-    results = [_finished(folder) for folder in folders]
-    first = results[0]
-    for folder, result in zip(folders[1:], results[1:], strict=True):
-        _check_alike(folder, result, folders[0], first)
+    first, *others = tumbles = [_Tumble(Path(folder)) for folder in (run, *recording.also)]
+    for tumble in others:
+        tumble.check_alike(first)
     plain = CampaignSettings()
     sensors = sensor_set(plain, noise=recording.noise)
     recordings: dict[tuple[str, str], Recording] = {}
     trials = []
-    for number, (folder, result) in enumerate(zip(folders, results, strict=True), 1):
+    for number, tumble in enumerate(tumbles, 1):
         name = f"{number:03d}"
-        trials.append(trial_table(name, _numbers(result), result["actuator"]))
-        measured = _record(folder, result, sensors, seed=(seed, number))
+        trials.append(trial_table(name, tumble.numbers, tumble.result["actuator"]))
+        measured = tumble.record(sensors, seed=(seed, number))
         for sensor in ("pose", "imu", "wheel"):
             recordings[name, sensor] = Recording(getattr(measured, sensor))
-    stiffness, damping, sigmas, said = _law(first, recording.fitted)
-    trial = _numbers(first)
+    stiffness, damping, sigmas, said = _law(first.result, recording.fitted)
+    result, trial, ground = first.result, first.numbers, first.ground
     tables = TumbleCampaign(
-        format="hedgehog-campaign/1", kind="tumble", name=f"tumbles on {_ground(first)}",
-        platform=platform_table(
-            mass=trial["mass"], inertia=trial["inertia"], spike_length=trial["spike_length"],
-            spike_count=int(first["spike_count"]),
-        ),
-        wheel=WheelTable(inertia=trial["wheel_inertia"]),
-        rig=RigTable(gravity=trial["gravity"]) if trial["counterweight"] > 0 else None,
-        surface=TumbleSurface(
-            kind=str(first["surface"]), granular=first["ground"] == "bed", stiffness=stiffness, damping=damping,
-            mu_s=trial["mu_s"], mu_d=trial["mu_d"],
+        **shared_tables(
+            f"tumbles on {ground}", trial | {"stiffness": stiffness, "damping": damping}, sensors,
+            spike_count=int(result["spike_count"]), kind=str(result["surface"]), granular=result["ground"] == "bed",
+            rig=RigTable(gravity=trial["gravity"]) if trial["counterweight"] > 0 else None,
         ),
         uncertainty=TumbleUncertainty(
             mass=plain.sigma_mass, inertia=plain.sigma_inertia, mu_s=plain.sigma_mu_s, mu_d=plain.sigma_mu_d,
             gravity_sim=plain.sigma_gravity_sim, **sigmas,
         ),
-        sensors=sensor_tables(sensors),
         notes={
-            "made_by": f"hedgebed {__version__} tumble on {_ground(first)}", "stiffness_and_damping": said,
-            "code": str(first.get("code", "")), "noise_seed": seed,
-            "grain_seeds": [result.get("grains", {}).get("seed", "none") for result in results],
+            "made_by": f"hedgebed {__version__} tumble on {ground}", "stiffness_and_damping": said,
+            "code": str(result.get("code", "")), "noise_seed": seed,
+            "grain_seeds": [tumble.result.get("grains", {}).get("seed", "none") for tumble in tumbles],
         },
         trial=tuple(trials),
     )  # fmt: skip
     return Campaign(tables, recordings)
 
 
-def _finished(folder: Path) -> Json:
-    kept = RunFolder.open(folder)
-    if kept.command != "tumble":
-        raise ValueError(say("no_tumble", folder=str(folder), command=kept.command))
-    if not (folder / "result.json").exists():
-        raise ValueError(say("no_result", folder=str(folder)))
-    require_files(kept, PATH_AND_MOTION, key="run")
-    result = kept.read_result()
-    if result["effects"]:
-        named = ", ".join(effect["id"] for effect in result["effects"])
-        raise ValueError(say("has_effects", folder=str(folder), named=named))
-    return dict(result)
+class _Tumble:
+    """A finished tumble in its folder. Raises ValueError, naming the folder, for what is none or has effects."""
 
+    def __init__(self, folder: Path) -> None:
+        kept = RunFolder.open(folder)
+        if kept.command != "tumble":
+            raise ValueError(say("no_tumble", folder=str(folder), command=kept.command))
+        if not (folder / "result.json").exists():
+            raise ValueError(say("no_result", folder=str(folder)))
+        require_files(kept, PATH_AND_MOTION, key="run")
+        self.folder, self.result = folder, kept.read_result()
+        if self.result["effects"]:
+            named = ", ".join(effect["id"] for effect in self.result["effects"])
+            raise ValueError(say("has_effects", folder=str(folder), named=named))
+        self.numbers: dict[str, float] = {name: entry["value"] for name, entry in self.result["trial"].items()}
+        ends = (self.numbers.get("torque_until"), self.result.get("wheel_at_limit"))
+        self.numbers["torque_until"] = min((end for end in ends if end is not None), default=math.inf)
 
-def _numbers(result: Mapping[str, Any]) -> dict[str, float]:
-    found = {name: entry["value"] for name, entry in result["trial"].items()}
-    until = found.get("torque_until")
-    full = result.get("wheel_at_limit")
-    found["torque_until"] = min(math.inf if until is None else until, math.inf if full is None else full)
-    return found
+    @property
+    def ground(self) -> str:
+        """What it tumbled on, in words."""
+        named = str(self.result["surface"])
+        return f"a bed of {named}" if self.result["ground"] == "bed" else f"the {self.result['ground']} of {named}"
 
+    def check_alike(self, first: "_Tumble") -> None:
+        """Raise ValueError for another platform, rig or surface than the first has."""
+        pairs: dict[str, tuple[Any, Any]] = {name: (first.numbers.get(name), self.numbers.get(name)) for name in SHARED}
+        pairs |= {name: (first.result[name], self.result[name]) for name in ("surface", "ground", "spike_count")}
+        for name, (before, now) in pairs.items():
+            if before != now:
+                folders = {"folder": str(self.folder), "first": str(first.folder)}
+                raise ValueError(say("not_alike", **folders, name=name, now=now, before=before))
 
-def _check_alike(folder: Path, result: Mapping[str, Any], first_folder: Path, first: Mapping[str, Any]) -> None:
-    one, other = _numbers(first), _numbers(result)
-    pairs: dict[str, tuple[Any, Any]] = {name: (one.get(name), other.get(name)) for name in SHARED}
-    pairs |= {name: (first[name], result[name]) for name in ("surface", "ground", "spike_count")}
-    for name, (before, now) in pairs.items():
-        if before != now:
-            raise ValueError(
-                say("not_alike", folder=str(folder), name=name, now=now, first=str(first_folder), before=before)
-            )
+    def record(self, sensors: SensorSet, *, seed: tuple[int, ...]) -> Measured:
+        """What the sensors make of its series; straight lines between the rows, a millisecond apart at most."""
+        series = read_series(self.folder / "trajectory.csv")
+        motion = read_series(self.folder / "series" / "motion.csv")
+        time = series["t_s"]
+        if time[-1] < FEWEST:
+            raise ValueError(say("too_brief", folder=str(self.folder), lasts=time[-1], least=FEWEST))
+        at = sensor_times(sensors, float(time[-1]))
 
+        def at_times(values: np.ndarray) -> np.ndarray:
+            return np.interp(at, time, values)
 
-def _record(folder: Path, result: Mapping[str, Any], sensors: SensorSet, *, seed: tuple[int, ...]) -> Any:
-    """What the sensors make of a run's series; straight lines between its rows, a millisecond apart at most."""
-    series, motion = read_series(folder / "trajectory.csv"), read_series(folder / "series" / "motion.csv")
-    time = series["t_s"]
-    if time[-1] < FEWEST:
-        raise ValueError(say("too_brief", folder=str(folder), lasts=time[-1], least=FEWEST))
-    at = sensor_times(sensors, float(time[-1]))
-
-    def at_times(values: np.ndarray) -> np.ndarray:
-        return np.interp(at, time, values)
-
-    moved = Motion(
-        time=at, x=at_times(series["x_m"] - series["x_m"][0]), y=at_times(series["y_m"]),
-        theta=at_times(series["theta_rad"]), vx=at_times(series["vx_m_s"]), vy=at_times(series["vy_m_s"]),
-        omega=at_times(series["omega_rad_s"]), wheel_speed=np.interp(at, motion["t_s"], motion["wheel_speed_rad_s"]),
-    )  # fmt: skip
-    numbers = _numbers(result)
-    local = numbers["gravity"] if numbers["counterweight"] > 0 else numbers["gravity_sim"]
-    return measure(moved, sensors, gravity_local=local, seed=seed)
+        moved = Motion(
+            time=at, x=at_times(series["x_m"] - series["x_m"][0]), y=at_times(series["y_m"]),
+            theta=at_times(series["theta_rad"]), vx=at_times(series["vx_m_s"]), vy=at_times(series["vy_m_s"]),
+            omega=at_times(series["omega_rad_s"]),
+            wheel_speed=np.interp(at, motion["t_s"], motion["wheel_speed_rad_s"]),
+        )  # fmt: skip
+        local = self.numbers["gravity"] if self.numbers["counterweight"] > 0 else self.numbers["gravity_sim"]
+        return measure(moved, sensors, gravity_local=local, seed=seed)
 
 
 def _law(first: Mapping[str, Any], fitted: str | None) -> tuple[float, float, dict[str, float], str]:
@@ -189,8 +177,3 @@ def _law(first: Mapping[str, Any], fitted: str | None) -> tuple[float, float, di
         values.append(SPIKES_PER_ROW * value)
         sigmas[name] = math.hypot(error, spread) / abs(value) if value else 1.0
     return values[0], values[1], sigmas, f"fitted to drives of one spike, twice: {folder.path.name}"
-
-
-def _ground(result: Mapping[str, Any]) -> str:
-    named = str(result["surface"])
-    return f"a bed of {named}" if result["ground"] == "bed" else f"the {result['ground']} of {named}"

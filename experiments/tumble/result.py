@@ -1,18 +1,25 @@
-"""The result of one tumble: its quantities, the columns of its series, and what result.json holds."""
+"""The result of one tumble: its quantities, the columns of its series, its sentences, and what result.json holds."""
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from experiments.platform.numbers import ball_radius, tip_depth
 from experiments.runs.result import quantity
 from experiments.runs.types import Json
-from rigid.planar.trajectory import Trajectory
+from rigid.planar.trajectory import Trajectory, Transition
 
 from . import say
 from .settings import TumbleSettings
 from .trial import TumblePlan
-from .words import stayed_words, tumble_sentences
 
-__all__ = ["motion_columns", "passages", "quantities_of", "result_of", "title_of", "trajectory_columns"]
+__all__ = [
+    "motion_columns", "passages", "quantities_of", "result_of", "title_of", "trajectory_columns", "tumble_sentences",
+    "way_through",
+]  # fmt: skip
+
+MOST = 8  # Changes of state that are stated one by one
 
 
 def quantities_of(trajectory: Trajectory) -> dict[str, Json]:
@@ -54,18 +61,10 @@ def trajectory_columns(trajectory: Trajectory) -> Json:
 
 def motion_columns(trajectory: Trajectory) -> Json:
     """What else the plots show, by time."""
-    columns: Json = {
-        "t_s": trajectory.time,
-        "ax_m_s2": trajectory.ax,
-        "ay_m_s2": trajectory.ay,
-        "wheel_speed_rad_s": trajectory.wheel_speed,
-    }
-    energies = {
-        "kinetic": trajectory.kinetic_energy, "potential": trajectory.potential_energy,
-        "stored": trajectory.stored_energy, "energy": trajectory.energy, "torque_work": trajectory.torque_work,
-        "dissipated": trajectory.dissipated,
-    }  # fmt: skip
-    return columns | {f"{name}_J": values for name, values in energies.items()}
+    names = {"t_s": "time", "ax_m_s2": "ax", "ay_m_s2": "ay", "wheel_speed_rad_s": "wheel_speed"}
+    names |= {f"{energy}_J": f"{energy}_energy" for energy in ("kinetic", "potential", "stored")}
+    names |= {f"{energy}_J": energy for energy in ("energy", "torque_work", "dissipated")}
+    return {column: getattr(trajectory, name) for column, name in names.items()}
 
 
 def passages(trajectory: Trajectory) -> list[Json]:
@@ -90,11 +89,7 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         "status": "done",
         "quantities": quantities_of(trajectory),
         "departures": {"sentences": tumble_sentences(trajectory)},
-        "trial": {
-            name: {"value": number.value, "unit": number.unit, "origin": number.origin}
-            for name, number in plan.numbers.items()
-        }
-        | {"weight": {"value": trial.weight, "unit": "N", "origin": "(m + m_b) g_sim"}},
+        "trial": plan.trial_table(trial.weight),
         "surface": plan.surface,
         "ground": settings.ground,
         "actuator": settings.actuator,
@@ -107,3 +102,46 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         "transitions": passages(trajectory),
         "warnings": warnings,
     }
+
+
+def tumble_sentences(trajectory: Trajectory) -> list[str]:
+    """The states in their order, each with when and at which angle it was entered; and when the centre was fastest."""
+    said = [way_through(trajectory.transitions)]
+    said += _does_not_tip(trajectory)
+    if trajectory.max_speed > 0:
+        when = trajectory.time_of_max_speed
+        state = [name for time, name, _ in trajectory.transitions if time < when or time == 0][-1]
+        said.append(say("fastest", when=when, state=state, speed=trajectory.max_speed))
+    return said
+
+
+def way_through(transitions: Sequence[Transition]) -> str:
+    """The states in their order, each with when and at which angle it was entered; the first few of them."""
+    changes = [
+        f"{state} at {time:.4g} s, {_degrees(angle)}" if time > 0 else f"{state} at once"
+        for time, state, angle in transitions[:MOST]
+    ]
+    more = len(transitions) - MOST
+    rest = say("more_changes", more=more, s="s" if more > 1 else "") if more > 0 else ""
+    return f"{' -> '.join(changes)}{rest}."
+
+
+def stayed_words(trajectory: Trajectory) -> str:
+    """That there is no trajectory angle, and how far the centre got instead, and which way."""
+    along, up = (values - values[0] for values in (trajectory.x, trajectory.y))
+    k = int(np.argmax(np.hypot(along, up)))
+    far = 1e3 * math.hypot(along[k], up[k])
+    return say("stayed", far=far, along=1e3 * along[k], up=1e3 * up[k], time=trajectory.time[k])
+
+
+def _does_not_tip(trajectory: Trajectory) -> list[str]:
+    """Whether it stayed on the rows it stood on: a pivot may be no more than a rocking."""
+    trial, most = trajectory.trial, float(abs(trajectory.theta).max())
+    if most >= math.pi / trial.spike_count or any(state == "hop" for _, state, _ in trajectory.transitions):
+        return []
+    below = trial.actuator == "motor" and not trial.effects and trial.torque < trial.tipping_torque
+    return [say("does_not_tip", most=_degrees(most), why=say("below_tipping", trial=trial) if below else "")]
+
+
+def _degrees(theta: float) -> str:
+    return f"{math.degrees(theta):.3g} degrees"

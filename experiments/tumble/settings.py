@@ -28,38 +28,28 @@ class TrialSettings(PlatformSettings):
     """What every trial of a platform on spikes shares: surface, platform, rig, terms."""
 
     # The surface
-    surface: str | None = Field(
-        None,
-        description="Material: steel, brick, sand, sand-calibrated or jsc1a; of the model, else brick, if not given.",
-    )
+    surface: str | None = None
+    """Material: steel, brick, sand, sand-calibrated or jsc1a; of the model, else brick, if not given."""
     ground: str = Field(
         "spring-damper",
         description="Law that computes the surface's force: "
         f"{' or '.join(', '.join(GROUNDS).rsplit(', ', 1))}; for tumble also bed, a bed of grains.",
     )
-    ground_parameters: tuple[str, ...] = Field(
-        (), description="Parameters of another law than the spring-damper, of one spike, as name=value in SI."
-    )
+    ground_parameters: tuple[str, ...] = ()
+    """Parameters of another law than the spring-damper, of one spike, as name=value in SI."""
 
     # The rig
-    rig_reading: Literal["pair", "weight"] = Field(
-        "pair",
-        description="What rig means: free-fall acceleration of platform and counterweight (pair), or the weight left "
-        "per mass of the platform (weight).",
-    )
-    counterweight: Positive | None = Field(
-        None, description="m_b of the rig [kg]; m (g - g_sim) / (g + g_sim) if not given; g_sim rules the weight."
-    )
+    rig_reading: Literal["pair", "weight"] = "pair"
+    """What rig means: free-fall acceleration of platform and counterweight (pair), or the weight left per mass of the
+    platform (weight)."""
+    counterweight: Positive | None = None
+    """m_b of the rig [kg]; m (g - g_sim) / (g + g_sim) if not given; g_sim rules the weight."""
 
     # Beyond the base model
-    model: str | None = Field(
-        None, description="A model.toml: its tables stand under what is given here, its effects are added."
-    )
-    effects: tuple[str, ...] = Field(
-        (),
-        description="Terms beyond the base model, as id.parameter=value in SI (pendulum.length=2.2); `hedgebed "
-        "effects` lists them.",
-    )
+    model: str | None = None
+    """A model.toml: its tables stand under what is given here, its effects are added."""
+    effects: tuple[str, ...] = ()
+    """Terms beyond the base model, as id.parameter=value in SI (pendulum.length=2.2); `hedgebed effects` lists them."""
 
     # How long
     torque_until: NotNegative | None = Field(None, description="End of the torque [s]; it does not end if not given.")
@@ -92,45 +82,33 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
     """One trial of a platform on spikes that a flywheel turns over: pivot, slip, hop."""
 
     # The gravity
-    rig: Positive | None = Field(
-        None, description="g_sim of the offloading rig [9.80665 m/s2]; 0.0085 if neither it nor gravity is given."
-    )
+    rig: Positive | None = None
+    """g_sim of the offloading rig [9.80665 m/s2]; 0.0085 if neither it nor gravity is given."""
     gravity: Positive | None = Field(None, description="Gravity of a free platform, without a rig [m/s2].")
 
     # What turns it
-    torque: NotNegative | None = Field(
-        None, description="Torque on the platform while a spike touches [N m]; 0.22 if not given."
-    )
-    actuator: Literal["motor", "brake"] = Field(
-        "motor",
-        description="What makes the torque: a motor that speeds the wheel up, or a brake that slows it to rest.",
-    )
-    wheel_speed_0: NotNegative | None = Field(
-        None, description="Speed of the wheel at the start [rad/s]; 0 for a motor; a brake must be given one."
-    )
+    torque: NotNegative | None = None
+    """Torque on the platform while a spike touches [N m]; 0.22 if not given."""
+    actuator: Literal["motor", "brake"] = "motor"
+    """What makes the torque: a motor that speeds the wheel up, or a brake that slows it to rest."""
+    wheel_speed_0: NotNegative | None = None
+    """Speed of the wheel at the start [rad/s]; 0 for a motor; a brake must be given one."""
 
     # Over a range
-    sweep: tuple[str, ...] = Field(
-        (),
-        description="Do it over a range of one number, or of two: KEY=FROM:TO:STEP, such as mu_s=0.3:0.6:0.1 or "
-        "pendulum.length=2:2.4:0.1.",
-    )
+    sweep: tuple[str, ...] = ()
+    """Do it over a range of one number, or of two: KEY=FROM:TO:STEP, such as mu_s=0.3:0.6:0.1 or
+    pendulum.length=2:2.4:0.1."""
 
     # How it is computed
-    method: Literal["located", "paper", "coupled"] = Field(
-        "located",
-        description="Integrator: transitions located in time, the paper's fixed step of 1 ms, or the coupling's "
-        "master, which steps the spring-damper as it does grains.",
-    )
+    method: Literal["located", "paper", "coupled"] = "located"
+    """Integrator: transitions located in time, the paper's fixed step of 1 ms, or the coupling's master, which steps
+    the spring-damper as it does grains."""
     sample_interval: float = Field(1e-3, gt=0, le=1e-3, description="Time between rows of trajectory.csv [s].")
 
     # Trials made up from it
-    campaign: str | None = Field(
-        None,
-        min_length=1,
-        description="Folder for made-up trials of this tumble, seen through noisy sensors, as a campaign; what is true "
-        "of them, effects and all, stays in the run's folder (truth.toml).",
-    )
+    campaign: str | None = Field(None, min_length=1)
+    """Folder for made-up trials of this tumble, seen through noisy sensors, as a campaign; what is true of them,
+    effects and all, stays in the run's folder (truth.toml)."""
     campaign_trials: int = Field(8, ge=1, le=999, description="Trials of the campaign [1].")
     campaign_seed: int = Field(1, ge=0, lt=2**31, description="Seed of what is true and of the noise.")
     campaign_noise: Positive = Field(1.0, description="Noise of the sensors over that of `hedgebed campaign` [1].")

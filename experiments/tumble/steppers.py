@@ -1,13 +1,12 @@
 """Which stepper a tumble's settings ask for: one tumble, several in a row, or a landing."""
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupling import CoupledTumble, Ground, Landing, Rest, TumblesInARow
+from experiments.platform.numbers import tip_depth
 from experiments.runs.result import quantity
 from experiments.runs.types import Json
 from rigid.model.trial import Trial
@@ -16,7 +15,7 @@ from . import say
 from .footfalls import find_footfalls, footfall_quantities, footfall_table
 from .settings import TumbleSettings
 
-__all__ = ["is_plain", "own_quantities", "own_warning", "stepper_of", "words"]
+__all__ = ["is_plain", "own_quantities", "own_warning", "row_feet", "sinkage_start", "stepper_of", "words"]
 
 
 def is_plain(settings: TumbleSettings) -> bool:
@@ -47,16 +46,31 @@ def words(settings: TumbleSettings, title: str) -> str:
     return title
 
 
-def own_quantities(
-    run: CoupledTumble, sinkage: NDArray[np.float64], load: NDArray[np.float64]
-) -> tuple[dict[str, Json], Json]:
-    """What a row of tumbles or a landing adds to a result: quantities, and (of a row) its tables and footfalls.
+def row_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
+    """Depth of each row's tip [m], 0 above the surface, and its load [N], shape [step, row] both.
 
-    sinkage [m] and load [N] of each row over the run, shape [step, row] both.
+    The load is the mean over the step before; on a law, at the start, before any, it is what the spring carries at
+    rest, and the depth is that of the row's end now.
     """
+    sinkage, load = run.feet[:, 3], run.feet[:, 0].copy()
+    if not run.ground.gives_friction:
+        rows, trial = run.columns, run.trial
+        depth = tip_depth(rows["theta"], rows["y"], count=trial.spike_count, length=trial.spike_length)
+        sinkage = np.maximum(0.0, depth)
+        load[0] = trial.stiffness * sinkage[0]
+    return sinkage, load
+
+
+def sinkage_start(run: CoupledTumble) -> float:
+    """Mean depth of the two rows that it stands on when the torque begins [m]."""
+    return float(row_feet(run)[0][0, [0, -1]].mean())
+
+
+def own_quantities(run: CoupledTumble) -> tuple[dict[str, Json], Json]:
+    """What a row of tumbles or a landing adds to a result: quantities, and (of a row) its tables and footfalls."""
     if isinstance(run, TumblesInARow):
         quantities, rests = _row(run)
-        falls = find_footfalls(run.columns["time"], sinkage, load)
+        falls = find_footfalls(run.columns["time"], *row_feet(run))
         return quantities | footfall_quantities(falls), {
             "tables": [rests, footfall_table(falls)], "footfalls": [asdict(fall) for fall in falls],
         }  # fmt: skip
@@ -101,10 +115,7 @@ def own_warning(run: CoupledTumble) -> str | None:
     """Which tumbles of a row ended without the platform at rest, in words; None where there are none."""
     if not isinstance(run, TumblesInARow):
         return None
-    return _unrested(run.rests["at_rest"][1:].tolist(), ended=run.ended, asked=run.tumbles, rest=run.rest)
-
-
-def _unrested(at_rest: Sequence[float], *, ended: int, asked: int, rest: Rest) -> str | None:
+    at_rest, ended, asked, rest = run.rests["at_rest"][1:].tolist(), run.ended, run.tumbles, run.rest
     moving = [str(k) for k, lay in enumerate(at_rest, start=1) if not lay]
     said = []
     if moving:

@@ -8,24 +8,15 @@ A tumble's campaign goes where it is asked for, and the truth into the tumble's 
 
 import math
 import shutil
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from experiments.campaign import (
-    Campaign,
-    EffectTable,
-    Recording,
-    TumbleCampaign,
-    TumbleModel,
-    write_campaign,
-    write_model,
-)
-from experiments.campaign.files import check_target, place_campaign
-from experiments.campaign.tables import FORMAT, RigTable, TumbleSurface, TumbleTrial, TumbleUncertainty, WheelTable
+from experiments.campaign import Campaign, EffectTable, Recording, TumbleCampaign, TumbleModel, tables
+from experiments.campaign.files import check_target, place_campaign, write_campaign, write_model
 from experiments.platform.numbers import torque_within_limit
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
@@ -36,33 +27,87 @@ from experiments.runs.version import __version__
 from experiments.runs.whole_runs import computed_run
 from experiments.tumble.settings import TrialSettings, TumbleSettings
 from experiments.tumble.trial import TumblePlan, plan_tumble, turns_of
-from rigid.model.trial import Effect, Trial
+from rigid.model.trial import Trial
 from rigid.planar.simulate import simulate
 from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
 
 from . import say
 from .campaign_settings import CampaignSettings
-from .campaign_tables import platform_table, sensor_set, sensor_tables, trial_table
 
-__all__ = ["TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "write_tumble_campaign"]
+__all__ = [
+    "TRUTH", "check", "check_tumble_campaign", "record", "resume", "run", "sensor_set", "shared_tables", "trial_table",
+    "write_tumble_campaign",
+]  # fmt: skip
 
-TRUTH = "truth.toml"
-"""What is true, in a run folder; never in the campaign's."""
-
-MOST_ROWS = 24
-"""Trials that the terminal shows."""
-
-MOTION = ("time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "ax", "ay")
-"""What sensors see of a trajectory."""
+TRUTH = "truth.toml"  # What is true, in a run folder; never in the campaign's
+MOST_ROWS = 24  # Trials that the terminal shows
+MOTION = ("time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "ax", "ay")  # What sensors see of a trajectory
 _DRAWN = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
+NUMBERS = ("gravity_sim", "torque", "torque_until", "wheel_speed_0", "counterweight")  # Of a trial, SI units
+
+
+def shared_tables(
+    name: str,
+    numbers: Mapping[str, float],
+    sensors: SensorSet,
+    *,
+    spike_count: int,
+    kind: str,
+    granular: bool,
+    rig: tables.RigTable | None,
+) -> Json:
+    """What a campaign of tumbles and its truth both have.
+
+    `numbers` of platform, wheel and surface by the names of `Trial`; `kind` and `granular` of the surface. The
+    Hedgehog's number of rows is left out, as the format has it.
+    """
+    return {
+        "format": tables.FORMAT, "kind": "tumble", "name": name,
+        "platform": tables.PlatformTable(
+            mass=numbers["mass"], inertia=numbers["inertia"], spike_length=numbers["spike_length"],
+            spike_count=None if spike_count == tables.HEDGEHOG_ROWS else spike_count,
+        ),
+        "wheel": tables.WheelTable(inertia=numbers["wheel_inertia"]),
+        "rig": rig,
+        "surface": tables.TumbleSurface(
+            kind=kind, granular=granular, stiffness=numbers["stiffness"], damping=numbers["damping"],
+            mu_s=numbers["mu_s"], mu_d=numbers["mu_d"],
+        ),
+        "sensors": tables.TumbleSensors(
+            pose=tables.PoseSensor(std=sensors.pose_std), wheel=tables.WheelSensor(std=(sensors.wheel_std,)),
+            imu=tables.ImuSensor(std=sensors.imu_std, window=sensors.imu_window),
+        ),
+    }  # fmt: skip
+
+
+def trial_table(
+    name: str, trial: Trial | Mapping[str, Any], actuator: Literal["motor", "brake"] = "motor"
+) -> tables.TumbleTrial:
+    """One trial, its recordings named after it; no counterweight is none, not 0. `actuator`: beside a mapping."""
+    numbers = trial if isinstance(trial, Mapping) else {key: getattr(trial, key) for key in NUMBERS}
+    given: Json = {key: numbers[key] for key in NUMBERS} | {"counterweight": numbers["counterweight"] or None}
+    return tables.TumbleTrial(
+        id=name, actuator=actuator if isinstance(trial, Mapping) else trial.actuator, **given,
+        pose=f"{name}-pose.csv", imu=f"{name}-imu.csv", wheel=f"{name}-wheel.csv",
+    )  # fmt: skip
+
+
+def sensor_set(settings: CampaignSettings, *, noise: float = 1.0) -> SensorSet:
+    """The sensors that `settings` describe, their standard deviations `noise` times as large."""
+    x, y, theta = (noise * std for std in settings.pose_std)
+    gyro, ax, ay = (noise * std for std in settings.imu_std)
+    return SensorSet(
+        camera_rate=settings.camera_rate, imu_rate=settings.imu_rate, wheel_rate=settings.wheel_rate,
+        pose_std=(x, y, theta), imu_std=(gyro, ax, ay), wheel_std=noise * settings.wheel_std,
+        imu_window=settings.imu_window, lead=settings.lead,
+    )  # fmt: skip
 
 
 def check(settings: CampaignSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
-    conditions = _conditions(settings)
-    sensor_set(settings)
-    for number, condition in enumerate(conditions, 1):
-        for trial in (condition.plan.trial, _true_trial(settings, condition, number, _truth(settings, conditions))):
+    made = _MadeUp(settings, _plans(settings))
+    for number, plan in enumerate(made.plans.values(), 1):
+        for trial in (plan.trial, made.true_trial(number, plan)):
             simulate(trial, duration=1e-3)  # that it can stand
 
 
@@ -84,98 +129,112 @@ def record(
     return measured, trajectory
 
 
-@dataclass(frozen=True)
-class _Condition:
-    """One trial to be made: its id and its plan as stated."""
-
-    id: str
-    plan: TumblePlan
-
-
-def _conditions(settings: CampaignSettings) -> list[_Condition]:
-    """Every trial as stated, in the order of its id."""
+def _plans(settings: CampaignSettings) -> list[TumblePlan]:
+    """One for each condition, as stated."""
     shared = {name: getattr(settings, name) for name in TrialSettings.model_fields}
     gravities = [{"gravity": value} for value in settings.gravity]
     where = gravities or [{"rig": value} for value in settings.rig]
     turns = turns_of(settings.motor_torques, settings.brake_torques, settings.brake_wheel_speed)
-    plans = [plan_tumble(TumbleSettings(**shared, **place, **turn)) for place in where for turn in turns]
-    plans = [replace(plan, trial=_within_limit(plan, settings.duration)) for plan in plans]
-    repeated = [plan for plan in plans for _ in range(settings.trials)]
-    width = max(3, len(str(len(repeated))))
-    return [_Condition(f"{number:0{width}d}", plan) for number, plan in enumerate(repeated, 1)]
+    return [plan_tumble(TumbleSettings(**shared, **place, **turn)) for place in where for turn in turns]
 
 
-def _within_limit(plan: TumblePlan, duration: float) -> Trial:
-    """The trial with its torque ended where the wheel comes to its limit: the format knows none."""
-    return torque_within_limit(plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration)[0]
+class _MadeUp:
+    """Made-up trials, `settings.trials` of each plan: what is stated of them and what is true."""
 
+    campaign: Campaign
+    model: TumbleModel  # What is true
+    rows: list[Json]  # Of result.json, one for each trial
 
-def _truth(settings: CampaignSettings, conditions: Sequence[_Condition]) -> Json:
-    """The true values of what all trials share, drawn within the stated uncertainties."""
-    stated = conditions[0].plan.trial
-    values: Json = {name: getattr(stated, name) for name in _DRAWN} | {"mu_d": stated.sliding_friction}
-    if settings.exact:
+    def __init__(self, settings: CampaignSettings, plans: Sequence[TumblePlan]) -> None:
+        self.settings, self.sensors, self.first = settings, sensor_set(settings), plans[0]
+        # The format knows no limit of a wheel: the torque ends where the wheel comes to it.
+        trials = [
+            torque_within_limit(plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=settings.duration)[0]
+            for plan in plans
+        ]
+        within = [replace(plan, trial=trial) for plan, trial in zip(plans, trials, strict=True)]
+        repeated = [plan for plan in within for _ in range(settings.trials)]
+        width = max(3, len(str(len(repeated))))
+        self.plans = {f"{number:0{width}d}": plan for number, plan in enumerate(repeated, 1)}
+        self.stated: Json = {name: getattr(trials[0], name) for name in _DRAWN} | {"mu_d": trials[0].sliding_friction}
+        self.true = self._drawn()
+
+    def _drawn(self) -> Json:
+        """The true values of what all trials share, drawn within the stated uncertainties."""
+        if self.settings.exact:
+            return self.stated
+        values, stream = dict(self.stated), np.random.default_rng([self.settings.seed, 0])
+        for name in _DRAWN:
+            # Within three sigma, so that nothing that cannot be is drawn.
+            sigma = getattr(self.settings, f"sigma_{name}")
+            values[name] *= 1 + sigma * float(np.clip(stream.standard_normal(), -3, 3))
+        values["mu_d"] = min(values["mu_d"], values["mu_s"])
         return values
-    stream = np.random.default_rng([settings.seed, 0])
-    for name in _DRAWN:
-        # Within three sigma, so that nothing that cannot be is drawn.
-        values[name] *= 1 + getattr(settings, f"sigma_{name}") * float(np.clip(stream.standard_normal(), -3, 3))
-    values["mu_d"] = min(values["mu_d"], values["mu_s"])
-    return values
 
+    def true_trial(self, number: int, plan: TumblePlan) -> Trial:
+        """The trial as it truly is, its gravity drawn anew."""
+        gravity = plan.trial.gravity_sim
+        if not self.settings.exact:
+            stream = np.random.default_rng([self.settings.seed, 1, number])
+            gravity *= 1 + self.settings.sigma_gravity_sim * float(np.clip(stream.standard_normal(), -3, 3))
+        return replace(plan.trial, gravity_sim=gravity, **self.true)
 
-def _true_trial(settings: CampaignSettings, condition: _Condition, number: int, truth: Json) -> Trial:
-    """The trial as it truly is, its gravity drawn anew."""
-    gravity = condition.plan.trial.gravity_sim
-    if not settings.exact:
-        stream = np.random.default_rng([settings.seed, 1, number])
-        gravity *= 1 + settings.sigma_gravity_sim * float(np.clip(stream.standard_normal(), -3, 3))
-    return replace(condition.plan.trial, gravity_sim=gravity, **truth)
+    def record(self, progress: Progress) -> None:
+        """Integrate and record every trial; the campaign, what is true of it, and a row for each."""
+        recordings: dict[tuple[str, str], Recording] = {}
+        true_trials, self.rows = [], []
+        progress.stage("trials", total=float(len(self.plans)))
+        for number, (name, plan) in enumerate(self.plans.items(), 1):
+            trial, seed = self.true_trial(number, plan), (self.settings.seed, 2, number)
+            measured, trajectory = record(trial, duration=self.settings.duration, sensors=self.sensors, seed=seed)
+            for sensor in ("pose", "imu", "wheel"):
+                recordings[name, sensor] = Recording(getattr(measured, sensor))
+            true_trials.append(trial_table(name, trial))
+            self.rows.append({
+                "id": name, "gravity_sim": plan.trial.gravity_sim, "true_gravity_sim": trial.gravity_sim,
+                "torque": trial.torque, "actuator": trial.actuator, "camera_zero": list(measured.camera_zero),
+                "trajectory_angle": trajectory.trajectory_angle, "max_speed": trajectory.max_speed,
+                "max_angular_velocity": trajectory.max_angular_velocity,
+                "states": [state for _, state, _ in trajectory.transitions],
+            })  # fmt: skip
+            progress.update(number)
+        sigmas = {name: getattr(self.settings, f"sigma_{name}") for name in (*_DRAWN, "gravity_sim")}
+        stated = TumbleCampaign(
+            **self._tables(self.stated),
+            uncertainty=tables.TumbleUncertainty(**sigmas),
+            notes={"made_by": f"hedgebed {__version__} campaign", "seed": self.settings.seed},
+            trial=tuple(trial_table(name, plan.trial) for name, plan in self.plans.items()),
+        )
+        self.campaign = Campaign(stated, recordings)
+        effects = []
+        for effect in self.first.trial.effects:
+            file = str(Path(effect.file).resolve()) if effect.file is not None else None
+            effects.append(EffectTable(id=effect.id, parameters=dict(effect.values), file=file))
+        self.model = TumbleModel(**self._tables(self.true), trial=tuple(true_trials), effect=tuple(effects))
+
+    def _tables(self, values: Json) -> Json:
+        """What the campaign and the truth both have, with their own numbers."""
+        settings, trial = self.settings, self.first.trial
+        numbers = values | {"spike_length": trial.spike_length, "wheel_inertia": trial.wheel_inertia}
+        rig = tables.RigTable(wire_length=settings.wire_length, gravity=trial.gravity)
+        return shared_tables(
+            settings.name, numbers, self.sensors, spike_count=trial.spike_count, kind=self.first.surface,
+            granular=find_surface(settings.surface).granular if settings.surface is not None else False,
+            rig=rig if trial.counterweight > 0 else None,
+        )  # fmt: skip
 
 
 def _compute(settings: CampaignSettings, folder: RunFolder, progress: Progress) -> Result:
-    conditions = _conditions(settings)
-    first = conditions[0].plan
-    for sentence in first.sentences():
+    made = _MadeUp(settings, _plans(settings))
+    for sentence in made.first.sentences():
         progress.message(sentence)
-    made = _make(settings, conditions, progress)
+    made.record(progress)
     target = folder.path / "campaign"
     if target.exists():  # of a run that was stopped
         shutil.rmtree(target)
     write_campaign(target, made.campaign)
-    write_model(folder.path / TRUTH, made.truth)
-    return _result(settings, first, made, folder.path)
-
-
-@dataclass(frozen=True)
-class _Made:
-    """A campaign, what is true of it, and a row of result.json for each trial."""
-
-    campaign: Campaign
-    truth: TumbleModel
-    rows: list[Json]
-
-
-def _make(settings: CampaignSettings, conditions: Sequence[_Condition], progress: Progress) -> _Made:
-    """Draw what is true, and record every trial."""
-    first = conditions[0].plan
-    truth = _truth(settings, conditions)
-    sensors = sensor_set(settings)
-    recordings: dict[tuple[str, str], Recording] = {}
-    true_trials, rows = [], []
-    progress.stage("trials", total=float(len(conditions)))
-    for number, condition in enumerate(conditions, 1):
-        trial = _true_trial(settings, condition, number, truth)
-        measured, trajectory = record(
-            trial, duration=settings.duration, sensors=sensors, seed=(settings.seed, 2, number)
-        )
-        for sensor in ("pose", "imu", "wheel"):
-            recordings[condition.id, sensor] = Recording(getattr(measured, sensor))
-        true_trials.append(trial_table(condition.id, trial))
-        rows.append(_row(condition, trial, measured, trajectory))
-        progress.update(number)
-    campaign = Campaign(_stated(settings, conditions), recordings)
-    return _Made(campaign, _true_model(settings, first, truth, true_trials), rows)
+    write_model(folder.path / TRUTH, made.model)
+    return _result(made, folder.path)
 
 
 def check_tumble_campaign(settings: TumbleSettings) -> None:
@@ -204,70 +263,12 @@ def write_tumble_campaign(settings: TumbleSettings, plan: TumblePlan, folder: Pa
         gravity=(settings.gravity,) if settings.gravity is not None else (), seed=settings.campaign_seed,
         trials=settings.campaign_trials, pose_std=noisy.pose_std, imu_std=noisy.imu_std, wheel_std=noisy.wheel_std,
     )  # fmt: skip
-    within = replace(plan, trial=_within_limit(plan, settings.duration))
-    made = _make(own, [_Condition(f"{n:03d}", within) for n in range(1, settings.campaign_trials + 1)], progress)
+    made = _MadeUp(own, [plan])
+    made.record(progress)
     target = place_campaign(settings.campaign, made.campaign, keep_out=folder)
-    write_model(folder / TRUTH, made.truth)
+    write_model(folder / TRUTH, made.model)
     progress.message(f"campaign {target}: {len(made.rows)} trials; what is true of them is in {folder / TRUTH}")
     return {"folder": str(target), "truth": TRUTH, "trials": made.rows}
-
-
-def _tables(settings: CampaignSettings, plan: TumblePlan, values: Json) -> Json:
-    """What the campaign and the truth both say, with their own numbers."""
-    trial = plan.trial
-    known = find_surface(settings.surface) if settings.surface is not None else None
-    rig = RigTable(wire_length=settings.wire_length, gravity=trial.gravity) if trial.counterweight > 0 else None
-    return {
-        "format": FORMAT,
-        "kind": "tumble",
-        "name": settings.name,
-        "platform": platform_table(
-            mass=values["mass"], inertia=values["inertia"], spike_length=trial.spike_length,
-            spike_count=trial.spike_count,
-        ),
-        "wheel": WheelTable(inertia=trial.wheel_inertia),
-        "rig": rig,
-        "surface": TumbleSurface(
-            kind=plan.surface,
-            granular=known.granular if known is not None else False,
-            **{name: values[name] for name in ("stiffness", "damping", "mu_s", "mu_d")},
-        ),
-        "sensors": sensor_tables(sensor_set(settings)),
-    }  # fmt: skip
-
-
-def _stated(settings: CampaignSettings, conditions: Sequence[_Condition]) -> TumbleCampaign:
-    plan = conditions[0].plan
-    values = {name: getattr(plan.trial, name) for name in _DRAWN} | {"mu_d": plan.trial.sliding_friction}
-    sigmas = {name: getattr(settings, f"sigma_{name}") for name in (*_DRAWN, "gravity_sim")}
-    return TumbleCampaign(
-        **_tables(settings, plan, values),
-        uncertainty=TumbleUncertainty(**sigmas),
-        notes={"made_by": f"hedgebed {__version__} campaign", "seed": settings.seed},
-        trial=tuple(trial_table(condition.id, condition.plan.trial) for condition in conditions),
-    )
-
-
-def _true_model(
-    settings: CampaignSettings, plan: TumblePlan, truth: Json, trials: Sequence[TumbleTrial]
-) -> TumbleModel:
-    def table(effect: Effect) -> EffectTable:
-        file = str(Path(effect.file).resolve()) if effect.file is not None else None
-        return EffectTable(id=effect.id, parameters=dict(effect.values), file=file)
-
-    effects = tuple(map(table, plan.trial.effects))
-    return TumbleModel(**_tables(settings, plan, truth), trial=tuple(trials), effect=effects)
-
-
-def _row(condition: _Condition, trial: Trial, measured: Measured, trajectory: Any) -> Json:
-    """One trial in result.json."""
-    return {
-        "id": condition.id, "gravity_sim": condition.plan.trial.gravity_sim, "true_gravity_sim": trial.gravity_sim,
-        "torque": trial.torque, "actuator": trial.actuator, "camera_zero": list(measured.camera_zero),
-        "trajectory_angle": trajectory.trajectory_angle, "max_speed": trajectory.max_speed,
-        "max_angular_velocity": trajectory.max_angular_velocity,
-        "states": [state for _, state, _ in trajectory.transitions],
-    }  # fmt: skip
 
 
 def _table(rows: Sequence[Json]) -> Json:
@@ -289,16 +290,16 @@ def _table(rows: Sequence[Json]) -> Json:
     return {"title": "What truly happens in the trials", "head": head, "rows": shown}
 
 
-def _result(settings: CampaignSettings, plan: TumblePlan, made: _Made, folder: Path) -> Result:
+def _result(made: _MadeUp, folder: Path) -> Result:
     count = sum(len(recording) for recording in made.campaign.recordings.values())
-    rows = made.rows
+    plan, rows = made.first, made.rows
     return Result.make(
         "campaign",
         title=f"A made-up campaign on {plan.surface}: {len(rows)} trials",
         quantities={
             "trial_count": quantity(len(rows), "1"),
             "row_count": quantity(count, "1", "of all recordings together"),
-            "duration": quantity(settings.duration, "s", "of each trial"),
+            "duration": quantity(made.settings.duration, "s", "of each trial"),
         },
         campaign="campaign",
         truth=TRUTH,

@@ -4,22 +4,15 @@ What is given wins over the model, the model over the surface's numbers and over
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.campaign import TumbleModel, read_model
+from experiments.platform import settled
 from experiments.platform.numbers import PlatformNumbers, platform_numbers
-from experiments.platform.settled import (
-    Number,
-    Settled,
-    check_spike_length,
-    defaults_said,
-    of_earth,
-    of_other_spikes,
-    rig_fault,
-)
+from experiments.platform.settled import check_spike_length
 from experiments.runs.types import Json
 from rigid.model.trial import Effect, Ground, Trial
 from rigid.platform.rig import STANDARD_GRAVITY, Rig
@@ -30,12 +23,9 @@ from .settings import TumbleSettings
 
 __all__ = ["DEFAULT_RIG", "Spikes", "TumblePlan", "model_trial", "plan_tumble", "spikes_of", "turns_of"]
 
-TORQUE = 0.22
-"""The paper's middle one [N m]."""
-DEFAULT_RIG = 0.0085
-"""The paper's lower gravity [9.80665 m/s2]."""
-SPIKES_PER_ROW = 2.0
-"""The platform stands on two rows of two."""
+TORQUE = 0.22  # The paper's middle one [N m]
+DEFAULT_RIG = 0.0085  # The paper's lower gravity [9.80665 m/s2]
+SPIKES_PER_ROW = 2.0  # The platform stands on two rows of two
 
 
 @dataclass(frozen=True)
@@ -54,30 +44,22 @@ def spikes_of(settings: TumbleSettings, own: PlatformNumbers) -> Spikes:
     for a platform without spikes.
     """
     given = {name: getattr(settings, name) for name in ("spike_diameter", "spike_clear")}
-    lacking = tuple(name for name, value in given.items() if value is None)
-    if lacking:
+    not_given = tuple(name for name, value in given.items() if value is None)
+    if not_given:
         if own.spike_diameter == 0:
-            raise ValueError(say("no_spikes", platform=settings.platform, names=" and ".join(lacking)))
-        given |= {name: getattr(own, name) for name in lacking}
-    return Spikes(given["spike_diameter"], given["spike_clear"], lacking)
+            raise ValueError(say("no_spikes", platform=settings.platform, names=" and ".join(not_given)))
+        given |= {name: getattr(own, name) for name in not_given}
+    return Spikes(given["spike_diameter"], given["spike_clear"], not_given)
 
 
-@dataclass(frozen=True)
-class TumblePlan:
-    """A trial, and what is said of it."""
+@dataclass(frozen=True, kw_only=True)
+class TumblePlan(settled.Plan):
+    """A trial in the plane."""
 
     trial: Trial
-    numbers: Mapping[str, Number]
-    surface: str  # name of the material
-    choices: Mapping[str, str]  # what else was left at its default: name -> value, as a person would type it
-    platform: PlatformNumbers  # what gives the numbers that nothing else gives
-    spikes: Spikes  # what grains meet of its spikes
-    warnings: tuple[str, ...] = ()
-    max_wheel_speed: float = math.inf  # where a motor's torque ends [rad/s]
-
-    def sentences(self) -> list[str]:
-        """One line for each number and choice that was not given: every default is said."""
-        return defaults_said(self.choices, self.numbers)
+    platform: PlatformNumbers  # What gives the numbers that nothing else gives
+    spikes: Spikes  # What grains meet of its spikes
+    max_wheel_speed: float = math.inf  # Where a motor's torque ends [rad/s]
 
 
 def plan_tumble(
@@ -95,7 +77,7 @@ def plan_tumble(
     """
     source = model_file if model_file is not None else Path(settings.model) if settings.model is not None else None
     model = _read(source) if source is not None else None
-    numbers = Settled(settings)
+    numbers = settled.Settled(settings)
     platform = platform_numbers(settings.platform) if platform is None else platform
     numbers.settle_platform(platform, model=model)
     check_spike_length(numbers)
@@ -116,7 +98,7 @@ def plan_tumble(
     if ground is None:
         diameter = platform.spike_diameter if spikes is None else spikes.diameter
         whose = f"platform {platform.name}" if spikes is None else "this run"
-        warnings += of_other_spikes(numbers, surface, diameter=diameter, whose=whose)
+        warnings += settled.of_other_spikes(numbers, surface, diameter=diameter, whose=whose)
     assert platform.spike_count is not None  # or it would have been refused
     trial = Trial(
         **values,
@@ -131,30 +113,32 @@ def plan_tumble(
         for name, value in ground.law.values(ground.parameters).items():
             unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
-            numbers[name] = Number(value, unit, origin)
+            numbers[name] = settled.Number(value, unit, origin)
     rows = f"rows of platform {platform.name}" if model is None else "model"
-    numbers["spike_count"] = Number(trial.spike_count, "1", rows)
+    numbers["spike_count"] = settled.Number(trial.spike_count, "1", rows)
     warnings += _rig_warnings(trial)
     if ground is None and model is None:
-        warnings += of_earth(numbers, surface, weight=trial.weight, mass=trial.mass, counterweight=trial.counterweight)
-    choices = _choices(settings, surface, model)
+        warnings += settled.of_earth(
+            numbers, surface, weight=trial.weight, mass=trial.mass, counterweight=trial.counterweight
+        )
     spikes = spikes or Spikes(platform.spike_diameter, platform.spike_clear, ("spike_diameter", "spike_clear"))
-    limit = numbers.value("max_wheel_speed")
-    return TumblePlan(trial, numbers, surface, choices, platform, spikes, tuple(warnings), limit)
+    return TumblePlan(
+        trial=trial, numbers=numbers, surface=surface, choices=_choices(settings, surface, model), platform=platform,
+        spikes=spikes, warnings=tuple(warnings), max_wheel_speed=numbers.value("max_wheel_speed"),
+    )  # fmt: skip
 
 
 def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:
     """The settings that are no numbers of the trial and stand at their defaults."""
     found = {"surface": surface} if settings.surface is None and model is None else {}
-    units = {"duration": " s", "sample_interval": " s"}
-    names = ["platform", "ground", "actuator", "duration", "method", "sample_interval"]
+    units = {
+        "platform": "", "ground": "", "actuator": "", "duration": " s", "method": "", "sample_interval": " s"
+    }  # fmt: skip
     if settings.gravity is None:
-        names.append("rig_reading")
+        units["rig_reading"] = ""
         if settings.rig is None:
             found["rig"] = f"{DEFAULT_RIG:g}"
-    for name in names:
-        if name not in settings.model_fields_set:
-            found[name] = f"{getattr(settings, name)}{units.get(name, '')}"
+    found |= settled.at_default(settings, units)
     if not settings.effects and model is None:
         found["effects"] = "none"
     return found
@@ -167,19 +151,19 @@ def _read(path: Path) -> TumbleModel:
     return model
 
 
-def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers: Settled) -> None:
+def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers: settled.Settled) -> None:
     """Settle gravity_sim, local gravity and counterweight, in the rig or free of it."""
     if settings.gravity is not None:
-        numbers["gravity_sim"] = Number(settings.gravity, "m/s2", "given")
-        numbers["gravity"] = Number(settings.gravity, "m/s2", "free platform: the same")
-        numbers["counterweight"] = Number(0.0, "kg", "free platform")
+        numbers["gravity_sim"] = settled.Number(settings.gravity, "m/s2", "given")
+        numbers["gravity"] = settled.Number(settings.gravity, "m/s2", "free platform: the same")
+        numbers["counterweight"] = settled.Number(0.0, "kg", "free platform")
         return
     if model is not None and model.rig is None and settings.rig is None:
         raise ValueError(f"gravity must be given: the model {settings.model!r} has no [rig] (m/s2, or rig)")
     in_model = model.rig if model is not None else None
     local = in_model.gravity if in_model is not None else STANDARD_GRAVITY
     stated = settings.rig if settings.rig is not None else DEFAULT_RIG
-    if fault := rig_fault(stated, local):
+    if fault := settled.rig_fault(stated, local):
         raise ValueError(fault)
     counterweight = settings.counterweight
     origin = "given"
@@ -190,9 +174,9 @@ def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers
     if counterweight is None:
         origin = "m (g - g_sim) / (g + g_sim)" if settings.rig_reading == "pair" else "m (1 - rig g0 / g)"
     read = f"rig = {stated:g}{'' if settings.rig is not None else ' by default'}, read as {settings.rig_reading}"
-    numbers["gravity_sim"] = Number(rig.gravity_sim, "m/s2", read)
-    numbers["gravity"] = Number(local, "m/s2", "model" if in_model is not None else "default")
-    numbers["counterweight"] = Number(rig.counterweight, "kg", origin)
+    numbers["gravity_sim"] = settled.Number(rig.gravity_sim, "m/s2", read)
+    numbers["gravity"] = settled.Number(local, "m/s2", "model" if in_model is not None else "default")
+    numbers["counterweight"] = settled.Number(rig.counterweight, "kg", origin)
 
 
 def _rig_warnings(trial: Trial) -> list[str]:

@@ -12,13 +12,9 @@ class ValidateSettings(StrictSettings):
 
     only: tuple[str, ...] = Field((), description="Cases to run, by their ids; all of them if none is given.")
     quick: bool = Field(False, description="Leave out the slow cases.")
-    keep: bool = Field(
-        False,
-        description="In a checkout, put the cases that are run into docs/validation.md, whose other rows stay as they "
-        "are; what it is made of is in docs/results/validate/result.json.",
-    )
-    document: str | None = Field(
-        None,
-        description="Markdown file for the table; a checkout's docs/validation.md if not given and everything is run. "
-        "The run folder has a copy in any case.",
-    )
+    keep: bool = False
+    """In a checkout, put the cases that are run into docs/validation.md, whose other rows stay as they are; what it is
+    made of is in docs/results/validate/result.json."""
+    document: str | None = None
+    """Markdown file for the table; a checkout's docs/validation.md if not given and everything is run. The run folder
+    has a copy in any case."""

@@ -77,7 +77,7 @@ class _LawGround:
     def force(self, depth: ArrayLike, velocity: ArrayLike) -> np.ndarray:
         """Upward force on the body [N] at `depth` [m] and `velocity` [m/s], both positive downwards, any one shape.
 
-        For a law with memory each depth is taken as the deepest: as on the way in.
+        For a law with memory each depth is taken as the deepest: loading.
         """
         z, rate = np.broadcast_arrays(np.asarray(depth, dtype=float), np.asarray(velocity, dtype=float))
         flat = [self._law.force(a, b, self._numbers) for a, b in zip(z.flat, rate.flat, strict=True)]

@@ -7,7 +7,7 @@ force, never negative, is
 
     force = loading(top, p) * springback(z, top, rebound) + rate_force(z, rate, p)
 
-- `loading` is the force on the way in to new depths, and `loading_work` its integral from 0.
+- `loading` is the force of loading, at new depths, and `loading_work` its integral from 0.
 - A law without memory springs back whole: there top = z, and springback(z, z, .) = 1. Grains do not: for them top is
   the deepest depth that this spike has reached here (top >= z; 0 again once it has left the surface), and the force
   falls in a straight line to 0 while the share `rebound` of that depth is undone.

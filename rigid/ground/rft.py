@@ -8,7 +8,7 @@ lambda rho (n.v)^2 along -n (Agarwal et al., Science Advances 7 (2021), eabe0631
 
 The 60 coefficients below are the paper's Table S1 as two public transcriptions have it. They differ in one, that of
 x3 x2^2 in f2: 0.18589 in github.com/KKKobefeng/3D-RFT, 0.18519 in the other. With the latter a flat plate that goes
-straight down bears 0.8757 xi_n d, which is the 0.876 that the paper states; with the former 0.8750.
+straight down carries 0.8757 xi_n d, which is the 0.876 that the paper states; with the former 0.8750.
 """
 
 import math

@@ -17,6 +17,15 @@ the numbers of the ground's law:
 - ``crater(p)``: share of the deepest depth at which a spike on the way up leaves the ground;
 - ``contact(p, s, q, depth, rate, slip, top, held)``: elastic normal force, dissipative normal force, stored energy,
   tangential drag, factors on mu_s and mu_d, load that friction sees beside the normal force.
+
+Geometry: spike n touches at the lowest point of its tip, which is h below and d behind the platform's centre. With r
+the radius of the tip's ball (0: a point) and gamma the spike's angle from the downward vertical,
+
+    h = (l - r) cos gamma + r,  d = (l - r) sin gamma,
+    depth = h - y,  rate = -(vy + omega d),  slip = vx - omega h   (slip: the material point's horizontal speed),
+    d(slip)/dt = ax - alpha h + omega^2 d,
+
+so a force (F, N) on the tip has the generalised force (F, N, N d - F h). A ball that sticks rolls.
 """
 
 import linecache
@@ -31,9 +40,10 @@ import numpy as np
 from rigid.ground.laws import SurfaceLaw, find_law, springback, springback_energy
 from rigid.terms import BASE, STATE_FIELDS, Term
 
-from .mechanics import contact_arms, divide_mass
-
-__all__ = ["Model", "State", "assemble", "for_taichi", "make_parameters", "model_source", "parameter_names"]
+__all__ = [
+    "Model", "State", "assemble", "contact_arms", "divide_mass", "for_taichi", "make_parameters", "model_source",
+    "parameter_names",
+]  # fmt: skip
 
 _MATHEMATICS = ("sin", "cos", "tan", "asin", "acos", "atan2", "exp", "log", "sqrt", "tanh", "floor")
 """What `math` and Taichi offer by one name."""
@@ -98,7 +108,7 @@ def _calls(terms: Sequence[Term], hook: str, fixed: str) -> list[str]:
 
 
 def _bent_energy(terms: Sequence[Term]) -> list[str]:
-    """Lines that integrate the force on the way out: whatever the law and its changes, no closed form holds for all.
+    """Lines that integrate the force of unloading: whatever the law and its changes, no closed form holds for all.
 
     Gauss and Legendre's nodes in u with x = z u^2, so that forces that begin with a power of depth are smooth in u.
     """
@@ -243,3 +253,26 @@ def for_taichi(function: Callable[..., Any]) -> Any:
 def make_parameters(terms: Sequence[Term]) -> type:
     """The class of `p` for Python: a record with the fields of `parameter_names`."""
     return type("Parameters", (), {"__slots__": parameter_names(terms)})
+
+
+def contact_arms(cosine, sine, length, radius):
+    """h and d [m] of a spike whose angle has this cosine and sine."""
+    return (length - radius) * cosine + radius, (length - radius) * sine
+
+
+def divide_mass(xx, xy, yy, xt, yt, tt, fx, fy, ft):
+    """M^-1 f for the symmetric mass matrix, by L D L^T; without off-diagonal entries f / diagonal, to the bit."""
+    ax = fx / xx
+    ay = fy / yy
+    at = ft / tt
+    if xy != 0.0 or xt != 0.0 or yt != 0.0:
+        a = xy / xx
+        b = xt / xx
+        d2 = yy - a * xy
+        c = (yt - b * xy) / d2
+        d3 = tt - b * xt - c * (c * d2)
+        g2 = fy - a * fx
+        at = (ft - b * fx - c * g2) / d3
+        ay = g2 / d2 - c * at
+        ax = fx / xx - a * ay - b * at
+    return ax, ay, at

@@ -149,7 +149,7 @@ class System:
         return bool(self.crater != 0.0 or fresh != again)
 
     def arms(self, spike: int, z: Sequence[float]) -> tuple[float, float]:
-        """h and d of `spike` (see `rigid.model.mechanics`)."""
+        """h and d of `spike` (see `rigid.model.model`)."""
         c, s = math.cos(z[THETA]), math.sin(z[THETA])
         cosine = c * self.cosines[spike] - s * self.sines[spike]
         sine = s * self.cosines[spike] + c * self.sines[spike]

@@ -3,6 +3,7 @@
 import bisect
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -189,11 +190,8 @@ class _Recorder:
 
     def build(self, method: str, transitions: Any, notes: dict[str, Any]) -> Trajectory:
         """What it was, as a trajectory."""
-        names = (
-            "time", "x", "y", "theta", "vx", "vy", "omega", "ax", "ay", "alpha", "wheel_speed", "state",
-            "kinetic_energy", "potential_energy", "stored_energy", "torque_work", "dissipated",
-        )  # fmt: skip
-        arrays: dict[str, Any] = dict(zip(names, np.array(self.rows, dtype=float).T, strict=True))
+        names = [field.name for field in fields(Trajectory)][2:]  # of the arrays, in the order of `sample`
+        arrays: dict[str, Any] = dict(zip(names, np.array(self.rows, dtype=float).T, strict=False))
         arrays["state"] = arrays["state"].astype(np.int8)
         tally = self.tally
         return Trajectory(

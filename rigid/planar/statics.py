@@ -71,7 +71,7 @@ def standing(system: System) -> tuple[list[float], Modes]:
         z[Y], z[THETA] = z[Y] + part * dy, z[THETA] + part * dt
     assert best is not None
     z[Y], z[THETA] = best[1], best[2]
-    # In a small body's gravity the sinkage is a few steps of what a height of 0.2 m can be told by.
+    # In a small body's gravity the sinkage is a few rounding steps of a height of 0.2 m.
     shallow = max(min(system.depth(n, z) for n in modes.touching), _EPS * trial.spike_length)
     if not best[0] <= max(1e-9, 8 * _EPS * trial.spike_length / shallow) or any(
         system.depth(n, z) <= 0 for n in modes.touching
@@ -91,10 +91,10 @@ def standing(system: System) -> tuple[list[float], Modes]:
 
 def _why_not(system: System, what: str) -> str:
     given = {effect.id: effect.values for effect in system.trial.effects}
-    told = ", ".join(f"{id}.{name} = {value:g}" for id, own in given.items() for name, value in own.items())
+    effects = ", ".join(f"{id}.{name} = {value:g}" for id, own in given.items() for name, value in own.items())
     ground = ", ".join(f"{value:g}" for value in system.q)
     limit = f"; {_offset_that_tips(system.trial)}" if "com-offset" in given else ""
-    return f"it cannot stand: {what} ({told or 'no effects'}; ground {system.trial.surface.name} of {ground}){limit}"
+    return f"it cannot stand: {what} ({effects or 'no effects'}; ground {system.trial.surface.name} of {ground}){limit}"
 
 
 def _offset_that_tips(trial: Trial) -> str:
@@ -119,9 +119,9 @@ def _sinkage(system: System, load: float) -> float:
             trial = system.trial
             weighs = f"mass = {trial.mass:g} kg" + (f" and {trial.counterweight:.4g} kg" if trial.counterweight else "")
             weighs += f" under gravity_sim = {trial.gravity_sim:.3g} m/s2"
-            said = f"the ground does not carry {load:.3g} N a row ({weighs}) down to its spike_length, "
-            said += f"{trial.spike_length:g} m"
-            raise ValueError(_why_not(system, said))
+            what = f"the ground does not carry {load:.3g} N a row ({weighs}) down to its spike_length, "
+            what += f"{trial.spike_length:g} m"
+            raise ValueError(_why_not(system, what))
     for _ in range(200):
         middle = 0.5 * (low + high)
         if middle in (low, high):
@@ -211,7 +211,7 @@ def _largest(system: System, rate: list[float]) -> float:
 def comes_to_rest(
     system: System, time: float, z: list[float], modes: Modes, scale: list[float], tolerance: float
 ) -> bool:
-    """Whether what moves in `z` is below the tolerance and stays so; then its speeds are taken out, and booked as lost.
+    """Whether what moves in `z` is below the tolerance and stays so; then its speeds are taken out, and count as lost.
 
     `scale`: what the tolerance is relative to. Speeds within the tolerance; at zero speed, so without what the dampers
     hold up, the equilibrium no further than the tolerance, and stable: the accelerations' slopes over the coordinates

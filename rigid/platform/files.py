@@ -150,9 +150,9 @@ def _sentence(path: Path, detail: Any) -> str:
         close = get_close_matches(str(detail["loc"][-1]), names, n=1)
         meant = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(names)}"
         return f"{path}: {key} = {detail['input']!r} is no key of a platform; {meant}"
-    said = detail["msg"].removeprefix("Value error, ")
+    message = detail["msg"].removeprefix("Value error, ")
     found = detail["input"] if not isinstance(detail["input"], dict) else sorted(detail["input"])
-    return f"{path}: {key} = {found!r} will not do: {said[:1].lower()}{said[1:]}"
+    return f"{path}: {key} = {found!r} will not do: {message[:1].lower()}{message[1:]}"
 
 
 def _keys_beside(place: tuple[Any, ...]) -> list[str]:

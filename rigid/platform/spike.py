@@ -111,7 +111,7 @@ class Spike:
     def area_at(self, depth: float) -> float:
         """Cross-section [m2] in the plane of the surface when the lowest point is `depth` [m] below it.
 
-        The widest below the surface counts: behind a thinner shaft the tip still bears on its own full section.
+        The widest below the surface counts: behind a thinner shaft the tip still presses with its own full section.
         """
         if depth <= 0:
             return 0.0

@@ -119,7 +119,7 @@ class Motion:
         depth = max(depth, 0.0)
         top = max(top, depth) if self.law.has_memory else depth
         force = self.law.loading(top, self.numbers) * springback(depth, top, self.rebound)
-        # A tip on the way out may be above the surface by what a step has left over: nothing acts there.
+        # A tip that moves out may be above the surface by the error of a step: nothing acts there.
         return max(0.0, float(force + self.law.rate_force(depth, rate, self.numbers)))
 
     def rates(self, z: Array, modes: Modes) -> Array:
@@ -223,7 +223,7 @@ class Motion:
         return total[:3], total[3:]
 
     def hold_still(self, z: Array, modes: Modes) -> None:
-        """Take out of the speeds what the sticking tips do not allow; the impulse's work is booked as friction's.
+        """Take out of the speeds what the sticking tips do not allow; the impulse's work counts as friction's.
 
         Uses what the last evaluation found, which must have been at `z` in `modes`.
         """

@@ -166,7 +166,7 @@ def standing(trial: SpatialTrial) -> tuple[Array, Array]:
     height = -float(motion.tips[feet[0], 2]) - high
     length = stance.spike_length
 
-    def lacking(unknown: Array) -> Array:
+    def imbalance(unknown: Array) -> Array:
         """Force along z and moments about x, y that are left, over weight (and length)."""
         turn = to_matrix(from_turn([unknown[1] * high / length, unknown[2] * high / length, 0.0]))
         arms = motion.tips[feet] @ turn.T
@@ -178,10 +178,10 @@ def standing(trial: SpatialTrial) -> tuple[Array, Array]:
         moment_y = -float(loads @ arms[:, 0]) - mean[2] * weight[0]
         return np.array([total + weight[2], moment_x / length, moment_y / length]) / -weight[2]
 
-    if np.abs(lacking(np.zeros(3))).max() > 1e-13:
-        solved: Any = root(lacking, np.zeros(3), method="hybr", tol=1e-14)
+    if np.abs(imbalance(np.zeros(3))).max() > 1e-13:
+        solved: Any = root(imbalance, np.zeros(3), method="hybr", tol=1e-14)
         unknown = np.asarray(solved.x)
-        if np.abs(lacking(unknown)).max() > 1e-9:
+        if np.abs(imbalance(unknown)).max() > 1e-9:
             raise ValueError(f"the platform does not stand: it tips over under gravity = {trial.gravity}")
     else:
         unknown = np.zeros(3)

@@ -104,7 +104,7 @@ def _entered(module: ModuleType) -> Term:
     return term
 
 
-def _check_alone(hook: Callable[..., object], said: str) -> None:
+def _check_alone(hook: Callable[..., object], what: str) -> None:
     """Raise ValueError for a hook that calls a function of its own file: each is compiled by itself, and the call would
     come out as nothing, without an error."""
     if not isinstance(hook, FunctionType):
@@ -113,6 +113,6 @@ def _check_alone(hook: Callable[..., object], said: str) -> None:
         found = hook.__globals__.get(called)
         if isinstance(found, FunctionType) and found.__globals__ is hook.__globals__:
             raise ValueError(
-                f"{said} calls {called}() of the same file: hooks are compiled one by one, so write what it does into "
+                f"{what} calls {called}() of the same file: hooks are compiled one by one, so write what it does into "
                 f"the hook itself"
             )

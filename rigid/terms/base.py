@@ -1,7 +1,6 @@
 """The paper's model as a list of terms (Reid, Roveda, Nesnas and Pavone, i-SAIRAS 2014, eqs 1 to 19).
 
-Contact and friction are the ground's law and Coulomb's; they are assembled in `rigid.model.model` and
-`rigid.model.mechanics`.
+Contact and friction are the ground's law and Coulomb's; `rigid.model.model` assembles them.
 """
 
 from .term import Term

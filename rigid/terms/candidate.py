@@ -113,7 +113,7 @@ class Push:
 
     | hook      | values                                        | result                                          |
     |-----------|-----------------------------------------------|-------------------------------------------------|
-    | `loading` | grown, depth, x                               | force of the spring on the way in [N]           |
+    | `loading` | grown, depth, x                               | force of the spring of loading [N]              |
     | `unload`  | at, stiff, bent, z, ever, stiffness           | at [m], stiff [N], bent [1]: the spring is then |
     |           |                                               | loading(at) bent - stiff, never below 0         |
     | `damper`  | spring                                        | factor on the damper [1]                        |

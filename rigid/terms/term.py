@@ -26,7 +26,7 @@ parameters, by name, in any number.
 | `hold`               | s, depth, held            | pull [N], energy stored [J]; held: deepest since it touched   |
 | `grip`               | s, depth, held            | load that friction sees beside the normal force [N]          |
 | `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
-| `rate_pull`          | s, depth, rate, held      | the same of a term that looks at the way back, too           |
+| `rate_pull`          | s, depth, rate, held      | the same of a term that depends on unloading, too            |
 | `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
 | `friction_factor`    | s, slip                   | factors on mu_s and mu_d [1]                                 |
 | `inner_mass`         | s                         | inertia of a coordinate of the term's own; 0: it has none    |

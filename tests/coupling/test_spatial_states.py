@@ -63,3 +63,27 @@ def test_a_landing_on_one_corner_pivots_slips_and_hops_as_the_located_events_hav
     assert len(loaded) == 1 and feet.shape[1:] == (6, len(HEDGEHOG.tips) + 1)
     assert feet[:, 0, loaded[0]] == pytest.approx(run.columns["fz"], abs=1e-12)
     assert (feet[:, 5].max(axis=1) == run.columns["sinkage"]).all()
+
+
+def test_a_checkpoint_with_the_names_of_an_earlier_version_goes_on_to_the_same_bits():
+    """Balance and ground were called books and footing."""
+    trial = SpatialTrial(platform=HEDGEHOG, gravity=0.0834, mu_s=0.5, ground_parameters=STIFF)
+    start = {"position": (0.0, 0.0, 0.2), "velocity": (0.05, -0.03, -0.1)}
+    run, again = (SpatialRun(trial, LawGround.of_spatial(trial), duration=0.1, **start) for _ in range(2))
+    for _ in range(40):
+        run.advance()
+    state = {
+        key.replace("master.exchange", "master.books")
+        .replace("balance.", "books.")
+        .replace("ground.", "footing."): value
+        for key, value in run.state().items()
+    }
+    assert sum(key.startswith(("books.", "footing.", "master.books")) for key in state) > 5
+    again.restore(state)
+    assert {key: value.tobytes() for key, value in again.state().items()} == {
+        key: value.tobytes() for key, value in run.state().items()
+    }
+    for _ in range(40):
+        run.advance()
+        again.advance()
+    assert all((again.columns[name] == values).all() for name, values in run.columns.items())

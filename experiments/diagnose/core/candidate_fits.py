@@ -83,7 +83,7 @@ class CandidateFits:
         contacts = model.problem.contacts
         if contacts is not None and forms:  # which looks for all of them together
             self.tell("looking for where the candidates' fits begin", 0.0)
-            contacts.guess(forms[:1], model.trials, self.base.fit.values, apart=model.scatter)
+            contacts.guess(model.with_forms(forms[:1]), self.base.fit.values)
         made: list[Hypothesis] = []
         for k, form in enumerate(forms):
             self.tell(f"trying {form.effect} ({form.name})", k / max(1, len(forms)))
@@ -156,8 +156,7 @@ class CandidateFits:
         begun = [fit(model, values, rounds=3) for values in places]
         contacts = model.problem.contacts
         if contacts is not None:  # a bend alone may put trials on other branches: from their beginnings, too
-            refined = contacts.refine([(model.forms, values) for values in places], model.trials, apart=model.scatter)
-            begun += [fit(model, values, rounds=3) for values in refined]
+            begun += [fit(model, values, rounds=3) for values in contacts.refine([model] * len(places), places)]
         return fit(model, min(begun, key=lambda one: one.objective).values)
 
     def _siblings(self, hypothesis: Hypothesis) -> list[Hypothesis]:
@@ -211,13 +210,12 @@ class CandidateFits:
 
     def _begun(self, model: Model, starts: Sequence[FormsStart]) -> list[Hypothesis]:
         """Fits of what `starts` add to `model`; the most promising in full."""
-        models = [model.with_forms((*model.forms, *start.forms)) for start in starts]
         places = [start.values for start in starts]
+        models = [model.with_forms((*model.forms, *start.forms)) for start in starts]
         contacts = model.problem.contacts
         begun: list[Fit] = []
         if contacts is not None and starts:  # a search of its own, after which the better half goes on
-            asked = [(longer.forms, values) for longer, values in zip(models, places, strict=True)]
-            places = list(contacts.refine(asked, model.trials, apart=model.scatter))
+            places = list(contacts.refine(models, places))
             left = [float(np.square(one.evaluate([point])[0]).sum()) for one, point in zip(models, places, strict=True)]
             kept = sorted(range(len(left)), key=lambda k: left[k])[: max(FOLLOWED, (len(left) + 1) // 2)]
             models, places = [models[k] for k in kept], [places[k] for k in kept]

@@ -12,7 +12,7 @@ from experiments.diagnose.fit.bounds import Bound, bounds_met
 from experiments.diagnose.fit.evidence import SMALL, held_out_fit, inflation
 from experiments.diagnose.fit.fitting import Fit, fit, settled
 from experiments.diagnose.fit.gate import Verdict
-from experiments.diagnose.fit.localise import Place, depends_on, latent_table, places, places_in
+from experiments.diagnose.fit.localise import Place, depends_on, latent_table, places
 from experiments.diagnose.fit.problem import Finding, Form, Problem
 from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
@@ -90,7 +90,9 @@ class Diagnosis(Known):
         """Where the base model fails."""
         if self.verdict == "none":
             return ()
-        return tuple(places(self.base.model, self.base_values, (*self.fitted, *self.held_out)))
+        forms = self.base.model.forms
+        (rest,) = self.problem.evaluate([self.base_values], forms, (*self.fitted, *self.held_out))
+        return tuple(places(self.problem, self.base_values, forms, rest))
 
     @cached_property
     def left(self) -> tuple[Place, ...]:
@@ -102,7 +104,7 @@ class Diagnosis(Known):
         others = {kind: std for kind, std in self.model_std.items() if kind not in factors}
         trials = (*self.fitted, *self.held_out)
         rest = weighed_residuals(self.problem, others, self.own_values, self.forms, trials)
-        return tuple(places_in(self.problem, self.own_values, self.forms, rest))
+        return tuple(places(self.problem, self.own_values, self.forms, rest))
 
     @cached_property
     def lines(self) -> tuple[Line, ...]:

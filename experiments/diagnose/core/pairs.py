@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.diagnose.fit.fitting import Model, linearised
+from experiments.diagnose.fit.fitting import Linear, Model
 from experiments.diagnose.fit.problem import Array, Form, Values
 
 __all__ = ["FormsStart", "next_starts", "pair_starts"]
@@ -74,29 +74,16 @@ class _Projected:
 
     def __init__(self, model: Model, values: Values, forms: Sequence[Form]) -> None:
         part = model.until(_BEGINNING)
-        self.values, self.parameters = values, part.parameters
-        modes, jacobian = linearised(part, values)
-        middle = np.array([p.value for p in self.parameters])
-        scales = np.array([p.scale for p in self.parameters])
-        self.x = np.array([values[p.name] for p in self.parameters])
-        precision = np.array([0.0 if np.isinf(p.std) else (p.scale / p.std) ** 2 for p in self.parameters])
-        self.whose, self.points, columns = _changes(part, values, modes, forms)
-        # What a refit of the model's parameters takes out: the normal matrix, priors included.
-        normal = jacobian.T @ jacobian + np.diag(precision)
-        self.inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
-        self.slope = jacobian.T @ modes + precision * (self.x - middle) / scales
-        self.cross = jacobian.T @ columns
-        self.gram = columns.T @ columns - self.cross.T @ self.inverse @ self.cross
-        """Products of the changes, shape [k, k]."""
-        self.along = columns.T @ modes - self.cross.T @ self.inverse @ self.slope
-        """Products of the changes with what is left, shape [k]."""
+        self.values, self.linear = values, Linear.of(part, values)
+        self.whose, self.points, columns = _changes(part, values, self.linear.modes, forms)
+        self.gram, self.along, self.cross = self.linear.projected(columns)
 
     def start(self, which: Sequence[int], sizes: Sequence[float]) -> dict[str, float]:
         """Values with these changes made, and the model's parameters moved as a refit would."""
-        taken = self.slope + sum(size * self.cross[:, k] for k, size in zip(which, sizes, strict=True))
+        taken = self.linear.slope + sum(size * self.cross[:, k] for k, size in zip(which, sizes, strict=True))
         moved = {
             p.name: float(np.clip(now + p.scale * step, p.lowest, p.highest))
-            for p, now, step in zip(self.parameters, self.x, -self.inverse @ taken, strict=True)
+            for p, now, step in zip(self.linear.parameters, self.linear.x, -self.linear.inverse @ taken, strict=True)
         }
         start = {**self.values, **moved}
         for k, size in zip(which, sizes, strict=True):

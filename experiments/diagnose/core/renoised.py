@@ -53,12 +53,11 @@ def jittered(found: Fit, held_out: tuple[str, ...], known: tuple[Jitter, ...] = 
 
 
 def doubted(found: Fit, held_out: tuple[str, ...]) -> Fit:
-    """With readings that this model makes doubtful counted for little (`Contacts.doubt`), where there are any."""
-    contacts = found.model.problem.contacts
-    if contacts is None:
+    """With readings that this model makes doubtful counted for little (`Problem.doubt`), where there are any."""
+    if found.model.problem.contacts is None:
         return found
     values = held_out_fit(found.model, held_out, found.values)
-    return fit(found.model, found.values) if contacts.doubt(values, found.model.forms) else found
+    return fit(found.model, found.values) if found.model.problem.doubt(values, found.model.forms) else found
 
 
 def plain(found: Fit) -> Fit:

@@ -1,7 +1,7 @@
 """Parameters that end where they cannot go on: at a bound, or far from what was stated.
 
-A number that was stated as 5.3 +- 0.01 and is fitted as 5.36 has not been measured anew: the model lacks something, and
-bends what it has. Such a model does not explain the data, however little it leaves.
+A number that was stated as 5.3 +- 0.01 and is fitted as 5.36 has not been measured anew: something is missing from the
+model, and it bends what it has. Such a model does not explain the data, however little it leaves.
 """
 
 import math

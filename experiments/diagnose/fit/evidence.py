@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .fitting import Fit, Model, fit, scanned
-from .gate import low_modes
+from .gate import column_basis, low_modes
 from .problem import Array, Form, Values
 
 __all__ = [
@@ -73,7 +73,7 @@ def tempered(left: float, modes: float) -> float:
 
 
 def inflation(found: Fit) -> float:
-    """Factor on standard errors: a misfit of form, E in M slow modes, makes each of them as loud as 1 + E / M.
+    """Factor on standard errors: a misfit of form, E in M slow modes, makes the power of each 1 + E / M.
 
     What chance alone brings, two standard deviations of chi-square, does not count.
     """
@@ -107,8 +107,8 @@ _FIRST = 0.2
 def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> Fit:
     """The best fit of `model` (which holds `form`) over the form's starts, in several sizes of the amplitude.
 
-    The other values are those given, and those of the priors: a base model that lacks an effect bends its parameters,
-    and what replicates differ by first of all.
+    The other values are those given, and those of the priors: a base model from which an effect is missing bends its
+    parameters, and what replicates differ by first of all.
     `rounds`: steps, where the problem looks for the best start itself.
     """
     if model.problem.contacts is not None:
@@ -153,12 +153,7 @@ def signature_matrix(found: Fit, forms: Sequence[Form]) -> tuple[Array, list[For
 
     A form that changes nothing here, or only what the parameters change as well, has none.
     """
-    free = found.free
-    weights = np.diag(np.sqrt(found.prior_precision()))
-    joint = np.vstack([found.jacobian, weights])[:, free]
-    joint = joint / np.maximum(np.linalg.norm(joint, axis=0), 1e-300)
-    left, sizes, _ = np.linalg.svd(joint, full_matrices=False)
-    basis = left[:, sizes > 1e-9]
+    basis = column_basis(np.vstack([found.jacobian, np.diag(np.sqrt(found.prior_precision()))])[:, found.free])
     columns, whose = [], []
     for form in forms:
         if form.effect in {f.effect for f in found.model.forms}:

@@ -1,156 +1,77 @@
 """Fits: the maximum of likelihood times priors, by a damped Gauss-Newton method over all trials at once.
 
-The residuals of a problem are white or are made so (`Whitener`): each channel of each trial is turned by a discrete
-cosine transform and every mode divided by the noise it has. In that domain the sum of squares is that of white noise,
-and slow misfit stands in the first modes.
+Steps are found from the normal equations, several dampings and lengths are tried at once, and the best is taken; a
+`Rule` says which, and when a fit ends. `SEARCH` is the rule for motions with contacts, whose likelihood jumps where a
+trial changes its branch (sticks or slips, touches or misses): such a fit may look at growing shares of the trials'
+time, and scans each trial's own numbers over their priors for the branch that was measured. A fit is a generator that
+asks for modes at a list of points, so that many fits are carried out together (`fits`): what all of them ask for is
+answered by one call of the batched model.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
 
-from .problem import Array, Form, Parameter, Problem, TrialInfo, Values
-from .together import each
+from .problem import Array, Model, Parameter, Values, Whitener, evaluate_all
 
-__all__ = ["SCAN", "Fit", "Model", "Whitener", "by_beginnings", "fit", "linearised", "scanned", "settled",
-           "settled_slopes"]  # fmt: skip
+__all__ = ["SCAN", "SEARCH", "Fit", "Linear", "Model", "Rule", "Whitener", "by_beginnings", "fit", "fits", "scanned",
+           "settled", "settled_slopes"]  # fmt: skip
 
-_ROUNDS = 30
-_DAMPINGS = (0.0, 1e-3, 1e-1, 10.0)
 _SETTLING = 3  # rounds in which the steps of a settled Jacobian are found
 SCAN = np.linspace(-3.0, 3.0, 25)  # standard deviations of a trial's own number that are looked at for another valley
 _PASSES = 3
 _BEGINNINGS = (0.3, 0.5, 0.7, 0.85)  # shares of their time that are looked at one after the other (`by_beginnings`)
-_MANY = 2**15  # residuals from which threads are worth their while
-_ENOUGH = 0.02  # change of chi-square below which a fit has ended: a hundredth of what one sigma is worth
+
+T = TypeVar("T")
+_Walk = Generator[tuple[Model, Sequence[Values]], list[Array], T]
+"""Asks for the modes of a model at points, gets them, and so on; ends with a result."""
 
 
-@dataclass(frozen=True)
-class Whitener:
-    """Turns residuals into modes of unit variance, trial by trial."""
+class Try(NamedTuple):
+    """One of the steps that are tried at once, and how the fit goes on where it is the best."""
 
-    blocks: Mapping[str, tuple[NDArray[np.intp], ...]]  # rows of each channel in each trial, in the order of time
-    weights: Mapping[str, Array]  # one over the noise of each mode, in the order of the blocks, shape [sample_count]
-    kept: Mapping[str, Array] = field(default_factory=dict)
-    """Of trials that are looked at in part only: factors 0 or 1 on the residuals, shape [sample_count]."""
-
-    @staticmethod
-    def white(problem: Problem) -> Whitener:
-        """For noise that is white, beside what replicates are known to differ by (`noise.wander`)."""
-        bare = Whitener.bare(problem)
-        return replace(bare, weights={**bare.weights, **problem.calmed})
-
-    @staticmethod
-    def bare(problem: Problem) -> Whitener:
-        """For noise that is white as it is."""
-        blocks, weights = {}, {}
-        for trial in problem.trials:
-            samples = problem.samples(trial.id)
-            names = list(dict.fromkeys(samples.channel.tolist()))
-            blocks[trial.id] = tuple(np.flatnonzero(samples.channel == name) for name in names)
-            weights[trial.id] = np.ones(len(samples.time))
-        return Whitener(blocks, weights)
-
-    def modes(self, trial: str, residuals: Array) -> Array:
-        """Modes of the residuals of a trial, shape [sample_count], or [point_count, sample_count]."""
-        if trial in self.kept:
-            residuals = residuals * self.kept[trial]
-        parts = [dct(np.take(residuals, rows, axis=-1), norm="ortho", axis=-1) for rows in self.blocks[trial]]
-        return np.concatenate(parts, axis=-1) * self.weights[trial]
-
-    def block_slices(self, trial: str) -> list[slice]:
-        """Where each channel's modes stand."""
-        edges = np.cumsum([0, *(len(rows) for rows in self.blocks[trial])]).tolist()
-        return [slice(low, high) for low, high in itertools.pairwise(edges)]
-
-    def channel_blocks(self, problem: Problem, trial: str) -> list[tuple[str, slice]]:
-        """Each channel of a trial, and where its modes stand."""
-        channels = dict.fromkeys(problem.samples(trial).channel.tolist())
-        return list(zip(channels, self.block_slices(trial), strict=True))
+    times: float  # the fit's damping, as its part of the step's
+    plus: float  # the rest of the step's damping, on the diagonal of the Hessian
+    length: float = 1.0
+    keep: float = 0.0  # factor on the fit's damping afterwards
+    then: float = 0.0  # what is added to it
 
 
-@dataclass(frozen=True)
-class Model:
-    """What is fitted: the problem, the effects added, the trials, and which scatter is let free."""
+@dataclass(frozen=True, kw_only=True)
+class Rule:
+    """How a fit steps, and when it ends."""
 
-    problem: Problem
-    whitener: Whitener
-    trials: tuple[str, ...]
-    forms: tuple[Form, ...] = ()
-    scatter: tuple[Parameter, ...] = ()  # nuisances of trials that describe what differs between replicates
-    held: Mapping[str, float] | None = None  # values at which all shared parameters are held; None: they are fitted
-    share: float = 1.0  # of their time, up to which trials are looked at (`until`)
+    rounds: int = 30  # steps at most
+    tries: tuple[Try, ...] = (
+        Try(0.0, 0.0, keep=0.3), Try(1e-3, 0.0, keep=0.3), Try(1e-1, 0.0, keep=1.0), Try(10.0, 0.0, keep=5.0),
+    )  # fmt: skip
+    damping: float = 1.0  # to begin with
+    least: float = 1e-4  # damping
+    bounded: int = 1
+    """Times that a step is found: from the second on without what runs into a bound at once."""
+    enough: float = 0.02  # change of chi-square below which a fit has ended: a hundredth of what one sigma is worth
+    relative: float = 1e-7  # the same as a share of chi-square, in addition
+    last: float = 0.0  # damping with which a fit goes on that gains nothing, though the normal equations promise it
+    poor: float = math.inf  # chi-square per sample from which a fit that would end is scanned once
+    scan: bool = False  # whether each trial's own numbers are scanned before the first step
+    shares: tuple[float, ...] = (1.0,)
+    """Shares of the trials' time that are fitted one after another, the last is 1: what happens early is smooth in the
+    parameters and determines most of them, so that later contacts are met on the right branch."""
+    early: float = 1e-3 / (1 + 1e-3)  # share of chi-square below which a fit to less than all has ended
+    keeps: bool = True  # whether the result holds the Jacobian, which is large where many fits go together
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """All that a fit changes."""
-        extra = tuple(p for form in self.forms for p in form.parameters)
-        every = (*self.problem.base, *self.scatter, *extra)
-        shared = self.held is None
-        return tuple(p for p in every if (shared if p.trial is None else p.trial in self.trials))
 
-    @property
-    def infos(self) -> list[TrialInfo]:
-        """What is known of its trials, in the campaign's order."""
-        return [trial for trial in self.problem.trials if trial.id in self.trials]
-
-    def with_forms(self, forms: Sequence[Form]) -> Model:
-        """The same with other effects."""
-        return replace(self, forms=tuple(forms))
-
-    def on(self, trials: Sequence[str]) -> Model:
-        """The same on other trials."""
-        return replace(self, trials=tuple(trials))
-
-    def holding(self, values: Values) -> Model:
-        """The same with all shared parameters held at these values."""
-        return replace(self, held=dict(values))
-
-    def until(self, share: float, trials: Sequence[str] | None = None) -> Model:
-        """The same, of these trials (None: those that the problem calls `rough`) only the first share of their time
-        looked at.
-
-        A motion with bounces depends on its parameters the more roughly the longer it goes on: fits that begin with its
-        beginning find their way.
-        """
-        kept = {}
-        for trial in self.problem.rough if trials is None else trials:
-            time = self.problem.samples(trial).time
-            kept[trial] = (time <= time.min() + share * np.ptp(time)).astype(float)
-        return replace(self, whitener=replace(self.whitener, kept=kept), share=share)
-
-    def evaluate(self, points: Sequence[Values]) -> list[Array]:
-        """Modes of all trials, one after another, at each point."""
-        held = self.held
-        whole = points if held is None else [{**held, **point} for point in points]
-        # What is not looked at need not be simulated.
-        share = self.share if all(trial in self.whitener.kept for trial in self.trials) else 1.0
-        found = self.problem.evaluate(whole, self.forms, self.trials, share)
-
-        def modes(trial: str) -> Array:
-            return self.whitener.modes(trial, np.stack([one[trial] for one in found]))
-
-        many = len(found) * sum(len(self.whitener.weights[id]) for id in self.trials) >= _MANY
-        parts = each(modes, self.trials, threads=None if many else 1)
-        return [np.concatenate([part[k] for part in parts]) for k in range(len(found))]
-
-    def rows(self) -> dict[str, slice]:
-        """Where each trial's modes stand."""
-        edges = np.cumsum([0, *(len(self.whitener.weights[id]) for id in self.trials)]).tolist()
-        return {id: slice(edges[k], edges[k + 1]) for k, id in enumerate(self.trials)}
-
-    def channel_rows(self) -> Iterator[tuple[str, str, slice]]:
-        """Trial, channel and where its modes stand, of all trials that are fitted."""
-        for trial, rows in self.rows().items():
-            for channel, block in self.whitener.channel_blocks(self.problem, trial):
-                yield trial, channel, slice(rows.start + block.start, rows.start + block.stop)
+SEARCH = Rule(
+    rounds=25, damping=0.0, least=0.0, bounded=2, enough=0.05, relative=0.0, last=1e3, poor=1.1, keeps=False,
+    tries=(Try(1.0, 0.0), Try(1.0, 0.0, 0.4), Try(1.0, 1e-2), Try(1.0, 1.0, then=1.0), Try(1.0, 30.0, then=1.0)),
+)  # fmt: skip
+"""For motions with contacts. The first three tries are as good as undamped."""
 
 
 @dataclass(frozen=True)
@@ -195,56 +116,109 @@ class Fit:
         return inverse / np.outer(size, size) * np.outer(scales, scales)
 
 
-def fit(model: Model, start: Values | None = None, *, rounds: int = _ROUNDS) -> Fit:
+def fit(model: Model, start: Values | None = None, *, rounds: int = Rule.rounds) -> Fit:
     """The best values near `start` (the parameters' own values where it names none)."""
+    return fits([(model, _begun(model, start), Rule(rounds=rounds))])[0]
+
+
+def fits(starts: Sequence[tuple[Model, Values, Rule]]) -> list[Fit]:
+    """Fits from `start`s that are carried out together."""
+    return _together([_descent(*start) for start in starts])
+
+
+def _together(walks: Sequence[_Walk[T]]) -> list[T]:
+    """Carry out walks: what all of them ask for at a time is answered at once."""
+    done: dict[int, T] = {}
+    answers: dict[int, list[Array] | None] = dict.fromkeys(range(len(walks)))
+    while answers:
+        asked = {}
+        for k, answer in answers.items():
+            try:
+                asked[k] = next(walks[k]) if answer is None else walks[k].send(answer)
+            except StopIteration as end:
+                done[k] = end.value
+        answers = dict(zip(asked, evaluate_all(list(asked.values())), strict=True))
+    return [done[k] for k in range(len(walks))]
+
+
+def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
+    """One fit."""
     parameters = model.parameters
     scales = np.array([p.scale for p in parameters])
     low, high = np.array([p.lowest for p in parameters]), np.array([p.highest for p in parameters])
     middle = np.array([p.value for p in parameters])
-    precision = np.array([0.0 if math.isinf(p.std) else p.std**-2 for p in parameters])
-    start = _begun(model, start)
-    x = np.array([start.get(p.name, p.value) for p in parameters], dtype=float)
-    x = np.clip(x, low, high)
+    precision = np.array([p.std**-2 for p in parameters])
+    x = np.clip(_numbers(parameters, start), low, high)
     names = [p.name for p in parameters]
 
     def named(values: Array) -> dict[str, float]:
-        return {name: float(value) for name, value in zip(names, values, strict=True)}
+        return dict(zip(names, values.tolist(), strict=True))
 
     def penalty(values: Array) -> float:
         return float((precision * (values - middle) ** 2).sum())
 
     best: Array | None = None
     jacobian = np.zeros((0, len(x)))
-    objective = math.inf
-    damping = 1.0
     free = np.ones(len(x), dtype=bool)
-    for _ in range(rounds):
-        best, jacobian = _linearise(model, parameters, x, best)
-        objective = float(best @ best) + penalty(x)
-        gradient = jacobian.T @ best + precision * scales * (x - middle)
-        at_low, at_high = (x <= low) & (gradient > 0), (x >= high) & (gradient < 0)
-        free = ~(at_low | at_high)
-        if not free.any():
-            break
-        hessian = (jacobian.T @ jacobian + np.diag(precision * scales**2))[np.ix_(free, free)]
-        diagonal = np.diag(np.maximum(np.diag(hessian), 1e-12))
-        trials = []
-        for factor in _DAMPINGS:
-            step = np.zeros(len(x))
-            step[free] = -_solve(hessian + factor * damping * diagonal, gradient[free])
-            trials.append(np.clip(x + scales * step, low, high))
-        modes = model.evaluate([named(trial) for trial in trials])
-        objectives = [float(m @ m) + penalty(t) for m, t in zip(modes, trials, strict=True)]
-        place = int(np.argmin(objectives))
-        gain = objective - objectives[place]
-        damping = max(damping * (0.3 if place <= 1 else 1.0 if place == 2 else 5.0), 1e-4)
-        if gain > 0:
-            x, best = trials[place], modes[place]
-        if gain < _ENOUGH + 1e-7 * objective:
+    for number, share in enumerate(rule.shares):
+        part, whole, best = replace(model, share=share) if share < 1 else model, share >= 1, None
+        if number or rule.scan:
+            x = _numbers(parameters, (yield from _scan(part, named(x)))[0])
+        damping, scannable = rule.damping, True
+        for _ in range(rule.rounds if whole else max(4, rule.rounds // 3)):
+            best, jacobian = yield from _slopes(part, x, best)
+            objective = float(best @ best) + penalty(x)
+            gradient = jacobian.T @ best + precision * scales * (x - middle)
+            at_low, at_high = x <= low, x >= high
+            free = ~((at_low & (gradient > 0)) | (at_high & (gradient < 0)))
+            if not free.any():
+                break
+            hessian = jacobian.T @ jacobian + np.diag(precision * scales**2)
+            jacobian = jacobian if rule.keeps else jacobian[:0]
+            trials = []
+            for tried in rule.tries:
+                damped = tried.times * damping + tried.plus
+                step = _step(hessian, gradient, free, damped, (at_low, at_high), rule.bounded)
+                trials.append(np.clip(x + tried.length * (scales * step), low, high))
+            modes = yield part, [named(trial) for trial in trials]
+            objectives = [float(m @ m) + penalty(t) for m, t in zip(modes, trials, strict=True)]
+            place = int(np.argmin(objectives))
+            gain = objective - objectives[place]
+            if gain > 0:
+                x, best = trials[place], modes[place]
+                damping = max(damping * rule.tries[place].keep + rule.tries[place].then, rule.least)
+            if gain >= (rule.enough + rule.relative * objective if whole else rule.early * objective):
+                continue
+            if gain <= 0 and damping < rule.last and gradient @ _solve(hessian, gradient) >= rule.enough:
+                damping = rule.last
+                continue
+            if whole and scannable and objective - max(gain, 0.0) > rule.poor * np.count_nonzero(best):
+                values, gain = yield from _scan(part, named(x))
+                x, best, damping, scannable = _numbers(parameters, values), None, rule.damping, False
+                if gain > 1.0:
+                    continue
             break
     if best is None:
-        best = model.evaluate([named(x)])[0]
+        (best,) = yield model, [named(x)]
     return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
+
+
+def _step(
+    hessian: Array, gradient: Array, free: NDArray[np.bool_], damping: float,
+    at_bounds: tuple[NDArray[np.bool_], NDArray[np.bool_]], times: int,
+) -> Array:  # fmt: skip
+    """The damped step of the free parameters, found so many `times`, what runs into a bound at once left out."""
+    step = np.zeros(len(gradient))
+    for _ in range(times):
+        mine = hessian[np.ix_(free, free)]
+        diagonal = np.diag(np.maximum(np.diag(mine), 1e-12))
+        step = np.zeros(len(gradient))
+        step[free] = -_solve(mine + damping * diagonal, gradient[free])
+        blocked = free & ((at_bounds[0] & (step < 0)) | (at_bounds[1] & (step > 0)))
+        if not blocked.any() or (blocked == free).all():
+            break
+        free = free & ~blocked
+    return step
 
 
 def scanned(found: Fit, *, passes: int = _PASSES) -> Fit:
@@ -255,14 +229,8 @@ def scanned(found: Fit, *, passes: int = _PASSES) -> Fit:
     that all trials are looked at together, and each takes its best.
     """
     for _ in range(passes):
-        values = dict(found.values)
-        moved = False
-        for kind in dict.fromkeys(
-            p.kind for p in found.model.parameters if p.trial is not None and math.isfinite(p.std)
-        ):
-            better = _along(found, values, kind)
-            moved, values = moved or bool(better), {**values, **better}
-        if not moved:
+        ((values, gain),) = _together([_scan(found.model, found.values, found.hessian(), least=1.0)])
+        if not gain:
             break
         again = fit(found.model, values)
         if again.objective > found.objective - 1.0:
@@ -284,47 +252,75 @@ def by_beginnings(found: Fit) -> Fit:
     return other if other.objective < found.objective - 1.0 else found
 
 
-def _along(found: Fit, values: Values, kind: str) -> dict[str, float]:
-    """Numbers of those trials that lie better elsewhere along the valley of one kind."""
-    model, parameters, rows = found.model, found.model.parameters, found.model.rows()
-    hessian = found.hessian()
-    mine = {p.trial: k for k, p in enumerate(parameters) if p.trial is not None and p.kind == kind}
-    ways = {}
-    for trial, here in mine.items():
-        own = [k for k, p in enumerate(parameters) if p.trial == trial]
-        covariance = np.linalg.pinv(hessian[np.ix_(own, own)], rcond=1e-12, hermitian=True)
-        place = own.index(here)
-        ways[trial] = own, covariance[:, place] / max(float(covariance[place, place]), 1e-300)
-    points = [dict(values)]
-    for z in SCAN:
-        point = dict(values)
+def _scan(
+    model: Model, values: Values, hessian: Array | None = None, *, least: float = 0.0
+) -> _Walk[tuple[dict[str, float], float]]:
+    """Values with the numbers of trials where they lie better, by more than `least`, along the valley of one kind after
+    another, and what the objective loses. `hessian`: moves a trial's others along; None: they stay."""
+    values, gain, parameters, rows = dict(values), 0.0, model.parameters, model.rows()
+    for kind in dict.fromkeys(p.kind for p in parameters if p.trial is not None and math.isfinite(p.std)):
+        mine = {p.trial: k for k, p in enumerate(parameters) if p.trial is not None and p.kind == kind}
+        ways = {}
         for trial, here in mine.items():
-            p = parameters[here]
-            far = (p.value + z * p.std - values[p.name]) / p.scale
-            own, way = ways[trial]
-            for k, slope in zip(own, way, strict=True):
-                q = parameters[k]
-                point[q.name] = float(np.clip(values[q.name] + far * slope * q.scale, q.lowest, q.highest))
-        points.append(point)
-    modes = model.evaluate(points)
-    told: dict[str, float] = {}
-    for trial, (own, _) in ways.items():
-        names = [parameters[k].name for k in own]
-        costs = [
-            float(one[rows[trial]] @ one[rows[trial]])
-            + sum(((point[parameters[k].name] - parameters[k].value) / parameters[k].std) ** 2 for k in own)
-            for one, point in zip(modes, points, strict=True)
-        ]
-        best = int(np.argmin(costs))
-        if costs[best] < costs[0] - 1.0:
-            told |= {name: points[best][name] for name in names}
-    return told
+            own = [k for k, p in enumerate(parameters) if p.trial == trial] if hessian is not None else [here]
+            matrix = hessian[np.ix_(own, own)] if hessian is not None else np.eye(1)
+            covariance = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True)
+            place = own.index(here)
+            ways[trial] = own, covariance[:, place] / max(float(covariance[place, place]), 1e-300)
+        points = [dict(values)]
+        for z in SCAN:
+            point = dict(values)
+            for trial, here in mine.items():
+                p = parameters[here]
+                far = (p.value + z * p.std - values[p.name]) / p.scale
+                for k, slope in zip(*ways[trial], strict=True):
+                    q = parameters[k]
+                    point[q.name] = float(np.clip(values[q.name] + far * slope * q.scale, q.lowest, q.highest))
+            points.append(point)
+        modes = yield model, points
+        for trial, (own, _) in ways.items():
+            costs = [
+                float(one[rows[trial]] @ one[rows[trial]])
+                + sum(((point[parameters[k].name] - parameters[k].value) / parameters[k].std) ** 2 for k in own)
+                for one, point in zip(modes, points, strict=True)
+            ]
+            best = int(np.argmin(costs))
+            if costs[best] < costs[0] - least:
+                gain += costs[0] - costs[best]
+                values |= {parameters[k].name: points[best][parameters[k].name] for k in own}
+    return values, gain
 
 
-def linearised(model: Model, values: Values) -> tuple[Array, Array]:
-    """Modes at `values`, shape [n], and their changes per scale of each of the model's parameters, shape [n, p]."""
-    parameters = model.parameters
-    return _linearise(model, parameters, np.array([values.get(p.name, p.value) for p in parameters], dtype=float))
+@dataclass(frozen=True)
+class Linear:
+    """A model linearised about values, with its normal equations, priors included; p parameters, n samples."""
+
+    parameters: tuple[Parameter, ...]
+    x: Array  # the values, shape [p]
+    modes: Array  # shape [n]
+    jacobian: Array  # d modes / d parameter / scale, shape [n, p]
+    inverse: Array  # of the normal matrix, in units of the scales, shape [p, p]
+    slope: Array  # half the gradient of the objective, in units of the scales, shape [p]
+
+    @staticmethod
+    def of(model: Model, values: Values) -> Linear:
+        """About these values, or the parameters' own where none is given."""
+        parameters = model.parameters
+        x = _numbers(parameters, values)
+        ((modes, jacobian),) = _together([_slopes(model, x)])
+        middle, scales = np.array([p.value for p in parameters]), np.array([p.scale for p in parameters])
+        precision = np.array([(p.scale / p.std) ** 2 for p in parameters])
+        normal = jacobian.T @ jacobian + np.diag(precision)
+        inverse = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=float)
+        slope = jacobian.T @ modes + precision * (x - middle) / scales
+        return Linear(parameters, x, modes, jacobian, inverse, slope)
+
+    def projected(self, changes: Array) -> tuple[Array, Array, Array]:
+        """Changes of the modes, shape [n, k], with what a refit of the parameters takes out taken out: their products
+        [k, k], their products with what is left [k], and their products with the Jacobian [p, k]."""
+        cross = self.jacobian.T @ changes
+        gram = changes.T @ changes - cross.T @ self.inverse @ cross
+        return gram, changes.T @ self.modes - cross.T @ self.inverse @ self.slope, cross
 
 
 def settled(found: Fit) -> Fit:
@@ -333,17 +329,17 @@ def settled(found: Fit) -> Fit:
 
 
 def settled_slopes(model: Model, values: Values) -> tuple[Array, Array]:
-    """As `linearised`, over steps that are worth a standard deviation of the data, both ways.
+    """As `Linear` has them, over steps that are worth a standard deviation of the data, both ways.
 
-    A fit's own steps are hundredths of what was stated or of a typical size. Where data tell a thousand times more,
-    such a step reaches over the next branch of sticking and slipping, and a jump is taken for a slope: standard errors
-    would come out far too small, and what is uncertain far too loud.
+    A fit's own steps are hundredths of what was stated or of a typical size. Where data determine a number a thousand
+    times better, such a step reaches over the next branch of sticking and slipping, and a jump is taken for a slope:
+    standard errors would come out far too small.
     """
     parameters = model.parameters
     names = [p.name for p in parameters]
     steps = np.array([p.step if p.step is not None else 1e-4 * p.scale for p in parameters])
     low, high = np.array([p.lowest for p in parameters]), np.array([p.highest for p in parameters])
-    x = np.array([values.get(p.name, p.value) for p in parameters], dtype=float)
+    x = _numbers(parameters, values)
     groups, rows = _groups(parameters), model.rows()
     now, slopes = np.zeros(0), np.zeros((0, len(x)))
     for _ in range(_SETTLING):
@@ -367,7 +363,7 @@ def settled_slopes(model: Model, values: Values) -> tuple[Array, Array]:
                     if moved:
                         sides.append((modes[where] - now[where]) / moved)
                 sizes = [float(np.linalg.norm(side)) for side in sides]
-                # A jump on one side is that side's: the other one tells the slope.
+                # A jump on one side is that side's: the other one has the slope.
                 slope = np.mean(sides, axis=0) if max(sizes) < 2 * min(sizes) else sides[int(np.argmin(sizes))]
                 slopes[where, k] = slope * parameters[k].scale
                 steps[k] = min(steps[k], 1.0 / max(min(sizes), 1e-300))
@@ -383,13 +379,17 @@ def _groups(parameters: Sequence[Parameter]) -> list[list[int]]:
 
 
 def _begun(model: Model, start: Values | None) -> Values:
-    """Where to begin: as told, and what is not told by the problem's own search, where it has one (`guess`)."""
+    """Where to begin: `start`, and for what it does not name the problem's own search, where it has one."""
     known, contacts = dict(start or {}), model.problem.contacts
     scatter = {p.name for p in model.scatter}  # a small thing beside the rest: it begins at none
     if contacts is None or all(p.name in known or p.name in scatter for p in model.parameters):
         return known
-    held = model.held is not None
-    return contacts.guess(model.forms, model.trials, {**(model.held or {}), **known}, held=held, apart=model.scatter)
+    return contacts.guess(model, {**(model.held or {}), **known})
+
+
+def _numbers(parameters: Sequence[Parameter], values: Values) -> Array:
+    """Values of the parameters, their own where none is given."""
+    return np.array([values.get(p.name, p.value) for p in parameters], dtype=float)
 
 
 def _solve(matrix: Array, right: Array) -> Array:
@@ -398,13 +398,10 @@ def _solve(matrix: Array, right: Array) -> Array:
     return np.linalg.lstsq(scaled, right / size, rcond=1e-13)[0] / size
 
 
-def _linearise(
-    model: Model, parameters: Sequence[Parameter], x: Array, known: Array | None = None
-) -> tuple[Array, Array]:
+def _slopes(model: Model, x: Array, known: Array | None = None) -> _Walk[tuple[Array, Array]]:
     """Modes at `x` (`known`, if they are), and their changes per scale of each parameter, one kind at a time."""
-    names = [p.name for p in parameters]
-    base = {name: float(value) for name, value in zip(names, x, strict=True)}
-    groups = _groups(parameters)
+    parameters, groups = model.parameters, _groups(model.parameters)
+    base = {p.name: float(value) for p, value in zip(parameters, x, strict=True)}
     points = [base] if known is None else []
     steps = np.zeros(len(parameters))
     for members in groups:
@@ -415,7 +412,7 @@ def _linearise(
             steps[k] = -step if x[k] + step > p.highest else step
             point[p.name] = x[k] + steps[k]
         points.append(point)
-    modes = model.evaluate(points)
+    modes = yield model, points
     modes = modes if known is None else [known, *modes]
     jacobian = np.zeros((len(modes[0]), len(parameters)))
     rows = model.rows()

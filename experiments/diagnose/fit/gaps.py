@@ -13,7 +13,7 @@ _UNITS: dict[str, tuple[str, float]] = {
 
 
 def unit_of(channel: str) -> tuple[str, float]:
-    """The unit in which a channel is told, and its size in SI units."""
+    """The unit in which a channel is reported, and its size in SI units."""
     return _UNITS.get(channel, ("SI", 1.0))
 
 

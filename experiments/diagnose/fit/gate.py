@@ -37,7 +37,7 @@ _LEVEL = 0.005  # chance that a right model is refused, of each of the two round
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the gate says of one fit."""
+    """The gate's result for one fit."""
 
     passed: bool
     score: float  # the most surprising statistic, as standard deviations of a normal law
@@ -74,7 +74,7 @@ def _statistics(modes: Array, slow: Mapping[tuple[str, str], np.ndarray], signat
     energy = {key: squares[:, rows].sum(axis=1) for key, rows in slow.items()}
     found = {"all": squares.sum(axis=1), "slow": np.sum(list(energy.values()), axis=0)}
     excess = np.stack([(e - len(slow[key])) / np.sqrt(2 * len(slow[key])) for key, e in energy.items()])
-    found["one trial"] = excess.max(axis=0)
+    found["one trial"] = excess.max(axis=0) + _OFFSET
     channels = dict.fromkeys(name for _, name in slow)
     for name in channels:
         rows = [rows for (_, channel), rows in slow.items() if channel == name]
@@ -107,7 +107,7 @@ def open_gate(
     tell: Callable[[float], None] | None = None,
     folder: Path | None = None,
 ) -> tuple[Gate, Verdict]:
-    """The null for this fit, and what it says of it.
+    """The null for this fit, and the verdict.
 
     `signatures`: unit vectors of what candidate effects would change, the fit's own parameters projected out, shape
     [n, k]. `refit`: make data and fit them in full, `draws` times, instead of projecting. `folder`: where nulls made by
@@ -122,7 +122,6 @@ def open_gate(
         if kept is not None:
             _write(kept, gate)
     here = {name: float(value[0]) for name, value in _statistics(found.modes[None, :], slow, columns).items()}
-    here["one trial"] += _OFFSET
     here["parameters"] = _moved(found)
     return gate, gate.judge(here)
 
@@ -138,15 +137,14 @@ def held_out_gate(found: Fit, trials: Sequence[str], values: Values, *, seed: in
     slow = low_modes(model)
     shared = np.array([p.trial is None for p in model.parameters], dtype=bool)
     scales = np.array([p.scale for p in model.parameters])
-    names = [p.name for p in found.model.parameters]
-    rows = [names.index(p.name) for p in model.parameters if p.trial is None]
+    rows = [k for k, p in enumerate(found.model.parameters) if p.trial is None]
     covariance = found.covariance()[np.ix_(rows, rows)] / np.outer(scales[shared], scales[shared])
     free = found.free[rows]  # what a bound holds is not uncertain
     covariance = covariance * np.outer(free, free)
     sizes, turns = np.linalg.eigh(covariance)
     spread = jacobian[:, shared] @ (turns * np.sqrt(np.maximum(sizes, 0.0)))
     priors = np.array([0.0 if np.isinf(p.std) else p.scale / p.std for p in model.parameters])[~shared]
-    basis, prior = _split_basis(np.vstack([jacobian[:, ~shared], np.diag(priors)]), len(modes))
+    basis, prior = np.split(column_basis(np.vstack([jacobian[:, ~shared], np.diag(priors)])), [len(modes)])
     random = np.random.default_rng(seed)
     parts, nothing = [], np.zeros((len(modes), 0))
     for _ in range(0, draws, 100):
@@ -155,7 +153,6 @@ def held_out_gate(found: Fit, trials: Sequence[str], values: Values, *, seed: in
         parts.append(_statistics(noise - (noise @ basis + more @ prior) @ basis.T, slow, nothing))
     gate = _gate_of(parts)
     here = {name: float(value[0]) for name, value in _statistics(modes[None, :], slow, nothing).items()}
-    here["one trial"] += _OFFSET
     return gate.judge(here)
 
 
@@ -164,7 +161,9 @@ def _calibrated(
     tell: Callable[[float], None] | None,
 ) -> Gate:  # fmt: skip
     random = np.random.default_rng(seed)
-    basis, prior = _basis(found)
+    # What a refit takes out of data and priors: rows of the data [n, p], of the priors.
+    joint = np.vstack([found.jacobian, np.diag(np.sqrt(found.prior_precision()))])
+    basis, prior = np.split(column_basis(joint[:, found.free]), [found.count])
     stated = _stated(found)
     if refit:
         made = np.stack([_refitted(found, random, tell, k / draws) for k in range(draws)])
@@ -190,18 +189,14 @@ def _stated(found: Fit) -> NDArray[np.bool_]:
 
 def _moved(found: Fit) -> float:
     """Squared standard deviations by which the base model's numbers are off what was stated, and one."""
-    off = [
-        (found.values[p.name] - p.value) / p.std
-        for p, counts in zip(found.model.parameters, _stated(found), strict=True)
-        if counts
-    ]
+    stated = zip(found.model.parameters, _stated(found), strict=True)
+    off = [(found.values[p.name] - p.value) / p.std for p, counts in stated if counts]
     return float(np.sum(np.square(off))) + 1.0
 
 
 def _gate_of(parts: Sequence[Mapping[str, Array]], more: Mapping[str, Array] | None = None) -> Gate:
     """The gate that draws of statistics make."""
     sample = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    sample["one trial"] = sample["one trial"] + _OFFSET
     sample |= {name: values[: len(sample["all"])] for name, values in (more or {}).items()}
     names = tuple(sample)
     table = np.stack([sample[name] for name in names], axis=1)
@@ -216,12 +211,12 @@ def _gate_of(parts: Sequence[Mapping[str, Array]], more: Mapping[str, Array] | N
 def _key(found: Fit, signature_count: int, seed: int, draws: int) -> str:
     """Digest of what decides the null: design, noise, what is fitted; not the measured numbers."""
     model = found.model
-    told = [
+    null = [
         _FORMAT, model.problem.kind, model.problem.design, model.trials, [form.id for form in model.forms],
         [(p.name, p.std) for p in model.scatter], signature_count, seed, draws, _LEVEL, LOW_MODES,
         [np.round(model.whitener.weights[trial], 6).tobytes().hex() for trial in model.trials],
     ]  # fmt: skip
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:24]
+    return hashlib.sha256(json.dumps(null).encode()).hexdigest()[:24]
 
 
 def _read(path: Path | None) -> Gate | None:
@@ -229,34 +224,23 @@ def _read(path: Path | None) -> Gate | None:
     if path is None or not path.exists():
         return None
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        return Gate(tuple(told["names"]), np.array(told["mean"]), np.array(told["variance"]), float(told["threshold"]))
+        null = json.loads(path.read_text(encoding="utf-8"))
+        return Gate(tuple(null["names"]), np.array(null["mean"]), np.array(null["variance"]), float(null["threshold"]))
     except (OSError, ValueError, KeyError) as problem:
         warnings.warn(f"the gate {path.name} cannot be read and is made anew: {problem}", stacklevel=2)
         return None
 
 
 def _write(path: Path, gate: Gate) -> None:
-    told = {"names": gate.names, "mean": gate.mean.tolist(), "variance": gate.variance.tolist(),
+    null = {"names": gate.names, "mean": gate.mean.tolist(), "variance": gate.variance.tolist(),
             "threshold": gate.threshold}  # fmt: skip
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = path.with_suffix(f".{os.getpid()}")
-        unfinished.write_text(json.dumps(told), encoding="utf-8")
+        unfinished.write_text(json.dumps(null), encoding="utf-8")
         unfinished.replace(path)
     except OSError as problem:
         warnings.warn(f"the gate could not be kept: {problem}", stacklevel=2)
-
-
-def _basis(found: Fit) -> tuple[Array, Array]:
-    """An orthonormal basis of what a refit takes out of data and priors: rows of the data [n, p], of the priors."""
-    joint = np.vstack([found.jacobian, np.diag(np.sqrt(found.prior_precision()))])
-    return _split_basis(joint[:, found.free], found.count)
-
-
-def _split_basis(joint: Array, count: int) -> tuple[Array, Array]:
-    basis = column_basis(joint)
-    return basis[:count], basis[count:]
 
 
 def column_basis(joint: Array) -> Array:
@@ -281,5 +265,5 @@ class _Shifted(Model):
 
     shift: Array | float = 0.0
 
-    def evaluate(self, points: Sequence[Values]) -> list[Array]:
-        return [modes - self.shift for modes in super().evaluate(points)]
+    def modes(self, residuals: Sequence[Mapping[str, Array]]) -> list[Array]:
+        return [modes - self.shift for modes in super().modes(residuals)]

@@ -1,4 +1,4 @@
-"""Where a model fails: sensor, trial, phase and seconds; and what a force that no effect explains goes with."""
+"""Where a model fails: sensor, trial, phase and seconds; the force that is missing, and what it depends on."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,14 +7,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .fitting import Model
 from .problem import Array, Form, Problem, Values
 
-__all__ = ["Place", "depends_on", "latent_table", "phases_of", "places", "places_in"]
+__all__ = ["Place", "acceleration", "depends_on", "latent_table", "phases_of", "places", "slope"]
 
 _SURE = 4.0  # standard deviations by which the energy of a stretch must exceed that of noise
 _MOST = 24
 _WINDOW = 9
+_SHARE = 1 / 12  # of a recording, over which an acceleration is taken
+_FEWEST = 7
 
 
 @dataclass(frozen=True)
@@ -29,14 +30,11 @@ class Place:
     excess: float  # chi-square beyond the number of its samples
 
 
-def places(model: Model, values: Values, trials: Sequence[str]) -> list[Place]:
-    """Stretches of one phase in which residuals are beyond noise, the worst first."""
-    (found,) = model.problem.evaluate([values], model.forms, trials)
-    return places_in(model.problem, values, model.forms, found)
+def places(problem: Problem, values: Values, forms: Sequence[Form], residuals: Mapping[str, Array]) -> list[Place]:
+    """Stretches of one phase in which residuals are beyond noise, the worst first.
 
-
-def places_in(problem: Problem, values: Values, forms: Sequence[Form], residuals: Mapping[str, Array]) -> list[Place]:
-    """The same of given residuals over the noise: trial -> shape [sample_count]."""
+    `residuals`: over the noise, by trial, shape [sample_count].
+    """
     out = []
     for trial, found in residuals.items():
         samples = problem.samples(trial)
@@ -60,7 +58,7 @@ def places_in(problem: Problem, values: Values, forms: Sequence[Form], residuals
 
 
 def phases_of(problem: Problem, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
-    """The phase at each sample; a platform stands until the torque starts, whatever a model says of then."""
+    """The phase at each sample; a platform stands until the torque starts, whatever a model predicts."""
     phases = problem.phases(values, forms, trial)
     return np.where(problem.samples(trial).time < 0, "stand", phases) if problem.kind == "tumble" else phases
 
@@ -83,7 +81,7 @@ def _core(rest: Array) -> tuple[int, int]:
 
 
 def latent_table(problem: Problem, values: Values, forms: Sequence[Form]) -> dict[str, NDArray[np.generic]]:
-    """Columns of latent.csv: trial, then what the problem says, trial after trial."""
+    """Columns of latent.csv: trial, then the problem's columns, trial after trial."""
     parts: dict[str, list[NDArray[np.generic]]] = {"trial": []}
     for trial in problem.trials:
         columns = problem.latent(values, forms, trial.id)
@@ -97,10 +95,10 @@ def latent_table(problem: Problem, values: Values, forms: Sequence[Form]) -> dic
 
 
 def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str, float]]:
-    """A sentence on what the latent columns go with, and the share of their variance that each column explains.
+    """A sentence on what the latent columns depend on, and the share of their variance that each column explains.
 
     The share is that of a mean in twenty bins of equal count, judged on every second sample after being made on the
-    others, so that noise explains nothing. A column that only says which trial it is counts as the trial.
+    others, so that noise explains nothing. A column that only identifies the trial counts as the trial.
     """
     shares: dict[str, float] = {}
     if not len(table["trial"]):
@@ -118,17 +116,17 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
             share = _explained(x[good], y[good])
             shares[name] = max(shares.get(name, 0.0), share)
     ranked = sorted(shares.items(), key=lambda pair: -pair[1])
-    told = [(_WORDS.get(name, name), share) for name, share in ranked if share > 0.1]
-    if not told:
+    named = [(_WORDS.get(name, name), share) for name, share in ranked if share > 0.1]
+    if not named:
         return "nothing that was recorded: no column explains a tenth of it", shares
-    best = told[0]
+    best = named[0]
     sentence = f"{best[0]} (explains {100 * best[1]:.0f} % of it)"
-    more = [f"{name} ({100 * share:.0f} %)" for name, share in told[1:3]]
+    more = [f"{name} ({100 * share:.0f} %)" for name, share in named[1:3]]
     return sentence + (f", then {', '.join(more)}" if more else ""), shares
 
 
 def _labels(column: NDArray[np.generic], which: NDArray[np.intp]) -> bool:
-    """Whether a column only says which trial it is: another single value in each of three trials or more."""
+    """Whether a column only identifies the trial: another single value in each of three trials or more."""
     count = int(which.max()) + 1
     values = np.asarray(column, dtype=float)
     single = all(np.ptp(values[which == k]) == 0 for k in range(count))
@@ -158,3 +156,26 @@ def _explained(x: Array, y: Array) -> float:
     rest = y[~learn] - means[bins[~learn]]
     total = float(np.sum((y[~learn] - y[learn].mean()) ** 2))
     return max(0.0, 1.0 - float(np.sum(rest**2)) / total) if total > 0 else 0.0
+
+
+def slope(time: Array, values: Array, *, rows: int) -> Array:
+    """Slope of a straight line through each `rows` neighbouring readings; shapes [n]."""
+    return _fitted(time, values, rows, 1)
+
+
+def acceleration(time: Array, values: Array) -> Array:
+    """Second derivative, of a parabola through the readings of a twelfth of the time; shapes [n]."""
+    return 2.0 * _fitted(time, values, max(_FEWEST, round(_SHARE * len(time))), 2)
+
+
+def _fitted(time: Array, values: Array, rows: int, degree: int) -> Array:
+    """The coefficient of the highest power of a polynomial through the rows around each; 0 where there are too few."""
+    half, found = rows // 2, np.zeros(len(time))
+    for k in range(len(time)):
+        own = slice(max(0, k - half), k + half + 1)
+        t = time[own] - time[own].mean()
+        span = float(np.ptp(t))
+        if len(t) > degree and span > 0:
+            powers = (t / span)[:, None] ** np.arange(degree + 1)
+            found[k] = np.linalg.lstsq(powers, values[own], rcond=None)[0][degree] / span**degree
+    return found

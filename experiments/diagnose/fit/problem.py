@@ -11,22 +11,33 @@ effect's as ``pendulum.curvature``. Units are SI. A parameter that is not among 
 
 A kind of trial is a class that inherits `Problem`, in ``experiments/diagnose/<push or tumble>/problem.py``, made there
 by ``make_problem(campaign, own=())``. A member that has a default here is one that not every kind of trial needs.
+
+What is fitted is a `Model`. Its residuals are white or are made so (`Whitener`): each channel of each trial is turned
+by a discrete cosine transform and every mode divided by the noise it has. In that domain the sum of squares is that of
+white noise, and slow misfit stands in the first modes.
 """
 
-import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import dct
 
 from experiments.check.words import Finding
 from rigid.terms.candidate import Bend, Number
 
-__all__ = ["Array", "Contacts", "Finding", "Form", "Parameter", "Problem", "Samples", "TrialInfo", "Values"]
+from .together import each
+
+__all__ = ["Array", "Contacts", "Finding", "Form", "Model", "Parameter", "Problem", "Samples", "TrialInfo", "Values",
+           "Whitener", "evaluate_all"]  # fmt: skip
+
+_MANY = 2**15  # residuals from which threads are worth their while
 
 Array = NDArray[np.float64]
 Values = Mapping[str, float]  # name of a parameter -> value
@@ -40,13 +51,13 @@ class Parameter:
     unit: str
     value: float
     """Where fits begin, and the middle of the prior. Of an effect's amplitude: 0."""
-    std: float = math.inf
+    std: float = np.inf
     """Gaussian prior, one sigma; infinite for none. A parameter that is exact is no Parameter."""
     scale: float
     """A size typical of a change that can be seen (above 0): the step of finite differences is 1e-4 of it, unless
     `step` says otherwise, and fits work in units of it."""
-    lowest: float = -math.inf
-    highest: float = math.inf
+    lowest: float = -np.inf
+    highest: float = np.inf
     trial: str | None = None  # id of the one trial that it touches; None for a shared parameter
     kind: str = ""
     """Of a nuisance: what it is in every trial (``gravity_sim``). Nuisances of one kind are changed in all trials at
@@ -54,7 +65,11 @@ class Parameter:
     step: float | None = None
     """Step of finite differences, in units of the parameter; for models whose contacts make small steps rough."""
     least: float | None = None
-    """Of what may differ between replicates: the std below which it says nothing; None: the problem's own."""
+    """Of what may differ between replicates: the std below which it is negligible; None: the problem's own."""
+
+    def in_each(self, trials: Iterable[str]) -> tuple[Parameter, ...]:
+        """Nuisances of this name, one for each trial."""
+        return tuple(replace(self, name=f"{self.name}[{id}]", kind=self.name, trial=id) for id in trials)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,25 +128,14 @@ class Samples:
 
 
 class Contacts(Protocol):
-    """What a problem also answers whose trials touch, slip and fall, so that the likelihood jumps in its parameters."""
+    """A search of its own for where fits begin: of trials that touch, slip and fall, whose likelihood jumps."""
 
-    def guess(
-        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
-        apart: Sequence[Parameter] = (),
-    ) -> dict[str, float]:  # fmt: skip
+    def guess(self, model: Model, values: Values) -> dict[str, float]:
         """Values near the best, from which a local fit may begin; parameters of forms that are not among `values` are
-        looked for. `held`: all that is shared stays; `apart`: what else is fitted to single trials."""
+        looked for."""
 
-    def refine(
-        self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str], *, apart: Sequence[Parameter] = ()
-    ) -> list[dict[str, float]]:
-        """The same for several sets of forms at once, all of whose values are given."""
-
-    def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
-        """The moment [s] up to which the model follows a trial; None where that is no good part of it."""
-
-    def doubt(self, values: Values, forms: Sequence[Form]) -> bool:
-        """Count readings next to which the model jumps as doubtful from now on; whether any has changed."""
+    def refine(self, models: Sequence[Model], values: Sequence[Values]) -> list[dict[str, float]]:
+        """The same for several models of the same trials at once, all of whose values are given."""
 
 
 class Problem(Protocol):
@@ -149,7 +153,7 @@ class Problem(Protocol):
     design: str  # digest of what decides the gate: sampling, conditions, noise, priors; not of the measured numbers
     granular: bool = True  # whether replicates differ because grains lie otherwise in each bed
     by_path: bool = False
-    """Whether trials follow a measured path: its error goes with the model (`rewhiten`), and replicates are compared
+    """Whether trials follow a measured path: its error depends on the model (`rewhiten`), and replicates are compared
     row by row (`calm`)."""
     contacts: Contacts | None = None  # of a motion with contacts; None where the likelihood is smooth
     rough: Sequence[str] = ()  # trials whose motion bounces: the likelihood is the rougher the longer they are
@@ -169,11 +173,11 @@ class Problem(Protocol):
     lone_scatter: tuple[tuple[str, ...], ...] = ()
     """What is asked for, one after the other, where no trial repeats another (`lone_beds`)."""
     known_std: Mapping[str, float] = MappingProxyType({})
-    """What differs from trial to trial as the readings themselves tell: kind -> std, in its unit."""
+    """What differs from trial to trial as the readings themselves show: kind -> std, in its unit."""
     calmed: Mapping[str, Array] = MappingProxyType({})  # weights of modes as `calm` was given them last
 
     def prepare(self, tell: Callable[[str, float], None]) -> None:
-        """What takes long the first time, and says so."""
+        """What takes long the first time; `tell` reports it."""
         return
 
     def samples(self, trial: str) -> Samples:
@@ -188,9 +192,24 @@ class Problem(Protocol):
         integrated, residuals are 1e3. The whitening must not depend on the values (between calls of `rewhiten`).
         `share`: of each trial's time, beyond which nothing need be simulated.
         """
+        return self.evaluate_together([(points, forms)], trials, share)[0]
+
+    def evaluate_together(
+        self, asked: Sequence[tuple[Sequence[Values], Sequence[Form]]], trials: Sequence[str], share: float = 1.0
+    ) -> list[list[dict[str, Array]]]:
+        """The same for several sets of forms, each at points of its own. A kind of trial implements one of the two."""
+        return [self.evaluate(points, forms, trials, share) for points, forms in asked]
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """Take the whitening at these values from now on. Does nothing where it does not depend on them."""
+
+    def doubt(self, values: Values, forms: Sequence[Form]) -> bool:
+        """Count readings next to which the model jumps as doubtful from now on; whether any has changed."""
+        return False
+
+    def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
+        """The moment [s] up to which the model follows a trial; None where that is no good part of it."""
+        return None
 
     def shake(self, along: Mapping[str, Array]) -> None:
         """Take times that jitter into the whitening from now on.
@@ -204,7 +223,7 @@ class Problem(Protocol):
         self.calmed = dict(weights)
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
-        """Sum of squared residuals with the std that docs/diagnose.md says for `gap`; number of samples."""
+        """Sum of squared residuals with the std that docs/diagnose.md states for `gap`; number of samples."""
 
     def sensor_std(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """Noise of each reading as `gap` takes it, by channel: of a driven force with the error of its depth; endless
@@ -219,7 +238,7 @@ class Problem(Protocol):
         """The state at each sample: stand, pivot, slip, hop; for penetration free, in, rest, out."""
 
     def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
-        """What diagnosis.json says of a form: name -> (value, unit), under the fixed names where there are such.
+        """What diagnosis.json reports of a form: name -> (value, unit), under the fixed names where there are such.
 
         A smooth function of the form's parameters: the core carries uncertainties through it by differences.
         """
@@ -233,12 +252,12 @@ class Problem(Protocol):
         return False
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> Sequence[str]:
-        """What else an engineer says of the forms' numbers, a sentence each."""
+        """Remarks on the forms' numbers, a sentence each."""
         return ()
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """Columns of latent.csv: ``t_s`` first, then ``latent_...`` (the force, torque or error of a sensor that the
-        model lacks, by time), then what it might depend on (``depth_m``, ``velocity_m_s``, ...); all of one shape."""
+        model misses, by time), then what it might depend on (``depth_m``, ``velocity_m_s``, ...); all of one shape."""
 
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """Channel -> {"t_s", "measured", "model"} for plots, at the samples; units those of the channel."""
@@ -247,4 +266,150 @@ class Problem(Protocol):
         """model.toml: the tables with the fitted values, and [[effect]] tables."""
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
-        """One sentence: the trial or bench measurement that would tell the two apart."""
+        """One sentence: the trial or bench measurement that would distinguish the two."""
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """Turns residuals into modes of unit variance, trial by trial."""
+
+    blocks: Mapping[str, tuple[NDArray[np.intp], ...]]  # rows of each channel in each trial, in the order of time
+    weights: Mapping[str, Array]  # one over the noise of each mode, in the order of the blocks, shape [sample_count]
+    kept: Mapping[str, Array] = field(default_factory=dict)
+    """Of trials that are looked at in part only: factors 0 or 1 on the residuals, shape [sample_count]."""
+
+    @staticmethod
+    def white(problem: Problem) -> Whitener:
+        """For noise that is white, beside what replicates are known to differ by (`noise.wander`)."""
+        bare = Whitener.bare(problem)
+        return replace(bare, weights={**bare.weights, **problem.calmed})
+
+    @staticmethod
+    def none(problem: Problem) -> Whitener:
+        """That leaves residuals as they are, in the order of the samples."""
+        return replace(Whitener.bare(problem), blocks={})
+
+    @staticmethod
+    def bare(problem: Problem) -> Whitener:
+        """For noise that is white as it is."""
+        blocks, weights = {}, {}
+        for trial in problem.trials:
+            samples = problem.samples(trial.id)
+            names = list(dict.fromkeys(samples.channel.tolist()))
+            blocks[trial.id] = tuple(np.flatnonzero(samples.channel == name) for name in names)
+            weights[trial.id] = np.ones(len(samples.time))
+        return Whitener(blocks, weights)
+
+    def modes(self, trial: str, residuals: Array) -> Array:
+        """Modes of the residuals of a trial, shape [sample_count], or [point_count, sample_count]."""
+        if trial in self.kept:
+            residuals = residuals * self.kept[trial]
+        if not self.blocks:
+            return residuals
+        parts = [dct(np.take(residuals, rows, axis=-1), norm="ortho", axis=-1) for rows in self.blocks[trial]]
+        return np.concatenate(parts, axis=-1) * self.weights[trial]
+
+    def channel_blocks(self, problem: Problem, trial: str) -> list[tuple[str, slice]]:
+        """Each channel of a trial, and where its modes stand."""
+        edges = np.cumsum([0, *(len(rows) for rows in self.blocks[trial])]).tolist()
+        channels = dict.fromkeys(problem.samples(trial).channel.tolist())
+        return list(zip(channels, map(slice, edges[:-1], edges[1:]), strict=True))
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is fitted: the problem, the effects added, the trials, and which scatter is let free."""
+
+    problem: Problem
+    whitener: Whitener
+    trials: tuple[str, ...]
+    forms: tuple[Form, ...] = ()
+    scatter: tuple[Parameter, ...] = ()  # nuisances of trials that describe what differs between replicates
+    held: Mapping[str, float] | None = None  # values at which all shared parameters are held; None: they are fitted
+    share: float = 1.0  # of their time, up to which trials are looked at (`until`)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All that a fit changes."""
+        extra = tuple(p for form in self.forms for p in form.parameters)
+        every = (*self.problem.base, *self.scatter, *extra)
+        shared = self.held is None
+        return tuple(p for p in every if (shared if p.trial is None else p.trial in self.trials))
+
+    @property
+    def infos(self) -> list[TrialInfo]:
+        """What is known of its trials, in the campaign's order."""
+        return [trial for trial in self.problem.trials if trial.id in self.trials]
+
+    def with_forms(self, forms: Sequence[Form]) -> Model:
+        """The same with other effects."""
+        return replace(self, forms=tuple(forms))
+
+    def on(self, trials: Sequence[str]) -> Model:
+        """The same on other trials."""
+        return replace(self, trials=tuple(trials))
+
+    def holding(self, values: Values) -> Model:
+        """The same with all shared parameters held at these values."""
+        return replace(self, held=dict(values))
+
+    def until(self, share: float, trials: Sequence[str] | None = None) -> Model:
+        """The same, of these trials (None: those that the problem calls `rough`) only the first share of their time
+        looked at.
+
+        A motion with bounces depends on its parameters the more roughly the longer it goes on: fits that begin with its
+        beginning find their way.
+        """
+        kept = {}
+        for trial in self.problem.rough if trials is None else trials:
+            time = self.problem.samples(trial).time
+            kept[trial] = (time <= time.min() + share * np.ptp(time)).astype(float)
+        return replace(self, whitener=replace(self.whitener, kept=kept), share=share)
+
+    @property
+    def simulated(self) -> float:
+        """Share of the trials' time that must be simulated: what is not looked at need not be."""
+        kept = self.whitener.kept
+        return self.share if not self.whitener.blocks or all(trial in kept for trial in self.trials) else 1.0
+
+    def evaluate(self, points: Sequence[Values]) -> list[Array]:
+        """Modes of all trials, one after another, at each point."""
+        return evaluate_all([(self, points)])[0]
+
+    def modes(self, residuals: Sequence[Mapping[str, Array]]) -> list[Array]:
+        """The same of residuals by trial, as the problem has them at each point."""
+
+        def modes(trial: str) -> Array:
+            return self.whitener.modes(trial, np.stack([one[trial] for one in residuals]))
+
+        many = len(residuals) * sum(len(self.whitener.weights[id]) for id in self.trials) >= _MANY
+        parts = each(modes, self.trials, threads=None if many else 1)
+        return [np.concatenate([part[k] for part in parts]) for k in range(len(residuals))]
+
+    def rows(self) -> dict[str, slice]:
+        """Where each trial's modes stand."""
+        edges = np.cumsum([0, *(len(self.whitener.weights[id]) for id in self.trials)]).tolist()
+        return {id: slice(edges[k], edges[k + 1]) for k, id in enumerate(self.trials)}
+
+    def channel_rows(self) -> Iterator[tuple[str, str, slice]]:
+        """Trial, channel and where its modes stand, of all trials that are fitted."""
+        for trial, rows in self.rows().items():
+            for channel, block in self.whitener.channel_blocks(self.problem, trial):
+                yield trial, channel, slice(rows.start + block.start, rows.start + block.stop)
+
+
+def evaluate_all(asked: Sequence[tuple[Model, Sequence[Values]]]) -> list[list[Array]]:
+    """Modes of each model at its points; models of one problem, on the same trials, are evaluated together."""
+    alike: dict[tuple[int, tuple[str, ...], float], list[int]] = {}
+    for k, (model, _) in enumerate(asked):
+        alike.setdefault((id(model.problem), model.trials, model.simulated), []).append(k)
+    found: dict[int, list[Array]] = {}
+    for (_, trials, share), mine in alike.items():
+        models, points = zip(*(asked[k] for k in mine), strict=True)
+        whole = [
+            ([{**(one.held or {}), **point} for point in own], one.forms)
+            for one, own in zip(models, points, strict=True)
+        ]
+        residuals = models[0].problem.evaluate_together(whole, trials, share)
+        found |= {k: model.modes(own) for k, model, own in zip(mine, models, residuals, strict=True)}
+    return [found[k] for k in range(len(asked))]

@@ -82,7 +82,7 @@ def diverging_held_out(
     """Those held-out trials, `most` at most, that the model follows at first only, all others passing the gate; None
     where more fail, or fail from the start. `enough`: chi-square per sample up to which trials pass in any case.
     `share`: of its time up to which each must be followed."""
-    problem, contacts = found.model.problem, found.model.problem.contacts
+    problem = found.model.problem
 
     def explained(trials: Sequence[str]) -> bool:
         left = [problem.chi_square(values, found.model.forms, trial) for trial in trials]
@@ -92,10 +92,10 @@ def diverging_held_out(
     if not held_out or explained(held_out):
         return ()
     failing = [t for t in held_out if not explained((t,))]
-    if not failing or len(failing) > most or contacts is None:
+    if not failing or len(failing) > most:
         return None
     for trial in failing:
-        until = contacts.follows(values, found.model.forms, trial)
+        until = problem.follows(values, found.model.forms, trial)
         if until is None or until < share * float(np.max(problem.samples(trial).time)):
             return None
     rest = tuple(trial for trial in held_out if trial not in failing)
@@ -122,7 +122,7 @@ def _refitted(found: Fit, trials: tuple[str, ...]) -> Fit:
     contacts = model.problem.contacts
     if not model.forms or contacts is None:
         return by_beginnings(fit(model))
-    (values,) = contacts.refine([(model.forms, found.values)], trials, apart=model.scatter)
+    (values,) = contacts.refine([model], [found.values])
     return fit(model, values)
 
 
@@ -131,7 +131,7 @@ def divergence_finding(
 ) -> Finding | None:
     """The finding of a trial that follows the model up to a moment only; None where it does not even that."""
     problem = found.model.problem
-    until = problem.contacts.follows(values, found.model.forms, trial) if problem.contacts is not None else None
+    until = problem.follows(values, found.model.forms, trial)
     if until is None:
         return None
     end = float(np.max(problem.samples(trial).time))

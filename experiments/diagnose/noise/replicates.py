@@ -155,7 +155,7 @@ def with_scatter(model: Model, values: Values) -> Fit:
         return found
     stated = {p.name: p.value for p in model.problem.base}
     begun = {p.name: values[p.name] for form in model.forms for p in form.parameters}
-    other = fit(model, contacts.guess(model.forms, model.trials, {**stated, **begun}, apart=model.scatter))
+    other = fit(model, contacts.guess(model, {**stated, **begun}))
     return scanned(min(found, other, key=lambda one: one.objective))
 
 

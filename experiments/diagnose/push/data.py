@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,12 @@ from .drive import Holds, Weights
 
 __all__ = ["Prepared", "prepare"]
 
-_FEWEST = 12  # rows that a trial must have to say anything
-_AROUND = 20  # rows on either side of a gap that tell whether the clock has jumped
-_LONG = 0.02  # share of a recording from which on a stretch without rows is said
+_FEWEST = 12  # rows that a trial must have to be used
+_AROUND = 20  # rows on either side of a gap that show whether the clock has jumped
+_LONG = 0.02  # share of a recording from which on a stretch without rows is reported
 _SMOOTH, _ROUGH = 1.7, 3.0
 """Chi-square a row up to which a polynomial goes through both sides of a gap, and beyond which it does not."""
-_LOUDER = 1.2
+_NOISIER = 1.2
 """Power of a depth sensor's slow noise, over what is stated, from which on its pushes are smoothed once more."""
 _AS_TAKEN = 3.0  # standard errors within which what is left is what it was taken for
 _OF_MEDIAN = 1.8
@@ -50,12 +50,17 @@ class Prepared:
     has_depth: NDArray[np.bool_]
     has_other: NDArray[np.bool_]
     smooth: SmoothDepth | None = None  # of a driven trial
-    findings: tuple[Finding, ...] = field(default=())
 
     @property
     def driven(self) -> bool:
         """Whether its depth was prescribed."""
         return self.table.mode == "driven"
+
+    @property
+    def path(self) -> SmoothDepth:
+        """The smoothed depth of a driven trial."""
+        assert self.smooth is not None
+        return self.smooth
 
 
 def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
@@ -65,128 +70,112 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     """
     tables = campaign.tables
     assert isinstance(tables, PenetrationCampaign)
+    recordings = {table.id: campaign.recordings[table.id, "data"] for table in tables.trial}
     trials: list[Prepared] = []
     findings: list[Finding] = []
-    louder = _louder(campaign)
-    cuts = _cuts(campaign, tables)
+    noisier = _noisier(tables, recordings)
+    cuts = _cuts(tables, recordings)
     for table in tables.trial:
-        recording = campaign.recording(table.id, "data")
-        assert recording is not None
-        colour = louder if table.mode == "driven" else None
-        trial, found = _one(tables, table, recording, colour=colour, cut=cuts.get(table.id))
+        colour = noisier if table.mode == "driven" else None
+        trial, found = _one(tables, table, recordings[table.id], colour=colour, cut=cuts.get(table.id))
         findings += found
         if trial is not None:
             trials.append(trial)
     if not trials:
-        said = "; ".join(finding.what for finding in findings)
-        raise ValueError(f"no trial of {tables.name!r} can be used: {said}")
-    campaign = _without(campaign, cuts)
-    trials, colours = _recoloured(campaign, trials, louder)
+        reasons = "; ".join(finding.what for finding in findings)
+        raise ValueError(f"no trial of {tables.name!r} can be used: {reasons}")
+    for id, rows in cuts.items():  # gaps in the place of forces that are cut off
+        columns = {name: column.copy() for name, column in recordings[id].columns.items()}
+        columns["force_N"][rows] = np.nan
+        recordings[id] = replace(recordings[id], columns=columns)
+
+    def again(trial: Prepared, colours: Mapping[str, Colour], alike: Holds = ()) -> Prepared:
+        """The same, smoothed with what is known now."""
+        id = trial.info.id
+        return _one(tables, trial.table, recordings[id], alike=alike, colour=colours.get(id))[0] or trial
+
+    trials, colours = _recoloured(
+        trials, noisier, stds(tables, True)[0] if any(t.driven for t in trials) else 0.0, again
+    )
     if colours:
         findings.append(Finding(trial="", channel="depth", what=together(list(dict.fromkeys(colours.values())))))
-    trials = _alike(campaign, trials, colours)
+    trials = _alike(trials, colours, again)
     infos = parted([trial.info for trial in trials], {trial.info.id: _path(trial) for trial in trials})
     return [replace(trial, info=info) for trial, info in zip(trials, infos, strict=True)], findings
 
 
-def _cuts(campaign: Campaign, tables: PenetrationCampaign) -> dict[str, NDArray[np.int64]]:
+def _cuts(tables: PenetrationCampaign, recordings: Mapping[str, Recording]) -> dict[str, NDArray[np.int64]]:
     """Rows of each push at which the amplifier shows 0 for all that is less."""
-    forces = {
-        table.id: recording["force_N"] for table in tables.trial
-        if table.mode == "driven" and (recording := campaign.recording(table.id, "data")) is not None
-    }  # fmt: skip
-    if not forces:
-        return {}
-    rows = cut_rows(list(forces.values()), stds(tables, True)[1])
+    forces = {table.id: recordings[table.id]["force_N"] for table in tables.trial if table.mode == "driven"}
+    rows = cut_rows(list(forces.values()), stds(tables, True)[1]) if forces else []
     return {id: own for id, own in zip(forces, rows, strict=True) if len(own)}
 
 
-def _without(campaign: Campaign, cuts: Mapping[str, NDArray[np.int64]]) -> Campaign:
-    """The same with gaps in the place of forces that are cut off."""
-    recordings = dict(campaign.recordings)
-    for id, rows in cuts.items():
-        columns = {name: column.copy() for name, column in recordings[id, "data"].columns.items()}
-        columns["force_N"][rows] = np.nan
-        recordings[id, "data"] = replace(recordings[id, "data"], columns=columns)
-    return replace(campaign, recordings=recordings) if cuts else campaign
-
-
-def _louder(campaign: Campaign) -> Colour | None:
-    """How loud the depth sensor of the pushes is, where it is louder than stated; else None.
+def _noisier(tables: PenetrationCampaign, recordings: Mapping[str, Recording]) -> Colour | None:
+    """How noisy the depth sensor of the pushes is, where it is noisier than stated; else None.
 
     Third differences know nothing of a smooth motion: those of white noise s have the variance 20 s^2. A curve smoothed
-    at a noise that is too small would follow the noise, and what it leaves would tell too little of it. Of noise that
-    is correlated they tell less than there is: that is looked for in what is left (`_recoloured`).
+    at a noise that is too small would follow the noise, and what it leaves would show too little of it. Of noise that
+    is correlated they show less than there is: that is looked for in what is left (`_recoloured`).
     """
-    assert isinstance(campaign.tables, PenetrationCampaign)
     sizes, count = [], 0
-    for table in campaign.tables.trial:
-        recording = campaign.recording(table.id, "data") if table.mode == "driven" else None
-        depth = recording["depth_m"] if recording is not None else np.zeros(0)
+    for table in tables.trial:
+        depth = recordings[table.id]["depth_m"] if table.mode == "driven" else np.zeros(0)
         third = np.diff(depth[np.isfinite(depth)], 3)
         if len(third) >= _FEWEST:
             sizes.append(float(np.median(np.abs(third))) / (np.sqrt(20.0) * float(norm.ppf(0.75))))
             count += len(third)
-    std = stds(campaign.tables, True)[0] if sizes else 0.0
-    louder = float(np.median(sizes)) / std if std > 0 else 1.0
+    std = stds(tables, True)[0] if sizes else 0.0
+    noisier = float(np.median(sizes)) / std if std > 0 else 1.0
     chance = 3 * _OF_MEDIAN / np.sqrt(max(count, 1))
-    return Colour("depth", louder, 0.0) if louder**2 > _LOUDER and louder > 1 + chance else None
+    return Colour("depth", noisier, 0.0) if noisier**2 > _NOISIER and noisier > 1 + chance else None
 
 
 def _recoloured(
-    campaign: Campaign, trials: list[Prepared], louder: Colour | None
+    trials: list[Prepared], noisier: Colour | None, std: float, again: Callable[..., Prepared]
 ) -> tuple[list[Prepared], dict[str, Colour]]:
     """Smoothed once more where the noise of the depths is not as it was taken, and its colour by trial.
 
     One sensor reads all pushes; rows at another rate are as long apart as they are, so that each rate has its own.
-    `louder`: what the noise was taken for; None: as stated.
+    `noisier`: what the noise was taken for; None: as stated. `std`: of the depth as stated [m]. `again`: smooths a
+    trial with the colours that are known.
     """
-    assert isinstance(campaign.tables, PenetrationCampaign)
-    std = stds(campaign.tables, True)[0] if any(trial.smooth is not None for trial in trials) else 0.0
     rates: dict[int, list[Prepared]] = {}
     for trial in trials if std > 0 else ():
-        if trial.smooth is not None:
+        if trial.driven:
             rates.setdefault(round(5 * float(np.log(np.median(np.diff(trial.time))))), []).append(trial)
     colours: dict[str, Colour] = {}
     anew: set[str] = set()
     for alike in rates.values():
-        left = [(trial.depth - trial.smooth.depth) / std for trial in alike if trial.smooth is not None]
+        left = [(trial.depth - trial.path.depth) / std for trial in alike]
         colour = colour_of("depth", left)
         slow = float(colour.power(np.zeros(1))[0]) if colour is not None else 1.0
-        if colour is not None and louder is not None and 1 / _LOUDER < slow / louder.std**2 < _LOUDER:
-            colour = louder  # as it was taken
-        elif colour is not None and slow > _LOUDER:
+        if colour is not None and noisier is not None and 1 / _NOISIER < slow / noisier.std**2 < _NOISIER:
+            colour = noisier  # as it was taken
+        elif colour is not None and slow > _NOISIER:
             anew |= {trial.info.id for trial in alike}
         else:
-            colour = louder
+            colour = noisier
         if colour is not None:
             colours |= {trial.info.id: colour for trial in alike}
-    found = {t.info.id: _again(campaign, t, colours) if t.info.id in anew else t for t in trials}
+    found = {t.info.id: again(t, colours) if t.info.id in anew else t for t in trials}
     for rate, alike in rates.items():
         if any(trial.info.id in colours for trial in alike) or not colours:
             continue
-        # Few rows tell little of it, least of all where a curve has followed the noise: then as at the rate next to
+        # Few rows show little of it, least of all where a curve has followed the noise: then as at the rate next to
         # it, unless what is left is not that.
         near = min((r for r in rates if rates[r][0].info.id in colours), key=lambda r: abs(r - rate))
-        said = colours[rates[near][0].info.id]
-        own = [_again(campaign, trial, {trial.info.id: said}) for trial in alike]
-        left = [(trial.depth - trial.smooth.depth) / std / said.std for trial in own if trial.smooth is not None]
-        rows = np.concatenate([Weights(np.ones(len(one)), said.persistence)(one) for one in left])
+        known = colours[rates[near][0].info.id]
+        own = [again(trial, {trial.info.id: known}) for trial in alike]
+        left = [(trial.depth - trial.path.depth) / std / known.std for trial in own]
+        rows = np.concatenate([Weights(np.ones(len(one)), known.persistence)(one) for one in left])
         if abs(float((rows**2).mean()) - 1) < _AS_TAKEN * np.sqrt(2 / len(rows)):
-            colours |= {trial.info.id: said for trial in alike}
+            colours |= {trial.info.id: known for trial in alike}
             found |= {trial.info.id: trial for trial in own}
     return [found[trial.info.id] for trial in trials], colours
 
 
-def _again(campaign: Campaign, trial: Prepared, colours: Mapping[str, Colour], alike: Holds = ()) -> Prepared:
-    """The same, smoothed with what is known now."""
-    recording = campaign.recording(trial.info.id, "data")
-    assert recording is not None and isinstance(campaign.tables, PenetrationCampaign)
-    found, _ = _one(campaign.tables, trial.table, recording, alike=alike, colour=colours.get(trial.info.id))
-    return found or trial
-
-
-def _alike(campaign: Campaign, trials: list[Prepared], colours: Mapping[str, Colour]) -> list[Prepared]:
+def _alike(trials: list[Prepared], colours: Mapping[str, Colour], again: Callable[..., Prepared]) -> list[Prepared]:
     """Smoothed once more where the holds of a push are not those of most: one machine makes all of them."""
     holds = Counter(trial.smooth.holds for trial in trials if trial.smooth is not None and trial.smooth.holds)
     if not holds:
@@ -194,12 +183,7 @@ def _alike(campaign: Campaign, trials: list[Prepared], colours: Mapping[str, Col
     usual, count = holds.most_common(1)[0]
     if count < 2:
         return trials
-    found = []
-    for trial in trials:
-        if trial.smooth is not None and trial.smooth.holds and trial.smooth.holds != usual:
-            trial = _again(campaign, trial, colours, usual)
-        found.append(trial)
-    return found
+    return [again(t, colours, usual) if t.smooth and t.smooth.holds not in ((), usual) else t for t in trials]
 
 
 def _path(trial: Prepared) -> tuple[float, ...]:
@@ -233,11 +217,11 @@ def _one(
     driven = table.mode == "driven"
     channel, key = ("force", "force_N") if driven else ("accel", "accel_m_s2")
     std_depth, std_other = stds(tables, driven)
-    loud = max(colour.std, 1.0) if colour is not None else 1.0
+    factor = max(colour.std, 1.0) if colour is not None else 1.0
     findings: list[Finding] = []
     time, depth, other = recording.time.copy(), recording["depth_m"].copy(), recording[key].copy()
 
-    def say(what: str, *, where: str | None = None, rows: NDArray[np.int64] | None = None) -> None:
+    def report(what: str, *, where: str | None = None, rows: NDArray[np.int64] | None = None) -> None:
         span = (float(time[rows[0]]), float(time[rows[-1]])) if rows is not None and len(rows) else (None, None)
         findings.append(Finding(trial=table.id, what=f"trial {table.id}: {what}", channel=where, from_s=span[0],
                                 to_s=span[1], set_aside=rows is not None))  # fmt: skip
@@ -245,25 +229,25 @@ def _one(
     blind = np.isin(np.arange(len(time)), cut) if cut is not None else np.zeros(len(time), dtype=bool)
     keep = np.concatenate([[True], np.diff(time) > 0])  # a coarse clock repeats itself: the first reading rules
     if not keep.all():
-        say(f"{int((~keep).sum())} rows repeat the time before them and are left out")
+        report(f"{int((~keep).sum())} rows repeat the time before them and are left out")
         time, depth, other, blind = time[keep], depth[keep], other[keep], blind[keep]
     for name, values in (("depth", depth), (channel, other)):
         missing = int(np.isnan(values).sum())
         if missing == len(values):
-            say(f"not one of {missing} readings of {name} is a number")
+            report(f"not one of {missing} readings of {name} is a number")
         elif missing > 0.02 * len(values):
-            say(f"{missing} of {len(values)} readings of {name} are gaps; the rest is used")
-    jump = _clock_jump(time, depth, loud * std_depth) or (None if driven else _clock_jump(time, other, std_other))
+            report(f"{missing} of {len(values)} readings of {name} are gaps; the rest is used")
+    jump = _clock_jump(time, depth, factor * std_depth) or (None if driven else _clock_jump(time, other, std_other))
     if jump is not None:
         rows = np.arange(jump, len(time))
-        say(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the motion goes on as if it had not; all "
+        report(f"the clock jumps by {time[jump] - time[jump - 1]:.3g} s where the motion goes on as if it had not; all "
             f"that follows is set aside", rows=rows)  # fmt: skip
         time, depth, other, blind = time[:jump], depth[:jump], other[:jump], blind[:jump]
     if blind.any():
-        say(f"{int(blind.sum())} readings of force are cut off at 0 or next to it: it reads exactly 0 and never less, "
-            f"which its noise would, so that it shows nothing that pulls (adhesion would be hidden): an amplifier for "
-            f"both signs is needed, or another zero; they are left out", where="force",
-            rows=np.flatnonzero(blind))  # fmt: skip
+        report(f"{int(blind.sum())} readings of force are cut off at 0 or next to it: it reads exactly 0 and never "
+               f"less, which its noise would, so that it shows nothing that pulls (adhesion would be hidden): an "
+               f"amplifier for both signs is needed, or another zero; they are left out", where="force",
+               rows=np.flatnonzero(blind))  # fmt: skip
         findings[-1] = replace(findings[-1], doubt=True)
         other[blind] = np.nan
     steps = np.diff(time)
@@ -274,27 +258,27 @@ def _one(
             what=f"trial {table.id}: there is no row from {time[k]:.4g} to {time[k + 1]:.4g} s, where one every "
             f"{usual:.3g} s is usual: kept as a gap",
         ))  # fmt: skip
-    _drop_odd(table, "depth", depth, loud * std_depth, say)
-    _drop_odd(table, channel, other, std_other, say)
-    _drop_jumps(time, depth, loud * std_depth, say)
+    _drop_odd(table, "depth", depth, factor * std_depth, report)
+    _drop_odd(table, channel, other, std_other, report)
+    _drop_jumps(time, depth, factor * std_depth, report)
     if driven:
         held = _held(other)
         if held is not None:
-            say(f"the force is held: {int((~held).sum())} of {len(other)} readings repeat the one before; only fresh "
-                f"ones are used", where="force")  # fmt: skip
+            report(f"the force is held: {int((~held).sum())} of {len(other)} readings repeat the one before; only "
+                   f"fresh ones are used", where="force")  # fmt: skip
             other[~held] = np.nan
         return _driven(tables, table, time, depth, other, std_depth, findings, alike, colour)
     has_depth, has_other = np.isfinite(depth), np.isfinite(other)
     has_other &= np.abs(time) > 1e-9  # the force jumps at the touch: neither side is wrong
     if has_depth.sum() + has_other.sum() < _FEWEST:
-        say("too few readings are left: it is set aside", rows=np.arange(0))
+        report("too few readings are left: it is set aside", rows=np.arange(0))
         return None, findings
     info = _info(tables, table, abs(float(table.speed or 0.0)))
     return Prepared(table, info, tables.diameter_of(table), time, depth, other, has_depth, has_other), findings
 
 
-def _drop_odd(table: PenetrationTrial, name: str, values: Array, std: float, say: Callable[..., None]) -> None:
-    """Put NaN in the place of readings that stand alone, clip or are stuck, and say so."""
+def _drop_odd(table: PenetrationTrial, name: str, values: Array, std: float, report: Callable[..., None]) -> None:
+    """Put NaN in the place of readings that stand alone, clip or are stuck, and report it."""
     # A depth cannot jump; a force can, where a tip touches for a moment, but not beyond all that it is elsewhere.
     known = values[np.isfinite(values)]
     range_ = float(np.ptp(np.percentile(known, [0.5, 99.5]))) if name != "depth" and len(known) else 0.0
@@ -302,23 +286,23 @@ def _drop_odd(table: PenetrationTrial, name: str, values: Array, std: float, say
     if len(lone):
         several = f"{len(lone)} readings of {name} lie far from their neighbours and are set aside"
         one = f"one reading of {name} lies far from its neighbours and is set aside"
-        say(several if len(lone) > 1 else one, where=name, rows=lone)
+        report(several if len(lone) > 1 else one, where=name, rows=lone)
         values[lone] = np.nan
     if table.mode == "driven" and name == "depth":
         return  # a machine may stop at its end, or stand still
     for end in clipped(values):
         if name == "accel" and abs(end.value - table.gravity) < 1e-3 * table.gravity:
             continue  # free flight
-        say(f"{len(end.rows)} readings of {name} {end.words}", where=name, rows=end.rows)
+        report(f"{len(end.rows)} readings of {name} {end.words}", where=name, rows=end.rows)
         values[end.rows] = np.nan
     stuck = stuck_rows(values)
     if len(stuck):
-        say(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "
+        report(f"{len(stuck)} readings of {name} repeat the one before where it never does otherwise: the sensor is "
             f"stuck, they are set aside", where=name, rows=stuck)  # fmt: skip
         values[stuck] = np.nan
 
 
-def _drop_jumps(time: Array, depth: Array, std: float, say: Callable[..., None]) -> None:
+def _drop_jumps(time: Array, depth: Array, std: float, report: Callable[..., None]) -> None:
     """The same of depths from a jump on to where it is taken back."""
     step = _step(time, depth, std)
     while step is not None:
@@ -329,7 +313,7 @@ def _drop_jumps(time: Array, depth: Array, std: float, say: Callable[..., None])
         rows = np.arange(step, len(depth) if back is None else back)
         stays = "stays there, as where a marker is lost; it is set aside from there on"
         comes = f"comes back {len(rows)} rows later, as where a marker is lost for a while; these are set aside"
-        say(f"the depth jumps by {1e3 * size:.3g} mm between two readings and {stays if back is None else comes}",
+        report(f"the depth jumps by {1e3 * size:.3g} mm between two readings and {stays if back is None else comes}",
             where="depth", rows=rows)  # fmt: skip
         depth[rows] = np.nan
         step = None if back is None else _step(time, depth, std, after=back)
@@ -344,9 +328,9 @@ def _driven(
         what = f"trial {table.id}: fewer than {_FEWEST} rows hold both depth and force: it is set aside"
         findings.append(Finding(trial=table.id, what=what, set_aside=True))
         return None, findings
-    louder, persistence = (max(colour.std, 1.0), colour.persistence) if colour is not None else (1.0, 0.0)
-    smooth = smooth_depth(time[known], depth[known], louder * std, alike=alike, persistence=persistence)
-    smooth = replace(smooth, inflation=louder * float(np.sqrt((1 + persistence) / (1 - persistence))))
+    noisier, persistence = (max(colour.std, 1.0), colour.persistence) if colour is not None else (1.0, 0.0)
+    smooth = smooth_depth(time[known], depth[known], noisier * std, alike=alike, persistence=persistence)
+    smooth = replace(smooth, inflation=noisier * float(np.sqrt((1 + persistence) / (1 - persistence))))
     speed = float(table.speed) if table.speed else float(np.percentile(np.abs(smooth.speed), 80))
     time, depth, other = time[known], depth[known], other[known]
     return Prepared(
@@ -410,7 +394,7 @@ def _clock_jump(time: Array, values: Array, std: float) -> int | None:
 
     One polynomial is laid through the rows on both sides of a gap, once with the times as they stand and once with the
     gap closed, of the lowest degree up to 3 that fits the second: where the clock jumped, it does not fit the first.
-    A few rows tell that of a fast motion, as many as the gap is long of a slow one.
+    A few rows show that of a fast motion, as many as the gap is long of a slow one.
     """
     known = np.flatnonzero(np.isfinite(values))
     t, v = time[known], values[known]

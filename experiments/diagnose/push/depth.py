@@ -24,7 +24,7 @@ _ROUND = (0.008, 0.02, 0.032, 0.05)  # of the record, about a kink
 _KINKED_INTERVALS = 2  # finer splines need no kinks, and the search is dear
 _KINK_GRID = 160
 _APART = 3.0
-"""Rows between two kinks: of a speed that lasts less they tell nothing, and a row that is far off would make one."""
+"""Rows between two kinks: of a speed that lasts less they show nothing, and a row that is far off would make one."""
 _DRIVEN = 24  # rows from which on levels and ramps are looked for
 _FINER = (1, 3)  # times as many intervals of bends, tried in turn
 _SHOWN = 3.0  # nats by which finer bends must be likelier
@@ -41,7 +41,7 @@ class SmoothDepth:
     speed_error: Array  # of the slope's, the same numbers [m/s], shape [n, p]
     holds: Holds = ()  # which of its levels of speed are 0; () where it is no motion of levels
     inflation: float = 1.0
-    """By how much its standard error is larger than with white noise as loud as stated, which the gap is taken with."""
+    """By how much its standard error is larger than with white noise of the stated size, as the gap has it."""
 
     @property
     def depth_std(self) -> Array:

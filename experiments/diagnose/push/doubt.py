@@ -11,7 +11,7 @@ from .depth import SmoothDepth
 
 __all__ = ["off_rest", "off_surface", "path_error", "reversing", "touching", "turning"]
 
-_BESIDE = 5  # rows before and after a turn that tell the force there
+_BESIDE = 5  # rows before and after a turn that show the force there
 _AT_TURN = 6
 """Rows that a turn may last; where a spike is slow for longer it is held, or eased, and its direction is what it is."""
 
@@ -19,40 +19,36 @@ _AT_TURN = 6
 def path_error(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:
     """What the error of a smoothed depth makes of the force [N], shape [n, error_count].
 
-    A force on the way back goes with two depths, where the spike is and how deep it has been, whose errors are not one:
-    a crater that is steep on the way out sees their difference.
+    A force on the way back depends on two depths, where the spike is and how deep it has been, whose errors are not
+    one: a crater that is steep on the way out sees their difference.
     """
-    deepest = np.maximum.accumulate(np.where(smooth.depth >= np.maximum.accumulate(smooth.depth),
-                                             np.arange(len(smooth.depth)), 0))  # fmt: skip
+    so_far = np.maximum.accumulate(smooth.depth)
+    deepest = np.maximum.accumulate(np.where(smooth.depth >= so_far, np.arange(len(so_far)), 0))
     far = (by_depth - by_row)[:, None] * smooth.depth_error[deepest]
     return by_row[:, None] * smooth.depth_error + far
 
 
 def touching(trial: Prepared) -> NDArray[np.bool_]:
     """Rows of a driven trial that may lie on either side of the surface."""
-    assert trial.smooth is not None
-    return np.abs(trial.smooth.depth) < off_surface(trial)
+    return np.abs(trial.path.depth) < off_surface(trial)
 
 
 def off_surface(trial: Prepared) -> Array:
     """How far from the surface [m] a row may be and yet lie on its other side: the depth's error, and the way of one
     row, since depth and force are not read at one and the same instant."""
-    assert trial.smooth is not None
-    smooth = trial.smooth
+    smooth = trial.path
     return 3 * smooth.depth_std + np.abs(smooth.speed) * np.gradient(trial.time)
 
 
 def off_rest(trial: Prepared) -> Array:
     """How far from rest [m/s] a row may be and yet move the other way: the speed's error, and what it changes by within
     a row."""
-    assert trial.smooth is not None
-    return 3 * trial.smooth.speed_std + np.abs(np.gradient(trial.smooth.speed))
+    return 3 * trial.path.speed_std + np.abs(np.gradient(trial.path.speed))
 
 
 def reversing(trial: Prepared) -> NDArray[np.bool_]:
     """The few rows at which a driven spike may already come back or still go on; none of those where it is held."""
-    assert trial.smooth is not None
-    speed, off = trial.smooth.speed, off_rest(trial)
+    speed, off = trial.path.speed, off_rest(trial)
     found = np.zeros(len(speed), dtype=bool)
     for low, high in spells(np.abs(speed) < off):
         low, high = max(0, low - 1), min(len(speed) - 1, high)
@@ -66,7 +62,7 @@ def reversing(trial: Prepared) -> NDArray[np.bool_]:
 def turning(speed: Array, std: Array, force: Array, noise: float) -> Array:
     """How far the force is in doubt where the direction of motion is: by its jump from before to after [N].
 
-    Dry friction changes sign where a spike turns; the smoothed depth tells when to within some rows only.
+    Dry friction changes sign where a spike turns; the smoothed depth shows when to within some rows only.
     """
     doubt = np.zeros(len(speed))
     for low, high in spells(np.abs(speed) < 3 * std):

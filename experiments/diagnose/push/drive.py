@@ -1,4 +1,4 @@
-"""The motion of a drive: levels of constant speed joined by ramps, at times that the depth column tells.
+"""The motion of a drive: levels of constant speed joined by ramps, at times that the depth column shows.
 
 A machine that pushes a spike moves at a speed, holds, and comes back; between two speeds it takes some time, during
 which the speed changes in proportion to time or as a raised cosine. Depth is then z0 + sum of L_k (time at level k),
@@ -69,7 +69,7 @@ class Drive:
 
     @property
     def count(self) -> float:
-        """Numbers that were chosen from the data; a width, which the few rows of its ramp tell, for half a one."""
+        """Numbers that were chosen from the data; a width, which only the few rows of its ramp show, for half a one."""
         ramps = len(self.middles)
         return 1 + len(self.levels) - sum(self.resting) + ramps + 0.5 * (min(ramps, 1) if self.even else ramps)
 

@@ -9,8 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from experiments.diagnose.fit.forms import plain_form
-from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.forms import OwnEffect, plain_form
 from experiments.diagnose.fit.problem import Form
 from rigid.terms import CANDIDATES
 from rigid.terms.candidate import Number, Push

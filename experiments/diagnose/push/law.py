@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.forms import OwnEffect
 from rigid.batch.runtime import ensure
 from rigid.model.model import for_taichi
-from rigid.terms import CANDIDATES, STATE_FIELDS, Term
+from rigid.terms import CANDIDATES, FIXED_ARGUMENTS, STATE_FIELDS, Term
 from rigid.terms.candidate import Push
 
 __all__ = ["PHASES", "SLOTS", "fall", "push", "slot_places", "slot_table"]
@@ -70,7 +70,7 @@ _STEP = 5e-4
 `fall` takes shorter ones where a lane is stiffer."""
 
 _SETTLED = 1e-3
-"""Speed [m/s] at which a spike that comes back to a surface that bears it stays there: it would hop by 5e-8 m."""
+"""Speed [m/s] at which a spike that comes back to a surface that supports it stays there: it would hop by 5e-8 m."""
 
 
 def slot_places(own: Sequence[OwnEffect] = ()) -> dict[str, int]:
@@ -137,7 +137,7 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
 
 
 _Own = tuple[tuple[Term, Push | None], ...]
-"""Effects from files: the term, and what its file says of the law of a push in the place of the term's hooks."""
+"""Effects from files: the term, and the law of a push that its file declares in the place of the term's hooks."""
 
 
 def _compiled(lines: Mapping[str, Sequence[str]], hooks: Mapping[str, Callable[..., Any]], name: str) -> list[Any]:
@@ -152,23 +152,36 @@ def _compiled(lines: Mapping[str, Sequence[str]], hooks: Mapping[str, Callable[.
     return [ti.func(names[head.partition("(")[0]]) for head in lines]
 
 
+_TERM_LINES: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "stiffen": ("own_spring", ("force, work = {}(z, force, 0.0{})",)),
+    "rate_force": ("own_force", ("total = total + {}(s, z, v{})",)),
+    "hold": ("own_force", ("pull, held = {}(s, z, most{})", "total = total - pull")),
+}
+"""Hooks of a term that a file has in the place of a law: in which function they are called, and how."""
+
+
 def _changes(own: _Own) -> list[Any]:
-    """What the effects make of the loading curve, of where it is read on the way back, of the damper and the force."""
-    parts = [(effect, _SLOT) for effect in _LIBRARY]
-    at = len(SLOTS)
+    """What the effects make of the loading curve, of where it is read on the way back, of the damper and the force;
+    what the terms of effects from files make of the spring's force, and the force that they add."""
+    at, parts = len(SLOTS), [(effect.law, _SLOT) for effect in _LIBRARY]
     for term, law in own:
-        slots = [p.name for p in term.parameters] if law is None else _slots_of(law)
-        if law is not None:
-            parts.append((law, {slot: at + place for place, slot in enumerate(slots)}))
-        at += len(slots)
+        names = tuple(p.name for p in term.parameters) if law is None else _slots_of(law)
+        functions = term.hooks if law is None else law.law
+        parts.append((functions, {name: at + place for place, name in enumerate(names)}))
+        at += len(names)
     hooks: dict[str, Callable[..., Any]] = {}
-    calls: dict[str, list[str]] = {hook: [] for hook in _VALUES}
-    for place, (effect, columns) in enumerate(parts):
-        for hook, function in effect.law.items():
-            asked = inspect.signature(function).parameters
-            told = ", ".join(name if name in _VALUES[hook] else f"n[k, {columns[name]}]" for name in asked)
-            hooks[f"{hook}_{place}"] = function
-            calls[hook].append(f"{hook}_{place}({told})")
+    calls: dict[str, list[str]] = {name: [] for name in (*_VALUES, "own_spring", "own_force")}
+    for place, (functions, columns) in enumerate(parts):
+        for hook, function in functions.items():
+            called, asked = f"{hook}_{place}", list(inspect.signature(function).parameters)
+            hooks[called] = function
+            if hook in _TERM_LINES:
+                where, lines = _TERM_LINES[hook]
+                numbers = "".join(f", n[k, {columns[name]}]" for name in asked[len(FIXED_ARGUMENTS[hook]) :])
+                calls[where] += [line.format(called, numbers) for line in lines]
+            else:
+                arguments = (name if name in _VALUES[hook] else f"n[k, {columns[name]}]" for name in asked)
+                calls[hook].append(f"{called}({', '.join(arguments)})")
     n = "n: ti.template(), k"
     return _compiled({
         f"loading_changed(before, depth, x, {n})":
@@ -181,33 +194,9 @@ def _changes(own: _Own) -> list[Any]:
         f"force_changed(before, {', '.join(_HERE)}, {n})":
             ["total = before", *(f"total = total + {call}" for call in calls["force"]),
              *(f"total = total - {call}" for call in calls["pull"]), "return total"],
+        f"own_spring(s, z, spring, {n})": ["force = spring", *calls["own_spring"], "return force"],
+        f"own_force(s, z, v, most, {n})": ["total = 0.0", *calls["own_force"], "return total"],
     }, hooks, "of the library" + "".join(f"+{term.id}" for term, _ in own))  # fmt: skip
-
-
-def _own_changes(own: _Own) -> list[Any]:
-    """What the terms of effects from files make of the spring's force, and the force that they add."""
-    hooks: dict[str, Callable[..., Any]] = {}
-    spring, force = ["force = spring"], ["total = 0.0"]
-    at = len(SLOTS)
-    for place, (term, law) in enumerate(own):
-        if law is not None:
-            at += len(_slots_of(law))
-            continue
-        column = {p.name: f"n[k, {at + number}]" for number, p in enumerate(term.parameters)}
-        at += len(term.parameters)
-        for hook, function in term.hooks.items():
-            hooks[f"{hook}_{place}"] = function
-            told = "".join(f", {column[argument]}" for argument in term.arguments(hook))
-            if hook == "stiffen":
-                spring.append(f"force, work = stiffen_{place}(z, force, 0.0{told})")
-            elif hook == "rate_force":
-                force.append(f"total = total + rate_force_{place}(s, z, v{told})")
-            else:
-                force += [f"pull, held = hold_{place}(s, z, most{told})", "total = total - pull"]
-    return _compiled({
-        "own_spring(s, z, spring, n: ti.template(), k)": [*spring, "return force"],
-        "own_force(s, z, v, most, n: ti.template(), k)": [*force, "return total"],
-    }, hooks, "+".join(term.id for term, _ in own) or "none")  # fmt: skip
 
 
 def _functions(own: _Own) -> tuple[Any, Any]:
@@ -215,8 +204,7 @@ def _functions(own: _Own) -> tuple[Any, Any]:
     import taichi as ti
 
     State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
-    loading_changed, unload_changed, damper_changed, force_changed = _changes(own)
-    own_spring, own_force = _own_changes(own)
+    loading_changed, unload_changed, damper_changed, force_changed, own_spring, own_force = _changes(own)
     OWN = any(law is None for _, law in own)
     MASS, GRAVITY, STIFFNESS, DAMPING = (_SLOT[name] for name in ("mass", "gravity", "stiffness", "damping"))
     REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
@@ -350,7 +338,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                                     inside, top = 0, 0.0
                                 else:
                                     inside, way = 1, 1.0
-                                    # On what bears it at the surface it would hop for ever, ever less.
+                                    # On what supports it at the surface it would hop for ever, ever less.
                                     bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, numbers, k)
                                     if v < SETTLED and bears > m * g:
                                         v, resting = 0.0, 1

@@ -14,7 +14,7 @@ from .forms import Scales
 __all__ = ["base_parameters", "comes_back", "diameters_of", "find_scales", "named", "scatter_parameters", "speeds_of"]
 
 _ZERO_DEPTH = 0.1  # how far a depth's zero may differ between pushes while it is asked whether it does, over D
-_LEAST_ZERO = 0.2  # zeros that differ by less than this share of the noise say nothing
+_LEAST_ZERO = 0.2  # zeros that differ by less than this share of the noise are negligible
 _BED_STD = 0.5  # how far the bed may differ between replicates while it is asked whether it does [1]
 
 
@@ -61,23 +61,25 @@ def scatter_parameters(
     A factor on K and C, and one on C alone; of pushes where the depth is counted from, and what the force reads
     at none.
     """
-    found = {kind: tuple(
-        Parameter(name=f"{kind}[{id}]", unit="1", value=0.0, std=_BED_STD, scale=0.02, lowest=-0.95, highest=5.0,
-                  trial=id, kind=kind, step=1e-4)
-        for id in (trial.info.id for trial in trials)
-    ) for kind in ("bed", "bed damping")}  # fmt: skip
-    pushes = [trial.info.id for trial in trials if trial.driven]
+    ids, pushes = ([t.info.id for t in trials if t.driven or not driven] for driven in (False, True))
+    found = {
+        kind: Parameter(
+            name=kind, unit="1", value=0.0, std=_BED_STD, scale=0.02, lowest=-0.95, highest=5.0, step=1e-4
+        ).in_each(ids)
+        for kind in ("bed", "bed damping")
+    }
     if not pushes:
         return found
     far = _ZERO_DEPTH * scales.depth
-    noises = dict(zip(("depth zero", "force zero"), stds(tables, True), strict=True))
-    ends = {"depth zero": far, "force zero": far * scales.force / scales.depth}
-    return found | {kind: tuple(
-        Parameter(name=f"{kind}[{id}]", unit=unit, value=0.0, std=ends[kind], scale=0.1 * max(ends[kind], 1e-12),
-                  lowest=-2 * ends[kind], highest=2 * ends[kind], trial=id, kind=kind, step=1e-3 * ends[kind],
-                  least=_LEAST_ZERO * noises[kind])
-        for id in pushes
-    ) for kind, unit in (("depth zero", "m"), ("force zero", "N"))}  # fmt: skip
+    force = far * scales.force / scales.depth
+    for kind, unit, end, noise in zip(
+        ("depth zero", "force zero"), ("m", "N"), (far, force), stds(tables, True), strict=True
+    ):
+        found[kind] = Parameter(
+            name=kind, unit=unit, value=0.0, std=end, scale=0.1 * max(end, 1e-12), lowest=-2 * end, highest=2 * end,
+            step=1e-3 * end, least=_LEAST_ZERO * noise,
+        ).in_each(pushes)  # fmt: skip
+    return found
 
 
 def _straight_stiffness(tables: PenetrationCampaign, trials: Sequence[Prepared], diameter: float) -> float:
@@ -86,9 +88,9 @@ def _straight_stiffness(tables: PenetrationCampaign, trials: Sequence[Prepared],
     A drop from speed v to depth z without loss: K z^2 / 2 = m v^2 / 2 + m g z.
     """
     driven = [trial for trial in trials if trial.driven and trial.diameter == diameter]
-    below = [(t, t.has_other & (t.smooth.depth > 0)) for t in driven if t.smooth is not None]
-    top = sum(float((t.smooth.depth * t.other)[rows].sum()) for t, rows in below if t.smooth is not None)
-    down = sum(float((t.smooth.depth**2)[rows].sum()) for t, rows in below if t.smooth is not None)
+    below = [(t, t.path.depth, t.has_other & (t.path.depth > 0)) for t in driven]
+    top = sum(float((depth * t.other)[rows].sum()) for t, depth, rows in below)
+    down = sum(float((depth**2)[rows].sum()) for _, depth, rows in below)
     if down > 0 and top > 0:
         return top / down
     found = []
@@ -116,9 +118,9 @@ def comes_back(trials: Sequence[Prepared]) -> bool:
     for trial in trials:
         if not trial.driven:
             return True
-        assert trial.smooth is not None
-        back = np.maximum.accumulate(trial.smooth.depth) - trial.smooth.depth
-        if back.max() > 0.02 * max(trial.smooth.depth.max(), 1e-12) + 5 * trial.smooth.depth_std.max():
+        depth = trial.path.depth
+        back = np.maximum.accumulate(depth) - depth
+        if back.max() > 0.02 * max(depth.max(), 1e-12) + 5 * trial.path.depth_std.max():
             return True
     return False
 

@@ -20,25 +20,16 @@ from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, PenetrationModel, write_model
 from experiments.diagnose.core.effect_texts import push_advice
-from experiments.diagnose.fit.forms import shapes_of
-from experiments.diagnose.fit.own import PENETRATION_HOOKS, OwnEffect
+from experiments.diagnose.fit.forms import PENETRATION_HOOKS, OwnEffect, shapes_of
+from experiments.diagnose.fit.localise import acceleration
 from experiments.diagnose.fit.problem import Array, Finding, Form, Problem, Samples, TrialInfo, Values
-from experiments.diagnose.fit.slopes import acceleration
 from experiments.diagnose.noise.jitter import Shaken
 
 from .data import Prepared, prepare, stds
 from .doubt import off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
-from .parameters import (
-    base_parameters,
-    comes_back,
-    diameters_of,
-    find_scales,
-    named,
-    scatter_parameters,
-    speeds_of,
-)  # fmt: skip
+from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, scatter_parameters, speeds_of
 from .remarks import Push, remarks
 from .zeros import find_force_zeros
 
@@ -165,8 +156,7 @@ class PenetrationProblem(Problem):
         numbers[:, _SLOT["shift_speed"]], numbers[:, _SLOT["shift_row"]] = shifts[1:]
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
-            depth = np.concatenate([trial.smooth.depth for trial in trials if trial.smooth is not None])
-            speed = np.concatenate([trial.smooth.speed for trial in trials if trial.smooth is not None])
+            depth, speed = (np.concatenate([getattr(t.path, name) for t in trials]) for name in ("depth", "speed"))
             out = push(numbers, lanes, starts, depth, speed, own)
             for place, trial in enumerate(trials):
                 zeros = np.array([values.get(f"force zero[{trial.info.id}]", 0.0) for values in points])
@@ -177,20 +167,16 @@ class PenetrationProblem(Problem):
             out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)
         return [out[p * count : (p + 1) * count, : len(trial.time)] for p, trial in enumerate(trials)]
 
-    def _models(self, points: Sequence[Values], forms: Sequence[Form], ids: Sequence[str]) -> dict[str, Array]:
-        found: dict[str, Array] = {}
-        for driven in (True, False):
-            chosen = [self._trials[id] for id in ids if self._trials[id].driven == driven]
-            if chosen:
-                for trial, out in zip(chosen, self._run(points, forms, chosen), strict=True):
-                    found[trial.info.id] = out
-        return found
-
     def evaluate(
         self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], share: float = 1.0
     ) -> list[dict[str, Array]]:
         """Whitened residuals, of all of their time."""
-        models = self._models(points, forms, trials)
+        models: dict[str, Array] = {}
+        for driven in (True, False):
+            chosen = [id for id in trials if self._trials[id].driven == driven]
+            if chosen:
+                out = self._run(points, forms, [self._trials[id] for id in chosen])
+                models |= dict(zip(chosen, out, strict=True))
         return [{id: self._residuals(self._trials[id], models[id][k]) for id in trials} for k in range(len(points))]
 
     def _residuals(self, trial: Prepared, model: Array) -> Array:
@@ -221,11 +207,7 @@ class PenetrationProblem(Problem):
         return found
 
     def shake(self, along: Mapping[str, Array]) -> None:
-        """Take times that jitter into the whitening from now on (of driven trials: from the next `rewhiten` on).
-
-        `along`: what one standard deviation of jitter changes in each sample, over its stated noise, by trial; {} for
-        times as they stand.
-        """
+        """See `Problem`; of driven trials from the next `rewhiten` on."""
         self._along = dict(along)
         self._shaken = {}
         for id, own in along.items():
@@ -237,12 +219,9 @@ class PenetrationProblem(Problem):
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """Take the error of the smoothed depth into the whitening, at these values."""
         driven = [trial for trial in self._trials.values() if trial.driven]
-        if not driven:
-            return
-        std_force = stds(self.tables, True)[1]
-        for trial, by_depth, by_row, by_speed in self._slopes(values, forms, driven):
-            assert trial.smooth is not None
-            smooth = trial.smooth
+        std_force = stds(self.tables, True)[1] if driven else 0.0
+        for trial, by_depth, by_row, by_speed in self._slopes(values, forms, driven) if driven else ():
+            smooth = trial.path
             factor = path_error(smooth, by_depth, by_row) + by_speed[:, None] * smooth.speed_error
             if self._zeros is not None:
                 factor = np.column_stack([factor, np.full(len(factor), self._zeros.std)])
@@ -251,8 +230,7 @@ class PenetrationProblem(Problem):
             jump = float(np.abs(by_speed).max() * np.abs(smooth.speed).max())
             # An effect may begin with a jump at the surface: as large as the force is measured to be just below it.
             depth_here = np.maximum(8 * smooth.depth_std, _SHALLOW * self._scales.depth)
-            shallow = (smooth.depth > 0) & (smooth.depth < depth_here)
-            shallow &= trial.has_other
+            shallow = (smooth.depth > 0) & (smooth.depth < depth_here) & trial.has_other
             below = float(np.median(np.abs(trial.other[shallow]))) if shallow.any() else 0.0
             start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
             touch = start * touching(trial)
@@ -286,11 +264,11 @@ class PenetrationProblem(Problem):
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
         """The sum of docs/diagnose.md; see `Problem`."""
         this = self._trials[trial]
-        if not this.driven:
-            missed = self._missed(this, self._run([values], forms, [this])[0][0])
-            return float(missed @ missed), len(missed)
-        force = self._run([values], forms, [this])[0][0]
-        rest = (this.other - force)[this.has_other] / self.gap_std(values, forms, trial)
+        model = self._run([values], forms, [this])[0][0]
+        if this.driven:
+            rest = (this.other - model)[this.has_other] / self.gap_std(values, forms, trial)
+        else:
+            rest = self._missed(this, model)
         return float(rest @ rest), len(rest)
 
     def sensor_std(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
@@ -301,19 +279,16 @@ class PenetrationProblem(Problem):
     def gap_std(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
         """Of each reading of a driven trial's force, as docs/diagnose.md has it for the gap [N], shape [n]."""
         this = self._trials[trial]
-        assert this.smooth is not None
         ((_, by_depth, by_row, _),) = self._slopes(values, forms, [this])
-        doubt = np.linalg.norm(path_error(this.smooth, by_depth, by_row), axis=1) / this.smooth.inflation
-        touch = touching(this)
-        if touch.any():  # the force begins with a jump: half of what it may be over what the depth leaves open
-            most = float(off_surface(this)[touch].max())
-            deep, shallow = (self._run([values], forms, [this], (shift, 0.0, 0.0))[0][0] for shift in (most, -most))
-            doubt = np.where(touch, np.maximum(doubt, 0.5 * np.abs(deep - shallow)), doubt)
-        turn = reversing(this)
-        if turn.any():  # and so it does where the direction of motion is another, which friction goes with
-            most = float(np.maximum(off_rest(this), np.abs(this.smooth.speed))[turn].max())
-            fast, slow = (self._run([values], forms, [this], (0.0, shift, 0.0))[0][0] for shift in (most, -most))
-            doubt = np.where(turn, np.maximum(doubt, 0.5 * np.abs(fast - slow)), doubt)
+        doubt = np.linalg.norm(path_error(this.path, by_depth, by_row), axis=1) / this.path.inflation
+        # The force jumps at the surface, and with friction where the motion turns: half of what the path leaves open.
+        turn = np.maximum(off_rest(this), np.abs(this.path.speed))
+        for rows, off, speed in ((touching(this), off_surface(this), 0.0), (reversing(this), turn, 1.0)):
+            if rows.any():
+                ways = [side * float(off[rows].max()) for side in (1, -1)]
+                shifts = [(way * (1 - speed), way * speed, 0.0) for way in ways]
+                up, down = (self._run([values], forms, [this], shift)[0][0] for shift in shifts)
+                doubt = np.where(rows, np.maximum(doubt, 0.5 * np.abs(up - down)), doubt)
         return np.hypot(stds(self.tables, True)[1], doubt[this.has_other])
 
     def samples(self, trial: str) -> Samples:
@@ -360,7 +335,7 @@ class PenetrationProblem(Problem):
         return found
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-        """The force [N] that the model lacks; of a drop m (g - a) over the model's, at the accelerometer's rows, or
+        """The force [N] that the model misses; of a drop m (g - a) over the model's, at the accelerometer's rows, or
         from its depth where it has none."""
         this = self._trials[trial]
         depth, speed, _, model = self._state(values, forms, trial)
@@ -390,7 +365,7 @@ class PenetrationProblem(Problem):
             for name, measured, rows, column in (
                 ("depth", this.depth, this.has_depth, 0), ("accel", this.other, this.has_other, 2),
             )
-            if rows.any()  # a sensor that this trial lacks is none of its channels
+            if rows.any()  # a sensor without readings here is none of its channels
         }  # fmt: skip
 
     def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
@@ -419,14 +394,14 @@ class PenetrationProblem(Problem):
         write_model(Path(path), model)
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> list[str]:
-        """Sentences on K, its spread, and whether C can be told, where it was not known beforehand; none with drops."""
+        """Sentences on K, its spread, and whether C can be determined, where it was not known; none with drops."""
         if self.tables.uncertainty.damping < 1 or not all(trial.driven for trial in self._trials.values()):
             return []
         still = {**values, **{named("damping", diameter, self._diameters): 0.0 for diameter in self._diameters}}
         pushes = [
             Push(trial.diameter, *(column[trial.has_other] for column in (
-                trial.smooth.depth, trial.smooth.speed, trial.other, self._run([still], forms, [trial])[0][0])))
-            for trial in self._trials.values() if trial.smooth is not None
+                trial.path.depth, trial.path.speed, trial.other, self._run([still], forms, [trial])[0][0])))
+            for trial in self._trials.values()
         ]  # fmt: skip
         return remarks(pushes, tuple(dict.fromkeys(form.effect for form in forms)))
 

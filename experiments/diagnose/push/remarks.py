@@ -1,4 +1,4 @@
-"""What an engineer also says of driven trials: K and its spread, how it goes with the diameter, if C can be told."""
+"""Remarks on driven trials: K and its spread, how it depends on the diameter, whether C can be determined."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ __all__ = ["Push", "remarks"]
 
 @dataclass(frozen=True)
 class Push:
-    """One driven trial: where it was, what it felt, and what the model without a damper says; shapes [n]."""
+    """One driven trial: where it was, what it felt, and what the model without a damper gives; shapes [n]."""
 
     diameter: float
     depth: Array
@@ -26,19 +26,19 @@ def remarks(pushes: Sequence[Push], added: Sequence[str]) -> list[str]:
     """Sentences. `added`: names of what the best model has beyond the base."""
     if not pushes:
         return []
-    said = _stiffness(pushes)
+    sentences = _stiffness(pushes)
     straight = [_two(push, lambda p: np.maximum(p.depth, 0.0)) for push in pushes]
     bent = [_two(push, lambda p: p.spring) for push in pushes] if added else []
     unsure = len({c > 0 for _, c, _ in straight + bent}) > 1 or any(abs(c) < 2 * s for _, c, s in straight + bent)
     if not unsure:
-        return said
-    said.append(
+        return sentences
+    sentences.append(
         "C cannot be told from these pushes: fitted to each alone beside a straight spring it is "
         + _range([c for _, c, _ in straight])
         + (f", and beside {' and '.join(added)} {_range([c for _, c, _ in bent])}" if bent else "")
         + ". A drop, or the same push at a tenth and at ten times the speed, would tell."
     )
-    return said
+    return sentences
 
 
 def _stiffness(pushes: Sequence[Push]) -> list[str]:
@@ -50,12 +50,12 @@ def _stiffness(pushes: Sequence[Push]) -> list[str]:
     for size, found in sorted(by_size.items()):
         spread = f" +- {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
         parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m at {1e3 * size:g} mm ({len(found)})")
-    said = [f"K of a straight spring, push by push (number of pushes): {', '.join(parts)}."]
+    sentences = [f"K of a straight spring, push by push (number of pushes): {', '.join(parts)}."]
     if len(by_size) > 2:
         sizes = np.log(sorted(by_size))
         means = np.log([max(float(np.mean(by_size[size])), 1e-300) for size in sorted(by_size)])
-        said.append(f"It goes with the diameter to the power {np.polyfit(sizes, means, 1)[0]:.2f}.")
-    return said
+        sentences.append(f"It goes with the diameter to the power {np.polyfit(sizes, means, 1)[0]:.2f}.")
+    return sentences
 
 
 def _two(push: Push, spring: Callable[[Push], Array]) -> tuple[float, float, float]:

@@ -2,7 +2,7 @@
 
 Rows above the surface are the one place where a force zero shows without any model of the bed. Where these means differ
 by more than their errors the zeros are a nuisance of each push with one common spread: it is marginalised in the
-likelihood (`PenetrationProblem.rewhiten`), where rows above the surface tell the most of it, and a push without such
+likelihood (`PenetrationProblem.rewhiten`), where rows above the surface determine most of it, and a push without such
 rows has it from the others.
 """
 
@@ -19,10 +19,10 @@ from .data import Prepared
 
 __all__ = ["ForceZeros", "find_force_zeros"]
 
-_FEWEST = 8  # rows above the surface that tell a zero
+_FEWEST = 8  # rows above the surface that determine a zero
 _CLEAR = 4.0  # standard errors of the smoothed depth by which such a row is above
 _SURE = 1e-4  # chance below which zeros differ
-_EDGE = 0.5  # pushes must be told to this share of all for their spread to be that of all of them
+_EDGE = 0.5  # this share of all pushes must be read for their spread to be that of all of them
 _WITHIN = 4.0  # spreads within which a zero is one of them
 
 
@@ -68,8 +68,7 @@ def find_force_zeros(trials: Sequence[Prepared], noise: float) -> ForceZeros | N
 
 def _before_touch(trial: Prepared) -> Array:
     """Forces read before the spike first comes near the surface [N]."""
-    smooth = trial.smooth
-    assert smooth is not None
+    smooth = trial.path
     near = smooth.depth > -_CLEAR * smooth.depth_std - np.abs(smooth.speed) * np.gradient(trial.time)
     first = int(np.argmax(near)) if near.any() else len(near)
     rows = trial.other[:first]

@@ -1,4 +1,4 @@
-"""Data that are wrong: found, said, and set aside before anything is fitted.
+"""Data that are wrong: found, reported, and set aside before anything is fitted.
 
 Looked at without a model: the marker of the camera that jumps for a while or for good (a step that no motion makes),
 a clock that jumps forward, long gaps. What needs the model (a trial at odds with its replicates) is the
@@ -22,15 +22,15 @@ __all__ = ["checked"]
 
 _FAR = 12.0  # stds of the sensor: white noise does not get there
 _SHARE = 0.5  # of a channel's rows; more of them are not set aside
-_NEAR = 8  # rows on either side that tell how much a row usually changes
+_NEAR = 8  # rows on either side that show how much a row usually changes
 _STEEP = 6.0  # times the usual change
 _AROUND = 8  # rows at least, on either side of a gap, from which a slope is taken
 _SPAN = 0.08  # s that they cover
 _SURE = 25.0  # squared standard deviations by which a clock that is right must be off
 _SENSORS = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro",), "the wheel": ("wheel",)}  # what is smooth
 _ALL = {"the camera": ("theta", "x", "y"), "the IMU": ("gyro", "ax", "ay"), "the wheel": ("wheel",)}
-_END = 0.1  # s by which a channel must be shorter than the others to be said
-_MOVED = 0.02  # s by which a clock must have jumped to be told from the motion on either side
+_END = 0.1  # s by which a channel must be shorter than the others to be reported
+_MOVED = 0.02  # s by which a clock must have jumped to be distinguished from the motion on either side
 _OFTEN = 4  # times that a marker may be lost before nothing is set aside where half of the rows would be
 
 
@@ -38,8 +38,8 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
     """The data without rows that cannot be, and what was found."""
     findings: list[Finding] = []
     trials = []
-    alone, said = spikes(data.trials)
-    findings += said
+    alone, found = spikes(data.trials)
+    findings += found
     for trial in data.trials:
         keep = np.ones(len(trial.time), dtype=bool)
         keep[alone.get(trial.id, [])] = False
@@ -67,11 +67,8 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
                 mine = np.delete(mine, stuck)
             if name in ("x", "y", "theta"):
                 _jumps(trial, name, mine, keep, findings)
-        lost = {name: trial.time[trial.of(name) & ~keep] for name in ("x", "y", "theta")}
-        together = np.unique(np.concatenate(list(lost.values())))
-        if len(together):  # a marker that is lost for one is lost for all three
-            camera = trial.of("x") | trial.of("y") | trial.of("theta")
-            keep &= ~(camera & np.isin(trial.time, together))
+        camera = trial.of("x") | trial.of("y") | trial.of("theta")  # a marker lost for one is lost for all three
+        keep &= ~(camera & np.isin(trial.time, trial.time[camera & ~keep]))
         kept = {field: getattr(trial, field)[keep] for field in ("time", "value", "std", "channel")}
         trials.append(trial if keep.all() else replace(trial, **kept))
     return replace(data, trials=tuple(trials)), findings
@@ -119,16 +116,16 @@ def _clocks(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) 
     right takes the value on by slope x gap; one that jumped, by slope x the usual step.
     """
     for sensor, names in _SENSORS.items():
-        told = [np.flatnonzero(trial.of(name)) for name in names if trial.of(name).sum() > 2 * _AROUND]
-        if not told:
+        smooth = [np.flatnonzero(trial.of(name)) for name in names if trial.of(name).sum() > 2 * _AROUND]
+        if not smooth:
             continue
-        clock = np.unique(trial.time[told[0]])
+        clock = np.unique(trial.time[smooth[0]])
         if len(clock) < 3:
             continue
         steps = np.diff(clock)
         usual = float(np.median(steps))
         for k in np.flatnonzero(steps > max(4 * usual, 2e-3)):
-            surprise = np.array([_surprise(trial, mine, clock[k], clock[k + 1], usual) for mine in told])
+            surprise = np.array([_surprise(trial, mine, clock[k], clock[k + 1], usual) for mine in smooth])
             good = np.isfinite(surprise).all(axis=1)
             right, jumped = surprise[good].sum(axis=0) if good.any() else (0.0, 0.0)
             if right < _SURE or jumped > 0.05 * right or jumped > 16.0 * good.sum():
@@ -142,7 +139,7 @@ def _clocks(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) 
 
 
 def _clocks_apart(trial: TrialData, keep: NDArray[np.bool_], findings: list[Finding]) -> None:
-    """The same for camera and IMU, told from one another: the angle is late against the gyro from a gap on."""
+    """The same for camera and IMU, compared with one another: the angle is late against the gyro from a gap on."""
     angle, rate = (np.flatnonzero(trial.of(name) & keep) for name in ("theta", "gyro"))
     if not len(angle) or not len(rate):
         return
@@ -183,7 +180,7 @@ def _surprise(
 ) -> tuple[float, float]:
     """Squared standard deviations by which the value after a gap is off, for a clock that is right and one that jumped.
 
-    NaN where the slopes on either side differ: then the gap tells nothing.
+    NaN where the slopes on either side differ: then the gap shows nothing.
     """
     time, value, std = trial.time[mine], trial.value[mine], float(trial.std[mine[0]])
     around = max(_AROUND, int(_SPAN / usual))

@@ -8,7 +8,7 @@ Nothing is averaged or resampled. Whitening divides by the std that campaign.tom
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 from experiments.campaign import Campaign, TumbleCampaign
 from experiments.diagnose.fit.problem import Array
 
-__all__ = ["CHANNELS", "TrialData", "TumbleData", "tumble_data"]
+__all__ = ["CHANNELS", "LOST", "ZERO_STD", "TrialData", "TumbleData", "thinned", "tumble_data", "whiten"]
 
 CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
 """Channels of a diagnosis, in the order of a trial's samples."""
+ZERO_STD = 3.0 / np.sqrt(3.0)
+"""Std of the camera's zero over the sensor's: it may be off by up to 3 of them, evenly (docs/diagnose.md)."""
+LOST = 1e3  # residual where the model cannot stand or run [1]
 
 _LATEST = 1e3  # seconds after the torque by which a trial must have begun: unix time would be simulated for years
 _FELT = ("ax", "ay")
@@ -117,3 +120,35 @@ def tumble_data(campaign: Campaign) -> TumbleData:
             time=time, value=value, std=std, channel=channel,
         ))  # fmt: skip
     return TumbleData(tables=tables, trials=tuple(trials))
+
+
+def thinned(data: TumbleData, channel: str, every: int) -> TumbleData:
+    """Every so many-th reading of one channel alone, and all of the others."""
+    trials = []
+    for trial in data.trials:
+        keep = ~trial.of(channel)
+        keep[np.flatnonzero(~keep)[::every]] = True
+        kept = {name: getattr(trial, name)[keep] for name in ("time", "value", "std", "channel")}
+        trials.append(replace(trial, **kept))
+    return replace(data, trials=tuple(trials))
+
+
+def whiten(trial: TrialData, value: Array, *, until: float = np.inf) -> Array:
+    """(measured - value) / std with the camera's zero marginalised, shape [set_count, sample_count].
+
+    With the zero's covariance s^2 1 1' beside unit noise, C^(-1/2) takes the share 1 - 1 / sqrt(1 + n s^2) of the mean.
+    Samples after `until` [s] count for nothing: 0.
+    """
+    residual = (trial.value - value) / trial.std
+    lost = ~np.isfinite(residual).all(axis=1)
+    seen = trial.time <= until
+    for name in ("x", "y", "theta"):
+        mine = np.flatnonzero(trial.of(name))
+        count = int(seen[mine].sum())
+        if count:
+            share = 1 - 1 / np.sqrt(1 + count * ZERO_STD**2)
+            own = slice(mine[0], mine[0] + count)  # a channel's samples lie in the order of their times
+            residual[:, own] -= share * residual[:, own].mean(axis=1, keepdims=True)
+    residual[lost] = LOST
+    residual[:, ~seen] = 0.0
+    return residual

@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from experiments.diagnose.fit.forms import plain_form
-from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.forms import OwnEffect, plain_form
 from experiments.diagnose.fit.problem import Array, Form, Values
 from rigid.terms import CANDIDATES, EFFECTS
 from rigid.terms.candidate import Typical

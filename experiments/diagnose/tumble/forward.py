@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.forms import OwnEffect
 from experiments.diagnose.fit.problem import Array
 from experiments.diagnose.fit.together import each
 from rigid.model.model import parameter_names
@@ -23,7 +23,7 @@ from rigid.terms import EFFECTS, Term, sensor_terms
 from .data import TrialData, TumbleData
 from .readings import Grid, Optics
 
-__all__ = ["Forward", "OWN_TO_A_TRIAL", "Prediction", "SHARED", "neutral"]
+__all__ = ["Forward", "OWN_TO_A_TRIAL", "Prediction", "SHARED"]
 
 SHARED = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 """Numbers that all trials share and that may be uncertain."""
@@ -54,12 +54,6 @@ def _moving_terms(rig: bool) -> tuple[Term, ...]:
     return tuple(term for term in found if not any(hook.startswith("inner_") for hook in term.hooks))
 
 
-def neutral(name: str) -> float:
-    """The value of "<effect>.<parameter>" that changes nothing."""
-    effect, _, parameter = name.partition(".")
-    return next(p.default for p in EFFECTS[effect].parameters if p.name == parameter)
-
-
 class Forward:
     """The forward model of one campaign.
 
@@ -80,16 +74,11 @@ class Forward:
             "stiffness": tables.surface.stiffness, "damping": tables.surface.damping,
             "mu_s": tables.surface.mu_s, "mu_d": tables.surface.sliding_friction,
         }  # fmt: skip
+        self.neutral = {f"{id}.{p.name}": p.default for id, term in EFFECTS.items() for p in term.parameters}
+        """Value of each "<effect>.<parameter>" that changes nothing."""
+        self.neutral |= {f"{mine.id}.{p.name}": mine.neutral(p.name) for mine in own for p in mine.term.parameters}
         self._grids = [Grid(trial, data.window, [own.term for own in self.own]) for trial in data.trials]
         self._buffer = np.empty(0)
-
-    def neutral(self, name: str) -> float:
-        """The value of "<effect>.<parameter>" that changes nothing."""
-        effect, _, parameter = name.partition(".")
-        for own in self.own:
-            if own.id == effect:
-                return own.neutral(parameter)
-        return neutral(name)
 
     def predict(
         self,
@@ -134,15 +123,14 @@ class Forward:
         names = [f"{term.id}.{name}" for term in terms for name in term.arguments(hook)]
         found = np.empty((count, len(names)))
         for k, name in enumerate(names):
-            found[:, k] = sets.get(name, self.neutral(name))
+            found[:, k] = sets.get(name, self.neutral[name])
         return found
 
     def _columns(self, sets: Mapping[str, Array], count: int, terms: tuple[Term, ...]) -> dict[str, Array]:
-        every = (*EFFECTS.values(), *(own.term for own in self.own))
-        known = {f"{term.id}.{p.name}" for term in every for p in term.parameters}
         for name in sets:
-            if name not in self.nominal and name not in OWN_TO_A_TRIAL and name not in known:
-                raise ValueError(f"{name!r} is no number of a tumble; there is {', '.join((*SHARED, *sorted(known)))}")
+            if name not in self.nominal and name not in OWN_TO_A_TRIAL and name not in self.neutral:
+                known = ", ".join((*SHARED, *sorted(self.neutral)))
+                raise ValueError(f"{name!r} is no number of a tumble; there is {known}")
         columns = {
             name: np.broadcast_to(np.asarray(sets.get(name, value), dtype=float), (count,))
             for name, value in self.nominal.items()
@@ -150,11 +138,8 @@ class Forward:
         each = np.ones((1, len(self.data.trials)))
         for name in OWN_TO_A_TRIAL:
             columns[name] = np.broadcast_to(np.asarray(sets.get(name, each), dtype=float), (count, each.size))
-        for term in terms:
-            for p in term.parameters:
-                name = f"{term.id}.{p.name}"
-                off = self.neutral(name)
-                columns[name] = np.broadcast_to(np.asarray(sets.get(name, off), dtype=float), (count,))
+        for name in (f"{term.id}.{p.name}" for term in terms for p in term.parameters):
+            columns[name] = np.broadcast_to(np.asarray(sets.get(name, self.neutral[name]), dtype=float), (count,))
         return columns
 
     def _chunks(self, chosen: Sequence[int], count: int) -> list[list[tuple[int, int, int]]]:

@@ -1,27 +1,22 @@
 """Where fits of tumbles should begin: near the best values, on the branch that was measured.
 
-The statistics' own fits are local. Contact makes the likelihood of a tumble jump, so before them stands a search of its
-own (`tumble_fit`): growing horizons, several starts, a scan of each trial's gravity. All candidates of one round are
-looked for together, so that the batched model has its hands full.
+The statistics' own fits are local. Contact makes the likelihood of a tumble jump, so before them stands a search
+(`SEARCH` in `experiments.diagnose.fit.fitting`): growing horizons, several starts, a scan of each trial's gravity. All
+candidates of one round are looked for together, so that the batched model has its hands full.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from experiments.diagnose.fit.problem import Array, Form, Parameter, Values
-
-from .data import TumbleData
-from .fit import Fit, Fitter
-from .forward import SHARED, Forward
-from .steps import Start
+from experiments.diagnose.fit.fitting import SEARCH, Fit, Linear, Model, Rule, Whitener, fits
+from experiments.diagnose.fit.problem import Form, Problem, Values, evaluate_all
 
 __all__ = ["Guesser"]
 
-_STEP = 1e-3  # of the integration while looking [s]; what follows is finer
-_THIN = 5
 _GROWING = (0.3, 0.6, 1.0)
+_LONGER = replace(SEARCH, scan=True, shares=_GROWING)
 _POOR = 1.1  # chi-square per sample beyond which the base model is looked for from more places
 _AWAY = (0.0, 1.0, -1.0)
 """Standard deviations of mu_s from which the base model is fitted once more where it leaves something."""
@@ -35,25 +30,14 @@ _SAME, _NEAR_BY = 0.003, 0.05
 _HOPELESS = 30.0  # times the best one's chi-square, over part of a trial, beyond which a start is given up
 
 
-def _thinned(data: TumbleData) -> TumbleData:
-    """Every fifth reading of the wheel, which is fast and says little, and all of the rest."""
-    trials = []
-    for trial in data.trials:
-        keep = ~trial.of("wheel")
-        keep[np.flatnonzero(~keep)[::_THIN]] = True
-        kept = {name: getattr(trial, name)[keep] for name in ("time", "value", "std", "channel")}
-        trials.append(replace(trial, **kept))
-    return replace(data, trials=tuple(trials))
-
-
-def _kinds(apart: Sequence[Parameter]) -> tuple[str, ...]:
-    """What is fitted to single trials, and within which prior."""
-    return tuple(dict.fromkeys(f"{p.kind} {p.std:.4g}" for p in apart))
+def _kinds(model: Model) -> tuple[str, ...]:
+    """What is fitted to single trials beside gravity, and within which prior."""
+    return tuple(dict.fromkeys(f"{p.kind} {p.std:.4g}" for p in model.scatter if p.trial in model.trials))
 
 
 def _alike(form: Form, one: Fit, other: Fit) -> bool:
     """Whether two fits of one form have come to the same place, as nearly as fits end."""
-    if abs(one.cost - other.cost) > _SAME * max(one.cost, other.cost):
+    if abs(one.objective - other.objective) > _SAME * max(one.objective, other.objective):
         return False
     return all(abs(one.values[p.name] - other.values[p.name]) <= _NEAR_BY * p.scale for p in form.parameters)
 
@@ -61,213 +45,166 @@ def _alike(form: Form, one: Fit, other: Fit) -> bool:
 class Guesser:
     """Guesses for one campaign. They are kept: the same question is answered once."""
 
-    def __init__(self, forward: Forward, forms: Sequence[Form]) -> None:
-        self.forward = Forward(_thinned(forward.data), time_step=_STEP, threads=forward.threads, own=forward.own)
-        self.forms = tuple(forms)
-        self._ids = [trial.id for trial in forward.data.trials]
-        self._stated = [trial.gravity_sim for trial in forward.data.trials]
+    def __init__(self, problem: Problem, forms: Sequence[Form]) -> None:
+        """`problem`: of the same campaign, thinned and coarse."""
+        self.problem, self.forms = problem, tuple(forms)
+        self._whitener = Whitener.none(problem)
+        self._shared = tuple(p for p in problem.base if p.trial is None)
         self._kept: dict[tuple[object, ...], dict[str, Fit]] = {}
         self._warm: dict[tuple[str, ...], tuple[dict[str, float], float]] = {}
 
-    def guess(
-        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
-        apart: Sequence[Parameter] = (),
-    ) -> dict[str, float]:  # fmt: skip
-        """Values near the best for the base model with `forms` on `trials`, beginning from `values`: see `Contacts`."""
-        fitter = Fitter(self.forward, trials=[self._ids.index(trial) for trial in trials])
-        start = self._start(forms, values, apart)
-        if held:
-            names = {*SHARED, *(p.name for form in forms for p in form.parameters)}
-            fixed = replace(start, frozen=frozenset(names), scan=True)
-            return self._told(fitter.fit([fixed])[0], trials, values)
+    def _coarse(self, model: Model) -> Model:
+        return replace(model, problem=self.problem, whitener=self._whitener)
+
+    def guess(self, model: Model, values: Values) -> dict[str, float]:
+        """Values near the best, beginning from `values`: see `Contacts`."""
+        forms, search = model.forms, self._coarse(model)
+        if model.held is not None:
+            return {**values, **fits([(search, values, replace(SEARCH, scan=True))])[0].values}
         new = [form for form in forms if any(p.name not in values for p in form.parameters)]
         if not new:
-            return self._told(self._base(fitter, start), trials, values)
+            return {**values, **self._base(search, values).values}
         old = [form for form in forms if form not in new]
         whose = tuple(form.id for form in new) if len(new) > 1 else ()
-        key = (tuple(form.id for form in old), tuple(trials), whose, *_kinds(apart))
-        if key not in self._kept:
-            self._kept[key] = {}
-        kept = self._kept[key]
+        kept = self._kept.setdefault((tuple(form.id for form in old), model.trials, whose, *_kinds(model)), {})
         if new[-1].id not in kept:
             others = [form for form in self.forms if form.effect not in {f.effect for f in forms}]
             candidates = [*others, *(f for f in self.forms if f.effect == new[-1].effect)] if not old else [new[-1]]
             if len(new) > 1:
                 candidates = [new[-1]]
-            kept |= self._candidates(fitter, old + new[:-1], candidates, start)
-        return self._told(kept[new[-1].id], trials, values)
+            kept |= self._candidates(search.with_forms(old + new[:-1]), candidates, values)
+        return {**values, **kept[new[-1].id].values}
 
-    def refine(
-        self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str],
-        *, apart: Sequence[Parameter] = (),
-    ) -> list[dict[str, float]]:  # fmt: skip
-        """Values near the best for each (forms, values): from there, and from nominal numbers over growing horizons."""
-        fitter = Fitter(self.forward, trials=[self._ids.index(trial) for trial in trials])
-        starts = []
-        for forms, values in asked:
-            own = {p.name: values[p.name] for form in forms for p in form.parameters}
-            starts.append(Start(forms=tuple(forms), values=own, scan=True, horizons=_GROWING, apart=tuple(apart)))
-            starts.append(self._start(forms, values, apart))
-        few = len(asked) <= _ALL_THE_WAY
-        fits = fitter.fit(starts, steps=_MORE_ROUNDS if few else _ROUNDS)
-        best = [min(pair, key=lambda fit: fit.cost) for pair in zip(fits[::2], fits[1::2], strict=True)]
+    def refine(self, models: Sequence[Model], values: Sequence[Values]) -> list[dict[str, float]]:
+        """Values near the best for each model: from there, and from nominal numbers over growing horizons."""
+        few = len(models) <= _ALL_THE_WAY
+        rounds = _MORE_ROUNDS if few else _ROUNDS
+        starts: list[tuple[Model, Values, Rule]] = []
+        for model, here in zip(map(self._coarse, models), values, strict=True):
+            own = {p.name: here[p.name] for form in model.forms for p in form.parameters}
+            starts += [(model, own, replace(_LONGER, rounds=rounds)), (model, here, replace(SEARCH, rounds=rounds))]
+        found = fits(starts)
+        best = [min(pair, key=lambda fit: fit.objective) for pair in zip(found[::2], found[1::2], strict=True)]
         if not few:  # of many only the most promising go on
-            going = sorted(range(len(best)), key=lambda k: best[k].cost)[:_ALL_THE_WAY]
-            more = [Start(forms=best[k].forms, values=best[k].values, gravity=best[k].gravity, apart=tuple(apart))
-                    for k in going]  # fmt: skip
-            for k, found in zip(going, fitter.fit(more, steps=_MORE_ROUNDS - _ROUNDS), strict=True):
-                best[k] = min(best[k], found, key=lambda fit: fit.cost)
-        return [self._told(found, trials, values) for found, (_, values) in zip(best, asked, strict=True)]
+            going = sorted(range(len(best)), key=lambda k: best[k].objective)[:_ALL_THE_WAY]
+            rule = replace(SEARCH, rounds=_MORE_ROUNDS - _ROUNDS)
+            for k, more in zip(going, fits([(best[k].model, best[k].values, rule) for k in going]), strict=True):
+                best[k] = min(best[k], more, key=lambda fit: fit.objective)
+        return [{**here, **one.values} for one, here in zip(best, values, strict=True)]
 
-    def _start(self, forms: Sequence[Form], values: Values, apart: Sequence[Parameter]) -> Start:
-        gravity = np.array(
-            [values.get(f"gravity_sim[{i}]", g) / g for i, g in zip(self._ids, self._stated, strict=True)]
-        )
-        known = {*SHARED, *(p.name for form in forms for p in form.parameters), *(p.name for p in apart)}
-        return Start(
-            forms=tuple(forms), values={name: v for name, v in values.items() if name in known}, gravity=gravity,
-            apart=tuple(apart),
-        )  # fmt: skip
-
-    def _told(self, found: Fit, trials: Sequence[str], values: Values) -> dict[str, float]:
-        told = {**values, **found.values}
-        for trial in trials:
-            k = self._ids.index(trial)
-            told[f"gravity_sim[{trial}]"] = float(found.gravity[k]) * self._stated[k]
-        return told
-
-    def _base(self, fitter: Fitter, start: Start) -> Fit:
+    def _base(self, model: Model, begun: Values) -> Fit:
         random = np.random.default_rng(0)
 
-        def drawn() -> Mapping[str, float]:
-            values = dict(start.values)
-            for name in SHARED:
-                if fitter.sigma[name] > 0:
-                    z = float(np.clip(random.standard_normal(), -2.5, 2.5))
-                    values[name] = self.forward.nominal[name] * (1 + fitter.sigma[name] * z)
-            return values
-
-        def begin(values: Mapping[str, float], horizons: tuple[float, ...]) -> Start:
-            return replace(start, values=values, scan=True, horizons=horizons)
+        def drawn() -> Values:
+            z = {p.name: float(np.clip(random.standard_normal(), -2.5, 2.5)) for p in self._shared}
+            return {**begun, **{p.name: p.value + p.std * z[p.name] for p in self._shared}}
 
         def poor(found: Fit, limit: float) -> bool:
-            return found.cost > limit * sum(len(r) for r in found.residuals)
+            return found.objective > limit * found.count
 
-        key = (*(form.id for form in start.forms), *_kinds(start.apart))
+        key = (*(form.id for form in model.forms), *_kinds(model))
+        longer, at_once = replace(_LONGER, rounds=15), replace(SEARCH, scan=True)
         if key in self._warm:  # found before, on other trials
             before, limit = self._warm[key]
-            values = {name: start.values.get(name, value) for name, value in before.items()}
-            (again,) = fitter.fit([begin(values, (1.0,))])
+            stated = [p.name for p in self.problem.base if p.name in begun]
+            (again,) = fits([(model, {**before, **{name: begun[name] for name in stated}}, at_once)])
             if not poor(again, limit):
                 return again
-        (best,) = fitter.fit([begin(start.values, _GROWING)], steps=15)
+        (best,) = fits([(model, begun, longer)])
         if poor(best, _POOR):
-            others = [begin(start.values, (1.0,)), begin(drawn(), _GROWING), begin(drawn(), _GROWING)]
-            best = min([best, *fitter.fit(others, steps=15)], key=lambda found: found.cost)
+            others = [(begun, replace(at_once, rounds=15)), (drawn(), longer), (drawn(), longer)]
+            best = min([best, *fits([(model, *other) for other in others])], key=lambda found: found.objective)
         if poor(best, _POOR):
-            best = min([best, *fitter.fit(self._rubbing(fitter, best, start), steps=15)], key=lambda found: found.cost)
-        size = best.cost / sum(len(r) for r in best.residuals)
-        self._warm[key] = ({name: best.values[name] for name in SHARED}, max(_POOR, 1.3 * size))
+            others = [(place, longer) for place in self._rubbing(best, begun)]
+            best = min([best, *fits([(model, *other) for other in others])], key=lambda found: found.objective)
+        size = best.objective / best.count
+        self._warm[key] = ({p.name: best.values[p.name] for p in self._shared}, max(_POOR, 1.3 * size))
         return best
 
-    def _rubbing(self, fitter: Fitter, found: Fit, start: Start) -> list[Start]:
-        """Starts where this fit ended, but with both coefficients of friction as stated, or nearly so.
+    def _rubbing(self, found: Fit, begun: Values) -> list[Values]:
+        """Places where this fit ended, but with both coefficients of friction as stated, or nearly so.
 
         They decide what sticks and what slips: where a trial is on a branch that was not measured they are drawn away
         to keep it there, for all trials, and what else is known by then finds the measured one without them.
         """
-        rubs = {name: self.forward.nominal[name] for name in ("mu_s", "mu_d")}
-        places = [{**rubs, "mu_s": rubs["mu_s"] * (1 + z * fitter.sigma["mu_s"])} for z in _AWAY]
-        known = {**start.values, **found.values}
-        return [replace(start, values=known | place, gravity=found.gravity, scan=True, horizons=_GROWING)
-                for place in (places if fitter.sigma["mu_s"] > 0 else places[:1])]  # fmt: skip
+        rubs = {p.name: p for p in self._shared if p.name in ("mu_s", "mu_d")}
+        known, sticks = {**begun, **found.values, **{name: p.value for name, p in rubs.items()}}, rubs.get("mu_s")
+        return [{**known, "mu_s": sticks.value + z * sticks.std} for z in _AWAY] if sticks else [known]
 
-    def _candidates(self, fitter: Fitter, old: Sequence[Form], forms: Sequence[Form], start: Start) -> dict[str, Fit]:
-        """The best fit found for each form added to `old`."""
-        begun = [(form, point) for form in forms for point in form.starts]
+    def _candidates(self, model: Model, forms: Sequence[Form], begun: Values) -> dict[str, Fit]:
+        """The best fit found for each form added to those of `model`."""
+        starts = [(form, point) for form in forms for point in form.starts]
         best: dict[str, Fit] = {}
 
-        def keep(whose: Sequence[Form], fits: Sequence[Fit]) -> None:
-            for form, found in zip(whose, fits, strict=True):
-                if form.id not in best or found.cost < best[form.id].cost:
-                    best[form.id] = found
+        def keep(found: Sequence[Fit]) -> None:
+            for one in found:
+                id = one.model.forms[-1].id
+                if id not in best or one.objective < best[id].objective:
+                    best[id] = one
 
-        (now,) = [fitter.residuals([self._point(start)], tuple(old))]
-        size = sum(float(rows[0] @ rows[0]) for rows in now) / max(1, sum(rows.shape[1] for rows in now))
-        if old or size < _NEAR:
-            chosen = self._screened(fitter, old, begun, start)
-            fits = fitter.fit([self._add(start, old, form, values) for form, values in chosen], steps=12 if old else 7)
-            keep([form for form, _ in chosen], fits)
+        old = model.forms
+        (now,) = model.evaluate([{p.name: begun.get(p.name, p.value) for p in model.parameters}])
+        if old or float(now @ now) < _NEAR * len(now):
+            rule = replace(SEARCH, rounds=12 if old else 7)
+            keep(fits([(one, {**begun, **values}, rule) for one, values in self._screened(model, starts, begun)]))
         if old:  # beside what was found already the way is short
             return best
-        bare = Start(apart=start.apart)
-        self._race(fitter, begun, bare, keep)
-        left = [form for form in forms if form.id not in best]  # given up on the way: told as they stand
-        places = {form.id: point for form, point in reversed(begun)}
-        keep(left, fitter.fit([self._add(bare, (), form, places[form.id]) for form in left], steps=2))
+        self._race(model, starts, keep)
+        places = {
+            form.id: (model.with_forms([form]), point, replace(SEARCH, rounds=2)) for form, point in reversed(starts)
+        }
+        left = [form.id for form in forms if form.id not in best]  # given up on the way: reported as they are
+        keep(fits([places[id] for id in left]))
         return best
 
-    def _race(
-        self, fitter: Fitter, begun: Sequence[tuple[Form, Values]], bare: Start,
-        keep: Callable[[Sequence[Form], Sequence[Fit]], None],
-    ) -> None:  # fmt: skip
+    def _race(self, model: Model, starts: Sequence[tuple[Form, Values]], keep: Callable[[Sequence[Fit]], None]) -> None:
         """Every form from all its starts and nominal numbers, over growing horizons; on the way most drop out.
 
-        A base model that lacks something plain stands on branches of its own, from which no effect is found: so all
+        A base model that misses something plain stands on branches of its own, from which no effect is found: so all
         begin where every branch is the same.
         """
-        running = [(form, self._add(bare, (), form, point, horizons=_GROWING[:1])) for form, point in begun]
+        rule = replace(SEARCH, rounds=_ROUNDS, shares=_GROWING[:1])
+        running: list[tuple[Model, Values]] = [(model.with_forms([form]), point) for form, point in starts]
         for following in (*_GROWING[1:], 1.0):
-            fits = fitter.fit([start for _, start in running], steps=_ROUNDS)
-            seen = max(1, sum(int(np.count_nonzero(rows)) for rows in fits[0].residuals))
-            limit = _HOPELESS * max(min(fit.cost for fit in fits), float(seen))
-            order = sorted(range(len(fits)), key=lambda k: fits[k].cost)
-            effects = list(dict.fromkeys(running[k][0].effect for k in order))
-            last = running[0][1].horizons[-1] >= 1
+            found = fits([(*one, rule) for one in running])
+            seen = max(1.0, float(np.count_nonzero(found[0].modes)))
+            limit = _HOPELESS * max(min(one.objective for one in found), seen)
+            found.sort(key=lambda one: one.objective)
+            effects = list(dict.fromkeys(one.model.forms[0].effect for one in found))
+            last = rule.shares[-1] >= 1
             if last:
-                keep([form for form, _ in running], fits)
-            each: dict[str, list[Fit]] = {}
-            longer = []
-            for k in order:
-                form, found = running[k][0], fits[k]
-                if any(_alike(form, found, other) for other in each.get(form.id, ())):
+                keep(found)
+            going: dict[str, list[Fit]] = {}
+            running = []
+            for one in found:
+                (form,) = one.model.forms
+                if any(_alike(form, one, other) for other in going.get(form.id, ())):
                     continue  # from there on two would go one way
-                each.setdefault(form.id, []).append(found)
+                going.setdefault(form.id, []).append(one)
                 most, alike = (len(effects), 2) if following < 1 else (_FOLLOWED, 1 if last else 2)
-                if len(each[form.id]) <= alike and form.effect in effects[:most] and found.cost <= limit:
-                    start = Start(forms=(form,), values=found.values, gravity=found.gravity, scan=not last,
-                                  horizons=(following,), apart=bare.apart)  # fmt: skip
-                    longer.append((form, start))
-            running = longer
-        keep([form for form, _ in running], fitter.fit([start for _, start in running], steps=_MORE_ROUNDS))
-
-    def _point(self, start: Start) -> tuple[dict[str, float], Array]:
-        return dict(start.values), np.ones(len(self._ids)) if start.gravity is None else start.gravity
-
-    def _add(
-        self, start: Start, old: Sequence[Form], form: Form, values: Values,
-        *, horizons: tuple[float, ...] = (1.0,),
-    ) -> Start:  # fmt: skip
-        return Start(
-            forms=(*old, form), values={**start.values, **values}, gravity=start.gravity,
-            scan=len(horizons) > 1, horizons=horizons, apart=start.apart,
-        )  # fmt: skip
+                if len(going[form.id]) <= alike and form.effect in effects[:most] and one.objective <= limit:
+                    running.append((one.model, one.values))
+            rule = replace(rule, scan=not last, shares=(following,))
+        keep(fits([(*one, replace(rule, rounds=_MORE_ROUNDS)) for one in running]))
 
     def _screened(
-        self, fitter: Fitter, old: Sequence[Form], begun: Sequence[tuple[Form, Values]], start: Start
-    ) -> list[tuple[Form, dict[str, float]]]:
+        self, model: Model, starts: Sequence[tuple[Form, Values]], begun: Values
+    ) -> list[tuple[Model, dict[str, float]]]:
         """For each form the start from which a linear step, the base model's included, promises most."""
-        space = fitter.linearised(replace(start, forms=tuple(old)))
-        gravity = np.ones(len(self._ids)) if start.gravity is None else start.gravity
-        answers = fitter.signatures([((*old, form), {**start.values, **point}, gravity) for form, point in begun])
-        best: dict[str, tuple[float, Form, dict[str, float]]] = {}
-        for (form, point), residuals in zip(begun, answers, strict=True):
-            gain, share = space.promise(residuals)
-            share = float(np.clip(share, 0.1, 4.0))
+        known = {p.name: begun.get(p.name, p.value) for p in model.parameters}
+        linear = Linear.of(model, known)
+        added = [(model.with_forms((*model.forms, form)), {**known, **point}) for form, point in starts]
+        changes = np.stack([modes - linear.modes for (modes,) in evaluate_all([(m, [p]) for m, p in added])], axis=1)
+        gram, along, _ = linear.projected(changes)
+        best: dict[str, tuple[float, Model, dict[str, float]]] = {}
+        for (form, point), (longer, _), size, slope in zip(starts, added, np.diag(gram), along, strict=True):
+            # What chi-square would lose if the change were free in size, and that size.
+            gain = slope**2 / size if size > 0 and slope < 0 else 0.0
+            share = float(np.clip(-slope / size if size > 0 else 0.0, 0.1, 4.0))
             scaled = dict(point)
             for p in form.parameters:
                 if p.name in point and not np.isfinite(p.std):
                     scaled[p.name] = float(np.clip(share * point[p.name], p.lowest, p.highest))
             if form.id not in best or gain > best[form.id][0]:
-                best[form.id] = (gain, form, scaled)
-        return [(form, values) for _, form, values in best.values()]
+                best[form.id] = (gain, longer, scaled)
+        return [(longer, values) for _, longer, values in best.values()]

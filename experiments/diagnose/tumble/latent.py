@@ -1,18 +1,18 @@
-"""What the model of a tumble lacks, as a force and a torque over time, and up to when it follows what was measured.
+"""The force and the torque over time that the model of a tumble misses; up to when it follows what was measured.
 
 At every row of the IMU, measured less modelled specific force, turned into the surface's axes by the measured attitude,
 times the inertia that resists (m along the surface, m + m_b along the normal in the rig); and J times the difference
 in angular acceleration, the slope of the gyro's difference over a few rows. Beside them stand the modelled motion, its
 state and the wheel, for whoever looks for what it depends on. Where model and measurement have gone apart, their states
-differ, and it is the sum of what is missing and of what follows from it; the first seconds tell most. A trial without
+differ, and it is the sum of what is missing and of what follows from it; the first seconds show most. A trial without
 an IMU has it from the camera's rows: inertia times the second derivative of measured less modelled place and angle.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.diagnose.fit.localise import acceleration, slope
 from experiments.diagnose.fit.problem import Array
-from experiments.diagnose.fit.slopes import acceleration, slope
 
 from .data import CHANNELS, TrialData
 from .forward import Prediction

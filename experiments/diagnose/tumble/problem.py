@@ -1,7 +1,7 @@
 """Tumbles as the statistics of `hedgebed diagnose` see them (`experiments.diagnose.fit.problem`).
 
 A trial's own nuisance is its simulated gravity. The camera's zero is no parameter: it is marginalised in the whitening
-(`steps.whiten`) and, for the gap that a person reads, put at its most probable value.
+(`data.whiten`) and, for the gap that a person reads, put at its most probable value.
 """
 
 import hashlib
@@ -9,7 +9,6 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,7 @@ from numpy.typing import NDArray
 from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
 from experiments.diagnose.core.effect_texts import advice
 from experiments.diagnose.fit.fitting import SCAN
-from experiments.diagnose.fit.forms import shapes_of
-from experiments.diagnose.fit.own import OwnEffect
+from experiments.diagnose.fit.forms import OwnEffect, shapes_of
 from experiments.diagnose.fit.problem import Array, Finding, Form, Parameter, Problem, Samples, TrialInfo, Values
 from experiments.diagnose.fit.together import each
 from experiments.diagnose.noise.jitter import Shaken
@@ -26,16 +24,17 @@ from experiments.diagnose.noise.replicates import parted
 from rigid.planar.trajectory import STATES
 from rigid.terms import EFFECTS
 
-from .data import CHANNELS, TumbleData, tumble_data
+from .data import CHANNELS, LOST, ZERO_STD, TumbleData, thinned, tumble_data, whiten
 from .forms import physical_at, tumble_forms
 from .forward import OWN_TO_A_TRIAL, SHARED, Forward, Prediction
 from .guess import Guesser
 from .latent import followed_until, latent_columns
-from .steps import LOST, ZERO_STD, whiten
 
 __all__ = ["TumbleProblem", "make_problem"]
 
 _UNITS = {"mass": "kg", "inertia": "kg m2", "stiffness": "N/m", "damping": "N s/m", "mu_s": "1", "mu_d": "1"}
+_COARSE = 1e-3  # step of the integration of a search [s]; what follows is finer
+_THIN = 5  # every fifth reading of the wheel, which is fast and shows little, is enough for a search
 _STEP = 0.02  # of finite differences, in sigmas: contacts make smaller ones rough
 _SWITCH = 5e-4
 """From the moment of a reading [s] within which a model that jumps leaves it in doubt: one step of the integration."""
@@ -55,8 +54,9 @@ class TumbleProblem(Problem):
 
     def __init__(
         self, data: TumbleData, *, findings: Sequence[Finding] = (), threads: int | None = None,
-        own: Sequence[OwnEffect] = (),
+        own: Sequence[OwnEffect] = (), coarse: bool = False,
     ) -> None:  # fmt: skip
+        """`coarse`: with the time step of a search, and none of its own."""
         for effect in own:
             inner = [hook for hook in effect.term.hooks if hook.startswith("inner_")]
             if inner:
@@ -64,26 +64,27 @@ class TumbleProblem(Problem):
             _ = effect.tumble  # refused here where it has no forms
         self.data = data
         self.own = {effect.id: effect for effect in own}
-        self.forward = Forward(data, threads=threads, own=own)
+        self.forward = Forward(data, **({"time_step": _COARSE} if coarse else {}), threads=threads, own=own)
         self.findings = tuple(findings)
-        self.contacts = self
         self.trials = self._trials()
         self.base = self._base()
         self.scatter = {
-            kind: tuple(
-                Parameter(name=f"{kind}[{trial.id}]", unit="1", value=0.0, std=_SCATTER_STD, scale=0.02, lowest=-0.5,
-                          highest=1.0, trial=trial.id, kind=kind, step=1e-3)
-                for trial in data.trials
-            )
+            kind: Parameter(
+                name=kind, unit="1", value=0.0, std=_SCATTER_STD, scale=0.02, lowest=-0.5, highest=1.0, step=1e-3
+            ).in_each(trial.id for trial in data.trials)
             for kind in OWN_TO_A_TRIAL[1:]
-        }  # fmt: skip
+        }
         self.forms: tuple[Form, ...] = self._forms()
         self.shapes = shapes_of(self.forms)
         self.design = self._design()
         self._index = {trial.id: k for k, trial in enumerate(data.trials)}
+        self._data = {trial.id: trial for trial in data.trials}
         self._shaken: dict[str, Shaken] = {}
         self._along: Mapping[str, Array] = {}
         self._switches: dict[str, Array] = {}
+        if not coarse:
+            few = thinned(data, "wheel", _THIN)
+            self.contacts = Guesser(TumbleProblem(few, threads=threads, own=own, coarse=True), self.forms)
 
     def _trials(self) -> tuple[TrialInfo, ...]:
         trials = self.data.trials
@@ -127,28 +128,28 @@ class TumbleProblem(Problem):
 
     def _design(self) -> str:
         tables = self.data.tables
-        told = {
+        content = {
             "tables": tables.model_dump(mode="json", exclude={"name", "notes", "trial"}),
             "trials": [
                 [*map(str, trial.condition), trial.end] + np.bincount(trial.channel, minlength=len(CHANNELS)).tolist()
                 for trial in self.data.trials
             ],
         }
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
     def samples(self, trial: str) -> Samples:
         """Times, channels and std of a trial's samples."""
-        data = self.data.trials[self._index[trial]]
+        data = self._data[trial]
         return Samples(time=data.time, channel=np.array(CHANNELS)[data.channel], std=data.std)
 
-    def evaluate(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], share: float = 1.0
-    ) -> list[dict[str, Array]]:
+    def evaluate_together(
+        self, asked: Sequence[tuple[Sequence[Values], Sequence[Form]]], trials: Sequence[str], share: float = 1.0
+    ) -> list[list[dict[str, Array]]]:
         """Whitened residuals of the first share of each trial's time, which alone is simulated; 0 after it."""
-        found = self._predict(points, forms, trials, states=False, horizon=share)
+        found = self._predict(asked, trials, states=False, horizon=share)
 
         def whitened(place: int) -> Array:
-            data, value = self.data.trials[self._index[trials[place]]], found[place].value
+            data, value = self._data[trials[place]], found[place].value
             until = share * data.end if share < 1 else np.inf
             if (shaken := self._shaken.get(data.id)) is None:
                 return whiten(data, value, until=until)
@@ -157,7 +158,8 @@ class TumbleProblem(Problem):
             return np.where(good, shaken.whitened(np.where(good, rest, LOST)), LOST)
 
         residuals = each(whitened, range(len(trials)), threads=self.forward.threads)
-        return [{trial: rows[k] for trial, rows in zip(trials, residuals, strict=True)} for k in range(len(points))]
+        rows = iter([dict(zip(trials, own, strict=True)) for own in zip(*residuals, strict=True)])
+        return [[next(rows) for _ in points] for points, _ in asked]
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """Take readings at a switch of the contact for doubtful, where this model switches."""
@@ -165,7 +167,7 @@ class TumbleProblem(Problem):
 
     def doubt(self, values: Values, forms: Sequence[Form]) -> bool:
         """Count readings of the IMU next to which the model jumps, where a spike touches or a slip ends, with an error
-        as large as the jump: on which side of it they were taken no fit can tell. Says whether any has changed."""
+        as large as the jump: on which side of it they were taken no fit can know. Returns whether any has changed."""
         before = self._switches
         self._switches = self.switches(values, forms, tuple(self._index))
         self._take_in()
@@ -180,7 +182,7 @@ class TumbleProblem(Problem):
         for trial in trials:
             after, before = late[trial] - now[trial], now[trial] - early[trial]
             jumps = np.abs(after - before) > np.maximum(_SEEN, 0.5 * np.abs(after + before))
-            imu = np.isin(self.data.trials[self._index[trial]].channel, _IMU)
+            imu = np.isin(self._data[trial].channel, _IMU)
             found[trial] = np.where(jumps & imu & np.isfinite(after + before), after + before, 0.0)
         return found
 
@@ -188,11 +190,8 @@ class TumbleProblem(Problem):
         """See `Problem`."""
         moved = replace(self.data, trials=tuple(replace(trial, time=trial.time + late) for trial in self.data.trials))
         forward = Forward(moved, threads=self.forward.threads, own=self.forward.own) if late else self.forward
-        found = self._predict([values], forms, trials, states=False, forward=forward)
-        return {
-            trial: one.value[0] / self.data.trials[self._index[trial]].std
-            for trial, one in zip(trials, found, strict=True)
-        }
+        found = self._predict([([values], forms)], trials, states=False, forward=forward)
+        return {id: one.value[0] / self._data[id].std for id, one in zip(trials, found, strict=True)}
 
     def shake(self, along: Mapping[str, Array]) -> None:
         """See `Problem`; readings of one clock with one time share an error."""
@@ -203,7 +202,7 @@ class TumbleProblem(Problem):
         """Times that jitter and readings at a switch into the whitening."""
         self._shaken = {}
         for id in self._index:
-            data = self.data.trials[self._index[id]]
+            data = self._data[id]
             own = self._along.get(id, np.zeros(len(data.time)))
             jump = self._switches.get(id, np.zeros(len(data.time)))
             own = np.where(np.abs(jump) > np.abs(own), jump, own)
@@ -216,14 +215,14 @@ class TumbleProblem(Problem):
 
     def sensor_std(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """As stated; endless where a contact switches."""
-        channel = np.array(CHANNELS)[self.data.trials[self._index[trial]].channel]
+        channel = np.array(CHANNELS)[self._data[trial].channel]
         doubtful = self.switches(values, forms, [trial])[trial] != 0
         found = super().sensor_std(values, forms, trial)
         return {name: np.where(doubtful[channel == name], np.inf, std) for name, std in found.items()}
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
-        """With the camera's zero at its most probable value; readings at a switch of the contact say nothing."""
-        data = self.data.trials[self._index[trial]]
+        """With the camera's zero at its most probable value; readings at a switch of the contact do not count."""
+        data = self._data[trial]
         residual = self._residual(values, forms, trial)
         valid = self.switches(values, forms, [trial])[trial] == 0
         residual = (residual - self._zero(data.channel, residual))[valid]
@@ -231,14 +230,16 @@ class TumbleProblem(Problem):
 
     def phases(self, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
         """stand, pivot, slip or hop at each sample."""
-        return np.array(STATES)[self._predict([values], forms, [trial])[0].state[0]]
+        return np.array(STATES)[self._predict([([values], forms)], [trial])[0].state[0]]
 
     def reported(self, values: Values, form: Form) -> dict[str, tuple[float, str]]:
         """The term's parameters under the fixed names of docs/diagnose.md."""
         term = self.own[form.effect].term if form.effect in self.own else EFFECTS[form.effect]
         units = {f"{form.effect}.{p.name}": p.unit for p in term.parameters}
-        physical = self._physical(values, form)
-        return {name.partition(".")[2]: (value, units[name]) for name, value in physical.items()}
+        return {
+            name.partition(".")[2]: (float(array[0]), units[name])
+            for name, array in physical_at(form, [values]).items()
+        }
 
     def form_std(self, form: Form) -> dict[str, float]:
         """Relative uncertainty of what is reported of a form, for nature's law is not the form's: name -> std."""
@@ -246,7 +247,7 @@ class TumbleProblem(Problem):
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> tuple[str, ...]:
         """What of the forms' numbers no rig and no platform has, a sentence each."""
-        said = []
+        sentences = []
         for form in forms:
             if form.effect != "rig-friction" or form.effect in self.own:
                 continue
@@ -254,39 +255,38 @@ class TumbleProblem(Problem):
             trial = min(self.data.tables.trial, key=self.data.tables.weight_of)
             weight = self.data.tables.weight_of(trial)
             if force > weight:
-                said.append(
+                sentences.append(
                     f"rig-friction of {force:.3g} N is more than the {weight:.3g} N that stand on the surface (trial "
                     f"{trial.id}): a rig with it would hold the platform up wherever it is. So it is hardly the "
                     f"pulleys, but something that resists when the platform rises and falls"
                 )
-        return tuple(said)
+        return tuple(sentences)
 
     def prepare(self, tell: Callable[[str, float], None]) -> None:
-        """Compile the kernels, which takes a while where that was not done before, and says so."""
-        for place, forward in enumerate((self.forward, self._guesser.forward)):
-            tell("compiling the kernels (kept for the next time)", 0.5 * place)
-            forward.predict({}, trials=[0], horizon=0.01)
-            forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)
+        """Compile the kernels, which takes a while the first time; `tell` reports it."""
+        tell("compiling the kernels (kept for the next time)", 0.0)
+        self.forward.predict({}, trials=[0], horizon=0.01)
+        self.forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-        """Force and torque that the model lacks, and what they might depend on (`latent_columns`)."""
-        data = self.data.trials[self._index[trial]]
-        prediction = self._predict([values], forms, [trial], motion=True)[0]
+        """Force and torque that the model misses, and what they might depend on (`latent_columns`)."""
+        data = self._data[trial]
+        prediction = self._predict([([values], forms)], [trial], motion=True)[0]
         mass = values.get("mass", self.forward.nominal["mass"])
         inertia = values.get("inertia", self.forward.nominal["inertia"])
         return latent_columns(data, prediction, mass=mass, inertia=inertia)
 
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """Measured and modelled, by channel, the camera's zero put right in the model."""
-        data = self.data.trials[self._index[trial]]
-        value = self._predict([values], forms, [trial])[0].value[0]
+        data = self._data[trial]
+        value = self._predict([([values], forms)], [trial])[0].value[0]
         value = value + self._zero(data.channel, (data.value - value) / data.std) * data.std
-        told = {}
+        channels = {}
         for number, name in enumerate(CHANNELS):
             mine = data.channel == number
             if mine.any():
-                told[name] = {"t_s": data.time[mine], "measured": data.value[mine], "model": value[mine]}
-        return told
+                channels[name] = {"t_s": data.time[mine], "measured": data.value[mine], "model": value[mine]}
+        return channels
 
     def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
         """model.toml, which `hedgebed tumble --model` runs."""
@@ -313,38 +313,21 @@ class TumbleProblem(Problem):
         write_model(path, model)
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
-        """What would tell two effects apart."""
+        """What would distinguish two effects."""
         return advice(first.effect, second.effect)
-
-    def guess(
-        self, forms: Sequence[Form], trials: Sequence[str], values: Values, *, held: bool = False,
-        apart: Sequence[Parameter] = (),
-    ) -> dict[str, float]:  # fmt: skip
-        """Values near the best, from which a local fit may begin (`Guesser`)."""
-        return self._guesser.guess(forms, trials, values, held=held, apart=_of(apart, trials))
-
-    def refine(
-        self, asked: Sequence[tuple[Sequence[Form], Values]], trials: Sequence[str], *, apart: Sequence[Parameter] = ()
-    ) -> list[dict[str, float]]:
-        """The same for several sets of forms at once, all of whose values are given (`Guesser`)."""
-        return self._guesser.refine(asked, trials, apart=_of(apart, trials))
 
     def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
         """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
         where that is no good part of it (`followed_until`)."""
-        data, sigma = self.data.trials[self._index[trial]], self.data.tables.uncertainty.gravity_sim
+        data, sigma = self._data[trial], self.data.tables.uncertainty.gravity_sim
         scan = 1 + sigma * SCAN if sigma > 0 else np.ones(1)
         points = [values, *({**values, f"gravity_sim[{trial}]": data.gravity_sim * float(g)} for g in scan)]
-        found = self._predict(points, forms, [trial])[0]
+        found = self._predict([(points, forms)], [trial])[0]
         moments = [
             followed_until(data, np.where(np.isfinite(value), (data.value - value) / data.std, LOST), state)
             for value, state in zip(found.value, found.state, strict=True)
         ]
         return max((moment for moment in moments if moment is not None), default=None)
-
-    @cached_property
-    def _guesser(self) -> Guesser:
-        return Guesser(self.forward, self.forms)
 
     def gravity(self, points: Sequence[Values]) -> Array:
         """Of each trial over its stated one, shape [point_count, trial_count]."""
@@ -352,22 +335,26 @@ class TumbleProblem(Problem):
         return np.array([[values.get(name, own) / own for name, own in stated] for values in points])
 
     def _predict(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], *, states: bool = True,
+        self, asked: Sequence[tuple[Sequence[Values], Sequence[Form]]], trials: Sequence[str], *, states: bool = True,
         motion: bool = False, forward: Forward | None = None, horizon: float = 1.0,
     ) -> list[Prediction]:  # fmt: skip
-        known, ids = self.forward.nominal.items(), tuple(self._index)
+        points, ids = [values for own, _ in asked for values in own], tuple(self._index)
+        known = self.forward.nominal.items()
         columns = {name: np.array([values.get(name, value) for values in points]) for name, value in known}
         columns["gravity"] = self.gravity(points)
         for kind in OWN_TO_A_TRIAL[1:]:
             columns[kind] = np.array([[1 + values.get(f"{kind}[{id}]", 0.0) for id in ids] for values in points])
-        for form in forms:
-            columns |= physical_at(form, points)
+        at = 0
+        for own, forms in asked:
+            for name, array in [pair for form in forms for pair in physical_at(form, own).items()]:
+                columns.setdefault(name, np.full(len(points), self.forward.neutral[name]))[at : at + len(own)] = array
+            at += len(own)
         chosen = [self._index[trial] for trial in trials]
         return (forward or self.forward).predict(columns, trials=chosen, states=states, motion=motion, horizon=horizon)
 
     def _residual(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
-        data = self.data.trials[self._index[trial]]
-        residual = (data.value - self._predict([values], forms, [trial])[0].value[0]) / data.std
+        data = self._data[trial]
+        residual = (data.value - self._predict([([values], forms)], [trial])[0].value[0]) / data.std
         return np.where(np.isfinite(residual), residual, LOST)
 
     @staticmethod
@@ -380,14 +367,6 @@ class TumbleProblem(Problem):
                 most = len(mine) / (len(mine) + ZERO_STD**-2)
                 zero[mine] = np.clip(most * residual[mine].mean(), -3.0, 3.0)
         return zero
-
-    @staticmethod
-    def _physical(values: Mapping[str, float], form: Form) -> dict[str, float]:
-        return {name: float(array[0]) for name, array in physical_at(form, [values]).items()}
-
-
-def _of(apart: Sequence[Parameter], trials: Sequence[str]) -> list[Parameter]:
-    return [p for p in apart if p.trial in trials]
 
 
 def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> TumbleProblem:

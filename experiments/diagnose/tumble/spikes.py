@@ -1,7 +1,7 @@
 """Single readings of gyro, accelerometers and wheel that neither their neighbours nor other trials share.
 
 A touch of the ground is no such reading: a tip stays on its spring for half a period at least (80 ms for 10 kg on
-1.5e4 N/m), and what it does to speed and rotation stays. A reading is told apart only where its eight neighbours lie on
+1.5e4 N/m), and what it does to speed and rotation stays. A reading counts as one only where its eight neighbours lie on
 a parabola as closely as the sensor's noise lets them.
 """
 
@@ -30,8 +30,8 @@ _PARABOLA = np.linalg.pinv(np.vander(_OFFSETS, 3, increasing=True))
 
 
 def spikes(trials: Sequence[TrialData]) -> tuple[dict[str, NDArray[np.intp]], list[Finding]]:
-    """Rows of each trial that stand alone (trial -> rows), and what is said of them."""
-    told: dict[str, NDArray[np.intp]] = {}
+    """Rows of each trial that stand alone (trial -> rows), and what is reported of them."""
+    rows_alone: dict[str, NDArray[np.intp]] = {}
     findings: list[Finding] = []
     apart = {(trial.id, name): _apart(trial, name) for trial in trials for name in _NAMES}
     for trial in trials:
@@ -51,8 +51,8 @@ def spikes(trials: Sequence[TrialData]) -> tuple[dict[str, NDArray[np.intp]], li
             what += f"{' ...' if len(when) > 4 else ''} s lie up to {size:.0f} std from their neighbours, which agree: "
             findings.append(aside(trial, name, when, what + "set aside"))
         if gone:
-            told[trial.id] = np.concatenate(gone)
-    return told, findings
+            rows_alone[trial.id] = np.concatenate(gone)
+    return rows_alone, findings
 
 
 def aside(trial: TrialData, channel: str, times: NDArray[np.float64], what: str) -> Finding:
@@ -72,7 +72,7 @@ def _apart(trial: TrialData, name: str) -> tuple[NDArray[np.intp], NDArray[np.fl
     beside = value[inner[:, None] + _OFFSETS]
     law = beside @ _PARABOLA.T
     left = beside - law @ np.vander(_OFFSETS, 3, increasing=True).T
-    loud = np.sqrt((left**2).sum(axis=1) / (len(_OFFSETS) - 3))
+    scatter = np.sqrt((left**2).sum(axis=1) / (len(_OFFSETS) - 3))
     usual = float(np.median(np.diff(time)))
     if name in ("ax", "ay") and usual > _SLOWEST:
         return rows, off
@@ -80,7 +80,7 @@ def _apart(trial: TrialData, name: str) -> tuple[NDArray[np.intp], NDArray[np.fl
     for moment in (0.0, trial.torque_until):
         even &= np.abs(time[inner] - moment) > _SETS_IN
     here = value[inner] - law[:, 0]
-    sure = even & (loud < _QUIET * std) & (np.abs(here) > _BESIDE * loud)
+    sure = even & (scatter < _QUIET * std) & (np.abs(here) > _BESIDE * scatter)
     off[inner[sure]] = here[sure] / std
     return rows, off
 

@@ -18,11 +18,7 @@ def make_events(parts: SimpleNamespace) -> Any:
     """
     import taichi as ti
 
-    @ti.func
-    def earlier(e: ti.template(), share, kind):
-        if share < e.ahead or e.kind == 0:
-            e.ahead = share
-            e.kind = kind
+    earlier = parts.earlier
 
     @ti.func
     def used_up(before, after):
@@ -49,8 +45,7 @@ def make_events(parts: SimpleNamespace) -> Any:
                     share = 0.0
                     if change < 0.0:
                         share = 1.0 - ti.min(sign * slip / (change * dt), 1.0)
-                    if share < e.ahead or e.kind == 0:
-                        e.ahead, e.kind, e.which = share, 3, n
+                    earlier(e, share, 3, n)
         f.margin = f.bound - ti.abs(f.hold)
         if m.stick != 0 and f.margin < 0.0:
             share = used_up(last.margin, f.margin)
@@ -62,10 +57,10 @@ def make_events(parts: SimpleNamespace) -> Any:
         if driving:
             then.wheel = now.wheel + 0.5 * dt * c.spin_up * (pull + s.torque)
             if c.braking != 0.0 and then.wheel < 0.0 and dt > 0.0:
-                earlier(e, now.wheel / (now.wheel - then.wheel), 5)
+                earlier(e, now.wheel / (now.wheel - then.wheel), 5, e.which)
         if ti.static(parts.INNER):
             if dt > 0.0 and f.own_holds < 0.0:
-                earlier(e, used_up(last.own_holds, f.own_holds), 10)
+                earlier(e, used_up(last.own_holds, f.own_holds), 10, e.which)
         f.dry_margin = f.dry_bound - ti.abs(f.dry_hold)
         if ti.static(parts.DRY):
             find_dry_events(s, then, f, last, m, e, dt)
@@ -82,10 +77,10 @@ def make_events(parts: SimpleNamespace) -> Any:
                 share = 0.0
                 if change[k] < 0.0:
                     share = 1.0 - ti.min(speed[k] / (change[k] * dt), 1.0)
-                earlier(e, share, 6 + k)
+                earlier(e, share, 6 + k, e.which)
         for k in ti.static(range(2)):
             if m.slide[k] == 0 and f.dry_bound[k] > 0.0 and f.dry_margin[k] < -parts.NEAR * f.dry_bound[k]:
-                earlier(e, used_up(last.dry_margin[k], f.dry_margin[k]), 8 + k)
+                earlier(e, used_up(last.dry_margin[k], f.dry_margin[k]), 8 + k, e.which)
 
     @ti.func
     def switch(

@@ -75,14 +75,12 @@ def make_contacts(parts: SimpleNamespace) -> Any:
                 if dt > 0.0 and depth < c.crater * deepest:  # gone since depth / (rate of leaving)
                     ago = ti.max(c.crater * deepest - depth, 0.0)
                     share = 1.0 - ti.min(ago / ti.max(-rate * dt, 1e-300), 1.0)
-                    if share < e.ahead or e.kind == 0:
-                        e.ahead, e.kind, e.which = share, 2, n
+                    parts.earlier(e, share, 2, n)
             elif dt > 0.0 and depth > c.crater * deepest:
                 rate = -(then.vy + then.omega * d)
                 if rate > 0.0:
                     share = 1.0 - ti.min((depth - c.crater * deepest) / (rate * dt), 1.0)
-                    if share < e.ahead or e.kind == 0:
-                        e.ahead, e.kind, e.which = share, 1, n
+                    parts.earlier(e, share, 1, n)
         m.touch &= near
         m.stick &= m.touch
         if ti.static(parts.count > 3):  # the fourth lowest tip

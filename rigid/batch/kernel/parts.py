@@ -1,9 +1,7 @@
 """What the kernels share: the terms' functions, the numbers that are known when they are compiled, small functions."""
 
-import linecache
 import math
 from types import SimpleNamespace
-from typing import Any
 
 from rigid.model.model import assemble, parameter_names
 from rigid.terms import STATE_FIELDS, Term
@@ -55,7 +53,6 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     Parameters = ti.types.struct(**dict.fromkeys(names, ti.f64))
     LAW = len(FIXED_NUMBERS)
     LAW_SIZE = len(model.law.slots)
-    load_parameters = _loader(names, Parameters, LAW + LAW_SIZE)
     vertical, tip_radius, torque_factor = model.vertical, model.tip_radius, model.torque_factor
     inertia, applied, dry_friction = model.inertia, model.applied, model.dry_friction
     inner_start, inner, crater_of = model.inner_start, model.inner, model.crater
@@ -85,25 +82,33 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     NEAR = 1e-12  # of a bound: less is rounding
 
     @ti.func
+    def load_parameters(numbers: ti.template(), i):
+        return Parameters(*[numbers[i, LAW + LAW_SIZE + k] for k in ti.static(range(len(names)))])
+
+    @ti.func
     def small_sine(a):
-        b = a * a
         value = SINE[7]
         for k in ti.static(range(6, -1, -1)):
-            value = value * b + SINE[k]
+            value = value * (a * a) + SINE[k]
         return value * a
 
     @ti.func
     def small_cosine(a):
-        b = a * a
         value = COSINE[8]
         for k in ti.static(range(7, -1, -1)):
-            value = value * b + COSINE[k]
+            value = value * (a * a) + COSINE[k]
         return value
 
     @ti.func
     def dry_along(s: ti.template(), x, y, turn):
         """Parts of a vector along the directions of the dry frictions: the vertical, the rotation."""
         return ti.Vector([s.up_x * x + s.up_y * y, turn])
+
+    @ti.func
+    def earlier(e: ti.template(), share, kind, which):
+        """Put an event at this share of the step into `e`, where it comes before what is there."""
+        if share < e.ahead or e.kind == 0:
+            e.ahead, e.kind, e.which = share, kind, which
 
     @ti.func
     def state_of(touch, stick):
@@ -144,16 +149,3 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
         return divide_mass(c.mxx, c.mxy, c.myy, c.mxt, c.myt, c.mtt, fx, fy, ft)
 
     return SimpleNamespace(**locals())
-
-
-def _loader(names: tuple[str, ...], kind: Any, first: int) -> Any:
-    """A Taichi function that reads the effects' parameters of trial i."""
-    import taichi as ti
-
-    fields = ", ".join(f"{name}=numbers[i, {first + k}]" for k, name in enumerate(names))
-    text = f"def load(numbers: ti.template(), i):\n    return Parameters({fields})\n"
-    file = f"<parameters {' '.join(names)}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    scope: dict[str, Any] = {"ti": ti, "Parameters": kind}
-    exec(compile(text, file, "exec"), scope)
-    return ti.func(scope["load"])

@@ -48,7 +48,7 @@ def wire_force(s, stiffness, damping):
 
 
 def wire_loss(s, stiffness, damping):
-    """c s'^2; of wires that shorten slack, by their damping, what their spring still gives up."""
+    """c s'^2; of wires that shorten slack, by their damping, what their spring still releases."""
     power = 0.0
     if stiffness < 1e300:
         rate = s.inner_speed - s.up_x * s.vx - s.up_y * s.vy

@@ -29,7 +29,7 @@ def held_back(s, depth, held, force, reach, sharpness, speed):
 
 
 def pulled_out(s, depth, rate, held, force, reach, speed):
-    """-A (1 - exp(-|v| / v_0)) (1 - exp(-x)) while the tip goes out at v, x the retreat over d; 0 on the way in."""
+    """-A (1 - exp(-|v| / v_0)) (1 - exp(-x)) while the tip goes out at v, x the retreat over d; 0 while it sinks."""
     pull = 0.0
     if speed > 0.0 and rate < 0.0:
         pull = -force * (1.0 - exp(rate / speed)) * (1.0 - exp(-max(held - depth, 0.0) / reach))
@@ -70,7 +70,7 @@ TERM = Term(
 
 
 def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
-    """A pull over a retreat; one that presses tip and ground together all the same; one that acts on the way out."""
+    """A pull over a retreat; one that presses tip and ground together all the same; one while the tip moves out."""
     force, reach = fit.free("force", "N", t.force, 0.0, 20 * t.weight), fit.logarithm("reach", t.depth)
     pulls = tuple((a * t.force, s) for a, s in ((3, 0.0), (10, 1.5), (10, -1.0)))
     torn = tuple((a * t.force, d, v) for a, d, v in ((3, -1.0, -1.0), (10, -1.5, 0.5), (10, 1.5, -1.0)))
@@ -85,7 +85,7 @@ def push_pull(
     z, v, way, most, ever, reference, pull, pull_reach, pull_deep, pull_growth, pull_ever, pull_short, pull_viscous,
     pull_sharpness, pull_fade, pull_fade_sharpness, pull_out, pull_let,
 ):  # fmt: skip
-    """A pull that is taken up over the way back, and what becomes of it."""
+    """A pull that is mobilised over the retreat, and what becomes of it."""
     back = most - z
     total = 0.0
     if back > 0.0:

@@ -30,7 +30,7 @@ def hardened(depth, force, work, exponent, reference, bend):
         grown = grown / (1.0 + x)
     if bend > 0.0:
         z = max(depth, 0.0)
-        power = 2.0  # one more than the power of depth that the force goes with
+        power = 2.0  # one more than the power of depth in the force
         if stored > 0.0:
             power = grown * z / stored
         stored = stored * (1.0 + bend * z * power / (power + 1.0))

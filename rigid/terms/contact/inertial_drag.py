@@ -46,7 +46,7 @@ def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
 
 
 def push_force(z, v, x, radius_depth, drag, drag_onset, drag_reach, drag_sharpness, drag_deep, drag_tip, drag_both):
-    """b v^2 on the way in, b by the depth in one of four ways; or both ways."""
+    """b v^2 of loading, b by the depth in one of four ways; or both ways."""
     sinking = max(v, 0.0)
     wide = min(z / radius_depth, 1.0)
     share = drag + drag_deep * x + drag_tip * wide * (2.0 - wide)

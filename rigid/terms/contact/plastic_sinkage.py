@@ -57,7 +57,7 @@ def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
 
 
 def push_unload(at, stiff, bent, z, ever, stiffness, crater_share, crater_bend, unload_stiffness):
-    """On the way back: the loading curve pressed into what is left of the depth, or a stiffer spring."""
+    """Unloading: the loading curve pressed into what is left of the depth, or a stiffer spring."""
     read = at
     less = stiff
     curve = bent

@@ -16,7 +16,7 @@ from tumble_campaigns import CONDITIONS, campaign
 import experiments
 from experiments.campaign import read_model
 from experiments.cli.main import main
-from experiments.diagnose.fit.own import load_own
+from experiments.diagnose.fit.forms import load_own
 from experiments.diagnose.push.law import push, slot_places, slot_table
 from experiments.diagnose.tumble.data import tumble_data
 from experiments.diagnose.tumble.forms import physical, tumble_forms

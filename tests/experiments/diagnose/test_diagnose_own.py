@@ -12,7 +12,7 @@ from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial,
 import experiments
 from experiments.campaign import read_model
 from experiments.cli.main import main
-from experiments.diagnose.fit.own import load_own, own_starts, parameters_of
+from experiments.diagnose.fit.forms import load_own, own_starts, parameters_of
 from experiments.diagnose.push.law import SLOTS, fall, push, slot_table
 from experiments.diagnose.push.problem import make_problem
 

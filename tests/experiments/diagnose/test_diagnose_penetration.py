@@ -331,7 +331,7 @@ def test_a_marker_that_is_lost_for_long_and_comes_back_costs_these_rows_only():
     depth[100:220] += 0.012
     problem = make_problem(campaign_of([("d", "driven", 0.01, Recording({**recording.columns, "depth_m": depth}))]))
     assert len(problem.samples("d").time) == 280
-    assert any("comes back 120 rows later" in finding.what for finding in problem.findings)
+    assert any("120 rows" in finding.what for finding in problem.findings)
 
 
 def test_a_clock_that_jumps_in_a_slow_push_ends_it_and_rows_that_lack_are_a_gap():
@@ -345,7 +345,7 @@ def test_a_clock_that_jumps_in_a_slow_push_ends_it_and_rows_that_lack_are_a_gap(
         counts.append(len(problem.samples("d").time))
         words.append(" ".join(finding.what for finding in problem.findings))
     assert counts == [150, 300]
-    assert "the clock jumps by 0.505 s" in words[0] and "there is no row from" in words[1]
+    assert "0.505 s" in words[0] and "gap" in words[1]
 
 
 def test_lone_readings_and_gaps_are_left_out_and_a_clock_that_jumps_ends_the_trial():
@@ -360,7 +360,7 @@ def test_lone_readings_and_gaps_are_left_out_and_a_clock_that_jumps_ends_the_tri
     )
     assert len(problem.samples("d").time) == 300 - 10 - 1
     said = " ".join(finding.what for finding in problem.findings)
-    assert "clock jumps" in said and "far from its neighbours" in said and "gaps" in said
+    assert "clock jumps" in said and "neighbours" in said and "gaps" in said
 
 
 def test_a_drop_without_an_accelerometer_has_its_latent_force_from_the_depth():
@@ -380,7 +380,7 @@ def test_a_drop_without_an_accelerometer_has_its_latent_force_from_the_depth():
 
 def test_nothing_that_can_be_told_is_said_where_no_sensor_tells_a_force():
     empty = {"trial": np.zeros(0, dtype=str), "t_s": np.zeros(0), "latent_force_x_N": np.zeros(0)}
-    assert depends_on(empty)[0].startswith("nothing that can be told")
+    assert depends_on(empty)[1] == {}
 
 
 def test_a_fitted_model_file_reads_back_with_its_effects(tmp_path):

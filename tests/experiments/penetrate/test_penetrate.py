@@ -16,7 +16,7 @@ from fake_bed import FakeBed
 from golden import golden
 from pydantic import ValidationError
 
-from experiments.grains.box import expected_grain_count
+from experiments.grains.sizes import expected_grain_count
 from experiments.penetrate import beds, units
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate import result as result_of_run

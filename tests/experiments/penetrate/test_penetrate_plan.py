@@ -6,7 +6,7 @@ from experiments.penetrate import beds
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import PenetratePlan, plan_units, share_done
 from experiments.runs.progress import Progress
-from experiments.runs.reporting import PictureCosts
+from experiments.runs.whole_runs import PictureCosts
 
 # The shipped case on two quiet cores, 2026-11-22: 574 s, by the files' times. Of the first bed 11 s are left out, in
 # which it was compiled.

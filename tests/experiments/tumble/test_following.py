@@ -2,7 +2,9 @@
 
 from types import SimpleNamespace
 
-from experiments.grains.following import follow
+from golden import golden
+
+from experiments.grains.following import Followed
 
 
 class InAHand:
@@ -18,7 +20,7 @@ class InAHand:
     def placement_is_long(self):
         return not self.placed and self.body.time > 1.0
 
-    def run(self, on_step, on_frame, frame_interval):
+    def run(self, on_step):
         for time in (0.5, 1.0, 1.5, 2.0):
             self.body.time = time
             on_step(self)
@@ -30,16 +32,17 @@ class InAHand:
         return {}
 
 
+class Placed(Followed):
+    """An experiment that draws nothing."""
+
+    settings = SimpleNamespace(frame_count=0, checkpoint_interval=60.0)
+    frames = write_series = conclude = None
+    sinkage = staticmethod(lambda run: 0.0239)
+
+
 def test_a_hand_that_takes_longer_than_was_guessed_is_said_once():
     told = []
     progress = SimpleNamespace(stage=lambda *_, **__: None, update=lambda _: None, message=told.append)
-    folder = SimpleNamespace(load_checkpoint=lambda _: None, save_checkpoint=lambda *_: None)
-    found = follow(
-        InAHand(), folder, progress, frames=lambda _: None, checkpoint_interval=60.0, sinkage=lambda: 0.0239,
-        write_series=lambda: None,
-    )  # fmt: skip
-    assert found == "found"
-    assert told == [
-        "still in the hand that sets it down after 1.5 s: it is let go once it rests",
-        "set down after 2 s: 23.9 mm deep",
-    ]
+    folder = SimpleNamespace(path=None, load_checkpoint=lambda _: None, save_checkpoint=lambda *_: None)
+    assert Placed().follow(InAHand(), folder, progress) == "found"
+    golden("tumble/placement", told)

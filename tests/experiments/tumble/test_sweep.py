@@ -15,7 +15,7 @@ from experiments.platform.numbers import torque_within_limit
 from experiments.runs.folder import read_series
 from experiments.tumble import sweep as tumble_sweep
 from experiments.tumble.settings import TumbleSettings
-from experiments.tumble.sweep import middle_of_sweep
+from experiments.tumble.sweep import Sweep
 from experiments.tumble.sweep_ranges import parse_sweep
 from experiments.tumble.trial import plan_tumble
 from rigid.planar.simulate import simulate
@@ -76,7 +76,9 @@ def test_a_range_holds_its_ends_as_far_as_the_step_leads(text, values):
 
 def test_the_middle_of_a_sweep_is_a_tumble_of_its_own():
     settings = TumbleSettings(sweep=("wheel_speed_0=100:300:50",), actuator="brake", torque=6.0)
-    assert middle_of_sweep(settings).wheel_speed_0 == 200.0 and middle_of_sweep(settings).sweep == ()
+    sweep = Sweep(settings)
+    middle = sweep.trial_settings(sweep.values[sweep.shown])
+    assert middle.wheel_speed_0 == 200.0 and middle.sweep == ()
 
 
 @pytest.mark.parametrize(
@@ -113,10 +115,10 @@ def test_a_sweep_of_a_model_needs_nothing_but_its_folder_to_be_done_again():
     write_model("a/model.toml", a_model())
     settings = TumbleSettings(model="gone.toml", rig=0.0085, sweep=("mu_s=0.3:0.5:0.1",))
     copy = Path("a/model.toml")
-    plan = plan_tumble(middle_of_sweep(settings, model_file=copy), model_file=copy)
-    points = tumble_sweep._plan(settings, model_file=Path("a/model.toml"))
-    assert [point.trial.mu_s for point in points] == [0.3, 0.4, 0.5]
-    assert points[1].trial == plan.trial and plan.trial.mass == 5.2
+    sweep = Sweep(settings, model_file=copy)
+    plan = plan_tumble(sweep.trial_settings(sweep.values[sweep.shown]), model_file=copy)
+    assert [point.trial.mu_s for point in sweep.plans] == [0.3, 0.4, 0.5]
+    assert sweep.plans[1].trial == plan.trial and plan.trial.mass == 5.2
 
 
 def test_a_trial_of_a_sweep_that_cannot_stand_has_no_numbers_and_is_counted():
@@ -165,12 +167,12 @@ def test_wheels_that_come_to_their_limit_are_sought_by_the_batch_and_tumble_as_o
 def test_a_trial_that_stands_or_gets_away_by_one_model_only_is_counted_and_told():
     """The batch's numbers put in by hand; within 0.8 s the accurate centre gets 10 mm away at 0.12 N m, not at 0.02."""
     settings = TumbleSettings(sweep=("torque=0.02:0.22:0.1",), duration=0.8)
-    points, ranges = tumble_sweep._plan(settings), parse_sweep(settings.sweep)
+    sweep = Sweep(settings)
     found = {name: np.array([0.1, np.nan, np.nan]) for name in tumble_sweep.GAPS}
     found["max_speed"][2] = 0.1
-    gaps = tumble_sweep._gaps(0.8, points, found, [0, 1, 2])
+    gaps = sweep.gaps(found, [0, 1, 2])
     assert (gaps["checked"], gaps["angles"]) == (2, 0)
     assert (gaps["stand_by_one_only"], gaps["away_by_one_only"]) == (1, 2)
-    said = tumble_sweep._sentences(settings, ranges, points, 1, 0, gaps)
+    said = sweep.sentences(0, gaps)
     golden("tumble/sweep_by_one_model", said)
     assert "degrees" not in " ".join(said)

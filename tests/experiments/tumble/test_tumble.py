@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from golden import golden
 
 from experiments.campaign import EffectTable, TumbleModel, write_model
 from experiments.campaign.tables import FORMAT, PlatformTable, RigTable, TumbleSurface, WheelTable
@@ -19,9 +20,9 @@ from experiments.grains.bed_result import residual_warning, reversal_warning
 from experiments.platform.numbers import torque_within_limit
 from experiments.platform.surfaces import find_surface, surface_names
 from experiments.runs.folder import read_series
+from experiments.tumble.result import tumble_sentences
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
-from experiments.tumble.words import tumble_sentences
 from rigid.planar.simulate import simulate
 from rigid.platform.rig import STANDARD_GRAVITY
 
@@ -224,10 +225,10 @@ def test_a_strong_brake_slides_off_at_the_angle_of_the_closed_form(options, rati
 
 
 def test_a_choice_that_was_given_is_no_default_though_it_equals_it():
-    assert "actuator = motor (default)" in plan_tumble(TumbleSettings()).sentences()
-    said = plan_tumble(TumbleSettings(actuator="motor", duration=3.0)).sentences()
-    assert not any(line.startswith(("actuator", "duration")) for line in said)
-    assert "method = located (default)" in said
+    assert plan_tumble(TumbleSettings()).choices["actuator"] == "motor"
+    plan = plan_tumble(TumbleSettings(actuator="motor", duration=3.0))
+    assert not any(line.startswith(("actuator", "duration")) for line in plan.sentences())
+    assert plan.choices["method"] == "located" and not {"actuator", "duration"} & plan.choices.keys()
 
 
 def test_a_brake_beyond_the_platforms_own_is_said():
@@ -240,7 +241,7 @@ def test_a_motor_has_no_torque_once_its_wheel_is_at_its_limit():
     assert main(["tumble", "--wheel-speed-0", "1040", *SHORT, "--out", "a"]) == 0
     result = result_of("a")
     assert result["wheel_at_limit"] == pytest.approx(10 * 1.2e-3 / 0.22, rel=1e-9)
-    assert any("max_wheel_speed = 1050 rad/s, at 0.05455 s" in warning for warning in result["warnings"])
+    assert any("1050 rad/s, at" in warning and "0.05455 s" in warning for warning in result["warnings"])
     wheel = read_series(Path("a/series/motion.csv"))["wheel_speed_rad_s"]
     assert wheel.max() == pytest.approx(1050, rel=1e-9)
     assert main(["tumble", "--wheel-speed-0", "1040", "--max-wheel-speed", "2000", *SHORT, "--out", "b"]) == 0
@@ -268,7 +269,7 @@ def test_the_limit_of_a_wheel_is_found_across_a_hop():
 def test_the_limit_is_that_of_the_platforms_own_wheel():
     other = plan_tumble(TumbleSettings(wheel_inertia=6e-4, wheel_speed_0=2000.0))
     assert other.max_wheel_speed == math.inf and "not the wheel" in other.numbers["max_wheel_speed"].origin
-    assert "max_wheel_speed = no limit known (wheel_inertia is given: not the wheel of hedgehog)" in other.sentences()
+    golden("tumble/no_limit_known", [line for line in other.sentences() if "max_wheel_speed" in line])
     assert plan_tumble(TumbleSettings(max_wheel_speed=3000.0, wheel_speed_0=2000.0)).trial.wheel_speed_0 == 2000.0
 
 
@@ -531,7 +532,7 @@ def test_numbers_of_another_body_on_a_platform_that_ships_are_said(given, kept):
 def test_it_is_said_when_a_torque_does_not_tip_the_platform():
     trial = plan_tumble(TumbleSettings(torque=0.03, surface="brick")).trial
     said = " ".join(tumble_sentences(simulate(trial, duration=1.0)))
-    assert "does not tip" in said and f"0.03 N m is below the {trial.tipping_torque:.4g} N m" in said
+    assert "does not tip" in said and f"{trial.tipping_torque:.4g} N m" in said
     tipped = plan_tumble(TumbleSettings(torque=0.22, surface="brick")).trial
     assert "does not tip" not in " ".join(tumble_sentences(simulate(tipped, duration=2.0)))
 
@@ -593,7 +594,7 @@ def test_a_landing_says_how_fast_it_came_and_what_it_kept():
     )
     assert main(["tumble", *given, *SHORT, "--out", "landed"]) == 0
     found = result_of("landed")
-    assert found["title"] == "A landing on brick: 0.05 m/s down, rig at 0.08336 m/s2"
+    assert "0.05 m/s down" in found["title"]
     assert found["trial"]["torque"] == {"value": 0.0, "unit": "N m", "origin": "a landing"}
     assert value_of("landed", "impact_speed") == pytest.approx(0.05, rel=0.02)
     assert 0.3 < value_of("landed", "restitution") < 1 and 0 < value_of("landed", "energy_kept") < 1
@@ -606,11 +607,11 @@ def test_a_row_of_tumbles_lists_each_row_that_comes_down(reported):
     assert main(["tumble", *given, "--quiet", "--out", "row"]) == 0
     found, feet = result_of("row"), read_series(Path("row/series/feet.csv"))
     deepest = [fall["deepest"] for fall in found["footfalls"]]
-    assert [table["title"] for table in found["tables"]] == ["Where it was after each tumble", "Rows that came down"]
+    golden("tumble/row_titles", [table["title"] for table in found["tables"]])
     assert len(deepest) >= 3 and max(deepest) == pytest.approx(max(feet[f"sinkage_{row}_m"].max() for row in range(8)))
     assert [fall["set_down"] for fall in found["footfalls"]] == [True, True] + [False] * (len(deepest) - 2)
     page = Path("row/report.html").read_text()
-    assert "Tumble by tumble" in page and "Rows that came down" in page
+    assert "Tumble by tumble" in page and all(table["title"] in page for table in found["tables"])
     # The torques that ended, and those after which it lay, are the table's; a warning names the others.
     rests = found["tables"][0]["rows"][1:]
     lay = [row[-1] == "yes" for row in rests]
@@ -619,8 +620,8 @@ def test_a_row_of_tumbles_lists_each_row_that_comes_down(reported):
         len(lay) + 1,
     )
     warned = " ".join(found["warnings"])
-    assert ("had not come to lie" in warned) == (not all(lay))
-    assert ("the run was over before" in warned) == (value_of("row", "tumbles_done") > len(lay))
+    assert ("not come to" in warned) == (not all(lay))
+    assert ("was over before" in warned) == (value_of("row", "tumbles_done") > len(lay))
 
 
 @pytest.mark.parametrize("value", [0.0100001, 0.01004, 0.0151, 0.3, math.inf])

