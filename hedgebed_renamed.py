@@ -142,9 +142,9 @@ _MODULES = {
     "vis": {
         "vis.bed": "bed_cone=tests bed_cut=tests bed_repose=tests bed_shear=tests bed_tests=tests calibrate validation",
         "vis.compare": "compare_figures=report compare_spatial=report",
-        "vis.diagnose": "campaign diagnose_figures=figures inspection",
+        "vis.diagnose": "campaign diagnose_figures=figures inspection=campaign",
         "vis.film": "jobs=film reel spatial_film=film spatial_pictures=film tumble_film=film",
-        "vis.page": "columns=page folder numbers palette=plots state_figures=states style tumble_series=states",
+        "vis.page": "columns=page folder numbers palette=plots state_figures=states style=plots tumble_series=states",
         "vis.paper": "hop paper_assumed=figures paper_measures=figures paper_paths=figures paper_run=figures",
         "vis.penetrate": (
             "amended=report plot_drag plot_drops plot_parts=plot_drag plots=report summary "
@@ -300,7 +300,7 @@ _NAMES = {
     "vis.tumble": {
         "vis.page.folder": "read_columns",
         "vis.page.states": "state_runs",
-        "vis.page.style": "STATES",
+        "vis.page.plots": "STATES",
         "vis.tumble.report": "write_tumble_report",
     },
 }

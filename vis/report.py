@@ -18,7 +18,7 @@ _REPORTS = {
     "hop": ("vis.paper.hop", "write_hop_report"),
     "paper": ("vis.paper.report", "write_paper_report"),
     "campaign": ("vis.diagnose.campaign", "write_campaign_report"),
-    "campaign check": ("vis.diagnose.inspection", "write_inspection_report"),
+    "campaign check": ("vis.diagnose.campaign", "write_inspection_report"),
     "diagnose": ("vis.diagnose.report", "write_diagnosis_report"),
     "bed make": ("vis.bed.report", "write_bed_report"),
     "bed refine": ("vis.bed.report", "write_bed_report"),

@@ -9,9 +9,8 @@ from matplotlib.patches import Patch
 
 from vis.bed.tests import flank_lines, said
 from vis.page.page import Block, Section, Tile, code, text
-from vis.page.plots import handle, legend_above, new_panels, smooth_ratio
+from vis.page.plots import BED, GREY, INK, MODEL, handle, legend_above, new_panels, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
-from vis.page.style import BED, GREY, INK, MODEL
 
 __all__ = ["write_calibration_report"]
 

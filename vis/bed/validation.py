@@ -9,9 +9,8 @@ from pathlib import Path
 
 from rigid.series import read_series
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
-from vis.page.plots import new_figure
+from vis.page.plots import GREY, new_figure
 from vis.page.report import Report, Result, number_text, report_of
-from vis.page.style import GREY
 
 __all__ = ["write_validation_report"]
 

@@ -15,10 +15,9 @@ from vis.film.reel import NAME, AnyReel, Reel, SpaceReel
 from vis.page.folder import read_folder
 from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, listing, table, text
-from vis.page.plots import DASHED, Array, handle, legend_above, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, as_it_lies, handle, legend_above, sheet
 from vis.page.report import Report, Result, again, report_of, unit_text
 from vis.page.states import LINES, States, draw_bands, legend_of_runs
-from vis.page.style import BED, GREY, INK, MODEL, as_it_lies
 from vis.pictures.frames import frame_names
 
 __all__ = ["write_compare_report"]

@@ -16,11 +16,10 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from rigid.series import read_series
-from vis.page.plots import DASHED, Array, handle, legend_above, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
-from vis.page.style import BED, GREY, INK, MODEL, STATES
 
 __all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
 

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from vis.film.reel import AnyReel, Reel, SpaceReel
-from vis.page.plots import Array
-from vis.page.style import INK
+from vis.page.plots import INK, Array, nice_below
 from vis.pictures.arrows import HALO
 from vis.pictures.frames import Frame
 from vis.pictures.scene import Eye, Stage
@@ -79,7 +78,7 @@ class _Plane:
             spine.set(visible=True, color="#bbbbbb")
         level = stage.place(np.array([[focus[0], reel.cut, reel.surface]]), focus)[0, 1]
         axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
-        step, right = _round_length(0.2 * stage.width), 0.97
+        step, right = nice_below(0.2 * stage.width), 0.97
         axis.plot([right - step / stage.width, right], [0.035, 0.035], color=INK, lw=2.5, solid_capstyle="butt")
         middle = right - 0.5 * step / stage.width
         axis.text(middle, 0.05, f"{1e3 * step:g} mm", ha="center", va="bottom", fontsize=10, bbox=HALO)
@@ -155,8 +154,3 @@ def layout(reels: Sequence[AnyReel]) -> list[Panel]:
 
 def _steady(way: Array) -> Array:
     return gaussian_filter1d(way, _STEADY * len(way), axis=0, mode="nearest") if len(way) > 3 else way
-
-
-def _round_length(length: float) -> float:
-    power = 10.0 ** np.floor(np.log10(length))
-    return float(max(n * power for n in (1.0, 2.0, 5.0) if n * power <= 1.0001 * length))

@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 from vis.film.cameras import layout
 from vis.film.reel import AnyReel, Reel, SpaceReel
 from vis.page.page import Block, figure
-from vis.page.plots import Array
+from vis.page.plots import Array, styled
 from vis.page.report import Progress, capital
 from vis.page.sentences import Sentences
 from vis.page.states import state_strip
-from vis.page.style import styled
 from vis.pictures.arrows import draw_force, draw_measure
 from vis.pictures.canvas import COLOURS, blank_page, colour_bar, colour_values, colourmap, pixels
 from vis.pictures.frames import Frame

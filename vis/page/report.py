@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from vis.page.folder import read_columns
 from vis.page.page import Block, Page, Section, Tile, code, figure, table, text, write_page
-from vis.page.plots import Array
+from vis.page.plots import Array, styled
 from vis.page.sentences import Sentences
-from vis.page.style import styled
 
 __all__ = [
     "Progress", "Report", "Result", "again", "capital", "given", "number_text", "report_of", "tables", "unit_text",

@@ -12,10 +12,9 @@ from matplotlib.patches import Patch
 
 from vis.page.folder import read_columns
 from vis.page.page import Block
-from vis.page.plots import Array, handle, legend_above, sheet
+from vis.page.plots import GREY, INK, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result
 from vis.page.states import States, state_runs
-from vis.page.style import GREY, INK, STATES
 
 __all__ = ["FIGURES", "PaperRun", "in_order"]
 

@@ -11,10 +11,9 @@ import numpy as np
 from vis.page.folder import read_columns
 from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, listing
-from vis.page.plots import DASHED, handle
+from vis.page.plots import BED, DASHED, GREY, MODEL, handle
 from vis.page.report import Report, Result, again, given, report_of
 from vis.page.states import by_state, legend_of_states, panels
-from vis.page.style import BED, GREY, MODEL
 
 __all__ = ["write_hop_report"]
 

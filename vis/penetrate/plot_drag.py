@@ -19,9 +19,8 @@ from matplotlib.ticker import MaxNLocator
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import plain, quote, short
-from vis.page.plots import DASHED, Array, handle, legend_above, new_panels, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, sheet
 from vis.page.sentences import Sentences
-from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
 __all__ = [
@@ -100,7 +99,6 @@ def spread_words(runs: list[Run]) -> str:
     return " Bars: standard deviation between beds, where there are several." if len(set(speeds)) < len(speeds) else ""
 
 
-@styled()
 def drag_plot(run: RunFolder) -> Plot | None:
     """Drag against depth, one panel per speed; every seed of the bed, their mean and spread; the spring-damper."""
     driven = [r for r in run.of_kind("driven") if r.bed is not None and r.speed is not None]
@@ -151,7 +149,6 @@ def drag_plot(run: RunFolder) -> Plot | None:
     return Plot.said("drag", figure, moved=moved, parts="".join(sentences))
 
 
-@styled()
 def gap_plot(run: RunFolder) -> Plot | None:
     """Spring-damper minus bed by depth and speed, as a map with the numbers written in."""
     table = departure_rows(run.result) or _departures_of_series(run)
@@ -195,7 +192,6 @@ def gap_plot(run: RunFolder) -> Plot | None:
     return Plot.said("gap", figure, told=told_below)
 
 
-@styled()
 def work_plot(run: RunFolder) -> Plot | None:
     """Work put in and got back, bed beside spring-damper, by speed."""
     known = (r for r in run.of_kind("driven") if r.speed is not None)

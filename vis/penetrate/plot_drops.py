@@ -7,10 +7,9 @@ from matplotlib.lines import Line2D
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import quote
-from vis.page.plots import DASHED, Array, handle, legend_above, new_panels, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, nice_below, sheet
 from vis.page.report import capital
 from vis.page.sentences import Sentences
-from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.penetrate.plot_drag import Plot, above_surface, by_speed, has_model, pair_of_handles, spread_words
 from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
 
@@ -19,7 +18,6 @@ __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
 say = Sentences(__package__)
 
 
-@styled()
 def drops_plot(run: RunFolder) -> Plot | None:
     """Depth and force of each drop against time, one column per speed."""
     drops = [r for r in run.of_kind("drop") if r.bed is not None and r.speed is not None]
@@ -27,7 +25,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
     if not speeds:
         return None
     figure, axes = sheet(2, len(speeds), 4.6, sharex="col", sharey="row")
-    window = _nice(0.04 * max(_settled(r) for r in drops))
+    window = nice_below(0.04 * max(_settled(r) for r in drops))
     free = False
     for column, speed in enumerate(speeds):
         above, below = axes[0, column], axes[1, column]
@@ -75,7 +73,6 @@ def drops_plot(run: RunFolder) -> Plot | None:
     return Plot.said("drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
 
 
-@styled()
 def drop_peaks_plot(run: RunFolder) -> Plot | None:
     """Peak force, greatest depth and time to stop of the drops against speed, bed beside spring-damper."""
     drops = [r for r in run.of_kind("drop") if r.speed is not None]
@@ -107,7 +104,6 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
     return Plot.said("drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
 
 
-@styled()
 def set_down_plot(run: RunFolder) -> Plot | None:
     """Depth against time of the spike set down under its load, to rest."""
     sets = [r for r in run.of_kind("set_down") if r.bed is not None]
@@ -173,7 +169,6 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     return Plot("set_down", "Set down under its load", said, figure)
 
 
-@styled()
 def spread_plot(run: RunFolder) -> Plot | None:
     """K and C fitted to each seed of the bed, their spread, and what is fitted to all of them."""
     fits = [f for f in run.result.get("fits") or [] if isinstance(f, dict)]
@@ -255,9 +250,3 @@ def _running_mean(time: Array, force: Array, window: float) -> Array:
     low, high = time - reach, time + reach
     mean = (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / np.maximum(high - low, 1e-300)
     return np.where(high > low, mean, force)
-
-
-def _nice(number: float) -> float:
-    """The next 1, 2 or 5 times a power of ten not above `number`."""
-    power = 10.0 ** np.floor(np.log10(number))
-    return float(next(n * power for n in (5.0, 2.0, 1.0) if n * power <= 1.0001 * number))

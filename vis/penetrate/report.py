@@ -16,9 +16,8 @@ from matplotlib.figure import Figure
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, figure, table, text, write_template
-from vis.page.plots import DASHED, handle, legend_above, sheet
+from vis.page.plots import BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled
 from vis.page.report import Progress, Report, Result, again, report_of
-from vis.page.style import BED, GREY, MODEL, styled
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
@@ -94,16 +93,16 @@ def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[t
     drawn: list[tuple[Plot, Path]] = []
     missing: list[str] = []
     plans = PLOTS | ({"With what was missing": _amended_plot} if _is_amended(run) else {})
-    for what, draw in plans.items():
-        try:
-            plot = draw(run)
-        except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError, FloatingPointError) as error:
-            missing.append(f"{what}: could not be drawn ({type(error).__name__}: {error}).")
-            continue
-        if plot is None:
-            missing.append(f"{what}: no data.")
-        else:
-            with styled():
+    with styled():
+        for what, draw in plans.items():
+            try:
+                plot = draw(run)
+            except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError, FloatingPointError) as error:
+                missing.append(f"{what}: could not be drawn ({type(error).__name__}: {error}).")
+                continue
+            if plot is None:
+                missing.append(f"{what}: no data.")
+            else:
                 drawn.append((plot, plot.save(target)))
     return drawn, missing
 
@@ -115,7 +114,6 @@ def _is_amended(run: RunFolder) -> bool:
     return any(r.amended is not None for r in run.runs)
 
 
-@styled()
 def _amended_plot(run: RunFolder) -> Plot | None:
     drawing = _draw_amended(run)
     return None if drawing is None else Plot.said("amended", drawing)

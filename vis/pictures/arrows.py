@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from vis.page.numbers import quote
-from vis.page.style import INK
+from vis.page.plots import INK
 
 __all__ = ["FORCE", "HALO", "draw_force", "draw_measure"]
 

@@ -19,7 +19,7 @@ from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from vis.page.style import INK, styled
+from vis.page.plots import INK, styled
 
 __all__ = [
     "COLOURS", "Page", "blank_page", "colour_bar", "colour_values", "colourmap", "moved_since", "nice_above", "pixels",

@@ -221,7 +221,7 @@ class _Story:
     def _before_the_way_out(self) -> NDArray[np.int64]:
         """Indices of the frames before the run's first row of the way out; all where it has none, or no series."""
         every, bed = np.arange(len(self.frames)), self.run.bed
-        out = np.flatnonzero(bed.phase == "out") if bed is not None and self.kind == "driven" else every[:0]
+        out = np.flatnonzero(bed.phase == "out") if bed is not None and self.run.kind == "driven" else every[:0]
         if bed is None or not len(out):
             return every
         before = every[np.asarray(self.frames.times) < bed.time[out[0]]]
@@ -230,7 +230,7 @@ class _Story:
     def held(self, index: int) -> bool:
         """Whether a driven spike was held still at this frame, its force falling off from what it was on the way in."""
         bed = self.run.bed
-        if bed is None or self.kind != "driven":
+        if bed is None or self.run.kind != "driven":
             return False
         row = int(np.searchsorted(bed.time, self.frames.times[index], side="right")) - 1
         return bool(bed.phase[max(row, 0)] == "rest")
@@ -240,21 +240,13 @@ class _Story:
         """Whether it was set down and came to rest, so that its last frame shows it at rest."""
         sinkage = self.run.quantities.get("sinkage")
         value = sinkage.get("value") if isinstance(sinkage, dict) else sinkage
-        return self.kind == "set_down" and value is not None
-
-    @property
-    def kind(self) -> str:
-        return self.run.kind
-
-    @property
-    def speed(self) -> float:
-        return self.run.speed or 0.0
+        return self.run.kind == "set_down" and value is not None
 
     @property
     def title(self) -> str:
-        speed = f" at {self.speed:.3g} m/s"
+        speed = f" at {self.run.speed or 0.0:.3g} m/s"
         words = {"driven": f"Driven{speed}", "drop": f"Dropped{speed}", "set_down": "Set down"}
-        return words.get(self.kind, self.name)
+        return words.get(self.run.kind, self.name)
 
     def line(self, index: int) -> str:
         parts = [f"bed {self.run.seed}"] if self.run.seed is not None else []
@@ -325,7 +317,7 @@ def _plan(
     if fast > 0.0:
         still(main, half, "speed", nice_above(fast), "speed", "the grains' speed half way in")
     last = len(main.frames) - 1
-    if last != main.deepest and main.kind == "driven":
+    if last != main.deepest and main.run.kind == "driven":
         inside = main.depth[last] > 0.0
         still(main, last, "displacement", top, "end", "near the end of the pull-out" if inside else "pulled out")
     for story in chosen[1:]:
@@ -341,9 +333,9 @@ def _plan(
 
 def _choose(stories: list[_Story]) -> list[_Story]:
     """The slowest and fastest driven run, the fastest drop and one set down; the first is animated."""
-    driven = sorted((s for s in stories if s.kind == "driven"), key=lambda s: (s.speed, -len(s.frames)))
-    drops = sorted((s for s in stories if s.kind == "drop"), key=lambda s: s.speed)
-    rest = [s for s in stories if s.kind == "set_down"]
+    driven = sorted((s for s in stories if s.run.kind == "driven"), key=lambda s: (s.run.speed or 0.0, -len(s.frames)))
+    drops = sorted((s for s in stories if s.run.kind == "drop"), key=lambda s: s.run.speed or 0.0)
+    rest = [s for s in stories if s.run.kind == "set_down"]
     wanted = [*driven[:1], *driven[-1:], *drops[-1:], *rest[:1]]
     chosen: list[_Story] = []
     for story in wanted or stories[:4]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageColor
 
-from vis.page.style import STATES
+from vis.page.plots import STATES
 from vis.pictures.arrows import FORCE
 from vis.pictures.canvas import Page, colourmap
 from vis.pictures.frames import read_frames

@@ -14,10 +14,9 @@ from vis.film.reel import NAME, SpaceReel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity
 from vis.page.page import Block, Section, Tile, listing, text
-from vis.page.plots import DASHED, DOTTED, Array, legend_above, mean_over, sheet
+from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, Array, legend_above, mean_over, sheet
 from vis.page.report import Report, Result, again, given, report_of
 from vis.page.states import States, draw_bands, draw_states, passages
-from vis.page.style import BED, GREY, INK, MODEL
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
 

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 
 from vis.page.numbers import short
 from vis.page.page import Section, table, text
-from vis.page.plots import DASHED, Array, legend_above, mean_over, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, as_it_lies, legend_above, mean_over, sheet
 from vis.page.report import Report
-from vis.page.style import BED, GREY, INK, MODEL, as_it_lies
 from vis.tumble.beside import HEAD, beside_rows, beside_words
 
 __all__ = ["grains_section"]

@@ -19,11 +19,10 @@ from vis.film.reel import Reel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity, short
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
-from vis.page.plots import DASHED, DOTTED, Array, handle, legend_above, sheet
+from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result, again, given, report_of, tables
 from vis.page.sentences import Sentences
 from vis.page.states import States, by_state, draw_states, legend_of_states, panels, passages
-from vis.page.style import BED, GREY, INK, MODEL, STATES
 from vis.pictures.canvas import COLOURS, nice_above
 from vis.pictures.pictures import Picture
 from vis.tumble.beside import HEAD
