@@ -5,11 +5,12 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from vis.bed.tests import flank_lines, said
+from vis.bed.tests import flank_lines, said, thicknesses
 from vis.page.page import Block, Section, Tile, code, text
-from vis.page.plots import BED, GREY, INK, MODEL, handle, legend_above, new_panels, smooth_ratio
+from vis.page.plots import BED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
 
 __all__ = ["write_calibration_report"]
@@ -132,15 +133,10 @@ def _tests(report: Report) -> list[Block]:
 
 def _slopes(report: Report) -> list[Block]:
     """What the drained beds of the check left."""
-    tests = [test for test in _checked(report.result) if test["state"] == "drained"]
-    if not tests:
-        return []
-    drawing, axes = new_panels(len(tests), height=2.4, sharey=True)
-    for axis, test in zip(axes, tests, strict=True):
-        columns = report.columns(test["series"])
-        axis.plot(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], color=BED, marker=".", ls="none")
+
+    def draw(axis: Axes, test: Result, x: Array, thickness: Array, standing: Array | None) -> str:
+        axis.plot(x, thickness, color=BED, marker=".", ls="none")
         flank_lines(axis, test, start=0.5 * test["slot"], period=test["size"][0], colour=MODEL)
-        title = f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
-        axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
-    axes[0].set_ylabel("thickness [mm]")
-    return [report.draw("slopes", drawing)]
+        return f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
+
+    return thicknesses(report, [test for test in _checked(report.result) if test["state"] == "drained"], draw, "slopes")

@@ -8,7 +8,7 @@ from pathlib import Path
 from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, figure, listing
 from vis.page.plots import DASHED, handle, legend_above, new_panels, shades
-from vis.page.report import Report, again, report_of, tables
+from vis.page.report import Report, report_of, tables
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import grains_box, read_frames
 from vis.pictures.pictures import Counter, carry_out
@@ -40,11 +40,7 @@ def write_bed_report(report: Report) -> Path:
         Section("", [*tables(result), *picture, *drawn]),
         Section("How each stage came to rest", [listing(criteria)]),
         report.numbers(),
-        again(
-            f"hedgebed {command} run.toml\nhedgebed bed show bed.npz",
-            f"With hedgebed {result['version']}, in this folder:",
-            "The same settings give the same bits.",
-        ),
+        report.again(f"hedgebed {command} run.toml\nhedgebed bed show bed.npz", "bits"),
     ]
     lead = [command, f"seed {result['bed']['seed']}"]
     return report.write(sections, lead=lead, tiles=tiles, missing=[note] if note else [])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from vis.page.report import Report, Result, again, report_of, tables
 from vis.page.sentences import Sentences
 from vis.pictures.frames import read_frames
 
-__all__ = ["FALLEN_SHARE", "flank_lines", "said", "write_shear_report", "write_test_report"]
+__all__ = ["FALLEN_SHARE", "flank_lines", "said", "thicknesses", "write_shear_report", "write_test_report"]
 
 say = Sentences(__package__)
 Grains = Mapping[str, NDArray[Any]]
@@ -201,7 +201,7 @@ def _cut_profiles(report: Report) -> list[Block]:
         return str(run["id"])
 
     handles = [handle("stood last", BED, lw=1.2), handle("at the end", MODEL, ls="--", lw=1.2)]
-    return _thicknesses(report, "tests_profiles", draw, handles)
+    return thicknesses(report, report.result["runs"], draw, "tests_profiles", name="profiles", handles=handles)
 
 
 def _trials(report: Report) -> list[Block]:
@@ -281,20 +281,25 @@ def _repose_profiles(report: Report) -> list[Block]:
 
     dots, fit = handle("bed", "black", marker=".", ls="none"), handle("fit", MODEL)
     before = handle("surface before", "#888888", ls="--", lw=0.8)
-    return _thicknesses(report, "repose_profiles", draw, [dots, fit, before])
+    handles = [dots, fit, before]
+    return thicknesses(report, report.result["runs"], draw, "repose_profiles", name="profiles", handles=handles)
 
 
-def _thicknesses(report: Report, key: str, draw: Callable[..., str], handles: list[Any]) -> list[Block]:
-    """Profiles in mm, a panel a run, each drawn by `draw`, which gives its title."""
-    runs = report.result["runs"]
+def thicknesses(
+    report: Report, runs: Sequence[Result], draw: Callable[..., str], key: str, *, name: str = "", handles: Any = ()
+) -> list[Block]:
+    """Profiles in mm, a panel a run, each drawn by `draw`, which gives its title; none without runs."""
+    if not runs:
+        return []
     drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
     for axis, run in zip(axes, runs, strict=True):
         columns = {name: 1e3 * values for name, values in report.columns(run["series"]).items()}
         title = draw(axis, run, columns["x_m"], columns["thickness_m"], columns.get("thickness_standing_m"))
         axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
     axes[0].set_ylabel("thickness [mm]")
-    legend_above(drawing, handles)
-    return [report.draw(key, drawing, name="profiles")]
+    if handles:
+        legend_above(drawing, handles)
+    return [report.draw(key, drawing, name=name)]
 
 
 _Drawer = Callable[[Report], list[Block]]

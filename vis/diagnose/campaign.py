@@ -16,7 +16,7 @@ from vis.page.folder import read_columns
 from vis.page.numbers import short
 from vis.page.page import Section, Tile, listing, table, text
 from vis.page.plots import BED, GREY, MODEL, RED, Array, handle, legend_above, line_handles, line_styles, sheet
-from vis.page.report import Report, Result, again, capital, report_of
+from vis.page.report import Report, Result, again, capital, report_of, terms_text
 
 __all__ = ["write_campaign_report", "write_inspection_report"]
 
@@ -59,16 +59,12 @@ def write_campaign_report(report: Report) -> Path:
     head = (
         "trial", "g_sim stated [m/s²]", "true", "torque [N m]", "actuator", "angle [degrees]", "speed [m/s]", "states",
     )  # fmt: skip
-    effects = [
-        f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
-        for effect in result["effects"]
-    ]
     sections = [
         Section("", [drawn]),
         Section(
             "The trials",
             [
-                text(f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}."),
+                text(terms_text(result)),
                 table(head, rows),
                 text("campaign/ is what a laboratory would hand over; truth.toml is what made it.", small=True),
             ],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -24,22 +24,21 @@ _STEADY = 0.03
 """Over which a camera's way is smoothed (standard deviation), over the run's duration."""
 
 
-class Camera(Protocol):
-    """Sees one run.
+class Camera:
+    """Sees one run."""
 
-    ``arrow``: Length of the arrow of the whole weight, over the picture's height; 0: forces are not shown.
-    """
-
-    arrow: float
+    arrow = 0.0
+    """Length of the arrow of the whole weight, over the picture's height; 0: forces are not shown."""
 
     def set_up(
         self, reel: Any, pixels: tuple[int, int], reach: float, *, opengl: bool
     ) -> tuple[Stage | FlatStage, Array]:
         """The stage for pictures of this size that show a platform of this reach [m], and the focus at every picture
         [m], shape (n, 2)."""
+        raise NotImplementedError
 
     def dress(self, axis: Any, reel: Any, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
-        """Draw what lies over the ground and the platform."""
+        """Draw what lies over the ground and the platform: nothing."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +51,13 @@ class Panel:
     """Left, foot, width, height in fractions of the sheet."""
 
 
-class _Plane:
+class _Plane(Camera):
     """In front of the plane of the spikes: a level line, a ruler.
 
     Least `width` and height `tall` of its picture are over the spikes' length.
     """
 
-    width, tall, arrow = 3.1, 2.75, 0.0
+    width, tall = 3.1, 2.75
 
     def set_up(
         self, reel: Reel, pixels: tuple[int, int], reach: float, *, opengl: bool
@@ -109,7 +108,7 @@ class _Near(_Plane):
         axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", bbox=HALO)
 
 
-class _Space:
+class _Space(Camera):
     """From above and aside; least width and height of the picture over the largest distance of a tip from the centre.
 
     The plane that a rendered picture looks at is the front of the bed: no grain is left out.
@@ -121,20 +120,12 @@ class _Space:
         self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool
     ) -> tuple[Stage | FlatStage, Array]:
         width = max(self.width, self.tall * pixels[0] / pixels[1]) * reach
-        (low, high), centres = reel.box, reel.centres
-        stage: Stage | FlatStage
-        if opengl:
-            cut = float(low[1])
-            stage = Stage(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius, pitch=self.pitch)
-            stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
-        else:
-            cut = float(centres[:, 1].mean())
-            stage = FlatStage(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius)
+        (low, high), centres, kind = reel.box, reel.centres, Stage if opengl else FlatStage
+        cut, pitch = (float(low[1]), self.pitch) if opengl else (float(centres[:, 1].mean()), 0.0)
+        stage = kind(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius, pitch=pitch)
+        stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
         level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(stage.pitch)
         return stage, _steady(np.column_stack([centres[:, 0], level - 0.12 * stage.height]))
-
-    def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
-        """Nothing."""
 
 
 def layout(reels: Sequence[AnyReel]) -> list[Panel]:

@@ -16,7 +16,8 @@ from vis.page.plots import Array, styled
 from vis.page.sentences import Sentences
 
 __all__ = [
-    "Progress", "Report", "Result", "again", "capital", "given", "number_text", "report_of", "tables", "unit_text",
+    "Progress", "Report", "Result", "again", "capital", "given", "number_text", "report_of", "tables", "terms_text",
+    "unit_text",
 ]  # fmt: skip
 
 Progress = Callable[[float], None]
@@ -81,6 +82,11 @@ class Report:
         blocks = [table(("quantity", "value", *more, "unit", "note"), rows, words=True)]
         return Section("Every number of the result", blocks)
 
+    def again(self, command: str, same: str = "") -> Section:
+        """How to do the run again with this version, and what is the same then."""
+        after = f"The same settings give the same {same}." if same else ""
+        return again(command, f"With hedgebed {self.result['version']}, in this folder:", after)
+
     def write(
         self,
         sections: Sequence[Section],
@@ -134,6 +140,15 @@ def given(entries: Mapping[str, Result]) -> Block:
     """The numbers of a trial and where each is from."""
     rows = [(name, number_text(e["value"]), unit_text(e["unit"]), e["origin"]) for name, e in entries.items()]
     return table(("number", "value", "unit", "where from"), rows, words=True)
+
+
+def terms_text(result: Result) -> str:
+    """The terms of the model beyond the base model, in a sentence."""
+    effects = [
+        f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
+        for effect in result["effects"]
+    ]
+    return f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}."
 
 
 def tables(result: Result) -> list[Block]:

@@ -12,7 +12,7 @@ from vis.page.folder import read_columns
 from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, listing
 from vis.page.plots import BED, DASHED, GREY, MODEL, handle
-from vis.page.report import Report, Result, again, given, report_of
+from vis.page.report import Report, Result, given, report_of
 from vis.page.states import by_state, legend_of_states, panels
 
 __all__ = ["write_hop_report"]
@@ -29,11 +29,7 @@ def write_hop_report(report: Report) -> Path:
         Section("", [listing(result["departures"]["sentences"]), *drawn]),
         Section("The numbers", [given(result["numbers"])]),
         report.numbers(),
-        again(
-            "hedgebed hop run.toml",
-            f"With hedgebed {result['version']}, in this folder:",
-            "The same settings give the same result.",
-        ),
+        report.again("hedgebed hop run.toml", "result"),
     ]
     return report.write(sections, lead=["hop", str(result["actuator"]), str(result["surface"])], tiles=_tiles(result))
 

@@ -193,23 +193,11 @@ def spread_plot(run: RunFolder) -> Plot | None:
         axis.axhline(mean, color=INK, lw=1.0)
         if spread:
             axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
-        axis.errorbar(
-            range(len(rows)),
-            values,
-            [np.nan if error is None else error for *_, error in rows],
-            fmt="o",
-            color=MODEL,
-            ms=7,
-            mec="white",
-            capsize=3,
-        )
+        errors = [np.nan if error is None else error for *_, error in rows]
+        axis.errorbar(range(len(rows)), values, errors, fmt="o", color=MODEL, ms=7, mec="white", capsize=3)
         axis.set_xticks(range(len(rows)), [str(seed) for seed, *_ in rows])
-        axis.set(
-            xlim=(-0.6, len(rows) - 0.4),
-            title=title,
-            xlabel="seed of the bed",
-            ylabel=f"{title.split()[1]} [{unit}]",
-        )
+        axis.set(xlim=(-0.6, len(rows) - 0.4), xlabel="seed of the bed")
+        axis.set(title=title, ylabel=f"{title.split()[1]} [{unit}]")
         reach = max(2.2 * (spread or 0.0), 0.1 * abs(mean), 1e-12)
         axis.set_ylim(min(mean - reach, *axis.get_ylim()), max(mean + reach, *axis.get_ylim()))
         axis.grid(False, axis="x")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -139,7 +140,7 @@ def _draw_amended(run: RunFolder) -> Figure | None:
     for row, group in zip(axes, groups, strict=True):
         for axis, (title, runs) in zip(row, group, strict=False):
             axis.set_title(title)
-            (_draw_driven if runs[0].kind == "driven" else _draw_motion)(axis, runs)
+            _draw_panel(axis, runs)
         for axis in row[len(group) :]:
             axis.set_visible(False)
     handles = [handle("bed", BED, lw=1.0)] if any(r.bed is not None for r in run.runs) else []
@@ -180,30 +181,25 @@ def _by_speed(runs: Sequence[Run]) -> list[tuple[str, list[Run]]]:
     ]
 
 
-def _draw_driven(axis: Axes, runs: Sequence[Run]) -> None:
-    for r in runs:
-        if r.bed is not None:
-            axis.plot(1e3 * r.bed.depth, r.bed.force, color=BED, lw=0.7, alpha=0.6)
-    for series, colour, style in ((runs[0].model, MODEL, DASHED), (runs[0].amended, AMENDED, "-")):
-        if series is not None:
-            axis.plot(1e3 * series.depth, series.force, color=colour, ls=style, lw=1.8)
+def _draw_panel(axis: Axes, runs: Sequence[Run]) -> None:
+    """Force against depth of driven runs; of the others depth against the time since they came to depth 0."""
+    driven = runs[0].kind == "driven"
+    bed: Mapping[str, Any] = {"color": BED, "lw": 0.7, "alpha": 0.6} if driven else {"color": BED, "lw": 0.9}
+    lines: list[tuple[Series | None, Mapping[str, Any]]] = [(r.bed, bed) for r in runs]
+    lines.append((runs[0].model, {"color": MODEL, "ls": DASHED, "lw": 1.8}))
+    lines.append((runs[0].amended, {"color": AMENDED, "lw": 1.8}))
+    for series, style in lines:
+        if series is None:
+            continue
+        across, up = 1e3 * series.depth, series.force
+        if not driven:
+            inside = np.flatnonzero(series.depth > 0)
+            start = float(series.time[inside[0]]) if len(inside) else float(series.time[0])
+            across, up = 1e3 * (series.time - start), 1e3 * series.depth
+        axis.plot(across, up, **style)
     axis.axhline(0.0, color=GREY, lw=0.8)
-    axis.set(xlabel="depth of the tip [mm]", ylabel="force on the spike [N]")
-
-
-def _draw_motion(axis: Axes, runs: Sequence[Run]) -> None:
-    beds = [r.bed for r in runs if r.bed is not None]
-    others = [(runs[0].model, MODEL, DASHED, 1.8), (runs[0].amended, AMENDED, "-", 1.8)]
-    for series, colour, style, width in [*((bed, BED, "-", 0.9) for bed in beds), *others]:
-        if series is not None:
-            start = _touch(series)
-            axis.plot(1e3 * (series.time - start), 1e3 * series.depth, color=colour, ls=style, lw=width)
-    axis.axhline(0.0, color=GREY, lw=0.8)
-    axis.invert_yaxis()
-    axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")
-
-
-def _touch(series: Series) -> float:
-    """When it came to depth 0 [s]."""
-    inside = np.flatnonzero(series.depth > 0)
-    return float(series.time[inside[0]]) if len(inside) else float(series.time[0])
+    if driven:
+        axis.set(xlabel="depth of the tip [mm]", ylabel="force on the spike [N]")
+    else:
+        axis.invert_yaxis()
+        axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")

@@ -31,7 +31,9 @@ def summarise(run: RunFolder) -> dict[str, Any]:
     "reproduce"; "caveat" is what to know before any number.
     """
     result = run.result
-    quantities = words.mapping_of(result.get("quantities"))
+    quantities, spike = words.mapping_of(result.get("quantities")), dict(words.mapping_of(result.get("spike")))
+    if spike.get("tip") != "cone":
+        spike.pop("cone_angle", None)
     experiment = str(result.get("experiment") or words.setting_of(run, "command") or "")
     return {
         "title": str(result.get("title") or (f"hedgebed {experiment}" if experiment else "A hedgebed run")),
@@ -47,7 +49,9 @@ def summarise(run: RunFolder) -> dict[str, Any]:
         "departures": words.departures_part(result),
         "reference": words.reference_part(result),
         "bed": words.bed_part(result, quantities),
-        "spike": words.facts_table(_spike(words.mapping_of(result.get("spike")))),
+        "spike": words.facts_table(
+            {key: spike[key] for key in spike if key != "cone_angle" or spike.get("tip") == "cone"}
+        ),
         "runs": words.runs_table(run),
         "numbers": words.numbers_table(quantities),
         "settings": words.settings_table(run.settings),
@@ -125,11 +129,6 @@ def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
     if not parts:
         return ""
     return f"The grains are {words.joined(parts)}: these are numbers of that bed, not of a material."
-
-
-def _spike(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """What there is to say of this spike: only a cone has an angle."""
-    return {key: value for key, value in facts.items() if key != "cone_angle" or facts.get("tip") == "cone"}
 
 
 def _frames(run: RunFolder) -> list[str]:
@@ -266,6 +265,5 @@ def _peaks(run: RunFolder, kind: str, key: str) -> list[tuple[float, tuple[float
 
 
 def _deeper(ratio: float) -> str:
-    return (
-        f"{plain(ratio, 2)} times as deep" if ratio >= 2.0 else words.more_or_less(ratio - 1.0, "deeper", "less deep")
-    )
+    far = ratio >= 2.0
+    return f"{plain(ratio, 2)} times as deep" if far else words.more_or_less(ratio - 1.0, "deeper", "less deep")

@@ -337,11 +337,7 @@ def _choose(stories: list[_Story]) -> list[_Story]:
     drops = sorted((s for s in stories if s.run.kind == "drop"), key=lambda s: s.run.speed or 0.0)
     rest = [s for s in stories if s.run.kind == "set_down"]
     wanted = [*driven[:1], *driven[-1:], *drops[-1:], *rest[:1]]
-    chosen: list[_Story] = []
-    for story in wanted or stories[:4]:
-        if story not in chosen:
-            chosen.append(story)
-    return chosen
+    return list(dict.fromkeys(wanted or stories[:4]))
 
 
 def _half_way(story: _Story) -> int:

@@ -186,13 +186,14 @@ class Eye:
     """Where a point lies on a picture of `width` [m] across whose middle is at the focus.
 
     ``size``: Of the picture [pixels]. ``width``: What it shows across [m]. ``cut``: y of the plane that is looked at
-    [m]. ``pitch``: How far the view goes downwards [radians].
+    [m]. ``pitch``: How far the view goes downwards [radians]. Its `reach` is how far from the focus there is something
+    to be seen [m].
     """
 
     def __init__(self, size: tuple[int, int], *, width: float, cut: float, pitch: float = 0.0) -> None:
         self.size, self.width, self.cut = size, width, cut
         self.height = width * size[1] / size[0]
-        self.pitch = pitch
+        self.pitch, self.reach = pitch, 0.5 * width
 
     def place(self, points: Array, focus: tuple[float, float]) -> Array:
         """Fractions of the picture from its lower left corner, shape (n, 2), of points [m], shape (n, 3)."""

@@ -15,7 +15,7 @@ from vis.page.folder import read_columns
 from vis.page.numbers import quantity
 from vis.page.page import Block, Section, Tile, listing, text
 from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, Array, legend_above, mean_over, sheet
-from vis.page.report import Report, Result, again, given, report_of
+from vis.page.report import Report, Result, given, report_of
 from vis.page.states import States, draw_bands, draw_states, passages
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
@@ -59,7 +59,7 @@ def write_spatial_report(
         *([Section("Transitions", passages(told, angle="turn", label="turn [degrees]"))] if told else []),
         Section("The trial", [given(result["trial"])]),
         report.numbers(beside=(result.get("grains") or {}).get("beside") or {}),
-        again("hedgebed tumble spatial run.toml", f"With hedgebed {result['version']}, in this folder:"),
+        report.again("hedgebed tumble spatial run.toml"),
     ]
     quantities = result["quantities"]
     tiles = [

@@ -20,7 +20,7 @@ from vis.page.folder import read_columns
 from vis.page.numbers import quantity, short
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
 from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
-from vis.page.report import Report, Result, again, given, report_of, tables
+from vis.page.report import Report, Result, given, report_of, tables, terms_text
 from vis.page.sentences import Sentences
 from vis.page.states import States, by_state, draw_states, legend_of_states, panels, passages
 from vis.pictures.canvas import COLOURS, nice_above
@@ -58,17 +58,14 @@ def write_tumble_report(
     title, caption = report.captions("moving.title"), report.captions("moving.caption", far=_FOLLOWED)
     movie = _animate(home / "animation.gif", result, numbers, states)
     moving = figure(movie, title=title, caption=caption, half=True, show_file=True)
+    settled = f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}."
     sections = [
         Section("", [path, turned, moving]),
         Section("Transitions", passages(result["transitions"], angle="theta", label="θ [degrees]")),
         Section("Energy", [energy]),
-        Section("The trial", [given(result["trial"]), _settled(result)]),
+        Section("The trial", [given(result["trial"]), text(f"{settled} {terms_text(result)}")]),
         report.numbers(),
-        again(
-            "hedgebed tumble run.toml",
-            f"With hedgebed {result['version']}, in this folder:",
-            "The same settings give the same trajectory.csv.",
-        ),
+        report.again("hedgebed tumble run.toml", "trajectory.csv"),
     ]
     if "sweep" in result:
         sections.insert(0, _sweep_section(report))
@@ -82,18 +79,6 @@ def write_tumble_report(
         sections.insert(1, _seen(report, colour, film))
     lead = ["tumble", f"{result['duration']:g} s", f"{len(numbers['t_s'])} rows"]
     return report.write(sections, lead=lead, tiles=_tiles(result))
-
-
-def _settled(result: Result) -> Block:
-    """What the trial was, in a sentence each."""
-    effects = [
-        f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
-        for effect in result["effects"]
-    ]
-    return text(
-        f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}. "
-        f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}.",
-    )
 
 
 def _seen(report: Report, colour: str, film: bool) -> Section:
