@@ -150,7 +150,7 @@ _MODULES = {
             "amended=report plot_drag plot_drops plot_parts=plot_drag plots=report summary "
             "summary_tables=summary_parts summary_words=summary_parts"
         ),
-        "vis.pictures": "arrows canvas frames meshes render scene sections stage=scene tracks",
+        "vis.pictures": "arrows=canvas canvas frames meshes render scene sections stage=scene tracks",
         "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=report tumble_sweep=report",
     },
 }

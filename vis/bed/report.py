@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 from vis.page.numbers import short
@@ -11,7 +10,7 @@ from vis.page.plots import DASHED, handle, legend_above, new_panels, shades
 from vis.page.report import Report, report_of, tables
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import grains_box, read_frames
-from vis.pictures.pictures import Counter, carry_out
+from vis.pictures.pictures import carry_out
 from vis.pictures.render import PictureJob, View, run_job
 
 __all__ = ["write_bed_report"]
@@ -101,8 +100,7 @@ def _picture(report: Report) -> tuple[list[Block], str]:
         "surface": float(result["bed"]["surface"]["value"]), "file": str(file), "size": [1600, 1200],
     }  # fmt: skip
     job: PictureJob = {"folder": str(folder), "views": [view]}
-    counter, flat = Counter([1.0], report.rest()), partial(run_job, job, opengl=False)
     stands_in = "a cross-section stands in for the picture"
-    _, notes = carry_out(job, counter, flat, failed=stands_in, without=stands_in)
+    _, notes = carry_out(job, run_job, [1.0], report.rest(), failed=stands_in, without=stands_in)
     said = "Grains coloured by the number of their contacts."
     return [figure(file, title="The bed", caption=said)], "".join(notes)

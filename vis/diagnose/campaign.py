@@ -20,14 +20,6 @@ from vis.page.report import Report, Result, again, capital, report_of, terms_tex
 
 __all__ = ["write_campaign_report", "write_inspection_report"]
 
-_CHANNELS = (
-    ("pose", "x_m", 1e3, "x [mm]"),
-    ("pose", "y_m", 1e3, "y [mm]"),
-    ("pose", "theta_rad", 180 / math.pi, "θ [degrees]"),
-    ("imu", "gyro_rad_s", 1.0, "gyro [rad/s]"),
-    ("imu", "ay_m_s2", 1.0, "body-y specific force [m/s²]"),
-    ("wheel", "omega_rad_s", 1.0, "wheel [rad/s]"),
-)
 _MOST = 12
 """Trials drawn at most; of a campaign that is checked those with findings first."""
 _MOST_LINES = 60
@@ -59,18 +51,9 @@ def write_campaign_report(report: Report) -> Path:
     head = (
         "trial", "g_sim stated [m/s²]", "true", "torque [N m]", "actuator", "angle [degrees]", "speed [m/s]", "states",
     )  # fmt: skip
-    sections = [
-        Section("", [drawn]),
-        Section(
-            "The trials",
-            [
-                text(terms_text(result)),
-                table(head, rows),
-                text("campaign/ is what a laboratory would hand over; truth.toml is what made it.", small=True),
-            ],
-        ),
-        again("hedgebed campaign run.toml", ""),
-    ]
+    note = text("campaign/ is what a laboratory would hand over; truth.toml is what made it.", small=True)
+    trials = [text(terms_text(result)), table(head, rows), note]
+    sections = [Section("", [drawn]), Section("The trials", trials), again("hedgebed campaign run.toml", "")]
     tiles = [
         Tile("Trials", str(quantities["trial_count"]["value"])),
         Tile("Rows recorded", str(quantities["row_count"]["value"])),
@@ -85,16 +68,13 @@ def _draw(campaign: Path, trials: Sequence[Result]) -> Figure:
     conditions = [f"{t['actuator']} {t['torque']:g} N m, {t['gravity_sim']:.3g} m/s²" for t in shown]
     styles = line_styles(conditions)
     drawing, grid = sheet(2, 3, 5.0, sharex=True)
-    axes = grid.ravel()
+    axes, channels = grid.ravel(), [channel for channel in _TUMBLE if channel[-1] != "ax"]
     for trial, condition in zip(shown, conditions, strict=True):
-        files = {
-            sensor: read_columns(campaign / f"{trial['id']}-{sensor}.csv")[0] for sensor in ("pose", "imu", "wheel")
-        }
-        for axis, (sensor, column, scale, _) in zip(axes, _CHANNELS, strict=True):
-            columns = files[sensor]
-            axis.plot(columns["t_s"], scale * columns[column], lw=0.8, **styles[condition])
-    for axis, (_, _, _, label) in zip(axes, _CHANNELS, strict=True):
-        axis.set_ylabel(label)
+        path = f"{campaign / trial['id']}-{{}}.csv"
+        files = {sensor: read_columns(Path(path.format(sensor)))[0] for sensor in ("pose", "imu", "wheel")}
+        for axis, (sensor, column, scale, label, channel) in zip(axes, channels, strict=True):
+            axis.plot(files[sensor]["t_s"], scale * files[sensor][column], lw=0.8, **styles[condition])
+            axis.set_ylabel("body-y specific force [m/s²]" if channel == "ay" else label)
     for axis in axes[3:]:
         axis.set_xlabel("time [s]")
     handles = line_handles([str(trial["id"]) for trial in shown], conditions)

@@ -236,7 +236,7 @@ def draw_evidence(said: Result) -> Figure | None:
         if len(names) > 1 and all(score[names] > score.get((name,), -math.inf) + 0.05 for name in names)
     ]
     names = sorted({*singles, *sets[:5], *([leading] if leading in best else [])}, key=lambda n: (score[n], -len(n)))
-    names = names[-_MOST_BARS:] if len(names) > _MOST_BARS else names
+    names = names[-_MOST_BARS:]
     drawing, ((axis, beside),) = sheet(1, 2, 1.3 + 0.27 * len(names), sharey=True, width_ratios=(3, 2))
     kinds = {name: _kind(name, leading, said) for name in names}
     colours = {name: _KINDS[kinds[name]] for name in names}
@@ -247,10 +247,8 @@ def draw_evidence(said: Result) -> Figure | None:
         axis.annotate(f"{score[name]:z.1f}" if abs(score[name]) < 10 else f"{score[name]:.0f}",
                       (max(score[name], 0.0), place), xytext=(3, 0), textcoords="offset points", va="center",
                       fontsize=7.5, color=INK)  # fmt: skip
-    axis.set_xlim(
-        max(1.1 * min(score[name] for name in names), -0.3 * most) if min(score[name] for name in names) < 0 else 0.0,
-        1.12 * most,
-    )  # one that is far off does not press the others together
+    least = min(score[name] for name in names)  # one that is far off does not press the others together
+    axis.set_xlim(max(1.1 * least, -0.3 * most) if least < 0 else 0.0, 1.12 * most)
     axis.axvline(0.0, color=INK, lw=0.9)
     axis.set_yticks(places, [" + ".join(name) for name in names])
     axis.grid(False, axis="y")

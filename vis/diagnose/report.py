@@ -97,19 +97,14 @@ def _number(value: float) -> str:
 
 def _gap_table(said: Result) -> Block:
     gap, weighed = said["gap"], said.get("gap_with_scatter")
-
-    def cell(value: float | None, error: float | None = None) -> str:
-        told = _DASH if value is None else _number(value)
-        return told if error is None else f"{told} ± {short(error, 1)}"
-
-    def error(one: Result, stage: str, part: str) -> float | None:
-        return one.get("after_std", {}).get(part) if stage == "after" else None
-
-    rows = [
-        (name, *(cell(one[stage][part], error(one, stage, part)) for one in (gap, weighed) if one is not None
-                 for stage in ("before", "after")))
-        for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials"))
-    ]  # fmt: skip
+    rows = []
+    for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials")):
+        cells = [name]
+        for one in (gap, weighed) if weighed is not None else (gap,):
+            cells += [_DASH if one[stage][part] is None else _number(one[stage][part]) for stage in ("before", "after")]
+            error = one.get("after_std", {}).get(part)
+            cells[-1] += "" if error is None else f" ± {short(error, 1)}"
+        rows.append(cells)
     head: tuple[str, ...] = ("", "base model", "best model")
     title = "The gap, chi-square per sample (1: the sensors' noise)"
     if weighed is not None:

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from vis.film.reel import AnyReel, Reel, SpaceReel
 from vis.page.plots import INK, Array, nice_below
-from vis.pictures.arrows import HALO
+from vis.pictures.canvas import HALO
 from vis.pictures.frames import Frame
 from vis.pictures.scene import Eye, Stage
 from vis.pictures.sections import FlatStage
@@ -20,6 +20,8 @@ __all__ = ["Camera", "Panel", "layout"]
 
 Focus = tuple[float, float]
 """x and z of the middle of a picture [m]."""
+View = tuple[Stage | FlatStage, Array]
+"""The stage, and the focus at every picture [m], shape (n, 2)."""
 _STEADY = 0.03
 """Over which a camera's way is smoothed (standard deviation), over the run's duration."""
 
@@ -30,11 +32,8 @@ class Camera:
     arrow = 0.0
     """Length of the arrow of the whole weight, over the picture's height; 0: forces are not shown."""
 
-    def set_up(
-        self, reel: Any, pixels: tuple[int, int], reach: float, *, opengl: bool
-    ) -> tuple[Stage | FlatStage, Array]:
-        """The stage for pictures of this size that show a platform of this reach [m], and the focus at every picture
-        [m], shape (n, 2)."""
+    def set_up(self, reel: Any, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
+        """The view for pictures of this size that show a platform of this reach [m]."""
         raise NotImplementedError
 
     def dress(self, axis: Any, reel: Any, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
@@ -59,9 +58,7 @@ class _Plane(Camera):
 
     width, tall = 3.1, 2.75
 
-    def set_up(
-        self, reel: Reel, pixels: tuple[int, int], reach: float, *, opengl: bool
-    ) -> tuple[Stage | FlatStage, Array]:
+    def set_up(self, reel: Reel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         width = max(self.width, self.tall * pixels[0] / pixels[1])
         (low, high), kind = reel.box, Stage if opengl else FlatStage
         stage = kind(pixels, width=width * reach, cut=reel.cut, low=low, high=high, radius=reel.radius)
@@ -116,9 +113,7 @@ class _Space(Camera):
 
     width, tall, arrow, pitch = 4.4, 2.6, 0.22, 0.5
 
-    def set_up(
-        self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool
-    ) -> tuple[Stage | FlatStage, Array]:
+    def set_up(self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         width = max(self.width, self.tall * pixels[0] / pixels[1]) * reach
         (low, high), centres, kind = reel.box, reel.centres, Stage if opengl else FlatStage
         cut, pitch = (float(low[1]), self.pitch) if opengl else (float(centres[:, 1].mean()), 0.0)

@@ -65,9 +65,9 @@ def summarise(run: RunFolder) -> dict[str, Any]:
 def _banner(run: RunFolder) -> str:
     if run.status == "done":
         return ""
-    unknown = "" if run.result else "Whether this run was finished is not known."
-    known = {"stopped": say("status_stopped"), "failed": say("status_failed"), "running": say("status_running")}
-    text = known.get(run.status, unknown)
+    text = "" if run.result else "Whether this run was finished is not known."
+    if run.status in ("stopped", "failed", "running"):
+        text = say(f"status_{run.status}")
     reason = f" Reason: {words.sentence(run.reason)}" if run.reason and text else ""
     return text + reason
 

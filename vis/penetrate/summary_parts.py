@@ -48,22 +48,20 @@ def fitted(quantities: Mapping[str, Any], key: str) -> str:
 
 @dataclass(frozen=True)
 class Departure:
-    """One row of the table of departures: mean forces of bed and law in a band of depth at one speed."""
+    """One row of the table of departures: mean forces of bed and law in a band of depth at one speed.
+
+    ``speed``: [m/s]. ``depth_from``, ``depth_to``: [m]. ``bed_force``, ``model_force``: [N], the bed's the mean over
+    the beds. ``beds``: How many; None where it is not stated. ``bed_std``: Standard deviation of the bed's force
+    between beds [N]; None where unknown.
+    """
 
     speed: float
-    """[m/s]."""
     depth_from: float
-    """[m]."""
     depth_to: float
-    """[m]."""
     bed_force: float
-    """[N], mean over the beds."""
     model_force: float
-    """[N]."""
     beds: float | None = None
-    """How many; None where it was not told."""
     bed_std: float | None = None
-    """Standard deviation of the bed's force between beds [N]; None where unknown."""
 
     @property
     def difference(self) -> float:

@@ -14,7 +14,7 @@ import select
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,15 +28,13 @@ from vis.page.plots import Array
 from vis.page.report import Progress
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
-from vis.pictures.render import PictureJob, View, run_job
+from vis.pictures.render import CUT, PictureJob, View, run_job
 
-__all__ = ["Counter", "Picture", "Pictures", "carry_out", "make_pictures", "opengl_available", "render_apart"]
+__all__ = ["Picture", "Pictures", "carry_out", "make_pictures", "opengl_available", "render_apart"]
 
 _STILLS = 6
 _STILL_COSTS = 4.0  # in frames of the animation, as measured in software
 _ANIMATED = 48
-_CUT = "cut open along the spike's mid-plane: what is in front is left out, of the spike too"
-_SLAB = "shown are those up to four diameters behind the spike's mid-plane, the farther the darker"
 
 
 @dataclass(frozen=True)
@@ -109,56 +107,43 @@ def make_pictures(
     if not stills:
         return Pictures(method="none", notes=[*notes, "There are no frames to draw pictures of."])
     costs = [1.0 if view["file"].endswith(".gif") else _STILL_COSTS for view in job["views"] for _ in view["frames"]]
-    counter = Counter(costs, progress)
-
-    def flat() -> None:
-        for view in job["views"]:
-            view["note"] = view["note"].replace(_CUT, _SLAB)
-        run_job(job, opengl=False, step=counter.step)
-
     method, note = carry_out(
-        job, counter, flat, stall=stall, failed="cross-sections stand in for the pictures",
+        job, run_job, costs, progress, stall=stall, failed="cross-sections stand in for the pictures",
         without="cross-sections stand in for them (Debian: apt install libegl1 libgl1-mesa-dri)",
     )  # fmt: skip
     return Pictures(stills, animation, method, notes + note)
 
 
-class Counter:
-    """Reports how much is done; a still may cost more than a frame of an animation."""
-
-    def __init__(self, costs: list[float], progress: Progress | None = None) -> None:
-        self.costs, self.progress, self.done = costs, progress, 0
-
-    def step(self) -> None:
-        """One more is done."""
-        self.done += 1
-        if self.progress is not None:
-            self.progress(min(1.0, sum(self.costs[: self.done]) / sum(self.costs)))
-
-
 def carry_out(
     job: Mapping[str, Any],
-    counter: Counter,
-    flat: Callable[[], None],
+    run: Callable[..., None],
+    costs: Sequence[float],
+    progress: Progress | None = None,
     *,
     failed: str,
     without: str,
-    module: str = "vis.pictures.render",
     stall: float = 120.0,
 ) -> tuple[str, list[str]]:
-    """Draw a job with OpenGL in a child process, `python -m module`, or where that does not do it by `flat`.
+    """Draw a job by `run` with OpenGL in a child process, or where that does not succeed flat in this one.
 
-    Returns "opengl" or "sections", and a note on what stands in: `failed` where OpenGL did not do it, `without` where
-    there is none.
+    ``costs``: Of each picture, in any unit, for the progress. Returns "opengl" or "sections", and a note on what stands
+    in: `failed` where OpenGL did not succeed, `without` where there is none.
     """
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(min(1.0, sum(costs[:done]) / sum(costs)))
+
     if not opengl_available():
         note = f"This machine has no OpenGL for off-screen pictures; {without}."
-    elif (failure := render_apart(job, stall, counter.step, module=module)) is None:
+    elif (failure := render_apart(job, stall, step, module=run.__module__)) is None:
         return "opengl", []
     else:
-        note = f"Rendering with OpenGL failed ({failure}); {failed}."
-        counter.done = 0
-    flat()
+        note, done = f"Rendering with OpenGL failed ({failure}); {failed}.", 0
+    run(job, opengl=False, step=step)
     return "sections", [note]
 
 
@@ -378,7 +363,7 @@ def _view(
     count = f"{len(position):,}".replace(",", "\N{NO-BREAK SPACE}")
     return {
         "name": story.name, "frames": frames, "by": by, "top": top, "title": story.title,
-        "lines": [story.line(index) for index in frames], "note": f"{count} grains; {_CUT}", "low": low.tolist(),
+        "lines": [story.line(index) for index in frames], "note": f"{count} grains; {CUT}", "low": low.tolist(),
         "high": high.tolist(), "cut": cut, "radius": float(first.grains["radius"].mean()), "surface": surface,
         "file": str(file), "size": list(size),
     }  # fmt: skip

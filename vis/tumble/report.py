@@ -294,7 +294,7 @@ def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
         for axis, (name, scale, label) in zip(axes, _PANELS, strict=True):
             axis.plot(columns[keys[0]["column"]], scale * columns[name], "o-", color=BED, ms=3.5, lw=1.4)
             _say_if_empty(axis, keys[0], columns[name])
-            _label(axis, keys[0], label)
+            axis.set(xlabel=_words(keys[0]), ylabel=label)
         return drawing
     along, other = (0, 1) if shape[0] >= shape[1] else (1, 0)
     grids = [scale * np.moveaxis(columns[name].reshape(shape), along, 0) for name, scale, _ in _PANELS]
@@ -312,17 +312,13 @@ def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
         for values, colour, value in zip(grid.T, colours, keys[other]["values"], strict=True):
             axis.plot(keys[along]["values"], values, "o-", color=colour, ms=3, lw=1.3, label=f"{value:g}")
         _say_if_empty(axis, keys[along], grid)
-        _label(axis, keys[along], label)
+        axis.set(xlabel=_words(keys[along]), ylabel=label)
     legend_above(drawing, axes[0].lines, _MOST_LINES, title=_words(keys[other]))
     return drawing
 
 
 def _words(key: Result) -> str:
     return key["key"] if key["unit"] == "1" else f"{key['key']} [{key['unit']}]"
-
-
-def _label(axis: Axes, key: Result, label: str) -> None:
-    axis.set(xlabel=_words(key), ylabel=label)
 
 
 def _say_if_empty(axis: Axes, key: Result, values: Array) -> None:
