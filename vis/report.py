@@ -35,7 +35,7 @@ _REPORTS = {
 def write_report(folder: str | Path, *, pictures: bool = True, progress: Progress | None = None) -> Path:
     """Make every plot and picture of a run folder, and its `report.html`.
 
-    Parts that are missing (a run that was stopped, no frames, no OpenGL) are said in the report.
+    Parts that are missing (a run that was stopped, no frames, no OpenGL) are listed in the report.
 
     ``folder``: The run folder; `figures/`, `animation.gif` and `report.html` are written into it. ``pictures``: Whether
     to draw pictures and the animation; otherwise the report says that they were not asked for. ``progress``: Called

@@ -62,10 +62,10 @@ def test_a_key_or_a_value_that_is_not_there_is_an_error(tmp_path, monkeypatch):
     package = tmp_path / "talkative"
     package.mkdir()
     (package / "__init__.py").write_text("")
-    (package / "sentences.toml").write_text('depth = "it sinks {depth:.3g} m"\n')
+    (package / "sentences.toml").write_text('depth = "{depth:.3g} m deep"\n')
     monkeypatch.syspath_prepend(tmp_path)
     say = Sentences("talkative")
-    assert say("depth", depth=0.01234) == "it sinks 0.0123 m"
+    assert say("depth", depth=0.01234) == "0.0123 m deep"
     with pytest.raises(KeyError, match="height"):
         say("height")
     with pytest.raises(KeyError, match="depth"):

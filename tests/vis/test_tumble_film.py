@@ -174,7 +174,7 @@ def test_the_arrow_of_four_weights_is_cut_at_the_edge_and_says_its_number(folder
     """Its head would lie outside the picture: longer than that of one weight, up to the edge, with `8.00 N`."""
     sheet = Sheet([Reel(folder)], (640, 360), by="displacement", opengl=False)
     said, x = [], sheet.ways[1][0, 0]
-    monkeypatch.setattr(canvas, "_say", lambda axis, end, words: said.append((*end, words)))
+    monkeypatch.setattr(canvas, "_note", lambda axis, end, words: said.append((*end, words)))
     reds = []
     for force in ([0.0, 0.0, 2.0], [aside, 0.0, 8.0]):
         with monkeypatch.context() as patch:

@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from vis.bed.tests import flank_lines, said, thicknesses
+from vis.bed.tests import flank_lines, quoted, thicknesses
 from vis.page.page import Block, Section, Tile, code, text
 from vis.page.plots import BED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
@@ -28,7 +28,7 @@ def write_calibration_report(report: Report) -> Path:
     def tile(name: str, note: str, second: bool = False) -> Tile:
         entry = quantities[name]
         unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
-        return Tile(name.replace("_", " ").capitalize(), said(entry, 1.0, unit), note, second=second)
+        return Tile(name.replace("_", " ").capitalize(), quoted(entry, 1.0, unit), note, second=second)
 
     tiles = [tile(key, quantities[key]["note"]) for key in free]
     tiles += [tile(one["name"], one["verdict"], second=one["verdict"] != "met") for one in result["figures"]]

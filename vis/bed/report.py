@@ -23,15 +23,15 @@ def write_bed_report(report: Report) -> Path:
     drawn = [_profiles(report), *_passes(report)]
     picture, note = _picture(report)
 
-    def said(name: str, scale: float = 1.0, unit: str = "") -> str:
+    def show(name: str, scale: float = 1.0, unit: str = "") -> str:
         value = quantities[name]["value"]
         return "–" if value is None else f"{short(scale * value, 4)} {unit}".strip()
 
     tiles = [
-        Tile("Packing fraction", said("packing_fraction"), f"from {said('loosest')} to {said('densest')} on the way"),
-        Tile("Contacts of a grain", said("coordination_number"), f"{quantities['grain_count']['value']} grains"),
-        Tile("Surface", said("surface", 1e3, "mm"), "above the floor"),
-        Tile("Horizontal over vertical stress", said("pressure_ratio"), "away from floor and surface"),
+        Tile("Packing fraction", show("packing_fraction"), f"from {show('loosest')} to {show('densest')} on the way"),
+        Tile("Contacts of a grain", show("coordination_number"), f"{quantities['grain_count']['value']} grains"),
+        Tile("Surface", show("surface", 1e3, "mm"), "above the floor"),
+        Tile("Horizontal over vertical stress", show("pressure_ratio"), "away from floor and surface"),
     ]
     criteria = [f"{stage['stage']}: {stage['criterion']}." for stage in result["stages"]]
     command = result["experiment"]
@@ -102,5 +102,5 @@ def _picture(report: Report) -> tuple[list[Block], str]:
     job: PictureJob = {"folder": str(folder), "views": [view]}
     stands_in = "a cross-section stands in for the picture"
     _, notes = carry_out(job, run_job, [1.0], report.rest(), failed=stands_in, without=stands_in)
-    said = "Grains coloured by the number of their contacts."
-    return [figure(file, title="The bed", caption=said)], "".join(notes)
+    caption = "Grains coloured by the number of their contacts."
+    return [figure(file, title="The bed", caption=caption)], "".join(notes)

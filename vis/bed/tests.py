@@ -20,7 +20,7 @@ from vis.page.report import Report, Result, again, report_of, tables
 from vis.page.sentences import Sentences
 from vis.pictures.frames import read_frames
 
-__all__ = ["FALLEN_SHARE", "flank_lines", "said", "thicknesses", "write_shear_report", "write_test_report"]
+__all__ = ["FALLEN_SHARE", "flank_lines", "quoted", "thicknesses", "write_shear_report", "write_test_report"]
 
 say = Sentences(__package__)
 Grains = Mapping[str, NDArray[Any]]
@@ -44,8 +44,8 @@ def write_test_report(report: Report) -> Path:
     return report.write(sections, lead=[command, f"{len(result['runs'])} runs"], tiles=tiles(result))
 
 
-def said(entry: Result, scale: float = 1.0, unit: str = "") -> str:
-    """A quantity with its spread, as a tile says it."""
+def quoted(entry: Result, scale: float = 1.0, unit: str = "") -> str:
+    """A quantity with its spread, for a tile."""
     if entry["value"] is None:
         return "–"
     value, std = scale * entry["value"], entry["std"]
@@ -105,9 +105,9 @@ def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top:
 def _cone_tiles(result: Result) -> list[Tile]:
     quantities, one = result["quantities"], result["runs"][0]
     return [
-        Tile("Gradient of the cone index", said(quantities["gradient"], 1e-6, " MPa/m"), "spread between the pushes"),
-        Tile("Over the unit weight", said(quantities["gradient_over_weight"]), "gradient / (bulk density g)"),
-        Tile("Cone index at the end", said(quantities["index_at_end"], 1e-3, " kPa"), "last tenth of the way"),
+        Tile("Gradient of the cone index", quoted(quantities["gradient"], 1e-6, " MPa/m"), "spread between the pushes"),
+        Tile("Over the unit weight", quoted(quantities["gradient_over_weight"]), "gradient / (bulk density g)"),
+        Tile("Cone index at the end", quoted(quantities["index_at_end"], 1e-3, " kPa"), "last tenth of the way"),
         Tile("Speed", f"{1e3 * one['speed']:.3g} mm/s", f"v / sqrt(g D) = {one['froude']:.2g}"),
     ]
 
@@ -172,9 +172,9 @@ def _cut_tiles(result: Result) -> list[Tile]:
     note = str(quantities["cohesion"]["note"]).partition(";")[0]
     angle = f"Terzaghi, with {note.partition(' with ')[2]}" if " with phi" in note else note
     return [
-        Tile("Critical height", said(quantities["critical_height"], 1e3, " mm"), between),
-        Tile("Cohesion", said(quantities["cohesion"], 1.0, " Pa"), angle),
-        Tile("Slumped to", said(quantities["slumped_to"], 1.0, "°"), "slope of a fallen face"),
+        Tile("Critical height", quoted(quantities["critical_height"], 1e3, " mm"), between),
+        Tile("Cohesion", quoted(quantities["cohesion"], 1.0, " Pa"), angle),
+        Tile("Slumped to", quoted(quantities["slumped_to"], 1.0, "°"), "slope of a fallen face"),
         Tile("Height of the faces", f"{1e3 * runs[0]['height']:.3g} mm", f"{len(runs)} beds"),
     ]
 
@@ -234,10 +234,10 @@ def _trials(report: Report) -> list[Block]:
 def _repose_tiles(result: Result) -> list[Tile]:
     quantities, runs = result["quantities"], result["runs"]
     return [
-        Tile("Angle of repose", said(quantities["angle_of_repose"], 1.0, "°"), "drained; spread between the runs"),
+        Tile("Angle of repose", quoted(quantities["angle_of_repose"], 1.0, "°"), "drained; spread between the runs"),
         Tile("Slopes", f"{2 * len(runs)}", f"{len(runs)} beds, two each"),
-        Tile("Crest", said(quantities["crest"], 1e3, " mm"), f"grains of {1e3 * runs[0]['grain']:.3g} mm"),
-        Tile("Packing fraction", said(quantities["packing_fraction"]), "before the slot was opened"),
+        Tile("Crest", quoted(quantities["crest"], 1e3, " mm"), f"grains of {1e3 * runs[0]['grain']:.3g} mm"),
+        Tile("Packing fraction", quoted(quantities["packing_fraction"]), "before the slot was opened"),
     ]
 
 

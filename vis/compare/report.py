@@ -126,12 +126,12 @@ def _tiles(result: Result) -> list[Tile]:
         row = rows.get(name)
         if row is None or row["first"] is None or row["second"] is None:
             continue
-        values = [_said(row[key], row["unit"]) for key in ("first", "second")]
+        values = [_in_unit(row[key], row["unit"]) for key in ("first", "second")]
         tiles.append(Tile(label, f"{values[0]} | {values[1]}", words))
     return tiles[:5]
 
 
-def _said(value: float, unit: str) -> str:
+def _in_unit(value: float, unit: str) -> str:
     if unit == "rad":
         return f"{short(math.degrees(value), 3)}°"
     if unit == "m" and abs(value) < 0.1:

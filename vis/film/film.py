@@ -152,8 +152,8 @@ def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> li
     for (name, words), time in zip(_WORDS.items(), (0.0, min(half, end), end), strict=True):
         at = float(coarse.times[coarse.nearest(time)])
         lines = [reel.line(reel.nearest(at)) for reel in reels]
-        said = [f"{label}: {line}" for label, line in zip(labels, lines, strict=True)] if labels else lines
-        found.append((name, f"Both {words}" if labels else capital(words), at, "; ".join(said) + "."))
+        parts = [f"{label}: {line}" for label, line in zip(labels, lines, strict=True)] if labels else lines
+        found.append((name, f"Both {words}" if labels else capital(words), at, "; ".join(parts) + "."))
     return found
 
 
@@ -191,11 +191,11 @@ def draw_runs(
     two runs. ``progress``: Called with the share that is done, 0 to 1.
     """
     kind = reels[0]
-    told = moments(reels, labels)
-    stills = [Picture(home / "figures" / f"{stem}-{name}.png", title, said) for name, title, _, said in told]
+    planned = moments(reels, labels)
+    stills = [Picture(home / "figures" / f"{stem}-{name}.png", title, caption) for name, title, _, caption in planned]
     pictures: list[_Picture] = [
         {"file": str(still.file), "times": [time], "size": kind.still}
-        for still, (_, _, time, _) in zip(stills, told, strict=True)
+        for still, (_, _, time, _) in zip(stills, planned, strict=True)
     ]
     moving = None
     if film:

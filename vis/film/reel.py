@@ -177,9 +177,9 @@ class Reel(_Filmed):
     @cached_property
     def spikes(self) -> tuple[float, float]:
         """Diameter of a spike, and how far it stands out of the hull [m]."""
-        told = self.result.get("grains") or {}
-        if "spike_diameter" in told:
-            return float(told["spike_diameter"]), float(told.get("spike_clear", _CLEAR))
+        grains = self.result.get("grains") or {}
+        if "spike_diameter" in grains:
+            return float(grains["spike_diameter"]), float(grains.get("spike_clear", _CLEAR))
         scale = self.reach / 0.2
         return self.like if self.like is not None else (_SPIKE * scale, _CLEAR * scale)
 

@@ -65,7 +65,7 @@ class Run:
     model: Series | None
     quantities: dict[str, Any] = field(default_factory=dict)
     amended: Series | None = None
-    """The same run on the law of a model, with what the spring-damper lacked."""
+    """The same run on the law of a model, with the effects that the spring-damper omits."""
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class Report:
             self.progress(done)
 
     def rest(self) -> Progress:
-        """What tells the progress of a part that takes nearly all of the time that is left."""
+        """A callback for the progress of a part that takes nearly all of the remaining time."""
         start = self.done
         return lambda done: self.tell(start + (0.95 - start) * done)
 
@@ -115,7 +115,7 @@ def report_of(dpi: int | None = None) -> Callable[[Callable[..., Path]], Callabl
     """Make of a function of a `Report` one of its folder: `write(folder, *, progress=None, **options)`.
 
     It draws in the house's style, `dpi` dots an inch, and takes titles and captions from figures.toml of its package.
-    Raises FileNotFoundError where the folder has no result.json, or lacks a file that is drawn.
+    Raises FileNotFoundError where the folder has no result.json, or a file that is drawn.
     """
 
     def decorate(write: Callable[..., Path]) -> Callable[..., Path]:

@@ -42,7 +42,7 @@ class Plot:
     figure: Figure
 
     @classmethod
-    def said(cls, key: str, figure: Figure, **values: Any) -> Plot:
+    def of(cls, key: str, figure: Figure, **values: Any) -> Plot:
         """A figure called as its key, with its title and caption from the table `key` of figures.toml."""
         return cls(key, captions(f"{key}.title", **values), captions(f"{key}.caption", **values).strip(), figure)
 
@@ -146,7 +146,7 @@ def drag_plot(run: RunFolder) -> Plot | None:
         say("drag_law") + say("drag_law_out" if out else "drag_law_in") if law else "",
     ]
     moved = f"driven in{' and pulled out' if out else ''}"
-    return Plot.said("drag", figure, moved=moved, parts="".join(sentences))
+    return Plot.of("drag", figure, moved=moved, parts="".join(sentences))
 
 
 def gap_plot(run: RunFolder) -> Plot | None:
@@ -162,9 +162,9 @@ def gap_plot(run: RunFolder) -> Plot | None:
     }
     for at, row in cells.items():
         difference[at] = row.difference
-    told = any(row.known for row in table)
+    counted = any(row.known for row in table)
     bound = float(np.nanmax(np.abs(difference))) or 1.0
-    figure, ((axis,),) = sheet(1, 1, max(2.6, 0.9 + (0.62 if told else 0.42) * len(depths)))
+    figure, ((axis,),) = sheet(1, 1, max(2.6, 0.9 + (0.62 if counted else 0.42) * len(depths)))
     norm = TwoSlopeNorm(0.0, -bound, bound)
     image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
     axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
@@ -188,8 +188,8 @@ def gap_plot(run: RunFolder) -> Plot | None:
     bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
     bar.set_label("spring-damper − bed [N]")
     bar.outline.set_visible(False)
-    told_below = say("gap_told") if told else ""
-    return Plot.said("gap", figure, told=told_below)
+    note = say("gap_told") if counted else ""
+    return Plot.of("gap", figure, note=note)
 
 
 def work_plot(run: RunFolder) -> Plot | None:
@@ -226,7 +226,7 @@ def work_plot(run: RunFolder) -> Plot | None:
         axis.axhline(0.0, color=GREY, lw=0.8)
     _label(axes, "speed [m/s]", "work [mJ]")
     legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
-    return Plot.said("work", figure, words=_returned_words(driven) + spread_words(driven))
+    return Plot.of("work", figure, words=_returned_words(driven) + spread_words(driven))
 
 
 def _label(axes: list[Axes], x: str, y: str) -> None:

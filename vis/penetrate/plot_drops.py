@@ -70,7 +70,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
     legend_above(figure, [bed, recorded, *model, peaks])
     each = ", a line for each bed" if len({(r.speed, r.seed) for r in drops}) > len(speeds) else ""
     left, later = say("drops_left") if free else "", say("drops_later") if has_model(drops) else ""
-    return Plot.said("drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
+    return Plot.of("drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
 
 
 def drop_peaks_plot(run: RunFolder) -> Plot | None:
@@ -101,7 +101,7 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
     law = any(value_of(r.quantities, "model_peak_force") is not None for r in drops)
     legend_above(figure, pair_of_handles(markers=True)[: 2 if law else 1])
     listed = joined([title[0].lower() + title[1:] for _, title, *_ in columns])
-    return Plot.said("drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
+    return Plot.of("drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
 
 
 def set_down_plot(run: RunFolder) -> Plot | None:
@@ -151,22 +151,22 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots])
     still = sum(value_of(r.quantities, "sinkage") is not None for r in sets)
     many = len(sets) > 1
-    said = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
+    caption = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
     if still < len(sets):
-        said += (
+        caption += (
             f" {still or 'None'} of them came to rest in the time that was followed."
             if many
             else (" It did not come to rest in the time that was followed.")
         )
     if rests:
-        said += f" Right: the depth at rest{', ± the standard deviation between beds' if still > 1 else ''}."
+        caption += f" Right: the depth at rest{', ± the standard deviation between beds' if still > 1 else ''}."
     if has_model(sets):
         fitted = "all beds" if many else "this bed's drives and drops"
-        said += f" The spring-damper is the one fitted to {fitted}; where it rests is predicted, not fitted."
+        caption += f" The spring-damper is the one fitted to {fitted}; where it rests is predicted, not fitted."
     departures = run.result.get("departures")
     if isinstance(departures, dict) and isinstance(departures.get("set_down"), str):
-        said += f" {departures['set_down']}"
-    return Plot("set_down", "Set down under its load", said, figure)
+        caption += f" {departures['set_down']}"
+    return Plot("set_down", "Set down under its load", caption, figure)
 
 
 def spread_plot(run: RunFolder) -> Plot | None:
@@ -203,7 +203,7 @@ def spread_plot(run: RunFolder) -> Plot | None:
         axis.grid(False, axis="x")
     known = any(fit_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
     bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"
-    return Plot.said("spread", figure, bars=bars)
+    return Plot.of("spread", figure, bars=bars)
 
 
 def _first_touch(series: Series | None) -> float:

@@ -117,7 +117,7 @@ def _is_amended(run: RunFolder) -> bool:
 
 def _amended_plot(run: RunFolder) -> Plot | None:
     drawing = _draw_amended(run)
-    return None if drawing is None else Plot.said("amended", drawing)
+    return None if drawing is None else Plot.of("amended", drawing)
 
 
 def words_of_effects(result: Result) -> str:

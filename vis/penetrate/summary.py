@@ -101,15 +101,15 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
 
 
 def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
-    said = [f"and damping C = {words.fitted(quantities, 'damping')}, for motion"]
+    parts = [f"and damping C = {words.fitted(quantities, 'damping')}, for motion"]
     drops = [r for r in run.of_kind("drop") if words.value_of(r.quantities, "stop_time") is not None]
     depths = [float(r.bed.depth.max()) for r in (*run.of_kind("driven"), *drops) if r.bed is not None]
-    said[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
+    parts[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
     if words.value_of(quantities, "stiffness_standing") is not None:
-        said.append(f"for a foot that stands K = {quantity(quantities['stiffness_standing'])}")
+        parts.append(f"for a foot that stands K = {quantity(quantities['stiffness_standing'])}")
     if words.std_of(quantities, "stiffness") is None and words.value_of(quantities, "stiffness_error") is not None:
-        said.append("± is the standard error of the fit")
-    return "; ".join(said)
+        parts.append("± is the standard error of the fit")
+    return "; ".join(parts)
 
 
 def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
@@ -154,18 +154,18 @@ def _push(run: RunFolder) -> tuple[str, str] | None:
 
 
 def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
-    said = words.mapping_of(run.result.get("departures"))
+    remarks = words.mapping_of(run.result.get("departures"))
 
     def also(*names: str) -> str:
-        return "".join(f" {words.sentence(str(said[name]))}" for name in names if said.get(name))
+        return "".join(f" {words.sentence(str(remarks[name]))}" for name in names if remarks.get(name))
 
     answers = {"How far does it sink?": _sinks(run, quantities, also("set_down", "surface"))}
     if push := _push(run):
         text = f"{push[0]} {push[1]}."
         drops = _peaks(run, "drop", "peak_force")
         if drops:
-            told = [f"{quote(*peak, 'N')} at {speed:g}{words.NBSP}m/s" for speed, peak in drops]
-            text += f" Dropped, its force peaks at {words.joined(told)}."
+            peaks = [f"{quote(*peak, 'N')} at {speed:g}{words.NBSP}m/s" for speed, peak in drops]
+            text += f" Dropped, its force peaks at {words.joined(peaks)}."
         if words.value_of(quantities, "work_returned_dem") is not None:
             text += " " + _returned(quantities)
         answers["What does the sand push back with?"] = text
@@ -177,9 +177,9 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         )
         if worst := _worst(run.result):
             text += f" {worst}"
-        peaks = _peak_gap(run)
-        if peaks is not None:
-            text += f" In drops its peak force is {words.more_or_less(peaks, 'above', 'below')} the bed's on average."
+        gap = _peak_gap(run)
+        if gap is not None:
+            text += f" In drops its peak force is {words.more_or_less(gap, 'above', 'below')} the bed's on average."
         answers["How wrong is the spring-damper?"] = text
         answers["Which K, and when?"] = also("which_stiffness").strip()
     return [{"question": question, "answer": answer} for question, answer in answers.items() if answer]

@@ -1,7 +1,7 @@
 """The page around a picture of the bed: title, colour bar, depth scale. The same with OpenGL and without.
 
 A picture is 4:3. The three-dimensional image, or the cross-section that stands in for it, fills the page to the left of
-the colour bar; where a point of the bed lies on it is told by `place`, a function (n, 3) [m] -> (n, 2) in fractions of
+the colour bar; `place` gives where a point of the bed lies on it, a function (n, 3) [m] -> (n, 2) in fractions of
 the page from its lower left corner.
 """
 
@@ -214,7 +214,7 @@ def draw_force(axis: Any, foot: NDArray[np.float64], head: NDArray[np.float64], 
     start, end = foot + low * (head - foot), foot + high * (head - foot)
     axis.annotate("", end, start, arrowprops=FORCE)
     if high < 1.0:
-        _say(axis, end, f"{quote(force, unit='N')}, arrow cut")
+        _note(axis, end, f"{quote(force, unit='N')}, arrow cut")
 
 
 def draw_measure(sheet: Figure, *, right: float, height: float, length: float, weight: float) -> None:
@@ -244,7 +244,7 @@ def _inside(foot: NDArray[np.float64], head: NDArray[np.float64]) -> tuple[float
     return low, high
 
 
-def _say(axis: Any, end: NDArray[np.float64], words: str) -> None:
+def _note(axis: Any, end: NDArray[np.float64], words: str) -> None:
     """Words beside the end of an arrow and over its shaft, towards the middle."""
     x, y = float(end[0]), float(np.clip(end[1] + 0.05, 0.06, 0.96))
     aside, side = (0.03, "left") if x < 0.6 else (-0.03, "right")

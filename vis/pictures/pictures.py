@@ -166,9 +166,9 @@ def render_apart(
             pipe = child.stdout.fileno()
             try:
                 while ready := select.select([pipe], [], [], stall)[0]:
-                    if not (said := os.read(pipe, 65536)):
+                    if not (output := os.read(pipe, 65536)):
                         break
-                    for _ in range(said.split().count(b"done")):
+                    for _ in range(output.split().count(b"done")):
                         step()
                 if not ready:
                     return f"no picture within {stall:g} s"
@@ -285,8 +285,8 @@ def _plan(
             return
         file = figures / f"bed-{story.name}-{moment}.png"
         job["views"].append(_view(run, story, [index], by, upper, file, size))
-        said = f"{story.line(index)}.".replace("\n", ", ").replace("bed ", "Bed ", 1)
-        stills.append(Picture(file, f"{story.title}: {words}", said))
+        caption = f"{story.line(index)}.".replace("\n", ", ").replace("bed ", "Bed ", 1)
+        stills.append(Picture(file, f"{story.title}: {words}", caption))
 
     def deep(story: _Story) -> None:
         if story.rested:  # it moves grains far less than a drive does: its scale is its own

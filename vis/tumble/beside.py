@@ -50,7 +50,7 @@ def beside_words(own: Quantities, beside: Quantities) -> str:
 def _way(angle: float) -> str:
     """A trajectory angle [rad] in words: up, down or level, and the degrees."""
     degrees = math.degrees(angle)
-    told = f"{degrees:+.1f}".replace("-", "−")
-    if told[1:] == "0.0":
+    signed = f"{degrees:+.1f}".replace("-", "−")
+    if signed[1:] == "0.0":
         return "level (0.0 degrees)"
-    return f"{'up' if degrees > 0 else 'down'} ({told} degrees)"
+    return f"{'up' if degrees > 0 else 'down'} ({signed} degrees)"

@@ -159,12 +159,12 @@ def _energy(report: Report) -> Block:
     time = motion["t_s"]
     gained = 1e3 * (motion["energy_J"] - motion["energy_J"][0])
     work, lost = 1e3 * motion["torque_work_J"], 1e3 * motion["dissipated_J"]
-    drawing, (book, rest) = panels(2, 3.0)
-    book.plot(time, work, color=BED, label="work of the torque")
-    book.plot(time, gained, color=MODEL, ls=DASHED, label="energy gained")
-    book.plot(time, lost, color=GREY, ls=DOTTED, label="dissipated")
-    book.set(xlabel="time [s]", ylabel="energy [mJ]")
-    drawing.legend(handles=book.lines, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=3)
+    drawing, (energy, rest) = panels(2, 3.0)
+    energy.plot(time, work, color=BED, label="work of the torque")
+    energy.plot(time, gained, color=MODEL, ls=DASHED, label="energy gained")
+    energy.plot(time, lost, color=GREY, ls=DOTTED, label="dissipated")
+    energy.set(xlabel="time [s]", ylabel="energy [mJ]")
+    drawing.legend(handles=energy.lines, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=3)
     residual = gained - work + lost
     most = float(np.abs(residual).max())
     unit, scale = next(((u, k) for u, k in _JOULES if most * k >= 0.999), _JOULES[-1])
@@ -283,8 +283,8 @@ def _sweep_section(report: Report) -> Section:
     drawing = _draw_sweep(sweep["keys"], report.columns(sweep["file"]))
     names = " and ".join(key["key"] for key in sweep["keys"])
     drawn = report.draw("sweep", drawing, trials=sweep["trials"], names=names)
-    told = tables(report.result) if "tables" in report.result else []
-    return Section("The sweep", [drawn, *told, listing(sweep["sentences"])])
+    made = tables(report.result) if "tables" in report.result else []
+    return Section("The sweep", [drawn, *made, listing(sweep["sentences"])])
 
 
 def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
@@ -293,7 +293,7 @@ def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
     if len(keys) == 1:
         for axis, (name, scale, label) in zip(axes, _PANELS, strict=True):
             axis.plot(columns[keys[0]["column"]], scale * columns[name], "o-", color=BED, ms=3.5, lw=1.4)
-            _say_if_empty(axis, keys[0], columns[name])
+            _note_if_empty(axis, keys[0], columns[name])
             axis.set(xlabel=_words(keys[0]), ylabel=label)
         return drawing
     along, other = (0, 1) if shape[0] >= shape[1] else (1, 0)
@@ -311,7 +311,7 @@ def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
     for axis, grid, (_, _, label) in zip(axes, grids, _PANELS, strict=True):
         for values, colour, value in zip(grid.T, colours, keys[other]["values"], strict=True):
             axis.plot(keys[along]["values"], values, "o-", color=colour, ms=3, lw=1.3, label=f"{value:g}")
-        _say_if_empty(axis, keys[along], grid)
+        _note_if_empty(axis, keys[along], grid)
         axis.set(xlabel=_words(keys[along]), ylabel=label)
     legend_above(drawing, axes[0].lines, _MOST_LINES, title=_words(keys[other]))
     return drawing
@@ -321,7 +321,7 @@ def _words(key: Result) -> str:
     return key["key"] if key["unit"] == "1" else f"{key['key']} [{key['unit']}]"
 
 
-def _say_if_empty(axis: Axes, key: Result, values: Array) -> None:
+def _note_if_empty(axis: Axes, key: Result, values: Array) -> None:
     if np.isnan(values).all():
         axis.set_xlim(min(key["values"]), max(key["values"]))
         axis.set_yticks([])
