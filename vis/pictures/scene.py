@@ -213,16 +213,7 @@ class Stage(Eye, Rendered):
     grain [m], for the shading of gaps; None: a block of ground in place of grains. (the others as `Eye`)
     """
 
-    def __init__(
-        self,
-        size: tuple[int, int],
-        *,
-        low: Array,
-        high: Array,
-        radius: float | None,
-        pitch: float = 0.24,
-        **view: float,
-    ) -> None:
+    def __init__(self, size: tuple[int, int], *, low: Array, high: Array, radius: float | None, **view: float) -> None:
         Eye.__init__(self, size, **({"pitch": 0.24} | view))
         Rendered.__init__(self, size, centre=np.zeros(3), reach=1.0)
         thick = 0.03 * float(high[2] - low[2])
