@@ -68,7 +68,7 @@ class Channel:
     """What replicates differ by beyond the sensors, beside the best model; None where they differ by no more."""
 
     def model(self, stage: str) -> Array:
-        """What the model "before" or "after" says."""
+        """The prediction of the model "before" or "after"."""
         return self.before if stage == "before" else self.after
 
     def residual(self, stage: str) -> Array:
@@ -302,7 +302,7 @@ def _plain_numbers(value: float, place: float) -> str:
 
 
 def _leading_names(diagnosis: Result, score: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
-    """The set of names that is told: named, or of an unknown the best model's, or the likeliest single one."""
+    """The leading set of names: the verdict's; where that is unknown the best model's, or the likeliest single name."""
     if diagnosis["verdict"] != "unknown":
         return tuple(effect["id"] for effect in diagnosis["effects"])
     names = tuple(diagnosis.get("leading", {}).get("effects", ()))
@@ -327,7 +327,10 @@ def _kind(name: tuple[str, ...], leading: tuple[str, ...], diagnosis: Result) ->
 
 
 def draw_latent(folder: Path, diagnosis: Result, channels: Sequence[Channel]) -> Figure | None:
-    """Every latent column over time, and over what it goes with most; coloured by phase, with means of equal counts."""
+    """Every latent column over time and over the column that explains most of it, by phase, with means of equal counts.
+
+    None where there is no latent force.
+    """
     if "latent" not in diagnosis or not (folder / diagnosis["latent"]["file"]).exists():
         return None
     columns = read_series(folder / diagnosis["latent"]["file"], text=("trial",))

@@ -81,7 +81,7 @@ class _Plane(Camera):
         self.mark(axis, stage, frame, focus, level)
 
     def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
-        """A line from the centre to where row 0 begins: it shows how far the platform has turned, and says so."""
+        """A line from the centre to where row 0 begins: it shows how far the platform has turned, with a key."""
         hull = frame.bodies["hull"][0]
         ring = hull[: len(hull) // 2]  # its face in front
         ends = stage.place(np.array([ring.mean(axis=0), ring[0]]), focus)

@@ -83,9 +83,9 @@ def styled() -> Iterator[None]:
 
 
 def as_it_lies(axis: Axes) -> bool:
-    """One scale along and up for the ways drawn in `axis`; where no height would be left of them, it says so.
+    """Give both axes one scale where the heights of the paths stay visible; else the title says "heights stretched".
 
-    Whether they are drawn in proportion.
+    Returns whether the paths are drawn in proportion.
     """
     ways = axis.dataLim
     if ways.width <= _TOO_LONG * ways.height:

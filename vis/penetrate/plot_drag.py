@@ -65,7 +65,7 @@ def pair_of_handles(*, markers: bool = False, bars: bool = False) -> list[Any]:
 
 
 def above_surface(series: Series | None) -> Series | None:
-    """The way in before depth 0 from where grains are first felt; None where none are."""
+    """The rows of loading above depth 0 from the first contact with a grain; None without such a contact."""
     if series is None:
         return None
     touched = np.flatnonzero((series.depth < 0.0) & (series.force > 0.0) & (series.velocity > 0.0))
@@ -251,7 +251,7 @@ def _band(axis: Axes, there: Sequence[Series], colour: str, *, alpha: float, sol
 
 
 def _parts(runs: Iterable[Series | None], way: str) -> list[Series]:
-    """The rows on the way in or out, in the ground, of those runs that have more than one."""
+    """The rows of loading or unloading in the ground ("in", "out"), of those runs that have more than one."""
     parts = (series.part(way) for series in runs if series is not None)
     return [inside for part in parts if len(inside := part.where(part.depth >= 0.0)) > 1]
 
@@ -301,7 +301,7 @@ def _departures_of_series(run: RunFolder) -> list[Departure]:
 
 
 def _returned_words(runs: list[Run]) -> str:
-    """What share of the work put in was got back, of bed and spring-damper: the mean over these runs."""
+    """The recovered share of the work of loading, of bed and spring-damper: the mean over these runs."""
     shares = []
     for prefix, what in (("", "the bed"), ("model_", "the spring-damper")):
         works = [

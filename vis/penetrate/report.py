@@ -1,7 +1,7 @@
 """The report of a spike in a bed, and that of a run on a model's law without a bed.
 
-In every plot the bed is blue, the spring-damper orange and dashed, the law with what it lacked green. Depth is in mm,
-positive downwards. `templates/report.html` is the page; what it says is from `vis.penetrate.summary`.
+In every plot the bed is blue, the spring-damper orange and dashed, the law with added effects green. Depth is in mm,
+positive downwards. `templates/report.html` is the page; its content is from `vis.penetrate.summary`.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[t
     return drawn, missing
 
 
-# With what the spring-damper lacked -----------------------------------------------------------------------------------
+# With effects that the spring-damper omits ----------------------------------------------------------------------------
 
 
 def _is_amended(run: RunFolder) -> bool:
@@ -121,7 +121,7 @@ def _amended_plot(run: RunFolder) -> Plot | None:
 
 
 def words_of_effects(result: Result) -> str:
-    """What was added, in words."""
+    """The added effects, in words."""
     model = result.get("model")
     effects = model.get("effects") if isinstance(model, Mapping) else None
     return " and ".join(map(str, effects)) if effects else "nothing added"

@@ -1,7 +1,7 @@
-"""What the report says, as plain words and formatted numbers; how it looks is `templates/report.html`'s business.
+"""The content of the report as plain text and formatted numbers; `templates/report.html` lays it out.
 
-`summarise(run)` turns a `RunFolder` into a dict of strings, lists and tables. Whatever the folder lacks is left out or
-reads "unknown"; nothing here raises for a part that is missing.
+`summarise(run)` turns a `RunFolder` into a dict of strings, lists and tables. What is missing in the folder is left out
+or reads "unknown"; nothing here raises for a part that is missing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _REAL_GRAINS = {"sand": 2e-4}
 
 
 def summarise(run: RunFolder) -> dict[str, Any]:
-    """Everything the report says but its images.
+    """The whole content of the report but its images.
 
     Returns a dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "fit",
     "departures", "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing", "frames" and
@@ -140,7 +140,7 @@ def _frames(run: RunFolder) -> list[str]:
 
 
 def _push(run: RunFolder) -> tuple[str, str] | None:
-    """The greatest force on the way in over all speeds, at which it was met, and the least of the other speeds'."""
+    """The largest force of loading over all speeds, the speed of it, and the peaks at the other speeds."""
     by_speed = _peaks(run, "driven", "peak_force")
     if not by_speed:
         return None
@@ -208,7 +208,7 @@ def _restless(run: RunFolder, quantities: Mapping[str, Any]) -> bool:
 
 
 def _returned(quantities: Mapping[str, Any]) -> str:
-    """What the bed gives back of the work put in; where that is negative, pulling out takes work as well."""
+    """The share of the work of loading that the bed recovers; where it is negative, pulling out takes work as well."""
     share, entry = words.value_of(quantities, "work_returned_dem"), quantities["work_returned_dem"]
     model = f"(spring-damper: {quantity(quantities.get('work_returned_spring_damper'), unit='%')} given back)"
     if share is not None and share < 0.0:

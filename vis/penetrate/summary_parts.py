@@ -80,7 +80,7 @@ class Departure:
 
 
 def departure_rows(result: Mapping[str, Any]) -> list[Departure]:
-    """The rows of the table of departures; one that lacks a number is left out."""
+    """The rows of the table of departures; one without all of its numbers is left out."""
     rows = []
     for entry in list_of(mapping_of(result.get("departures")).get("table")):
         numbers = {field.name: plain_value(mapping_of(entry).get(field.name)) for field in fields(Departure)}

@@ -175,7 +175,7 @@ class Frame:
 
 
 class Frames(Sequence[Frame]):
-    """The frames of one run; a frame is read from disk when it is asked for."""
+    """The frames of one run; a frame is read from disk at its use."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self.folder = folder

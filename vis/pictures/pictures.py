@@ -63,7 +63,7 @@ class Pictures:
 def opengl_available(*, timeout: float = 60.0) -> bool:
     """Whether a small off-screen picture comes out right, tried once in a child process of at most `timeout` seconds.
 
-    HEDGEBED_NO_OPENGL=1 in the environment says no without trying.
+    HEDGEBED_NO_OPENGL=1 in the environment switches it off without a test.
     """
     return os.environ.get("HEDGEBED_NO_OPENGL", "") in ("", "0") and _probe(timeout)
 
@@ -204,7 +204,7 @@ class _Story:
         return int(before[np.argmax(known >= top - 0.002 * abs(top))])
 
     def _before_the_way_out(self) -> NDArray[np.int64]:
-        """Indices of the frames before the run's first row of the way out; all where it has none, or no series."""
+        """Indices of the frames before the run's first row of unloading; all where it has none, or no series."""
         every, bed = np.arange(len(self.frames)), self.run.bed
         out = np.flatnonzero(bed.phase == "out") if bed is not None and self.run.kind == "driven" else every[:0]
         if bed is None or not len(out):
@@ -213,7 +213,7 @@ class _Story:
         return before if len(before) else every
 
     def held(self, index: int) -> bool:
-        """Whether a driven spike was held still at this frame, its force falling off from what it was on the way in."""
+        """Whether a driven spike was held still at this frame, its force relaxing from that of loading."""
         bed = self.run.bed
         if bed is None or self.run.kind != "driven":
             return False
