@@ -22,7 +22,8 @@ def keys_said(folder: Path) -> tuple[set[str], set[str]]:
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "say" and node.args
     ]
     begun = [part for node in calls for part in ast.walk(node.args[0]) if isinstance(part, ast.JoinedStr)]
-    pieces = {id(piece) for part in begun for piece in ast.walk(part)}
+    compared = [part for node in calls for part in ast.walk(node.args[0]) if isinstance(part, ast.Compare)]
+    pieces = {id(piece) for part in [*begun, *compared] for piece in ast.walk(part)}  # no keys of their own
     whole = [part for node in calls for part in ast.walk(node.args[0]) if id(part) not in pieces]
     return {part.value for part in whole if isinstance(part, ast.Constant) and isinstance(part.value, str)}, {
         part.values[0].value for part in begun if isinstance(part.values[0], ast.Constant)
