@@ -40,10 +40,8 @@ def check(settings: CheckSettings) -> None:
 
 
 def find_faults(campaign: Campaign) -> list[Finding]:
-    """What is odd about the recordings, each in a plain sentence that names its trial.
-
-    Raises ValueError where no diagnosis could be made: a sensor stated to have no noise, no trial that can be used.
-    """
+    """What is odd about the recordings, each in a plain sentence that names its trial. Raises ValueError where no
+    diagnosis could be made: a sensor stated to have no noise, no trial that can be used."""
     with threadpool_limits(1):  # matrices are small
         found = _faults_of_data(campaign)
     jumped = {finding.trial for finding in found if _jumps(finding)}
