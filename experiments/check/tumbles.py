@@ -120,7 +120,7 @@ def _begins_late(tables: TumbleCampaign, trial: TumbleTrial, there: Mapping[str,
 
 
 def _start(tables: TumbleCampaign, trial: TumbleTrial, pose: Recording, *, angle: bool) -> Iterator[Odd]:
-    """x = 0, theta = 0 (unless the angle is known to be odd) and the height of a platform that stands on two rows: by the
+    """x = 0, theta = 0 (unless the angle is known to be odd) and the height of a platform on two rows of spikes: by the
     stated K W / 2K deep (docs/planar.md); on a surface that is no spring-damper, anywhere down to twice that."""
     sensor = tables.sensors.pose
     assert sensor is not None
