@@ -102,7 +102,7 @@ _MODULES = {
             "penetration_data=data penetration_depth=depth penetration_drive=drive penetration_forms=forms "
             "penetration_law=law penetration_problem=problem penetration_remarks=remarks penetration_zeros=zeros"
         ),
-        "experiments.diagnose.report": "candidates document sizes=document summary telling",
+        "experiments.diagnose.report": "candidates=sentences document sizes=document summary telling=sentences",
         "experiments.diagnose.tumble": (
             "tumble_checks=checks tumble_data=data tumble_follow=latent tumble_forms=forms "
             "tumble_forward=forward tumble_guess=guess tumble_latent=latent tumble_problem=problem "

@@ -25,8 +25,8 @@ from .fit.forms import OwnEffect, load_own
 from .fit.problem import Problem
 from .noise.colour import together
 from .report.document import write_diagnosis
+from .report.sentences import findings_in_words, told_tables, where_sentences
 from .report.summary import summary_sentences, title_words
-from .report.telling import findings_in_words, told_tables, where_sentences
 
 __all__ = ["check", "diagnose_campaign", "make_problem", "resume", "run"]
 

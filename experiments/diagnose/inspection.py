@@ -25,7 +25,7 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 
 from .fit.problem import Finding
-from .report.telling import findings_in_words
+from .report.sentences import findings_in_words
 from .settings import CheckSettings
 
 __all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
