@@ -31,7 +31,7 @@ _MODULES = {
         "dem.grains": "graded materials packing sizes",
         "dem.measure": "cutting element grading lid penetrometer repose shearing",
         "dem.prepare": "bedfile laboratory pouring=laboratory recipe stages",
-        "dem.shapes": "mesh mesh_tree solids",
+        "dem.shapes": "mesh mesh_tree=mesh solids",
     },
     "experiments": {
         "experiments": "plausible=check",
@@ -196,7 +196,7 @@ _NAMES = {
         "dem.grains.packing": "curve_ranks",
     },
     "dem.measure": {
-        "dem.grains.profile": "bulk_packing packing_profile surface_height",
+        "dem.grains.packing": "bulk_packing packing_profile surface_height",
     },
     "dem.prepare": {
         "dem.prepare.prepare": "prepare_bed",
