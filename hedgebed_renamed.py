@@ -31,7 +31,7 @@ _MODULES = {
         "dem.grains": "graded materials packing sizes",
         "dem.measure": "cutting element grading lid penetrometer repose shearing",
         "dem.prepare": "bedfile laboratory pouring=laboratory recipe stages",
-        "dem.shapes": "mesh mesh_tree solids",
+        "dem.shapes": "mesh mesh_tree=mesh solids",
     },
     "experiments": {
         "experiments": "plausible=check",
@@ -103,7 +103,7 @@ _MODULES = {
             "penetration_data=data penetration_depth=depth penetration_drive=drive penetration_forms=forms "
             "penetration_law=law penetration_problem=problem penetration_remarks=remarks penetration_zeros=zeros"
         ),
-        "experiments.diagnose.report": "candidates document sizes=document summary telling",
+        "experiments.diagnose.report": "candidates=sentences document sizes=document summary telling=sentences",
         "experiments.diagnose.tumble": (
             "tumble_checks=checks tumble_data=data tumble_follow=latent tumble_forms=forms "
             "tumble_forward=forward tumble_guess=guess tumble_latent=latent tumble_problem=problem "
@@ -143,15 +143,15 @@ _MODULES = {
     "vis": {
         "vis.bed": "bed_cone=tests bed_cut=tests bed_repose=tests bed_shear=tests bed_tests=tests calibrate validation",
         "vis.compare": "compare_figures=report compare_spatial=report",
-        "vis.diagnose": "campaign diagnose_figures=figures inspection",
+        "vis.diagnose": "campaign diagnose_figures=figures inspection=campaign",
         "vis.film": "jobs=film reel spatial_film=film spatial_pictures=film tumble_film=film",
-        "vis.page": "columns=page folder numbers palette=plots state_figures=states style tumble_series=states",
+        "vis.page": "columns=page folder numbers palette=plots state_figures=states style=plots tumble_series=states",
         "vis.paper": "hop paper_assumed=figures paper_measures=figures paper_paths=figures paper_run=figures",
         "vis.penetrate": (
             "amended=report plot_drag plot_drops plot_parts=plot_drag plots=report summary "
             "summary_tables=summary_parts summary_words=summary_parts"
         ),
-        "vis.pictures": "arrows canvas frames meshes render scene sections stage=scene tracks",
+        "vis.pictures": "arrows=canvas canvas frames meshes render scene sections stage=scene tracks",
         "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=report tumble_sweep=report",
     },
 }
@@ -197,7 +197,7 @@ _NAMES = {
         "dem.grains.packing": "curve_ranks",
     },
     "dem.measure": {
-        "dem.grains.profile": "bulk_packing packing_profile surface_height",
+        "dem.grains.packing": "bulk_packing packing_profile surface_height",
     },
     "dem.prepare": {
         "dem.prepare.prepare": "prepare_bed",
@@ -301,7 +301,7 @@ _NAMES = {
     "vis.tumble": {
         "vis.page.folder": "read_columns",
         "vis.page.states": "state_runs",
-        "vis.page.style": "STATES",
+        "vis.page.plots": "STATES",
         "vis.tumble.report": "write_tumble_report",
     },
 }

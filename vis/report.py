@@ -18,7 +18,7 @@ _REPORTS = {
     "hop": ("vis.paper.hop", "write_hop_report"),
     "paper": ("vis.paper.report", "write_paper_report"),
     "campaign": ("vis.diagnose.campaign", "write_campaign_report"),
-    "campaign check": ("vis.diagnose.inspection", "write_inspection_report"),
+    "campaign check": ("vis.diagnose.campaign", "write_inspection_report"),
     "diagnose": ("vis.diagnose.report", "write_diagnosis_report"),
     "bed make": ("vis.bed.report", "write_bed_report"),
     "bed refine": ("vis.bed.report", "write_bed_report"),
@@ -35,7 +35,7 @@ _REPORTS = {
 def write_report(folder: str | Path, *, pictures: bool = True, progress: Progress | None = None) -> Path:
     """Make every plot and picture of a run folder, and its `report.html`.
 
-    Parts that are missing (a run that was stopped, no frames, no OpenGL) are said in the report.
+    Parts that are missing (a run that was stopped, no frames, no OpenGL) are listed in the report.
 
     ``folder``: The run folder; `figures/`, `animation.gif` and `report.html` are written into it. ``pictures``: Whether
     to draw pictures and the animation; otherwise the report says that they were not asked for. ``progress``: Called

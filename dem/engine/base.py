@@ -12,7 +12,7 @@ import taichi as ti
 from dem.contact.cohesion import COHESIONS, jkr_range
 from dem.contact.law import effective_moduli, pair_row
 from dem.grains.materials import Material
-from dem.grains.profile import bulk_packing, surface_height
+from dem.grains.packing import bulk_packing, surface_height
 from dem.grains.sizes import Json
 
 from . import runtime

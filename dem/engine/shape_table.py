@@ -12,8 +12,7 @@ import numpy as np
 import taichi as ti
 
 from dem.shapes.basic import BOX, CAPSULE, FRUSTUM, MESH, PLACE_WIDTH, PLACED, TUBE, Shape, distance_to, rotate
-from dem.shapes.mesh import Mesh, Surface
-from dem.shapes.mesh_tree import CORNER_A, CORNER_B, CORNER_C, EDGE_AB, EDGE_BC, EDGE_CA, FACE, FEATURES, mesh_tree
+from dem.shapes.mesh import Feature, Mesh, Surface, mesh_tree
 from dem.shapes.solids import box_distance, capsule_distance, tube_distance
 
 from .rows import put_rows
@@ -22,7 +21,7 @@ from .values import EnginePart
 __all__ = ["PLAIN", "ShapeTable", "Shapes"]
 
 FAR = 1e30
-FEATURE_COUNT = len(FEATURES)
+FEATURE_COUNT = 7
 _LEAST_TRIANGLES = 1024
 
 
@@ -116,7 +115,7 @@ class ShapeTable:
             if self.beyond_box(first, p) == 0.0:
                 best = best * 0.0 + FAR
         found = -1
-        feature = FACE
+        feature = Feature.FACE
         nearest = p
         node = first
         while node < end:
@@ -136,7 +135,7 @@ class ShapeTable:
         normal = p * 0.0
         if found >= 0:
             normal = self.normals[FEATURE_COUNT * found + feature]
-            if feature == FACE:
+            if feature == Feature.FACE:
                 distance = normal.dot(p - self.corner[found])
             else:
                 offset = p - nearest
@@ -162,30 +161,30 @@ class ShapeTable:
         va = d3 * d6 - d5 * d4
         vb = d5 * d2 - d1 * d6
         vc = d1 * d4 - d3 * d2
-        feature = FACE
+        feature = Feature.FACE
         v = d1 * 0.0
         w = d1 * 0.0
         if d1 <= 0.0 and d2 <= 0.0:
-            feature = CORNER_A
+            feature = Feature.CORNER_A
         elif d3 >= 0.0 and d4 <= d3:
-            feature = CORNER_B
+            feature = Feature.CORNER_B
             v += 1.0
         elif d6 >= 0.0 and d5 <= d6:
-            feature = CORNER_C
+            feature = Feature.CORNER_C
             w += 1.0
         elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-            feature = EDGE_AB
+            feature = Feature.EDGE_AB
             v = d1 / (d1 - d3)
         elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-            feature = EDGE_CA
+            feature = Feature.EDGE_CA
             w = d2 / (d2 - d6)
         elif va <= 0.0 and d4 >= d3 and d5 >= d6:
-            feature = EDGE_BC
+            feature = Feature.EDGE_BC
             w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
             v = 1.0 - w
         nearest = a + v * ab + w * ac
         square = (p - nearest).norm_sqr()
-        if feature == FACE:
+        if feature == Feature.FACE:
             square = self.normals[FEATURE_COUNT * t].dot(ap) ** 2
         return square, feature, nearest
 

@@ -28,8 +28,7 @@ from dem.engine.core import BedCore
 from dem.engine.stress import stress_profile
 from dem.engine.values import BedFailure
 from dem.grains.materials import Facing, Material
-from dem.grains.packing import draw_radii, rain_positions
-from dem.grains.profile import packing_profile
+from dem.grains.packing import draw_radii, packing_profile, rain_positions
 from dem.grains.sizes import Uniform
 
 from .lid import ROUGH, Tell, add_lid, refuse_not_positive

@@ -8,7 +8,7 @@ import numpy as np
 
 from dem.engine.core import BedCore
 from dem.grains.graded import THROAT, Graded, middles
-from dem.grains.profile import bulk_packing, surface_height
+from dem.grains.packing import bulk_packing, surface_height
 
 __all__ = ["MOST_DRAINED", "MOST_STRAYED", "Grading", "Layer", "Zone", "measure_grading", "surface_under"]
 

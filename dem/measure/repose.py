@@ -13,7 +13,7 @@ import numpy as np
 
 from dem.engine.core import BedCore
 from dem.engine.values import BedFailure
-from dem.grains.profile import packing_profile
+from dem.grains.packing import packing_profile
 from dem.shapes.solids import Box
 
 from .lid import ROUGH, Tell, refuse_tilted

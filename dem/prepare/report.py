@@ -8,7 +8,7 @@ import numpy as np
 
 from dem.engine.core import BedCore
 from dem.engine.stress import find_contacts, stress_profile
-from dem.grains.profile import packing_profile
+from dem.grains.packing import packing_profile
 from dem.grains.sizes import Json
 
 __all__ = ["ENERGY_RATIO", "FLOOR_RATIO", "Prepared", "StageReport", "measure_stage"]

@@ -60,8 +60,7 @@ class EffectTable(Table):
     file: str | None = Field(None, description="path of a user's own term, relative to model.toml")
 
 
-HEDGEHOG_ROWS = 8
-"""Rows of spikes that a platform has of which nothing is said."""
+HEDGEHOG_ROWS = 8  # rows of spikes of a platform for which none are stated
 
 
 class PlatformTable(Table):

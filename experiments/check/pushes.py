@@ -285,8 +285,7 @@ def force_units(campaign: Campaign) -> Iterator[str]:
     spring and damper give as stated; none else.
 
     Such a factor is the same in every push and at every depth, and far from what a stated uncertainty allows. Without a
-    stiffness that is stated to better than its own size, that of drops is taken: m (g - accel) over the depth where
-    they turn. Nothing is converted.
+    stiffness stated to better than its own size, that of drops is taken: m (g - accel) over the depth where they turn.
     """
     tables = campaign.tables
     if not isinstance(tables, PenetrationCampaign):

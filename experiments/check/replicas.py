@@ -45,13 +45,11 @@ def condition_words(tables: TumbleCampaign | PenetrationCampaign, trial: Any) ->
 
 
 def odd_replicates(campaign: Campaign) -> list[Finding]:
-    """Trials at odds with two or more replicates that agree with one another, the channel said in which most.
+    """Trials at odds with two or more replicates that agree with one another, in the channel where they are most so.
 
-    Compared over the time that all of them have: cameras from the mean of their first tenth, driven forces on the way
-    in by depth. In mean square a trial at odds lies `_AT_ODDS` times as far from its nearest replicate as the others
-    from one another (median), `_NOISE` times what the sensors' noise makes of it, and `_SIZEABLE` of the channel's
-    own size.
-    """
+    Compared over the time that all of them have: cameras from the mean of their first tenth, driven forces downwards by
+    depth. In mean square a trial at odds lies `_AT_ODDS` times as far from its nearest replicate as the others from one
+    another (median), `_NOISE` times what noise makes of it, and `_SIZEABLE` of the channel's own size."""
     tables = campaign.tables
     std = tables.uncertainty.gravity_sim if isinstance(tables, TumbleCampaign) else 0.0
     also = say("own_gravity", percent=100 * std) if std else ""  # each trial's gravity may be behind it

@@ -73,11 +73,8 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
 
 
 def _gravity(tables: TumbleCampaign, trial: TumbleTrial) -> Iterator[Odd]:
-    """Is (m + m_b) g_sim what (m - m_b) g leaves on the surface, within what is stated and rounding?
-
-    The free-fall acceleration of the pair (`rigid.platform.rig`), which is what a campaign's gravity_sim means,
-    whichever reading of a stated gravity made it.
-    """
+    """Is (m + m_b) g_sim what (m - m_b) g leaves on the surface, within what is stated and rounding? gravity_sim is the
+    free-fall acceleration of the pair (`rigid.platform.rig`), whichever reading of a stated gravity made it."""
     if tables.rig is None:
         return
     mass, other, local = tables.platform.mass, tables.counterweight_of(trial), tables.rig.gravity
@@ -123,11 +120,8 @@ def _begins_late(tables: TumbleCampaign, trial: TumbleTrial, there: Mapping[str,
 
 
 def _start(tables: TumbleCampaign, trial: TumbleTrial, pose: Recording, *, angle: bool) -> Iterator[Odd]:
-    """x = 0, theta = 0 (unless the angle is known to be odd) and the height of a platform that stands on two rows.
-
-    They stand W / 2K deep (docs/planar.md) by the K that is stated; a surface that the spring-damper does not describe
-    may let them stand anywhere down to twice that.
-    """
+    """x = 0, theta = 0 (unless the angle is known to be odd) and the height of a platform on two rows of spikes: by the
+    stated K W / 2K deep (docs/planar.md); on a surface that is no spring-damper, anywhere down to twice that."""
     sensor = tables.sensors.pose
     assert sensor is not None
     sunk = tables.weight_of(trial) / (2 * tables.surface.stiffness)
@@ -353,10 +347,8 @@ def find_lag(
     seen: Array, angle: Array, felt: Array, rate: Array, *, std: tuple[float, float], near: float = 0.0
 ) -> Lag | None:
     """The lag of `angle` [rad] at the times `seen` [s] behind the integral of `rate` [rad/s] at the times `felt` [s].
-
-    `std`: noise of angle and rate. `near`: the lag that is expected [s]. None where the rate does not
-    change enough to tell, and where the best lag is at the end of what is tried.
-    """
+    `std`: noise of angle and rate. `near`: the lag that is expected [s]. None where the rate changes too little, and
+    where the best lag is at the end of the range."""
     if min(len(seen), len(felt)) < _FEW or np.ptp(felt) <= 0:
         return None
     turned = cumulative_trapezoid(rate, felt, initial=0)

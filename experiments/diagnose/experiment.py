@@ -25,8 +25,8 @@ from .fit.forms import OwnEffect, load_own
 from .fit.problem import Problem
 from .noise.colour import together
 from .report.document import write_diagnosis
+from .report.sentences import findings_in_words, told_tables, where_sentences
 from .report.summary import summary_sentences, title_words
-from .report.telling import findings_in_words, told_tables, where_sentences
 
 __all__ = ["check", "diagnose_campaign", "make_problem", "resume", "run"]
 
@@ -40,10 +40,8 @@ def diagnose_campaign(
     campaign: str | Path, *, thorough: bool = False, seed: int = 0, effect_file: Sequence[str | Path] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:  # fmt: skip
-    """The diagnosis of the campaign in a folder, without files. Raises ValueError as `check` does.
-
-    `effect_file`: Python files with effects of one's own (`own`), which are among the candidates.
-    """
+    """The diagnosis of the campaign in a folder, without files. Raises ValueError as `check` does. `effect_file`:
+    Python files with effects of one's own, which are among the candidates."""
     free_kernel_cache()
     measured, problem = _make_problem(Path(campaign), effect_file)
     shown = progress or Progress()

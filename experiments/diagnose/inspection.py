@@ -25,7 +25,7 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 
 from .fit.problem import Finding
-from .report.telling import findings_in_words
+from .report.sentences import findings_in_words
 from .settings import CheckSettings
 
 __all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
@@ -40,10 +40,8 @@ def check(settings: CheckSettings) -> None:
 
 
 def find_faults(campaign: Campaign) -> list[Finding]:
-    """What is odd about the recordings, each in a plain sentence that names its trial.
-
-    Raises ValueError where no diagnosis could be made: a sensor stated to have no noise, no trial that can be used.
-    """
+    """What is odd about the recordings, each in a plain sentence that names its trial. Raises ValueError where no
+    diagnosis could be made: a sensor stated to have no noise, no trial that can be used."""
     with threadpool_limits(1):  # matrices are small
         found = _faults_of_data(campaign)
     jumped = {finding.trial for finding in found if _jumps(finding)}

@@ -154,7 +154,7 @@ def test_the_deepest_picture_is_from_before_the_pull_out(tmp_path, make_run):
     run = pictures.read_folder(folder)
     for name in pictures.frame_names(folder):
         story = pictures._tell(run, name)
-        if story.kind != "driven":
+        if story.run.kind != "driven":
             continue
         out = story.run.bed.time[np.flatnonzero(story.run.bed.phase == "out")[0]]
         time, depth = story.frames.times[story.deepest], story.depth[story.deepest]

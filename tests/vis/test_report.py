@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 import vis
-from vis.page import style
+from vis.page import plots
 from vis.page.folder import read_folder, read_series
 from vis.penetrate.plot_drops import _running_mean
 from vis.penetrate.report import PLOTS, make_plots
@@ -52,7 +52,7 @@ class Page(HTMLParser):
 @pytest.fixture(autouse=True)
 def coarse_plots(monkeypatch):
     """Plots of a test's own are small; those of the `report` fixture, which comes first, are as large as life."""
-    monkeypatch.setitem(style._STYLE, "savefig.dpi", 40)
+    monkeypatch.setitem(plots._STYLE, "savefig.dpi", 40)
 
 
 @pytest.fixture(scope="module")

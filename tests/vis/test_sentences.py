@@ -22,7 +22,8 @@ def keys_said(folder: Path) -> tuple[set[str], set[str]]:
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "say" and node.args
     ]
     begun = [part for node in calls for part in ast.walk(node.args[0]) if isinstance(part, ast.JoinedStr)]
-    pieces = {id(piece) for part in begun for piece in ast.walk(part)}
+    compared = [part for node in calls for part in ast.walk(node.args[0]) if isinstance(part, ast.Compare)]
+    pieces = {id(piece) for part in [*begun, *compared] for piece in ast.walk(part)}  # no keys of their own
     whole = [part for node in calls for part in ast.walk(node.args[0]) if id(part) not in pieces]
     return {part.value for part in whole if isinstance(part, ast.Constant) and isinstance(part.value, str)}, {
         part.values[0].value for part in begun if isinstance(part.values[0], ast.Constant)
@@ -62,10 +63,10 @@ def test_a_key_or_a_value_that_is_not_there_is_an_error(tmp_path, monkeypatch):
     package = tmp_path / "talkative"
     package.mkdir()
     (package / "__init__.py").write_text("")
-    (package / "sentences.toml").write_text('depth = "it sinks {depth:.3g} m"\n')
+    (package / "sentences.toml").write_text('depth = "{depth:.3g} m deep"\n')
     monkeypatch.syspath_prepend(tmp_path)
     say = Sentences("talkative")
-    assert say("depth", depth=0.01234) == "it sinks 0.0123 m"
+    assert say("depth", depth=0.01234) == "0.0123 m deep"
     with pytest.raises(KeyError, match="height"):
         say("height")
     with pytest.raises(KeyError, match="depth"):

@@ -10,7 +10,7 @@ from PIL import Image, ImageColor
 
 from vis.compare.report import _draw_path
 from vis.diagnose.figures import _PHASES
-from vis.page.style import STATES, as_it_lies
+from vis.page.plots import STATES, as_it_lies
 from vis.pictures.render import write_gif
 
 

@@ -10,7 +10,7 @@ from PIL import Image
 from vis.compare.report import _alike
 from vis.film.film import Sheet, film_times, moments, run_film_job
 from vis.film.reel import Reel
-from vis.pictures import arrows
+from vis.pictures import canvas
 from vis.pictures.canvas import moved_since
 from vis.pictures.frames import FrameWriter
 from vis.pictures.meshes import spike_mesh
@@ -76,10 +76,10 @@ def test_the_camera_follows_and_the_scale_stays_put(folder):
     whole, near = sheet.ways
     assert whole[:, 0] == pytest.approx(reel.centres()[:, 0], abs=1e-3)  # 30 mm further at the end
     assert np.ptp(near[:, 0]) > 0.02 and np.ptp(near[:, 1]) == 0.0
-    assert sheet.norm.vmax == 2.0  # mm: what the grains that take part moved by the end, in every picture
+    assert sheet.page.norm.vmax == 2.0  # mm: what the grains that take part moved by the end, in every picture
     sheet.draw(0.0)
     sheet.draw(1.0)
-    assert sheet.norm.vmax == 2.0
+    assert sheet.page.norm.vmax == 2.0
 
 
 def test_displacement_counts_from_the_first_picture_whatever_the_setting_down_moved_and_however_grains_are_listed():
@@ -174,7 +174,7 @@ def test_the_arrow_of_four_weights_is_cut_at_the_edge_and_says_its_number(folder
     """Its head would lie outside the picture: longer than that of one weight, up to the edge, with `8.00 N`."""
     sheet = Sheet([Reel(folder)], (640, 360), by="displacement", opengl=False)
     said, x = [], sheet.ways[1][0, 0]
-    monkeypatch.setattr(arrows, "_say", lambda axis, end, words: said.append((*end, words)))
+    monkeypatch.setattr(canvas, "_note", lambda axis, end, words: said.append((*end, words)))
     reds = []
     for force in ([0.0, 0.0, 2.0], [aside, 0.0, 8.0]):
         with monkeypatch.context() as patch:
@@ -189,9 +189,9 @@ def test_the_arrow_of_four_weights_is_cut_at_the_edge_and_says_its_number(folder
 
 def test_an_arrow_is_cut_where_it_leaves_the_picture_and_left_out_where_it_misses_it():
     """From (0.5, 0.2) straight up by 1.2: inside for 0.79 / 1.2 of the way. One beside the picture is nowhere in it."""
-    inside = arrows._inside(np.array([0.5, 0.2]), np.array([0.5, 1.4]))
+    inside = canvas._inside(np.array([0.5, 0.2]), np.array([0.5, 1.4]))
     assert inside == pytest.approx((0.0, 0.79 / 1.2))
-    assert arrows._inside(np.array([0.5, 0.2]), np.array([0.6, 0.9])) == (0.0, 1.0)
+    assert canvas._inside(np.array([0.5, 0.2]), np.array([0.6, 0.9])) == (0.0, 1.0)
     for foot, head in (([1.2, 0.2], [1.2, 0.9]), ([1.2, 0.2], [1.1, 0.9])):
-        low, high = arrows._inside(np.array(foot), np.array(head))
+        low, high = canvas._inside(np.array(foot), np.array(head))
         assert low >= high

@@ -5,13 +5,13 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from vis.bed.tests import flank_lines, said
+from vis.bed.tests import flank_lines, quoted, thicknesses
 from vis.page.page import Block, Section, Tile, code, text
-from vis.page.plots import handle, legend_above, new_panels, smooth_ratio
+from vis.page.plots import BED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
-from vis.page.style import BED, GREY, INK, MODEL
 
 __all__ = ["write_calibration_report"]
 
@@ -28,7 +28,7 @@ def write_calibration_report(report: Report) -> Path:
     def tile(name: str, note: str, second: bool = False) -> Tile:
         entry = quantities[name]
         unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
-        return Tile(name.replace("_", " ").capitalize(), said(entry, 1.0, unit), note, second=second)
+        return Tile(name.replace("_", " ").capitalize(), quoted(entry, 1.0, unit), note, second=second)
 
     tiles = [tile(key, quantities[key]["note"]) for key in free]
     tiles += [tile(one["name"], one["verdict"], second=one["verdict"] != "met") for one in result["figures"]]
@@ -133,15 +133,10 @@ def _tests(report: Report) -> list[Block]:
 
 def _slopes(report: Report) -> list[Block]:
     """What the drained beds of the check left."""
-    tests = [test for test in _checked(report.result) if test["state"] == "drained"]
-    if not tests:
-        return []
-    drawing, axes = new_panels(len(tests), height=2.4, sharey=True)
-    for axis, test in zip(axes, tests, strict=True):
-        columns = report.columns(test["series"])
-        axis.plot(1e3 * columns["x_m"], 1e3 * columns["thickness_m"], color=BED, marker=".", ls="none")
+
+    def draw(axis: Axes, test: Result, x: Array, thickness: Array, standing: Array | None) -> str:
+        axis.plot(x, thickness, color=BED, marker=".", ls="none")
         flank_lines(axis, test, start=0.5 * test["slot"], period=test["size"][0], colour=MODEL)
-        title = f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
-        axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
-    axes[0].set_ylabel("thickness [mm]")
-    return [report.draw("slopes", drawing)]
+        return f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
+
+    return thicknesses(report, [test for test in _checked(report.result) if test["state"] == "drained"], draw, "slopes")

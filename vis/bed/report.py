@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, figure, listing
 from vis.page.plots import DASHED, handle, legend_above, new_panels, shades
-from vis.page.report import Report, again, report_of, tables
+from vis.page.report import Report, report_of, tables
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import grains_box, read_frames
-from vis.pictures.pictures import Counter, carry_out
+from vis.pictures.pictures import carry_out
 from vis.pictures.render import PictureJob, View, run_job
 
 __all__ = ["write_bed_report"]
@@ -24,15 +23,15 @@ def write_bed_report(report: Report) -> Path:
     drawn = [_profiles(report), *_passes(report)]
     picture, note = _picture(report)
 
-    def said(name: str, scale: float = 1.0, unit: str = "") -> str:
+    def show(name: str, scale: float = 1.0, unit: str = "") -> str:
         value = quantities[name]["value"]
         return "–" if value is None else f"{short(scale * value, 4)} {unit}".strip()
 
     tiles = [
-        Tile("Packing fraction", said("packing_fraction"), f"from {said('loosest')} to {said('densest')} on the way"),
-        Tile("Contacts of a grain", said("coordination_number"), f"{quantities['grain_count']['value']} grains"),
-        Tile("Surface", said("surface", 1e3, "mm"), "above the floor"),
-        Tile("Horizontal over vertical stress", said("pressure_ratio"), "away from floor and surface"),
+        Tile("Packing fraction", show("packing_fraction"), f"from {show('loosest')} to {show('densest')} on the way"),
+        Tile("Contacts of a grain", show("coordination_number"), f"{quantities['grain_count']['value']} grains"),
+        Tile("Surface", show("surface", 1e3, "mm"), "above the floor"),
+        Tile("Horizontal over vertical stress", show("pressure_ratio"), "away from floor and surface"),
     ]
     criteria = [f"{stage['stage']}: {stage['criterion']}." for stage in result["stages"]]
     command = result["experiment"]
@@ -40,11 +39,7 @@ def write_bed_report(report: Report) -> Path:
         Section("", [*tables(result), *picture, *drawn]),
         Section("How each stage came to rest", [listing(criteria)]),
         report.numbers(),
-        again(
-            f"hedgebed {command} run.toml\nhedgebed bed show bed.npz",
-            f"With hedgebed {result['version']}, in this folder:",
-            "The same settings give the same bits.",
-        ),
+        report.again(f"hedgebed {command} run.toml\nhedgebed bed show bed.npz", "bits"),
     ]
     lead = [command, f"seed {result['bed']['seed']}"]
     return report.write(sections, lead=lead, tiles=tiles, missing=[note] if note else [])
@@ -105,8 +100,7 @@ def _picture(report: Report) -> tuple[list[Block], str]:
         "surface": float(result["bed"]["surface"]["value"]), "file": str(file), "size": [1600, 1200],
     }  # fmt: skip
     job: PictureJob = {"folder": str(folder), "views": [view]}
-    counter, flat = Counter([1.0], report.rest()), partial(run_job, job, opengl=False)
     stands_in = "a cross-section stands in for the picture"
-    _, notes = carry_out(job, counter, flat, failed=stands_in, without=stands_in)
-    said = "Grains coloured by the number of their contacts."
-    return [figure(file, title="The bed", caption=said)], "".join(notes)
+    _, notes = carry_out(job, run_job, [1.0], report.rest(), failed=stands_in, without=stands_in)
+    caption = "Grains coloured by the number of their contacts."
+    return [figure(file, title="The bed", caption=caption)], "".join(notes)

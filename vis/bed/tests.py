@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, text
-from vis.page.plots import Array, handle, legend_above, new_panels, shades, smooth_ratio
+from vis.page.plots import BED, MODEL, Array, handle, legend_above, new_panels, shades, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
 from vis.page.sentences import Sentences
-from vis.page.style import BED, MODEL
 from vis.pictures.frames import read_frames
 
-__all__ = ["FALLEN_SHARE", "flank_lines", "said", "write_shear_report", "write_test_report"]
+__all__ = ["FALLEN_SHARE", "flank_lines", "quoted", "thicknesses", "write_shear_report", "write_test_report"]
 
 say = Sentences(__package__)
 Grains = Mapping[str, NDArray[Any]]
@@ -37,7 +36,7 @@ def write_test_report(report: Report) -> Path:
     scaled = {"mm": 1e3 * one["grain"], "deep": 1e3 * one["surface"], "mpa": 1e-6 * one["young"]}
     bed = say("first_bed", one=one, sides=sides, step=1e6 * one["time_step"], **scaled)
     sections = [
-        Section("", [*tables(result), *plots(report)]),
+        Section("", [*tables(result), *(block for draw in plots for block in draw(report))]),
         Section("How it is measured", [*(text(words) for words in method), text(bed)]),
         report.numbers(std=True),
         again(f"hedgebed {command} run.toml"),
@@ -45,8 +44,8 @@ def write_test_report(report: Report) -> Path:
     return report.write(sections, lead=[command, f"{len(result['runs'])} runs"], tiles=tiles(result))
 
 
-def said(entry: Result, scale: float = 1.0, unit: str = "") -> str:
-    """A quantity with its spread, as a tile says it."""
+def quoted(entry: Result, scale: float = 1.0, unit: str = "") -> str:
+    """A quantity with its spread, for a tile."""
     if entry["value"] is None:
         return "–"
     value, std = scale * entry["value"], entry["std"]
@@ -106,18 +105,14 @@ def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top:
 def _cone_tiles(result: Result) -> list[Tile]:
     quantities, one = result["quantities"], result["runs"][0]
     return [
-        Tile("Gradient of the cone index", said(quantities["gradient"], 1e-6, " MPa/m"), "spread between the pushes"),
-        Tile("Over the unit weight", said(quantities["gradient_over_weight"]), "gradient / (bulk density g)"),
-        Tile("Cone index at the end", said(quantities["index_at_end"], 1e-3, " kPa"), "last tenth of the way"),
+        Tile("Gradient of the cone index", quoted(quantities["gradient"], 1e-6, " MPa/m"), "spread between the pushes"),
+        Tile("Over the unit weight", quoted(quantities["gradient_over_weight"]), "gradient / (bulk density g)"),
+        Tile("Cone index at the end", quoted(quantities["index_at_end"], 1e-3, " kPa"), "last tenth of the way"),
         Tile("Speed", f"{1e3 * one['speed']:.3g} mm/s", f"v / sqrt(g D) = {one['froude']:.2g}"),
     ]
 
 
-def _cone_plots(report: Report) -> list[Block]:
-    return [_indices(report), *_cone_side(report)]
-
-
-def _indices(report: Report) -> Block:
+def _indices(report: Report) -> list[Block]:
     runs = report.result["runs"]
     drawing, (axis, lines) = new_panels(2, height=3.8, sharey=True)
     handles = []
@@ -137,7 +132,7 @@ def _indices(report: Report) -> Block:
     for panel in (axis, lines):
         panel.set(xlim=(0.0, None), xlabel="cone index [kPa]")
     legend_above(drawing, handles)
-    return report.draw("index", drawing)
+    return [report.draw("index", drawing)]
 
 
 def _cone_side(report: Report) -> list[Block]:
@@ -177,15 +172,11 @@ def _cut_tiles(result: Result) -> list[Tile]:
     note = str(quantities["cohesion"]["note"]).partition(";")[0]
     angle = f"Terzaghi, with {note.partition(' with ')[2]}" if " with phi" in note else note
     return [
-        Tile("Critical height", said(quantities["critical_height"], 1e3, " mm"), between),
-        Tile("Cohesion", said(quantities["cohesion"], 1.0, " Pa"), angle),
-        Tile("Slumped to", said(quantities["slumped_to"], 1.0, "°"), "slope of a fallen face"),
+        Tile("Critical height", quoted(quantities["critical_height"], 1e3, " mm"), between),
+        Tile("Cohesion", quoted(quantities["cohesion"], 1.0, " Pa"), angle),
+        Tile("Slumped to", quoted(quantities["slumped_to"], 1.0, "°"), "slope of a fallen face"),
         Tile("Height of the faces", f"{1e3 * runs[0]['height']:.3g} mm", f"{len(runs)} beds"),
     ]
-
-
-def _cut_plots(report: Report) -> list[Block]:
-    return [*_cut_side(report), _cut_profiles(report), _trials(report)]
 
 
 def _cut_side(report: Report) -> list[Block]:
@@ -202,7 +193,7 @@ def _cut_side(report: Report) -> list[Block]:
     return _side_plot(report, run, draw, "cut_side")
 
 
-def _cut_profiles(report: Report) -> Block:
+def _cut_profiles(report: Report) -> list[Block]:
     def draw(axis: Axes, run: Result, x: Array, thickness: Array, standing: Array | None) -> str:
         if standing is not None:
             axis.step(x, standing, where="mid", color=BED, lw=1.2)
@@ -210,10 +201,10 @@ def _cut_profiles(report: Report) -> Block:
         return str(run["id"])
 
     handles = [handle("stood last", BED, lw=1.2), handle("at the end", MODEL, ls="--", lw=1.2)]
-    return _thicknesses(report, "tests_profiles", draw, handles)
+    return thicknesses(report, report.result["runs"], draw, "tests_profiles", name="profiles", handles=handles)
 
 
-def _trials(report: Report) -> Block:
+def _trials(report: Report) -> list[Block]:
     runs = report.result["runs"]
     drawing, (axis,) = new_panels(1, height=2.6)
     handles = []
@@ -234,7 +225,7 @@ def _trials(report: Report) -> Block:
         ylabel="grains of the wedge\nthat have moved [1]",
     )
     legend_above(drawing, handles)
-    return report.draw("trials", drawing)
+    return [report.draw("trials", drawing)]
 
 
 # A slot drains the bed ------------------------------------------------------------------------------------------------
@@ -243,10 +234,10 @@ def _trials(report: Report) -> Block:
 def _repose_tiles(result: Result) -> list[Tile]:
     quantities, runs = result["quantities"], result["runs"]
     return [
-        Tile("Angle of repose", said(quantities["angle_of_repose"], 1.0, "°"), "drained; spread between the runs"),
+        Tile("Angle of repose", quoted(quantities["angle_of_repose"], 1.0, "°"), "drained; spread between the runs"),
         Tile("Slopes", f"{2 * len(runs)}", f"{len(runs)} beds, two each"),
-        Tile("Crest", said(quantities["crest"], 1e3, " mm"), f"grains of {1e3 * runs[0]['grain']:.3g} mm"),
-        Tile("Packing fraction", said(quantities["packing_fraction"]), "before the slot was opened"),
+        Tile("Crest", quoted(quantities["crest"], 1e3, " mm"), f"grains of {1e3 * runs[0]['grain']:.3g} mm"),
+        Tile("Packing fraction", quoted(quantities["packing_fraction"]), "before the slot was opened"),
     ]
 
 
@@ -264,10 +255,6 @@ def flank_lines(axis: Axes, run: Result, *, start: float, period: float, colour:
             axis.plot(1e3 * x, 1e3 * height, color=colour, ls=style, lw=2.0, zorder=3)
 
 
-def _repose_plots(report: Report) -> list[Block]:
-    return [*_repose_side(report), _repose_profiles(report)]
-
-
 def _repose_side(report: Report) -> list[Block]:
     run = report.result["runs"][0]
 
@@ -283,7 +270,7 @@ def _repose_side(report: Report) -> list[Block]:
     return _side_plot(report, run, draw, "repose_side")
 
 
-def _repose_profiles(report: Report) -> Block:
+def _repose_profiles(report: Report) -> list[Block]:
     colours = iter(shades(len(report.result["runs"])))
 
     def draw(axis: Axes, run: Result, x: Array, thickness: Array, standing: Array | None) -> str:
@@ -294,26 +281,32 @@ def _repose_profiles(report: Report) -> Block:
 
     dots, fit = handle("bed", "black", marker=".", ls="none"), handle("fit", MODEL)
     before = handle("surface before", "#888888", ls="--", lw=0.8)
-    return _thicknesses(report, "repose_profiles", draw, [dots, fit, before])
+    handles = [dots, fit, before]
+    return thicknesses(report, report.result["runs"], draw, "repose_profiles", name="profiles", handles=handles)
 
 
-def _thicknesses(report: Report, key: str, draw: Callable[..., str], handles: list[Any]) -> Block:
-    """Profiles in mm, a panel a run, each drawn by `draw`, which gives its title."""
-    runs = report.result["runs"]
+def thicknesses(
+    report: Report, runs: Sequence[Result], draw: Callable[..., str], key: str, *, name: str = "", handles: Any = ()
+) -> list[Block]:
+    """Profiles in mm, a panel a run, each drawn by `draw`, which gives its title; none without runs."""
+    if not runs:
+        return []
     drawing, axes = new_panels(len(runs), height=2.4, sharey=True)
     for axis, run in zip(axes, runs, strict=True):
         columns = {name: 1e3 * values for name, values in report.columns(run["series"]).items()}
         title = draw(axis, run, columns["x_m"], columns["thickness_m"], columns.get("thickness_standing_m"))
         axis.set(title=title, xlabel="x [mm]", ylim=(0.0, None))
     axes[0].set_ylabel("thickness [mm]")
-    legend_above(drawing, handles)
-    return report.draw(key, drawing, name="profiles")
+    if handles:
+        legend_above(drawing, handles)
+    return [report.draw(key, drawing, name=name)]
 
 
-_TESTS: dict[str, tuple[Callable[[Report], list[Block]], Callable[[Result], list[Tile]], list[str]]] = {
-    "cone": (_cone_plots, _cone_tiles, [say("cone_method_1"), say("cone_method_2")]),
-    "cut": (_cut_plots, _cut_tiles, [say("cut_method_1"), say("cut_method_2")]),
-    "repose": (_repose_plots, _repose_tiles, [say("repose_method_1"), say("repose_method_2")]),
+_Drawer = Callable[[Report], list[Block]]
+_TESTS: dict[str, tuple[tuple[_Drawer, ...], Callable[[Result], list[Tile]], tuple[str, ...]]] = {
+    "cone": ((_indices, _cone_side), _cone_tiles, (say("cone_method_1"), say("cone_method_2"))),
+    "cut": ((_cut_side, _cut_profiles, _trials), _cut_tiles, (say("cut_method_1"), say("cut_method_2"))),
+    "repose": ((_repose_side, _repose_profiles), _repose_tiles, (say("repose_method_1"), say("repose_method_2"))),
 }
 """What draws, the numbers on top, and how the test is made, a paragraph each."""
 
@@ -332,18 +325,20 @@ def write_shear_report(report: Report) -> Path:
         ("Cohesion, critical", "critical_cohesion", " Pa", "where the line begins"),
         ("Critical stress ratio", "critical_ratio", "", "shear over normal"),
     )
-    tiles = [Tile(label, _shear_said(quantities[name], unit), note) for label, name, unit, note in numbers]
+
+    def words(value: float, std: float | None) -> str:
+        return quote(value) if std is None else f"{value:.3g} ± {std:.1g}"
+
+    tiles = [
+        Tile(label, words(quantities[name]["value"], quantities[name]["std"]) + unit, note)
+        for label, name, unit, note in numbers
+    ]
     sections = [
         Section("", [*tables(result), _curves(report), _lines(report)]),
         report.numbers(std=True),
         again("hedgebed bed test shear run.toml"),
     ]
     return report.write(sections, lead=["bed test shear"], tiles=tiles)
-
-
-def _shear_said(entry: Result, unit: str) -> str:
-    value, std = entry["value"], entry["std"]
-    return f"{quote(value)}{unit}" if std is None else f"{value:.3g} ± {std:.1g}{unit}"
 
 
 def _curves(report: Report) -> Block:

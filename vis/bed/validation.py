@@ -9,9 +9,8 @@ from pathlib import Path
 
 from rigid.series import read_series
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
-from vis.page.plots import new_figure
+from vis.page.plots import GREY, new_figure
 from vis.page.report import Report, Result, number_text, report_of
-from vis.page.style import GREY
 
 __all__ = ["write_validation_report"]
 
@@ -106,8 +105,8 @@ def _sections(cases: Sequence[Result], blocks: Mapping[str, Sequence[Block]]) ->
     run = _run(cases)
     sections = [_overview(run)]
     if failing := [case for case in run if case["status"] == "fail"]:
-        said = [f"{case['id']}: {case['reason'] or 'not looked into yet'}." for case in failing]
-        sections.append(Section("What fails, and why", [listing(said)]))
+        reasons = [f"{case['id']}: {case['reason'] or 'not looked into yet'}." for case in failing]
+        sections.append(Section("What fails, and why", [listing(reasons)]))
     for family in dict.fromkeys(case["family"] for case in run):
         own = [block for case in run if case["family"] == family for block in _case(case, blocks)]
         sections.append(Section(family, own))
@@ -138,11 +137,11 @@ def _case(case: Result, blocks: Mapping[str, Sequence[Block]]) -> list[Block]:
 
 def _absent(cases: Sequence[Result]) -> list[str]:
     """What is not in the report: each case that could not be run, and in one sentence those that were left out."""
-    said, left = [], []
+    reasons, left = [], []
     for case in cases:
         why = case.get("waits_for") or case.get("skipped")
         if why:
-            said.append(f"{case['id']} ({case['title']}): {case['status']}, {why}")
+            reasons.append(f"{case['id']} ({case['title']}): {case['status']}, {why}")
         elif case["status"] not in ("pass", "fail"):
             left.append(case["id"])
-    return [*said, f"left out of this run: {', '.join(left)}"] if left else said
+    return [*reasons, f"left out of this run: {', '.join(left)}"] if left else reasons

@@ -14,17 +14,15 @@ from vis.film.film import ARROWS, draw_runs, shown
 from vis.film.reel import NAME, AnyReel, Reel, SpaceReel
 from vis.page.folder import read_folder
 from vis.page.numbers import short
-from vis.page.page import Block, Section, Tile, listing, table, text
-from vis.page.plots import DASHED, Array, handle, legend_above, sheet
+from vis.page.page import Block, Section, Tile, listing, table, table_of, text
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, as_it_lies, handle, legend_above, sheet
 from vis.page.report import Report, Result, again, report_of, unit_text
-from vis.page.states import LINES, States, draw_bands, legend_of_runs
-from vis.page.style import BED, GREY, INK, MODEL, as_it_lies
+from vis.page.states import LINES, draw_bands, legend_of_runs
 from vis.pictures.frames import frame_names
 
 __all__ = ["write_compare_report"]
 
 Columns = Mapping[str, Array]
-Both = tuple[States, States]
 Labels = tuple[str, str]
 _ROWS = (BED, "#E69F00", "#009E73", "#CC79A7", GREY, "#56B4E9", INK, MODEL)
 """Colours of rows or spikes."""
@@ -39,11 +37,12 @@ def write_compare_report(report: Report) -> Path:
     result = report.result
     labels = (result["runs"][0]["label"], result["runs"][1]["label"])
     penetrations = result["kind"] == "penetrate"
-    differs = [Section("What the two were given", [_given(result, labels)])] if result["differs"] else []
+    rows = [(row["key"], row["first"], row["second"], row["unit"]) for row in result["differs"]]
+    given = table_of(("key", *labels, "unit"), rows, words=True)
     sections = [
         *([Section("", _drives(report, labels))] if penetrations else _tumbles(report, labels)),
         Section("Every number, side by side", _numbers(result, labels)),
-        *differs,
+        *([Section("What the two were given", given)] if given else []),
         again("hedgebed compare run.toml"),
     ]
     lead = ["compare", *(f"{run['label']}: {run['title']}" for run in result["runs"])]
@@ -127,12 +126,12 @@ def _tiles(result: Result) -> list[Tile]:
         row = rows.get(name)
         if row is None or row["first"] is None or row["second"] is None:
             continue
-        values = [_said(row[key], row["unit"]) for key in ("first", "second")]
+        values = [_in_unit(row[key], row["unit"]) for key in ("first", "second")]
         tiles.append(Tile(label, f"{values[0]} | {values[1]}", words))
     return tiles[:5]
 
 
-def _said(value: float, unit: str) -> str:
+def _in_unit(value: float, unit: str) -> str:
     if unit == "rad":
         return f"{short(math.degrees(value), 3)}°"
     if unit == "m" and abs(value) < 0.1:
@@ -172,13 +171,7 @@ def _row_sinkage(result: Result, labels: Labels) -> list[Block]:
     rows = [
         (str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))) for row in result.get("rows", [])
     ]
-    title = "Sinkage of each row while both last, deepest [mm]"
-    return [table(("row", *labels), rows, title=title)] if rows else []
-
-
-def _given(result: Result, labels: Labels) -> Block:
-    rows = [(row["key"], row["first"], row["second"], row["unit"]) for row in result["differs"]]
-    return table(("key", *labels, "unit"), rows, words=True)
+    return table_of(("row", *labels), rows, title="Sinkage of each row while both last, deepest [mm]")
 
 
 # Figures --------------------------------------------------------------------------------------------------------------
@@ -197,10 +190,11 @@ def _figures(report: Report, labels: Labels) -> list[Block]:
         names, called = result["spikes"], "spike"
     else:
         names, called = [str(row) for row in range(int(result["spike_count"]))], "row"
+    angles = (np.degrees(columns[f"{angle}_{number}"]) for number in (1, 2))
     path, in_proportion = _draw_way(columns, labels) if in_space else _draw_path(columns, labels)
     drawings = {
         "path": path,
-        "states": _draw_states(columns, angle, states, labels, label),
+        "states": draw_bands([(columns["t_s"], *run) for run in zip(angles, states, strict=True)], labels, label=label),
         "sinkage": _draw_spikes(columns, names, labels, called=called),
         "forces": _draw_forces(result["weights"], columns, forces, labels),
         "energy": _draw_energy(columns, labels),
@@ -246,12 +240,6 @@ def _draw_way(columns: Columns, labels: Labels) -> tuple[Figure, bool]:
         axis.set(ylabel=label, xlabel="time [s]")
     legend_of_runs(drawing, labels)
     return drawing, True
-
-
-def _draw_states(columns: Columns, angle: str, states: Both, labels: Labels, label: str) -> Figure:
-    """The column `angle` [rad] of both, and their states."""
-    angles = (np.degrees(columns[f"{angle}_{number}"]) for number in (1, 2))
-    return draw_bands([(columns["t_s"], *run) for run in zip(angles, states, strict=True)], labels, label=label)
 
 
 def _draw_spikes(columns: Columns, names: Sequence[str], labels: Labels, *, called: str) -> Figure:

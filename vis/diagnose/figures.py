@@ -16,11 +16,10 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from rigid.series import read_series
-from vis.page.plots import DASHED, Array, handle, legend_above, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
-from vis.page.style import BED, GREY, INK, MODEL, STATES
 
 __all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
 
@@ -69,7 +68,7 @@ class Channel:
     """What replicates differ by beyond the sensors, beside the best model; None where they differ by no more."""
 
     def model(self, stage: str) -> Array:
-        """What the model "before" or "after" says."""
+        """The prediction of the model "before" or "after"."""
         return self.before if stage == "before" else self.after
 
     def residual(self, stage: str) -> Array:
@@ -218,17 +217,17 @@ def draw_phases(rows: Sequence[Result], labels: tuple[str, str]) -> Figure | Non
 # Candidates -----------------------------------------------------------------------------------------------------------
 
 
-def draw_evidence(said: Result) -> Figure | None:
+def draw_evidence(diagnosis: Result) -> Figure | None:
     """Bars of evidence, and what each candidate leaves: the best form of each single name, and the best sets of names
     that beat all of their parts."""
     best: dict[tuple[str, ...], Result] = {}
     orders: dict[frozenset[str], tuple[str, ...]] = {}  # one set of names, in whatever order they were added
-    for row in (*said.get("candidates", []), *said.get("evidence", [])):
+    for row in (*diagnosis.get("candidates", []), *diagnosis.get("evidence", [])):
         best.setdefault(orders.setdefault(frozenset(row["effects"]), tuple(row["effects"])), row)
     if not best:
         return None
     score = {names: float(row["score"]) for names, row in best.items()}
-    leading = _leading_names(said, score)
+    leading = _leading_names(diagnosis, score)
     leading = orders.get(frozenset(leading), leading)
     singles = [names for names in best if len(names) == 1]
     sets = [
@@ -237,9 +236,9 @@ def draw_evidence(said: Result) -> Figure | None:
         if len(names) > 1 and all(score[names] > score.get((name,), -math.inf) + 0.05 for name in names)
     ]
     names = sorted({*singles, *sets[:5], *([leading] if leading in best else [])}, key=lambda n: (score[n], -len(n)))
-    names = names[-_MOST_BARS:] if len(names) > _MOST_BARS else names
+    names = names[-_MOST_BARS:]
     drawing, ((axis, beside),) = sheet(1, 2, 1.3 + 0.27 * len(names), sharey=True, width_ratios=(3, 2))
-    kinds = {name: _kind(name, leading, said) for name in names}
+    kinds = {name: _kind(name, leading, diagnosis) for name in names}
     colours = {name: _KINDS[kinds[name]] for name in names}
     places = range(len(names))
     axis.barh(places, [score[name] for name in names], color=[colours[n] for n in names], height=0.66)
@@ -248,15 +247,13 @@ def draw_evidence(said: Result) -> Figure | None:
         axis.annotate(f"{score[name]:z.1f}" if abs(score[name]) < 10 else f"{score[name]:.0f}",
                       (max(score[name], 0.0), place), xytext=(3, 0), textcoords="offset points", va="center",
                       fontsize=7.5, color=INK)  # fmt: skip
-    axis.set_xlim(
-        max(1.1 * min(score[name] for name in names), -0.3 * most) if min(score[name] for name in names) < 0 else 0.0,
-        1.12 * most,
-    )  # one that is far off does not press the others together
+    least = min(score[name] for name in names)  # one that is far off does not press the others together
+    axis.set_xlim(max(1.1 * least, -0.3 * most) if least < 0 else 0.0, 1.12 * most)
     axis.axvline(0.0, color=INK, lw=0.9)
     axis.set_yticks(places, [" + ".join(name) for name in names])
     axis.grid(False, axis="y")
     axis.set_xlabel("log evidence over the base model [nats]\n(left of 0: not worth its parameters)")
-    _draw_left(beside, [best[name] for name in names], [colours[name] for name in names], said)
+    _draw_left(beside, [best[name] for name in names], [colours[name] for name in names], diagnosis)
     shown = [kind for kind in _KINDS if kind in kinds.values()]
     handles: list[Any] = [Patch(color=_KINDS[kind], label=kind) for kind in shown]
     handles.append(handle("the noise alone", INK, ls=(0, (1, 1.5))))
@@ -270,9 +267,9 @@ _KINDS = {"named": BED, "certain": BED, "likeliest, not certain": "#7fb8d9", "ca
 """What a candidate is -> its colour."""
 
 
-def _draw_left(axis: Axes, rows: Sequence[Result], colours: Sequence[str], said: Result) -> None:
+def _draw_left(axis: Axes, rows: Sequence[Result], colours: Sequence[str], diagnosis: Result) -> None:
     """Chi-square a sample that each candidate leaves, between that of the base model and that of the noise."""
-    base = said.get("evidence_base", {})
+    base = diagnosis.get("evidence_base", {})
     left = [max(1 + float(row["left"]), 1e-2) for row in rows]
     axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
     whole = 1 + float(base["left"]) if base else max(left)
@@ -304,36 +301,39 @@ def _plain_numbers(value: float, place: float) -> str:
     return f"{value:g}" if 1e-3 <= value < 1e5 else f"{value:.0e}"
 
 
-def _leading_names(said: Result, score: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
-    """The set of names that is told: named, or of an unknown the best model's, or the likeliest single one."""
-    if said["verdict"] != "unknown":
-        return tuple(effect["id"] for effect in said["effects"])
-    names = tuple(said.get("leading", {}).get("effects", ()))
+def _leading_names(diagnosis: Result, score: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
+    """The leading set of names: the verdict's; where that is unknown the best model's, or the likeliest single name."""
+    if diagnosis["verdict"] != "unknown":
+        return tuple(effect["id"] for effect in diagnosis["effects"])
+    names = tuple(diagnosis.get("leading", {}).get("effects", ()))
     same = next((known for known in score if sorted(known) == sorted(names)), names)
     singles = [known for known in score if len(known) == 1 and score[known] > 0]
     return same or max(singles, key=lambda known: score[known], default=())
 
 
-def _kind(name: tuple[str, ...], leading: tuple[str, ...], said: Result) -> str:
-    if said["verdict"] == "unknown":
-        certain = {effect["id"] for effect in said["effects"]}
+def _kind(name: tuple[str, ...], leading: tuple[str, ...], diagnosis: Result) -> str:
+    if diagnosis["verdict"] == "unknown":
+        certain = {effect["id"] for effect in diagnosis["effects"]}
         if certain and set(name) == certain:
             return "certain"
         return "likeliest, not certain" if name == leading else "other"
     if name == leading:
         return "named"
-    swapped = [(other, *leading[1:]) for other in said["alternatives"]]
+    swapped = [(other, *leading[1:]) for other in diagnosis["alternatives"]]
     return "cannot be told from it" if set(name) in [set(s) for s in swapped] else "other"
 
 
 # What no effect explains ----------------------------------------------------------------------------------------------
 
 
-def draw_latent(folder: Path, said: Result, channels: Sequence[Channel]) -> Figure | None:
-    """Every latent column over time, and over what it goes with most; coloured by phase, with means of equal counts."""
-    if "latent" not in said or not (folder / said["latent"]["file"]).exists():
+def draw_latent(folder: Path, diagnosis: Result, channels: Sequence[Channel]) -> Figure | None:
+    """Every latent column over time and over the column that explains most of it, by phase, with means of equal counts.
+
+    None where there is no latent force.
+    """
+    if "latent" not in diagnosis or not (folder / diagnosis["latent"]["file"]).exists():
         return None
-    columns = read_series(folder / said["latent"]["file"], text=("trial",))
+    columns = read_series(folder / diagnosis["latent"]["file"], text=("trial",))
     latents = [name for name in columns if name.startswith("latent_")]
     if not latents or not len(columns["trial"]):
         return None
@@ -342,7 +342,7 @@ def draw_latent(folder: Path, said: Result, channels: Sequence[Channel]) -> Figu
         name: column if column.dtype.kind == "f" else np.array([float(cell or "nan") for cell in column])
         for name, column in columns.items()
     }
-    shares = {name: share for name, share in said["latent"].get("explained", {}).items() if name in values}
+    shares = {name: share for name, share in diagnosis["latent"].get("explained", {}).items() if name in values}
     others = [name for name in sorted(shares, key=lambda n: -shares[n]) if name != "t_s" and shares[name] > 0]
     other = others[0] if others else next(name for name in columns if name not in (*latents, "t_s"))
     phase = _phase_at(trials, values["t_s"], channels)
@@ -356,7 +356,7 @@ def draw_latent(folder: Path, said: Result, channels: Sequence[Channel]) -> Figu
                 axis.plot(across[own], values[latent][own], ".", ms=2.2, color=_PHASES.get(name, GREY), alpha=0.8)
             axis.axhline(0.0, color=GREY, lw=0.8)
             axis.plot(*_means(across, values[latent]), "-", color=INK, lw=1.3, marker="o", ms=3)
-            share = said["latent"].get("explained", {}).get(column)
+            share = diagnosis["latent"].get("explained", {}).get(column)
             several = "up to " if len(latents) > 1 else ""  # it is the largest of all that is missing
             axis.set_xlabel(label + (f"; explains {several}{100 * share:.0f} %" if share is not None else ""))
         pair[0].set_ylabel(_label(latent)[0])

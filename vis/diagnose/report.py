@@ -26,27 +26,27 @@ def write_diagnosis_report(report: Report) -> Path:
 
     Raises FileNotFoundError where the folder has no diagnosis.json or result.json.
     """
-    said: Result = json.loads((report.folder / "diagnosis.json").read_text(encoding="utf-8"))
-    drawn = _drawn(report, said)
-    result, gap = report.result, said["gap"]
-    named = ", ".join(effect["id"] for effect in said["effects"]) or "nothing"
+    diagnosis: Result = json.loads((report.folder / "diagnosis.json").read_text(encoding="utf-8"))
+    drawn = _drawn(report, diagnosis)
+    result, gap = report.result, diagnosis["gap"]
+    named = ", ".join(effect["id"] for effect in diagnosis["effects"]) or "nothing"
     which = "chi-square a sample, " + ("fitted" if gap["before"]["held_out"] is None else "held-out") + " trials"
     tiles = [
-        Tile("Verdict", said["verdict"], " or ".join([named, *said["alternatives"]])),
-        Tile("Gap before", _gap(gap["before"]), which + _weighed(said, "before")),
-        Tile("Gap after", _gap(gap["after"]), which + _weighed(said, "after"), second=True),
+        Tile("Verdict", diagnosis["verdict"], " or ".join([named, *diagnosis["alternatives"]])),
+        Tile("Gap before", _gap(gap["before"]), which + _weighed(diagnosis, "before")),
+        Tile("Gap after", _gap(gap["after"]), which + _weighed(diagnosis, "after"), second=True),
     ]
-    departures = result["departures"]["sentences"]
+    departures, following = result["departures"]["sentences"], diagnosis.get("next_experiment")
+    left = [_gap_table(diagnosis), *_in_units(diagnosis), *drawn["residuals"], *_phase_table(diagnosis)]
     sections = [
         Section("", [listing(result.get("summary", [])), *drawn["trajectories"]]),
-        Section("What is left", [_gap_table(said), *_in_units(said), *drawn["residuals"], *_phase_table(said),
-                                 *drawn["latent"]]),
-        Section("Where the base model fails", [*([listing(departures)] if departures else []), *_where(said)]),
-        Section("Candidates", [*drawn["evidence"], *_evidence(said)]),
-        Section("What these trials can tell apart", _told_apart(said)),
-        Section("The next experiment", [text(said["next_experiment"])] if said.get("next_experiment") else []),
-        Section("Numbers", _numbers(said)),
-        Section("What was found in the recordings", _findings(said)),
+        Section("What is left", [*left, *drawn["latent"]]),
+        Section("Where the base model fails", [*([listing(departures)] if departures else []), *_where(diagnosis)]),
+        Section("Candidates", [*drawn["evidence"], *_evidence(diagnosis)]),
+        Section("What these trials can tell apart", _distinguished(diagnosis)),
+        Section("The next experiment", [text(following)] if following else []),
+        Section("Numbers", _numbers(diagnosis)),
+        Section("What was found in the recordings", _findings(diagnosis)),
         again("hedgebed diagnose THIS_FOLDER/run.toml", f"With hedgebed {result['version']}, where it was started from "
               "(the campaign's path is as given):"),
     ]  # fmt: skip
@@ -54,35 +54,35 @@ def write_diagnosis_report(report: Report) -> Path:
     return report.write([section for section in sections if section.blocks], lead=lead, tiles=tiles)
 
 
-def _drawn(report: Report, said: Result) -> dict[str, list[Block]]:
+def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
     """Each of the figures that has something to show."""
     channels = [read_channel(path) for path in sorted((report.folder / "series").glob("*.csv"))]
-    held, labels = set(said["gap"]["held_out_trials"]), _labels(said)
+    held, labels = set(diagnosis["gap"]["held_out_trials"]), _labels(diagnosis)
     shown = worst([channel for channel in channels if len(channel.time)], held)
     drawings = {
         "trajectories": draw_trajectories(shown, held, labels),
-        "residuals": draw_phases(said.get("by_phase", []), labels),
-        "evidence": draw_evidence(said),
-        "latent": draw_latent(report.folder, said, channels),
+        "residuals": draw_phases(diagnosis.get("by_phase", []), labels),
+        "evidence": draw_evidence(diagnosis),
+        "latent": draw_latent(report.folder, diagnosis, channels),
     }
     return {key: [] if drawing is None else [report.draw(key, drawing)] for key, drawing in drawings.items()}
 
 
-def _labels(said: Result) -> tuple[str, str]:
+def _labels(diagnosis: Result) -> tuple[str, str]:
     """What the models before and after are called; the second is empty where nothing was added."""
-    before, names = "base model, fitted", " + ".join(effect["id"] for effect in said["effects"])
-    if said["verdict"] == "none" or said["gap"]["after"] == said["gap"]["before"]:
+    before, names = "base model, fitted", " + ".join(effect["id"] for effect in diagnosis["effects"])
+    if diagnosis["verdict"] == "none" or diagnosis["gap"]["after"] == diagnosis["gap"]["before"]:
         return before, ""
-    likeliest = " + ".join(said.get("leading", {}).get("effects", []))
+    likeliest = " + ".join(diagnosis.get("leading", {}).get("effects", []))
     return before, f"with {names}" if names else f"with {likeliest}, not certain" if likeliest else "best model found"
 
 
 # Its parts ------------------------------------------------------------------------------------------------------------
 
 
-def _weighed(said: Result, stage: str) -> str:
+def _weighed(diagnosis: Result, stage: str) -> str:
     """The same weighed against what replicates differ by, where that is more than the sensors."""
-    weighed = said.get("gap_with_scatter")
+    weighed = diagnosis.get("gap_with_scatter")
     return "" if weighed is None else f"; {_gap(weighed[stage])} beside what replicates differ by"
 
 
@@ -95,21 +95,16 @@ def _number(value: float) -> str:
     return plain(value) if value >= 1e3 else short(value, 3)
 
 
-def _gap_table(said: Result) -> Block:
-    gap, weighed = said["gap"], said.get("gap_with_scatter")
-
-    def cell(value: float | None, error: float | None = None) -> str:
-        told = _DASH if value is None else _number(value)
-        return told if error is None else f"{told} ± {short(error, 1)}"
-
-    def error(one: Result, stage: str, part: str) -> float | None:
-        return one.get("after_std", {}).get(part) if stage == "after" else None
-
-    rows = [
-        (name, *(cell(one[stage][part], error(one, stage, part)) for one in (gap, weighed) if one is not None
-                 for stage in ("before", "after")))
-        for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials"))
-    ]  # fmt: skip
+def _gap_table(diagnosis: Result) -> Block:
+    gap, weighed = diagnosis["gap"], diagnosis.get("gap_with_scatter")
+    rows = []
+    for part, name in (("fit", "fitted trials"), ("held_out", "held-out trials")):
+        cells = [name]
+        for one in (gap, weighed) if weighed is not None else (gap,):
+            cells += [_DASH if one[stage][part] is None else _number(one[stage][part]) for stage in ("before", "after")]
+            error = one.get("after_std", {}).get(part)
+            cells[-1] += "" if error is None else f" ± {short(error, 1)}"
+        rows.append(cells)
     head: tuple[str, ...] = ("", "base model", "best model")
     title = "The gap, chi-square per sample (1: the sensors' noise)"
     if weighed is not None:
@@ -120,16 +115,16 @@ def _gap_table(said: Result) -> Block:
     return table(head, rows, title=title)
 
 
-def _in_units(said: Result) -> list[Block]:
+def _in_units(diagnosis: Result) -> list[Block]:
     """The gap in the channels' units, and by condition."""
     blocks = []
-    cells = {(row["channel"], row["held_out"]): row for row in said.get("by_channel", [])}
+    cells = {(row["channel"], row["held_out"]): row for row in diagnosis.get("by_channel", [])}
 
     def rms(name: str, held: bool, stage: str) -> str:
         row = cells.get((name, held))
         return _DASH if row is None else short(row[f"rms_{stage}"], 3)
 
-    names = dict.fromkeys((row["channel"], row["unit"]) for row in said.get("by_channel", []))
+    names = dict.fromkeys((row["channel"], row["unit"]) for row in diagnosis.get("by_channel", []))
     if names:
         rows = [
             (name, unit, *(rms(name, held, stage) for held in (False, True) for stage in ("before", "after")))
@@ -137,7 +132,7 @@ def _in_units(said: Result) -> list[Block]:
         ]
         head = ("channel", "unit", "fitted: before", "after", "held out: before", "after")
         blocks.append(table(head, rows, title="Measured less modelled, root mean square, the sensors' noise included"))
-    conditions = said.get("by_condition", [])
+    conditions = diagnosis.get("by_condition", [])
     if len(conditions) > 1:
         common = _common([row["settings"] for row in conditions])
         lines = [(_settings(row["settings"], but=common), ", ".join(row["trials"]), _number(row["before"]),
@@ -147,10 +142,10 @@ def _in_units(said: Result) -> list[Block]:
     return blocks
 
 
-def _phase_table(said: Result) -> list[Block]:
+def _phase_table(diagnosis: Result) -> list[Block]:
     """By phase and channel, fitted trials beside held-out ones."""
     rows: dict[tuple[str, str], dict[bool, Result]] = {}
-    for row in said.get("by_phase", []):
+    for row in diagnosis.get("by_phase", []):
         rows.setdefault((row["phase"], row["channel"]), {})[row["held_out"]] = row
 
     def cells(part: Result | None) -> tuple[str, str, str]:
@@ -163,20 +158,20 @@ def _phase_table(said: Result) -> list[Block]:
     return table_of(head, body, title="Chi-square per sample by phase and channel")
 
 
-def _where(said: Result) -> list[Block]:
-    if not said["where"]:
+def _where(diagnosis: Result) -> list[Block]:
+    if not diagnosis["where"]:
         return []
-    places = said["where"][:_MOST_PLACES]
-    common = _common([p.get("settings", {}) for p in said["where"]])
+    places = diagnosis["where"][:_MOST_PLACES]
+    common = _common([p.get("settings", {}) for p in diagnosis["where"]])
     rows = [
         (p["trial"], _settings(p.get("settings", {}), but=common), p["channel"], p["phase"], f"{p['from_s']:.4g}",
          f"{p['to_s']:.4g}", _number(p.get("excess", 0.0)))
         for p in places
     ]  # fmt: skip
-    more = len(said["where"]) - len(places)
+    more = len(diagnosis["where"]) - len(places)
     title = "The worst stretches" + (f" (of {len(places) + more}, which diagnosis.json has)" if more else "")
     head = ("trial", "settings", "channel", "phase", "from [s]", "to [s]", "chi-square beyond noise")
-    return [table(head, rows, title=title), *_parted(said)]
+    return [table(head, rows, title=title), *_parted(diagnosis)]
 
 
 def _common(settings: Sequence[Mapping[str, float]]) -> dict[str, float]:
@@ -185,10 +180,10 @@ def _common(settings: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {name: value for name, value in first.items() if all(other.get(name) == value for other in settings)}
 
 
-def _parted(said: Result) -> list[Block]:
+def _parted(diagnosis: Result) -> list[Block]:
     """When each trial parts from the base model, channel by channel, in the order in which they do."""
     trials: dict[str, list[str]] = {}
-    for row in said.get("parted", []):
+    for row in diagnosis.get("parted", []):
         trials.setdefault(row["trial"], []).append(f"{row['channel']} {row['at_s']:.3g}")
     title = "First parts from the base model at [s]: a running mean of nine samples beyond 5 standard errors"
     rows = [(trial, ", ".join(times)) for trial, times in trials.items()]
@@ -208,10 +203,10 @@ def _settings(settings: Mapping[str, float], *, but: Mapping[str, float] | None 
     return ", ".join(shown)
 
 
-def _evidence(said: Result) -> list[Block]:
+def _evidence(diagnosis: Result) -> list[Block]:
     """A line a set of names; those no better than the base model in one sentence."""
     plain = {"closes": None, "tried": 1, "better": True, "note": ""}  # of a folder from before there were candidates
-    rows = said.get("candidates") or [plain | dict(row) for row in said.get("evidence", [])]
+    rows = diagnosis.get("candidates") or [plain | dict(row) for row in diagnosis.get("evidence", [])]
     if not rows:
         return [text("Nothing was left that a candidate could explain: none was tried.")]
     better = [
@@ -233,21 +228,21 @@ def _evidence(said: Result) -> list[Block]:
     return blocks
 
 
-def _sizes(said: Result) -> list[Block]:
+def _sizes(diagnosis: Result) -> list[Block]:
     rows = [
         (size["effect"], short(size["signature"], 2), size["channel"], f"{short(size['rms'], 2)} {size['unit']}",
          f"{short(size['most'], 2)} {size['unit']}",
          _DASH if size["share"] is None else f"{100 * size['share']:.2g} %")
-        for size in said.get("sizes", []) if size["channel"] is not None
+        for size in diagnosis.get("sizes", []) if size["channel"] is not None
     ]  # fmt: skip
     head = ("effect", "signature [noise]", "plainest in", "change, root mean square", "at most", "of what it reads")
     return table_of(head, rows, title=say("sizes"))
 
 
-def _numbers(said: Result) -> list[Block]:
+def _numbers(diagnosis: Result) -> list[Block]:
     ends = {
         stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
-        for stage, bounds in said.get("at_bounds", {}).items()
+        for stage, bounds in diagnosis.get("at_bounds", {}).items()
     }
 
     def error(entry: Result, name: str, stage: str) -> str:
@@ -256,43 +251,43 @@ def _numbers(said: Result) -> list[Block]:
     effects = [
         (effect["id"], name, short(entry["value"], 4), error(entry, f"{effect['id']}.{name}", "after"),
          unit_text(entry["unit"]))
-        for effect in said["effects"] for name, entry in effect["parameters"].items()
+        for effect in diagnosis["effects"] for name, entry in effect["parameters"].items()
     ]  # fmt: skip
-    after = said["base"]["after"]
+    after = diagnosis["base"]["after"]
     base = [
         (name, short(entry["value"], 4), error(entry, name, "before"), short(after[name]["value"], 4),
          error(after[name], name, "after"), unit_text(entry["unit"]))
-        for name, entry in said["base"]["before"].items() if name in after
+        for name, entry in diagnosis["base"]["before"].items() if name in after
     ]  # fmt: skip
     added = table_of(("effect", "parameter", "value", "standard error", "unit"), effects, title="What was added")
     head = ("parameter", "before", "standard error", "after", "standard error", "unit")
     fitted = table_of(head, base, title="The base model's parameters")
-    blocks = [*_sizes(said), *added, *_equations(said), *fitted] if effects else fitted
+    blocks = [*_sizes(diagnosis), *added, *_equations(diagnosis), *fitted] if effects else fitted
     return [*blocks, text(say("standard_errors"), small=True)] if blocks else []
 
 
-def _equations(said: Result) -> list[Block]:
+def _equations(diagnosis: Result) -> list[Block]:
     """The law that each number is of."""
-    rows = [row for row in said.get("equations", []) if row["equation"]]
+    rows = [row for row in diagnosis.get("equations", []) if row["equation"]]
     if not rows:
         return []
     laws = [f"{row['effect']} ({row['form']}): {row['equation']}." for row in rows]
-    symbols = said.get("symbols", "")
+    symbols = diagnosis.get("symbols", "")
     return [listing(laws), *([text(f"{symbols}.", small=True)] if symbols else [])]
 
 
-def _findings(said: Result) -> list[Block]:
+def _findings(diagnosis: Result) -> list[Block]:
     rows = [
         (f["what"], f["trial"] or _DASH, f["channel"] or _DASH,
          _DASH if f["from_s"] is None else f"{f['from_s']:.4g} to {f['to_s']:.4g}", "yes" if f["set_aside"] else "no")
-        for f in said.get("findings", [])
+        for f in diagnosis.get("findings", [])
     ]  # fmt: skip
     return table_of(("what", "trial", "channel", "seconds", "set aside"), rows, words=True)
 
 
-def _told_apart(said: Result) -> list[Block]:
+def _distinguished(diagnosis: Result) -> list[Block]:
     """The first effect against the nearest other names, and what would tell them apart."""
-    rows = said.get("equivalence", [])
+    rows = diagnosis.get("equivalence", [])
     if len(rows) < 2:
         return []
     first, *others = rows

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from vis.film.reel import AnyReel, Reel, SpaceReel
-from vis.page.plots import Array
-from vis.page.style import INK
-from vis.pictures.arrows import HALO
+from vis.page.plots import INK, Array, nice_below
+from vis.pictures.canvas import HALO
 from vis.pictures.frames import Frame
 from vis.pictures.scene import Eye, Stage
 from vis.pictures.sections import FlatStage
@@ -21,26 +20,24 @@ __all__ = ["Camera", "Panel", "layout"]
 
 Focus = tuple[float, float]
 """x and z of the middle of a picture [m]."""
+View = tuple[Stage | FlatStage, Array]
+"""The stage, and the focus at every picture [m], shape (n, 2)."""
 _STEADY = 0.03
 """Over which a camera's way is smoothed (standard deviation), over the run's duration."""
 
 
-class Camera(Protocol):
-    """Sees one run.
+class Camera:
+    """Sees one run."""
 
-    ``arrow``: Length of the arrow of the whole weight, over the picture's height; 0: forces are not shown.
-    """
+    arrow = 0.0
+    """Length of the arrow of the whole weight, over the picture's height; 0: forces are not shown."""
 
-    arrow: float
-
-    def set_up(
-        self, reel: Any, pixels: tuple[int, int], reach: float, *, opengl: bool
-    ) -> tuple[Stage | FlatStage, Array]:
-        """The stage for pictures of this size that show a platform of this reach [m], and the focus at every picture
-        [m], shape (n, 2)."""
+    def set_up(self, reel: Any, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
+        """The view for pictures of this size that show a platform of this reach [m]."""
+        raise NotImplementedError
 
     def dress(self, axis: Any, reel: Any, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
-        """Draw what lies over the ground and the platform."""
+        """Draw what lies over the ground and the platform: nothing."""
 
 
 @dataclass(frozen=True)
@@ -53,17 +50,15 @@ class Panel:
     """Left, foot, width, height in fractions of the sheet."""
 
 
-class _Plane:
+class _Plane(Camera):
     """In front of the plane of the spikes: a level line, a ruler.
 
     Least `width` and height `tall` of its picture are over the spikes' length.
     """
 
-    width, tall, arrow = 3.1, 2.75, 0.0
+    width, tall = 3.1, 2.75
 
-    def set_up(
-        self, reel: Reel, pixels: tuple[int, int], reach: float, *, opengl: bool
-    ) -> tuple[Stage | FlatStage, Array]:
+    def set_up(self, reel: Reel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         width = max(self.width, self.tall * pixels[0] / pixels[1])
         (low, high), kind = reel.box, Stage if opengl else FlatStage
         stage = kind(pixels, width=width * reach, cut=reel.cut, low=low, high=high, radius=reel.radius)
@@ -79,14 +74,14 @@ class _Plane:
             spine.set(visible=True, color="#bbbbbb")
         level = stage.place(np.array([[focus[0], reel.cut, reel.surface]]), focus)[0, 1]
         axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
-        step, right = _round_length(0.2 * stage.width), 0.97
+        step, right = nice_below(0.2 * stage.width), 0.97
         axis.plot([right - step / stage.width, right], [0.035, 0.035], color=INK, lw=2.5, solid_capstyle="butt")
         middle = right - 0.5 * step / stage.width
         axis.text(middle, 0.05, f"{1e3 * step:g} mm", ha="center", va="bottom", fontsize=10, bbox=HALO)
         self.mark(axis, stage, frame, focus, level)
 
     def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
-        """A line from the centre to where row 0 begins: it shows how far the platform has turned, and says so."""
+        """A line from the centre to where row 0 begins: it shows how far the platform has turned, with a key."""
         hull = frame.bodies["hull"][0]
         ring = hull[: len(hull) // 2]  # its face in front
         ends = stage.place(np.array([ring.mean(axis=0), ring[0]]), focus)
@@ -110,7 +105,7 @@ class _Near(_Plane):
         axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", bbox=HALO)
 
 
-class _Space:
+class _Space(Camera):
     """From above and aside; least width and height of the picture over the largest distance of a tip from the centre.
 
     The plane that a rendered picture looks at is the front of the bed: no grain is left out.
@@ -118,24 +113,14 @@ class _Space:
 
     width, tall, arrow, pitch = 4.4, 2.6, 0.22, 0.5
 
-    def set_up(
-        self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool
-    ) -> tuple[Stage | FlatStage, Array]:
+    def set_up(self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         width = max(self.width, self.tall * pixels[0] / pixels[1]) * reach
-        (low, high), centres = reel.box, reel.centres
-        stage: Stage | FlatStage
-        if opengl:
-            cut = float(low[1])
-            stage = Stage(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius, pitch=self.pitch)
-            stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
-        else:
-            cut = float(centres[:, 1].mean())
-            stage = FlatStage(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius)
+        (low, high), centres, kind = reel.box, reel.centres, Stage if opengl else FlatStage
+        cut, pitch = (float(low[1]), self.pitch) if opengl else (float(centres[:, 1].mean()), 0.0)
+        stage = kind(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius, pitch=pitch)
+        stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
         level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(stage.pitch)
         return stage, _steady(np.column_stack([centres[:, 0], level - 0.12 * stage.height]))
-
-    def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
-        """Nothing."""
 
 
 def layout(reels: Sequence[AnyReel]) -> list[Panel]:
@@ -155,8 +140,3 @@ def layout(reels: Sequence[AnyReel]) -> list[Panel]:
 
 def _steady(way: Array) -> Array:
     return gaussian_filter1d(way, _STEADY * len(way), axis=0, mode="nearest") if len(way) > 3 else way
-
-
-def _round_length(length: float) -> float:
-    power = 10.0 ** np.floor(np.log10(length))
-    return float(max(n * power for n in (1.0, 2.0, 5.0) if n * power <= 1.0001 * length))

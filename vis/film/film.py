@@ -9,27 +9,22 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TypedDict
 
 import numpy as np
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from vis.film.cameras import layout
 from vis.film.reel import AnyReel, Reel, SpaceReel
 from vis.page.page import Block, figure
-from vis.page.plots import Array
+from vis.page.plots import Array, styled
 from vis.page.report import Progress, capital
 from vis.page.sentences import Sentences
 from vis.page.states import state_strip
-from vis.page.style import styled
-from vis.pictures.arrows import draw_force, draw_measure
-from vis.pictures.canvas import COLOURS, blank_page, colour_bar, colour_values, colourmap, pixels
-from vis.pictures.frames import Frame
-from vis.pictures.pictures import Counter, Picture, Pictures, carry_out
+from vis.pictures import canvas
+from vis.pictures.pictures import Picture, Pictures, carry_out
 from vis.pictures.render import main, write_pictures
 
 __all__ = ["ARROWS", "MOST_FRAMES", "Sheet", "draw_runs", "film_times", "moments", "run_film_job", "shown"]
@@ -75,10 +70,9 @@ class Sheet:
         opengl: bool,
         labels: Sequence[str] | None = None,
     ) -> None:
-        self.reels, self.size, self.by = list(reels), size, by
+        self.reels, self.size = list(reels), size
         self.labels = [reel.called for reel in self.reels] if labels is None else list(labels)
-        self.norm = Normalize(0.0, max(reel.colour_top(by) for reel in self.reels) or 1.0)
-        self.map = colourmap()
+        self.page = canvas.Page(size, by, max(reel.colour_top(by) for reel in self.reels) or 1.0)
         self.weight = max(reel.number("weight") for reel in self.reels)
         reach = max(reel.reach for reel in self.reels)
         self.panels = layout(self.reels)
@@ -92,7 +86,7 @@ class Sheet:
     def draw(self, time: float) -> NDArray[np.uint8]:
         """The sheet at `time` [s], shape (height, width, 3)."""
         with styled():
-            sheet = blank_page(self.size, 12.8)
+            sheet = canvas.blank_page(self.size, 12.8)
             for number in range(len(self.panels)):
                 self._panel(sheet, number, time)
             for number, reel in enumerate(self.reels):
@@ -104,13 +98,13 @@ class Sheet:
                 if panel.camera.arrow:
                     long = panel.camera.arrow * panel.place[3] * float(sheet.get_size_inches()[1])
                     right = panel.place[0] + panel.place[2]
-                    draw_measure(sheet, right=right, height=0.915, length=long, weight=self.weight)
+                    canvas.draw_measure(sheet, right=right, height=0.915, length=long, weight=self.weight)
             if all(len(reel.states) for reel in self.reels):
                 runs = [{"t_s": reel.series["t_s"], "state": reel.states} for reel in self.reels]
                 state_strip(sheet, runs, self.labels, time)
             if any(reel.on_grains for reel in self.reels):
-                colour_bar(sheet, self.reels[0].bar, self.norm, self.map, COLOURS[self.by][0], 10.5)
-            return pixels(sheet)
+                self.page.colour_bar(sheet, self.reels[0].bar, 10.5)
+            return canvas.pixels(sheet)
 
     def close(self) -> None:
         """Free the windows."""
@@ -126,19 +120,14 @@ class Sheet:
         axis = sheet.add_axes(panel.place)
         axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), autoscale_on=False, xticks=[], yticks=[])
         axis.grid(False)
-        stage.draw(axis, frame, self._colours(frame), focus)
+        stage.draw(axis, frame, self.page.colours(frame.grains), focus)
         camera.dress(axis, reel, stage, frame, focus)
         if camera.arrow:
             long = camera.arrow * stage.height / self.weight  # [m/N]
             points, fields = frame.clouds.get("row_forces", (np.zeros((0, 3)), {}))
             for point, force in zip(points, fields.get("force", np.zeros((0, 3))), strict=True):
                 ends = stage.place(np.array([point, point + long * np.asarray(force, dtype=float)]), focus)
-                draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
-
-    def _colours(self, frame: Frame) -> Array:
-        if not len(frame.grains["position"]):
-            return np.zeros((0, 4))
-        return np.asarray(self.map(self.norm(colour_values(frame.grains, self.by))))
+                canvas.draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
 
 
 def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> list[tuple[str, str, float, str]]:
@@ -163,8 +152,8 @@ def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> li
     for (name, words), time in zip(_WORDS.items(), (0.0, min(half, end), end), strict=True):
         at = float(coarse.times[coarse.nearest(time)])
         lines = [reel.line(reel.nearest(at)) for reel in reels]
-        said = [f"{label}: {line}" for label, line in zip(labels, lines, strict=True)] if labels else lines
-        found.append((name, f"Both {words}" if labels else capital(words), at, "; ".join(said) + "."))
+        parts = [f"{label}: {line}" for label, line in zip(labels, lines, strict=True)] if labels else lines
+        found.append((name, f"Both {words}" if labels else capital(words), at, "; ".join(parts) + "."))
     return found
 
 
@@ -202,11 +191,11 @@ def draw_runs(
     two runs. ``progress``: Called with the share that is done, 0 to 1.
     """
     kind = reels[0]
-    told = moments(reels, labels)
-    stills = [Picture(home / "figures" / f"{stem}-{name}.png", title, said) for name, title, _, said in told]
+    planned = moments(reels, labels)
+    stills = [Picture(home / "figures" / f"{stem}-{name}.png", title, caption) for name, title, _, caption in planned]
     pictures: list[_Picture] = [
         {"file": str(still.file), "times": [time], "size": kind.still}
-        for still, (_, _, time, _) in zip(stills, told, strict=True)
+        for still, (_, _, time, _) in zip(stills, planned, strict=True)
     ]
     moving = None
     if film:
@@ -221,9 +210,8 @@ def draw_runs(
         "by": by,
         "pictures": pictures,
     }
-    counter = Counter([1.0] * sum(len(picture["times"]) for picture in pictures), progress)
-    flat = partial(run_film_job, job, opengl=False, step=counter.step)
-    method, note = carry_out(job, counter, flat, module="vis.film.film", failed=kind.failed, without=kind.without)
+    costs = [1.0] * sum(len(picture["times"]) for picture in pictures)
+    method, note = carry_out(job, run_film_job, costs, progress, failed=kind.failed, without=kind.without)
     return Pictures(stills, moving, method, note)
 
 

@@ -50,7 +50,7 @@ class _Filmed:
     """End of the colour scale where there are no grains."""
     failed: ClassVar[str]
     without: ClassVar[str]
-    """What to say where OpenGL failed, and where there is none."""
+    """Texts where OpenGL failed, and where there is none."""
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
@@ -137,7 +137,7 @@ class SpaceReel(_Filmed):
         return low, high
 
     def line(self, index: int) -> str:
-        """Time and state, as a picture says it."""
+        """Time and state, as text on a picture."""
         state = f"    {self.states[self.row(index)]}" if len(self.states) else ""
         return f"t = {self.times[index]:.3f} s{state}"
 
@@ -164,7 +164,7 @@ class Reel(_Filmed):
             self.times = np.linspace(0.0, float(self.series["t_s"][-1]), max(2, count))
 
     def line(self, index: int) -> str:
-        """Time, angle, state, as a picture says it."""
+        """Time, angle and state, as text on a picture."""
         row = self.row(index)
         theta = math.degrees(float(self.series["theta_rad"][row]))
         return f"t = {self.times[index]:.3f} s    θ = {theta:.1f}°    {self.states[row]}".replace("-", "−")
@@ -177,9 +177,9 @@ class Reel(_Filmed):
     @cached_property
     def spikes(self) -> tuple[float, float]:
         """Diameter of a spike, and how far it stands out of the hull [m]."""
-        told = self.result.get("grains") or {}
-        if "spike_diameter" in told:
-            return float(told["spike_diameter"]), float(told.get("spike_clear", _CLEAR))
+        grains = self.result.get("grains") or {}
+        if "spike_diameter" in grains:
+            return float(grains["spike_diameter"]), float(grains.get("spike_clear", _CLEAR))
         scale = self.reach / 0.2
         return self.like if self.like is not None else (_SPIKE * scale, _CLEAR * scale)
 

@@ -22,6 +22,8 @@ __all__ = [
 PHASES = ("free", "in", "rest", "out")
 #: Experiment of a run that a script has saved -> the function of `coupling` that made it.
 PYTHON_RUNS = {"driven": "drive", "drop": "drop", "set_down": "set_down"}
+_VALUE = re.compile(r"""((?:"[^"]*"?|'[^']*'?|[^"'#])*)(?:#(.*))?""")
+"""A value of a TOML file as it is written, and the comment behind it."""
 _COLUMNS = ("t_s", "depth_m", "velocity_m_s", "force_N", "phase")
 
 
@@ -63,7 +65,7 @@ class Run:
     model: Series | None
     quantities: dict[str, Any] = field(default_factory=dict)
     amended: Series | None = None
-    """The same run on the law of a model, with what the spring-damper lacked."""
+    """The same run on the law of a model, with the effects that the spring-damper omits."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,10 @@ def read_folder(folder: str | Path) -> RunFolder:
     missing: list[str] = []
     result = _read_result(path / "result.json", missing)
     runs = []
-    for entry in _dicts(result.get("runs")):
+    listed = result.get("runs")
+    for entry in listed if isinstance(listed, list) else []:
+        if not isinstance(entry, dict):
+            continue
         name = str(entry.get("id", "unnamed"))
         bed = model = amended = None
         if result.get("ground") != "spring-damper":
@@ -165,10 +170,6 @@ def read_columns(path: Path) -> tuple[dict[str, NDArray[np.float64]], NDArray[np
     columns = series.read_series(path, text=("state",))
     states = columns.pop("state", np.array([], dtype=str))
     return {name: values.astype(float) for name, values in columns.items()}, states
-
-
-def _dicts(value: Any) -> list[dict[str, Any]]:
-    return [entry for entry in value if isinstance(entry, dict)] if isinstance(value, list) else []
 
 
 def _read_result(path: Path, missing: list[str]) -> dict[str, Any]:
@@ -226,7 +227,8 @@ def _read_settings(path: Path, missing: list[str]) -> list[Setting]:
         elif header := re.match(r"\s*\[+([^\]]+)\]+\s*(#.*)?$", line):
             table, above = header.group(1).strip(), []
         elif pair := re.match(r"\s*([A-Za-z0-9_.\"'-]+)\s*=\s*(.*)", line):
-            value, comment = _split_comment(pair.group(2))
+            parts = _VALUE.fullmatch(pair.group(2))
+            value, comment = (part.strip() for part in (parts.groups("") if parts else (pair.group(2), "")))
             if not table:
                 above = []  # what stands there is about the file
             settings.append(Setting(table, pair.group(1).strip("\"'"), value, " ".join([*above, comment]).strip()))
@@ -234,15 +236,3 @@ def _read_settings(path: Path, missing: list[str]) -> list[Setting]:
         else:
             above = []
     return settings
-
-
-def _split_comment(text: str) -> tuple[str, str]:
-    quote = ""
-    for index, letter in enumerate(text):
-        if quote:
-            quote = "" if letter == quote else quote
-        elif letter in "\"'":
-            quote = letter
-        elif letter == "#":
-            return text[:index].strip(), text[index + 1 :].strip()
-    return text.strip(), ""

@@ -17,6 +17,11 @@ __all__ = ["column", "digits_for", "foldable", "plain", "quantity", "quote", "sh
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SCALED = {"J", "s", "Pa", "W", "kg"}
+_AS_THEY_ARE = {
+    "1": (1.0, ""), "%": (0.01, "%"), "m/s2": (1.0, "m/s²"), "m/s^2": (1.0, "m/s²"), "kg/m3": (1.0, "kg/m³"),
+    "N s/m": (1.0, "N\N{NO-BREAK SPACE}s/m"),
+}  # fmt: skip
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _MINUS, _SPACE = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 
 
@@ -37,7 +42,7 @@ def plain(value: float, significant: int = 3) -> str:
     exponent = math.floor(math.log10(abs(rounded)))
     if exponent >= 9 or exponent < -4:
         mantissa, power = f"{value:.{significant - 1}e}".split("e")
-        return f"{mantissa.replace('-', _MINUS)}\N{MULTIPLICATION SIGN}10{_superscript(int(power))}"
+        return f"{mantissa.replace('-', _MINUS)}\N{MULTIPLICATION SIGN}10{str(int(power)).translate(_RAISED)}"
     return _fixed(value, max(0, significant - 1 - exponent))
 
 
@@ -108,26 +113,16 @@ def quantity(entry: Any, *, unit: str | None = None, significant: int | None = N
 
 
 def _scale(value: float, unit: str) -> tuple[float, str]:
-    if unit == "1":
-        return 1.0, ""
-    if unit == "%":
-        return 0.01, "%"
+    """The unit that a number is shown in: how many SI units it is, and its sign."""
+    if unit in _AS_THEY_ARE:
+        return _AS_THEY_ARE[unit]
     if unit == "m":
         return (1e-3, "mm") if abs(value) < 1.0 else (1.0, "m")
-    if unit in ("m/s2", "m/s^2"):
-        return 1.0, "m/s²"
-    if unit == "kg/m3":
-        return 1.0, "kg/m³"
-    if unit == "N s/m":
-        return 1.0, "N\N{NO-BREAK SPACE}s/m"
     if unit not in _SCALED or value == 0.0 or not math.isfinite(value):
         return 1.0, unit
     if unit == "kg":
         return (1e-3, "g") if abs(value) < 1.0 else (1.0, "kg")
-    for factor, prefix in _PREFIXES:
-        if abs(value) >= 0.9995 * factor:
-            return factor, prefix + unit
-    return 1.0, unit
+    return next(((factor, prefix + unit) for factor, prefix in _PREFIXES if abs(value) >= 0.9995 * factor), (1.0, unit))
 
 
 def _fixed(value: float, decimals: int) -> str:
@@ -136,7 +131,3 @@ def _fixed(value: float, decimals: int) -> str:
         rounded = 0.0  # no minus zero
     text = f"{rounded:,.{max(0, decimals)}f}".replace("-", _MINUS)
     return text.replace(",", _SPACE) if abs(rounded) >= 10000.0 else text.replace(",", "")
-
-
-def _superscript(power: int) -> str:
-    return str(power).translate(str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"))

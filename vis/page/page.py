@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from PIL import Image
 
 __all__ = [
     "Block", "Columns", "Page", "Section", "Tile", "code", "columns", "figure", "listing", "table", "table_of",
-    "template", "text", "write_page", "write_template",
+    "text", "write_page", "write_template",
 ]  # fmt: skip
 
 _KINDS = {".png": "png", ".gif": "gif", ".jpg": "jpeg"}
@@ -123,24 +123,19 @@ def write_page(path: Path, page: Page) -> Path:
 
 
 def write_template(path: Path, name: str, **context: Any) -> Path:
-    """Write the template `name` with its values to `path`, all of it or nothing, and return it."""
+    """Write the template `name` of `vis/templates` with its values to `path`, all of it or nothing, and return it.
+
+    It escapes what it is given and refuses a name it was not given.
+    """
+    environment = Environment(
+        loader=PackageLoader("vis"), autoescape=select_autoescape(["html"]), undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.globals["columns"] = columns
     temporary = path.with_name(f"{path.name}.part")
-    temporary.write_text(template(name).render(**context), encoding="utf-8")
+    temporary.write_text(environment.get_template(name).render(**context), encoding="utf-8")
     temporary.replace(path)
     return path
-
-
-def template(name: str) -> Template:
-    """A page of `vis/templates`, that escapes what it is given and refuses a name it was not given."""
-    environment = Environment(
-        loader=PackageLoader("vis"),
-        autoescape=select_autoescape(["html"]),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals["columns"] = columns
-    return environment.get_template(name)
 
 
 # How the columns of a table wrap: sentences do, numbers do not, long reasons stand beneath their row ------------------

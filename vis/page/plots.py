@@ -1,10 +1,15 @@
-"""What figures share: the empty sheet, its legend, the colours of a row, means over a window, the way into a report."""
+"""How every figure looks, and what figures share: the empty sheet, its legend, colours of a row, means over a window.
+
+The colours are safe for the colour-blind (Okabe and Ito).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -14,8 +19,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 __all__ = [
-    "DASHED", "DOTTED", "RED", "WIDTH", "Array", "handle", "legend_above", "line_handles", "line_styles",
-    "mean_over", "new_figure", "new_panels", "shades", "sheet", "smooth_ratio",
+    "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES", "WIDTH", "Array", "as_it_lies", "handle",
+    "legend_above", "line_handles", "line_styles", "mean_over", "new_figure", "new_panels", "nice_below", "shades",
+    "sheet", "smooth_ratio", "styled",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -25,6 +31,68 @@ RED = "#c0392b"
 """What was found to be wrong, in every figure."""
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222", "#E69F00", "#56B4E9", "#8a6d3b")
 _DASHES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (1, 1.4)))
+BED = "#0072B2"  # what the grains do
+MODEL = "#D55E00"  # what the spring-damper does; always dashed as well, for print in grey
+INK = "#222222"
+GREY = "#8a8a8a"
+STATES = {"stand": "#a4a4a4", "pivot": BED, "slip": MODEL, "hop": "#882255"}
+"""The states in the order of losing hold, with their colours: apart for the colour-blind too (tests/vis/test_style.py),
+to whom Okabe and Ito's green is the grey of standing or the blue of pivoting; Tol's wine is neither."""
+DPI = 160
+_TOO_LONG = 8.0  # times as long as high: drawn in its true shape such a way is a line
+
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.5,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": "#666666",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.7,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "lines.linewidth": 1.8,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "text.color": INK,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "savefig.dpi": DPI,
+    "figure.constrained_layout.use": True,
+    "image.cmap": "cividis",
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """The style, for as long as the block lasts; the user's own matplotlib settings stay as they are."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def as_it_lies(axis: Axes) -> bool:
+    """Give both axes one scale where the heights of the paths stay visible; else the title says "heights stretched".
+
+    Returns whether the paths are drawn in proportion.
+    """
+    ways = axis.dataLim
+    if ways.width <= _TOO_LONG * ways.height:
+        axis.set_aspect("equal", adjustable="datalim")
+        return True
+    axis.set_title("heights stretched", fontsize=8.5, fontweight="normal", color=GREY)
+    return False
 
 
 def new_figure(height: float, *, width: float = WIDTH, **options: Any) -> Figure:
@@ -104,3 +172,9 @@ def line_handles(labels: Sequence[str], keys: Sequence[Hashable]) -> list[Line2D
 
 def _listed(labels: Sequence[str]) -> str:
     return ", ".join(labels) if len(labels) <= 4 else f"{labels[0]} to {labels[-1]} ({len(labels)})"
+
+
+def nice_below(number: float) -> float:
+    """The next 1, 2 or 5 times a power of ten not above `number`."""
+    power = 10.0 ** np.floor(np.log10(number))
+    return float(max(n * power for n in (1.0, 2.0, 5.0) if n * power <= 1.0001 * number))

@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 
 from vis.page.folder import read_columns
 from vis.page.page import Block, Page, Section, Tile, code, figure, table, text, write_page
-from vis.page.plots import Array
+from vis.page.plots import Array, styled
 from vis.page.sentences import Sentences
-from vis.page.style import styled
 
 __all__ = [
-    "Progress", "Report", "Result", "again", "capital", "given", "number_text", "report_of", "tables", "unit_text",
+    "Progress", "Report", "Result", "again", "capital", "given", "number_text", "report_of", "tables", "terms_text",
+    "unit_text",
 ]  # fmt: skip
 
 Progress = Callable[[float], None]
@@ -65,7 +65,7 @@ class Report:
             self.progress(done)
 
     def rest(self) -> Progress:
-        """What tells the progress of a part that takes nearly all of the time that is left."""
+        """A callback for the progress of a part that takes nearly all of the remaining time."""
         start = self.done
         return lambda done: self.tell(start + (0.95 - start) * done)
 
@@ -81,6 +81,11 @@ class Report:
         more = [*(["std"] if std else []), *(["spring-damper"] if beside else [])]
         blocks = [table(("quantity", "value", *more, "unit", "note"), rows, words=True)]
         return Section("Every number of the result", blocks)
+
+    def again(self, command: str, same: str = "") -> Section:
+        """How to do the run again with this version, and what is the same then."""
+        after = f"The same settings give the same {same}." if same else ""
+        return again(command, f"With hedgebed {self.result['version']}, in this folder:", after)
 
     def write(
         self,
@@ -110,7 +115,7 @@ def report_of(dpi: int | None = None) -> Callable[[Callable[..., Path]], Callabl
     """Make of a function of a `Report` one of its folder: `write(folder, *, progress=None, **options)`.
 
     It draws in the house's style, `dpi` dots an inch, and takes titles and captions from figures.toml of its package.
-    Raises FileNotFoundError where the folder has no result.json, or lacks a file that is drawn.
+    Raises FileNotFoundError where the folder has no result.json, or a file that is drawn.
     """
 
     def decorate(write: Callable[..., Path]) -> Callable[..., Path]:
@@ -135,6 +140,15 @@ def given(entries: Mapping[str, Result]) -> Block:
     """The numbers of a trial and where each is from."""
     rows = [(name, number_text(e["value"]), unit_text(e["unit"]), e["origin"]) for name, e in entries.items()]
     return table(("number", "value", "unit", "where from"), rows, words=True)
+
+
+def terms_text(result: Result) -> str:
+    """The terms of the model beyond the base model, in a sentence."""
+    effects = [
+        f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
+        for effect in result["effects"]
+    ]
+    return f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}."
 
 
 def tables(result: Result) -> list[Block]:

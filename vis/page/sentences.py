@@ -1,6 +1,6 @@
 """The sentences of a package, kept as templates in a file of text beside its code.
 
-A package that says something to a person has a file ``sentences.toml``: ``key = "text with {name:.3g}"``. Its modules
+A package with texts for users has a file ``sentences.toml``: ``key = "text with {name:.3g}"``. Its modules
 share ``say = Sentences(__package__)`` and write ``say("key", name=value)``. Placeholders are those of `str.format`, so
 attributes, items, conversions and format codes work: ``{settings.depth:g}``, ``{name!r}``.
 """
@@ -16,7 +16,7 @@ __all__ = ["Sentences"]
 
 
 class Sentences:
-    """The sentences of one package, read when the first one is asked for.
+    """The sentences of one package, read at the first use.
 
     `file` is another than ``sentences.toml``: ``figures.toml`` has a table for each figure; title and caption of the
     table path have the keys path.title and path.caption.

@@ -18,8 +18,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from vis.page.page import Block, table, text
-from vis.page.plots import Array, handle, legend_above, new_figure, sheet
-from vis.page.style import BED, GREY, INK, MODEL, STATES
+from vis.page.plots import BED, GREY, INK, MODEL, STATES, Array, handle, legend_above, new_figure, sheet
 
 __all__ = [
     "LINES", "States", "by_state", "draw_bands", "draw_states", "legend_of_runs", "legend_of_states", "panels",

@@ -12,10 +12,9 @@ from matplotlib.patches import Patch
 
 from vis.page.folder import read_columns
 from vis.page.page import Block
-from vis.page.plots import Array, handle, legend_above, sheet
+from vis.page.plots import GREY, INK, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result
 from vis.page.states import States, state_runs
-from vis.page.style import GREY, INK, STATES
 
 __all__ = ["FIGURES", "PaperRun", "in_order"]
 
@@ -287,6 +286,13 @@ def figure_sweep(paper: PaperRun) -> Block | None:
     sliding = paper.result.get("sliding", [])
     ratios = sorted({entry["varied"]["ratio"] for entry in sliding})
     places = [*keys, "sliding"] if sliding else keys
+    marks: list[tuple[Result, int, str, float]] = []
+    for entry in paper.sweep:
+        key, factor = entry["variant"].split(" x")
+        marks.append((entry, keys.index(key), ">" if float(factor) > 1 else "<", 6.0))
+    for entry in sliding:
+        if entry["rig"] == rig:
+            marks.append((entry, len(keys), "D", _diamond(entry["varied"]["ratio"], ratios)))
     words = {
         "inertia": "inertia J", "wheel_inertia": "wheel inertia", "stiffness": "stiffness K", "damping": "damping C",
         "wheel_speed_0": "brake's wheel speed", "sliding": "friction mu_d / mu_s",
@@ -305,26 +311,16 @@ def figure_sweep(paper: PaperRun) -> Block | None:
                 if nominal is None:
                     continue
                 axis.axvline(math.degrees(nominal), color=paper.colour(torque), lw=0.9)
-                for entry in paper.sweep:
-                    if entry["surface"] != surface or entry["torque"] != torque or entry[measure] is None:
-                        continue
-                    key, factor = entry["variant"].split(" x")
-                    mark = ">" if float(factor) > 1 else "<"
-                    value = math.degrees(entry[measure])
-                    axis.plot(value, keys.index(key), mark, color=paper.colour(torque), ms=6)
-                for entry in sliding:
-                    where = (entry["surface"], entry["rig"], entry["torque"])
-                    if where == (surface, rig, torque) and entry[measure] is not None:
-                        size = _diamond(entry["varied"]["ratio"], ratios)
-                        value = math.degrees(entry[measure])
-                        axis.plot(value, len(keys), "D", color=paper.colour(torque), ms=size)
+                for entry, place, mark, size in marks:
+                    if (entry["surface"], entry["torque"]) == (surface, torque) and entry[measure] is not None:
+                        axis.plot(math.degrees(entry[measure]), place, mark, color=paper.colour(torque), ms=size)
             if i == len(paper.hard) - 1:
                 axis.set_xlabel(label)
         axes[i, 0].set_yticks(range(len(places)), [words.get(key, key) for key in places])
         axes[i, 0].set_ylim(len(places) - 0.5, -0.5)
-    marks = [handle(label, INK, marker=mark, ls="", ms=6) for mark, label in (("<", "halved"), (">", "doubled"))]
-    marks += [handle(f"mu_d = {ratio:g} mu_s", INK, marker="D", ls="", ms=_diamond(ratio, ratios)) for ratio in ratios]
-    legend_above(drawing, [*paper.handles(), *marks], columns=5)
+    legend = [handle(label, INK, marker=mark, ls="", ms=6) for mark, label in (("<", "halved"), (">", "doubled"))]
+    legend += [handle(f"mu_d = {ratio:g} mu_s", INK, marker="D", ls="", ms=_diamond(ratio, ratios)) for ratio in ratios]
+    legend_above(drawing, [*paper.handles(), *legend], columns=5)
     return paper.draw("sweep", drawing, rig=rig)
 
 
@@ -333,11 +329,5 @@ def _diamond(ratio: float, ratios: Sequence[float]) -> float:
     return 3.0 + 3.5 * ratios.index(ratio) / max(len(ratios) - 1, 1)
 
 
-FIGURES = {
-    "figure5": figure_5,
-    "figure6": figure_6,
-    "figure7": figure_7,
-    "figure8": figure_8,
-    "sweep": figure_sweep,
-}
+FIGURES = {"figure5": figure_5, "figure6": figure_6, "figure7": figure_7, "figure8": figure_8, "sweep": figure_sweep}
 """Name -> what draws it, in the report's order; None where there is nothing to draw."""

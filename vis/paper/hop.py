@@ -11,10 +11,9 @@ import numpy as np
 from vis.page.folder import read_columns
 from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, listing
-from vis.page.plots import DASHED, handle
-from vis.page.report import Report, Result, again, given, report_of
+from vis.page.plots import BED, DASHED, GREY, MODEL, handle
+from vis.page.report import Report, Result, given, report_of
 from vis.page.states import by_state, legend_of_states, panels
-from vis.page.style import BED, GREY, MODEL
 
 __all__ = ["write_hop_report"]
 
@@ -30,11 +29,7 @@ def write_hop_report(report: Report) -> Path:
         Section("", [listing(result["departures"]["sentences"]), *drawn]),
         Section("The numbers", [given(result["numbers"])]),
         report.numbers(),
-        again(
-            "hedgebed hop run.toml",
-            f"With hedgebed {result['version']}, in this folder:",
-            "The same settings give the same result.",
-        ),
+        report.again("hedgebed hop run.toml", "result"),
     ]
     return report.write(sections, lead=["hop", str(result["actuator"]), str(result["surface"])], tiles=_tiles(result))
 
@@ -83,7 +78,7 @@ def _launch(report: Report) -> Block:
     return report.draw("launch", drawing, surface=report.result["surface"])
 
 
-def _said(result: Result, name: str, scale: float = 1.0, unit: str | None = None) -> str:
+def _show(result: Result, name: str, scale: float = 1.0, unit: str | None = None) -> str:
     entry = result["quantities"][name]
     if entry["value"] is None:
         return "none"
@@ -94,15 +89,15 @@ def _said(result: Result, name: str, scale: float = 1.0, unit: str | None = None
 
 def _tiles(result: Result) -> list[Tile]:
     ground, degrees = result["surface"], math.degrees(1.0)
-    at, at_model = (_said(result, f"{which}launch_angle", degrees, "°") for which in ("", "model_"))
+    at, at_model = (_show(result, f"{which}launch_angle", degrees, "°") for which in ("", "model_"))
     tiles = [
-        Tile("Wheel speed", _said(result, "wheel_speed"), result["quantities"]["wheel_speed"]["note"]),
-        Tile("Launch, rigid ground", _said(result, "launch_speed"), f"at {at}"),
-        Tile("Distance, rigid ground", _said(result, "distance"), f"in {_said(result, 'flight_time')}"),
-        Tile(f"Launch from {ground}", _said(result, "model_launch_speed"), f"at {at_model}, planar model", second=True),
-        Tile(f"Distance from {ground}", _said(result, "model_distance"), "the same wheel", second=True),
+        Tile("Wheel speed", _show(result, "wheel_speed"), result["quantities"]["wheel_speed"]["note"]),
+        Tile("Launch, rigid ground", _show(result, "launch_speed"), f"at {at}"),
+        Tile("Distance, rigid ground", _show(result, "distance"), f"in {_show(result, 'flight_time')}"),
+        Tile(f"Launch from {ground}", _show(result, "model_launch_speed"), f"at {at_model}, planar model", second=True),
+        Tile(f"Distance from {ground}", _show(result, "model_distance"), "the same wheel", second=True),
     ]
     if result["quantities"]["model_wheel_speed"]["value"] is not None:  # sought on ground that gives, and found
-        said = _said(result, "model_wheel_speed")
-        tiles.insert(1, Tile(f"Wheel speed, {ground}", said, "for that distance, planar model", second=True))
+        speed = _show(result, "model_wheel_speed")
+        tiles.insert(1, Tile(f"Wheel speed, {ground}", speed, "for that distance, planar model", second=True))
     return tiles

@@ -42,6 +42,7 @@ def write_paper_report(report: Report) -> Path:
         (name, f"{s['stiffness']:g}", f"{s['damping']:g}", f"{s['mu_s']:g}", f"{s['mu_d']:g}", s["source"])
         for name, s in result["surfaces"].items()
     ]
+    given = table(("surface", "K [N/m]", "C [N s/m]", "mu_s", "mu_d", "source"), surfaces, words=True)
     numbers = [_number_row(paper, case) for case in paper.cases if case["variant"] == "nominal"]
     small = "In brackets: friction at both ends of its band; after the semicolon: the paper's 1 ms step."
     sections = [
@@ -50,13 +51,7 @@ def write_paper_report(report: Report) -> Path:
         Section("The figures", list(blocks.values())),
         Section("What the paper does not give", [*swept, *_sliding_blocks(paper), *_grains_blocks(paper)]),
         Section("Every case", [table(_CASES, numbers), text(small, small=True)]),
-        Section(
-            "What stands behind it",
-            [
-                text(f"{_platform(result)} {_ours(result)}"),
-                table(("surface", "K [N/m]", "C [N s/m]", "mu_s", "mu_d", "source"), surfaces, words=True),
-            ],
-        ),
+        Section("What stands behind it", [text(f"{_platform(result)} {_ours(result)}"), given]),
         again("hedgebed paper run.toml", ""),
     ]
     count = result.get("integrations", len(paper.cases) + len(paper.sweep))

@@ -19,9 +19,8 @@ from matplotlib.ticker import MaxNLocator
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import plain, quote, short
-from vis.page.plots import DASHED, Array, handle, legend_above, new_panels, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, sheet
 from vis.page.sentences import Sentences
-from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
 __all__ = [
@@ -43,7 +42,7 @@ class Plot:
     figure: Figure
 
     @classmethod
-    def said(cls, key: str, figure: Figure, **values: Any) -> Plot:
+    def of(cls, key: str, figure: Figure, **values: Any) -> Plot:
         """A figure called as its key, with its title and caption from the table `key` of figures.toml."""
         return cls(key, captions(f"{key}.title", **values), captions(f"{key}.caption", **values).strip(), figure)
 
@@ -66,7 +65,7 @@ def pair_of_handles(*, markers: bool = False, bars: bool = False) -> list[Any]:
 
 
 def above_surface(series: Series | None) -> Series | None:
-    """The way in before depth 0 from where grains are first felt; None where none are."""
+    """The rows of loading above depth 0 from the first contact with a grain; None without such a contact."""
     if series is None:
         return None
     touched = np.flatnonzero((series.depth < 0.0) & (series.force > 0.0) & (series.velocity > 0.0))
@@ -100,7 +99,6 @@ def spread_words(runs: list[Run]) -> str:
     return " Bars: standard deviation between beds, where there are several." if len(set(speeds)) < len(speeds) else ""
 
 
-@styled()
 def drag_plot(run: RunFolder) -> Plot | None:
     """Drag against depth, one panel per speed; every seed of the bed, their mean and spread; the spring-damper."""
     driven = [r for r in run.of_kind("driven") if r.bed is not None and r.speed is not None]
@@ -148,10 +146,9 @@ def drag_plot(run: RunFolder) -> Plot | None:
         say("drag_law") + say("drag_law_out" if out else "drag_law_in") if law else "",
     ]
     moved = f"driven in{' and pulled out' if out else ''}"
-    return Plot.said("drag", figure, moved=moved, parts="".join(sentences))
+    return Plot.of("drag", figure, moved=moved, parts="".join(sentences))
 
 
-@styled()
 def gap_plot(run: RunFolder) -> Plot | None:
     """Spring-damper minus bed by depth and speed, as a map with the numbers written in."""
     table = departure_rows(run.result) or _departures_of_series(run)
@@ -165,9 +162,9 @@ def gap_plot(run: RunFolder) -> Plot | None:
     }
     for at, row in cells.items():
         difference[at] = row.difference
-    told = any(row.known for row in table)
+    counted = any(row.known for row in table)
     bound = float(np.nanmax(np.abs(difference))) or 1.0
-    figure, ((axis,),) = sheet(1, 1, max(2.6, 0.9 + (0.62 if told else 0.42) * len(depths)))
+    figure, ((axis,),) = sheet(1, 1, max(2.6, 0.9 + (0.62 if counted else 0.42) * len(depths)))
     norm = TwoSlopeNorm(0.0, -bound, bound)
     image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
     axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
@@ -191,11 +188,10 @@ def gap_plot(run: RunFolder) -> Plot | None:
     bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
     bar.set_label("spring-damper − bed [N]")
     bar.outline.set_visible(False)
-    told_below = say("gap_told") if told else ""
-    return Plot.said("gap", figure, told=told_below)
+    note = say("gap_told") if counted else ""
+    return Plot.of("gap", figure, note=note)
 
 
-@styled()
 def work_plot(run: RunFolder) -> Plot | None:
     """Work put in and got back, bed beside spring-damper, by speed."""
     known = (r for r in run.of_kind("driven") if r.speed is not None)
@@ -230,7 +226,7 @@ def work_plot(run: RunFolder) -> Plot | None:
         axis.axhline(0.0, color=GREY, lw=0.8)
     _label(axes, "speed [m/s]", "work [mJ]")
     legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
-    return Plot.said("work", figure, words=_returned_words(driven) + spread_words(driven))
+    return Plot.of("work", figure, words=_returned_words(driven) + spread_words(driven))
 
 
 def _label(axes: list[Axes], x: str, y: str) -> None:
@@ -255,7 +251,7 @@ def _band(axis: Axes, there: Sequence[Series], colour: str, *, alpha: float, sol
 
 
 def _parts(runs: Iterable[Series | None], way: str) -> list[Series]:
-    """The rows on the way in or out, in the ground, of those runs that have more than one."""
+    """The rows of loading or unloading in the ground ("in", "out"), of those runs that have more than one."""
     parts = (series.part(way) for series in runs if series is not None)
     return [inside for part in parts if len(inside := part.where(part.depth >= 0.0)) > 1]
 
@@ -305,7 +301,7 @@ def _departures_of_series(run: RunFolder) -> list[Departure]:
 
 
 def _returned_words(runs: list[Run]) -> str:
-    """What share of the work put in was got back, of bed and spring-damper: the mean over these runs."""
+    """The recovered share of the work of loading, of bed and spring-damper: the mean over these runs."""
     shares = []
     for prefix, what in (("", "the bed"), ("model_", "the spring-damper")):
         works = [

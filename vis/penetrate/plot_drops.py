@@ -7,10 +7,9 @@ from matplotlib.lines import Line2D
 
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import quote
-from vis.page.plots import DASHED, Array, handle, legend_above, new_panels, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, nice_below, sheet
 from vis.page.report import capital
 from vis.page.sentences import Sentences
-from vis.page.style import BED, GREY, INK, MODEL, styled
 from vis.penetrate.plot_drag import Plot, above_surface, by_speed, has_model, pair_of_handles, spread_words
 from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
 
@@ -19,7 +18,6 @@ __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
 say = Sentences(__package__)
 
 
-@styled()
 def drops_plot(run: RunFolder) -> Plot | None:
     """Depth and force of each drop against time, one column per speed."""
     drops = [r for r in run.of_kind("drop") if r.bed is not None and r.speed is not None]
@@ -27,7 +25,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
     if not speeds:
         return None
     figure, axes = sheet(2, len(speeds), 4.6, sharex="col", sharey="row")
-    window = _nice(0.04 * max(_settled(r) for r in drops))
+    window = nice_below(0.04 * max(_settled(r) for r in drops))
     free = False
     for column, speed in enumerate(speeds):
         above, below = axes[0, column], axes[1, column]
@@ -72,10 +70,9 @@ def drops_plot(run: RunFolder) -> Plot | None:
     legend_above(figure, [bed, recorded, *model, peaks])
     each = ", a line for each bed" if len({(r.speed, r.seed) for r in drops}) > len(speeds) else ""
     left, later = say("drops_left") if free else "", say("drops_later") if has_model(drops) else ""
-    return Plot.said("drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
+    return Plot.of("drops", figure, each=each, window=quote(window, 0.0, "s"), left=left, later=later)
 
 
-@styled()
 def drop_peaks_plot(run: RunFolder) -> Plot | None:
     """Peak force, greatest depth and time to stop of the drops against speed, bed beside spring-damper."""
     drops = [r for r in run.of_kind("drop") if r.speed is not None]
@@ -104,10 +101,9 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
     law = any(value_of(r.quantities, "model_peak_force") is not None for r in drops)
     legend_above(figure, pair_of_handles(markers=True)[: 2 if law else 1])
     listed = joined([title[0].lower() + title[1:] for _, title, *_ in columns])
-    return Plot.said("drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
+    return Plot.of("drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
 
 
-@styled()
 def set_down_plot(run: RunFolder) -> Plot | None:
     """Depth against time of the spike set down under its load, to rest."""
     sets = [r for r in run.of_kind("set_down") if r.bed is not None]
@@ -155,25 +151,24 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots])
     still = sum(value_of(r.quantities, "sinkage") is not None for r in sets)
     many = len(sets) > 1
-    said = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
+    caption = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
     if still < len(sets):
-        said += (
+        caption += (
             f" {still or 'None'} of them came to rest in the time that was followed."
             if many
             else (" It did not come to rest in the time that was followed.")
         )
     if rests:
-        said += f" Right: the depth at rest{', ± the standard deviation between beds' if still > 1 else ''}."
+        caption += f" Right: the depth at rest{', ± the standard deviation between beds' if still > 1 else ''}."
     if has_model(sets):
         fitted = "all beds" if many else "this bed's drives and drops"
-        said += f" The spring-damper is the one fitted to {fitted}; where it rests is predicted, not fitted."
+        caption += f" The spring-damper is the one fitted to {fitted}; where it rests is predicted, not fitted."
     departures = run.result.get("departures")
     if isinstance(departures, dict) and isinstance(departures.get("set_down"), str):
-        said += f" {departures['set_down']}"
-    return Plot("set_down", "Set down under its load", said, figure)
+        caption += f" {departures['set_down']}"
+    return Plot("set_down", "Set down under its load", caption, figure)
 
 
-@styled()
 def spread_plot(run: RunFolder) -> Plot | None:
     """K and C fitted to each seed of the bed, their spread, and what is fitted to all of them."""
     fits = [f for f in run.result.get("fits") or [] if isinstance(f, dict)]
@@ -198,29 +193,17 @@ def spread_plot(run: RunFolder) -> Plot | None:
         axis.axhline(mean, color=INK, lw=1.0)
         if spread:
             axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
-        axis.errorbar(
-            range(len(rows)),
-            values,
-            [np.nan if error is None else error for *_, error in rows],
-            fmt="o",
-            color=MODEL,
-            ms=7,
-            mec="white",
-            capsize=3,
-        )
+        errors = [np.nan if error is None else error for *_, error in rows]
+        axis.errorbar(range(len(rows)), values, errors, fmt="o", color=MODEL, ms=7, mec="white", capsize=3)
         axis.set_xticks(range(len(rows)), [str(seed) for seed, *_ in rows])
-        axis.set(
-            xlim=(-0.6, len(rows) - 0.4),
-            title=title,
-            xlabel="seed of the bed",
-            ylabel=f"{title.split()[1]} [{unit}]",
-        )
+        axis.set(xlim=(-0.6, len(rows) - 0.4), xlabel="seed of the bed")
+        axis.set(title=title, ylabel=f"{title.split()[1]} [{unit}]")
         reach = max(2.2 * (spread or 0.0), 0.1 * abs(mean), 1e-12)
         axis.set_ylim(min(mean - reach, *axis.get_ylim()), max(mean + reach, *axis.get_ylim()))
         axis.grid(False, axis="x")
     known = any(fit_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
     bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"
-    return Plot.said("spread", figure, bars=bars)
+    return Plot.of("spread", figure, bars=bars)
 
 
 def _first_touch(series: Series | None) -> float:
@@ -255,9 +238,3 @@ def _running_mean(time: Array, force: Array, window: float) -> Array:
     low, high = time - reach, time + reach
     mean = (np.interp(high, time, impulse) - np.interp(low, time, impulse)) / np.maximum(high - low, 1e-300)
     return np.where(high > low, mean, force)
-
-
-def _nice(number: float) -> float:
-    """The next 1, 2 or 5 times a power of ten not above `number`."""
-    power = 10.0 ** np.floor(np.log10(number))
-    return float(next(n * power for n in (5.0, 2.0, 1.0) if n * power <= 1.0001 * number))

@@ -1,13 +1,14 @@
 """The report of a spike in a bed, and that of a run on a model's law without a bed.
 
-In every plot the bed is blue, the spring-damper orange and dashed, the law with what it lacked green. Depth is in mm,
-positive downwards. `templates/report.html` is the page; what it says is from `vis.penetrate.summary`.
+In every plot the bed is blue, the spring-damper orange and dashed, the law with added effects green. Depth is in mm,
+positive downwards. `templates/report.html` is the page; its content is from `vis.penetrate.summary`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,9 +17,8 @@ from matplotlib.figure import Figure
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, figure, table, text, write_template
-from vis.page.plots import DASHED, handle, legend_above, sheet
+from vis.page.plots import BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled
 from vis.page.report import Progress, Report, Result, again, report_of
-from vis.page.style import BED, GREY, MODEL, styled
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
@@ -94,35 +94,34 @@ def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[t
     drawn: list[tuple[Plot, Path]] = []
     missing: list[str] = []
     plans = PLOTS | ({"With what was missing": _amended_plot} if _is_amended(run) else {})
-    for what, draw in plans.items():
-        try:
-            plot = draw(run)
-        except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError, FloatingPointError) as error:
-            missing.append(f"{what}: could not be drawn ({type(error).__name__}: {error}).")
-            continue
-        if plot is None:
-            missing.append(f"{what}: no data.")
-        else:
-            with styled():
+    with styled():
+        for what, draw in plans.items():
+            try:
+                plot = draw(run)
+            except (ValueError, TypeError, KeyError, IndexError, ZeroDivisionError, FloatingPointError) as error:
+                missing.append(f"{what}: could not be drawn ({type(error).__name__}: {error}).")
+                continue
+            if plot is None:
+                missing.append(f"{what}: no data.")
+            else:
                 drawn.append((plot, plot.save(target)))
     return drawn, missing
 
 
-# With what the spring-damper lacked -----------------------------------------------------------------------------------
+# With effects that the spring-damper omits ----------------------------------------------------------------------------
 
 
 def _is_amended(run: RunFolder) -> bool:
     return any(r.amended is not None for r in run.runs)
 
 
-@styled()
 def _amended_plot(run: RunFolder) -> Plot | None:
     drawing = _draw_amended(run)
-    return None if drawing is None else Plot.said("amended", drawing)
+    return None if drawing is None else Plot.of("amended", drawing)
 
 
 def words_of_effects(result: Result) -> str:
-    """What was added, in words."""
+    """The added effects, in words."""
     model = result.get("model")
     effects = model.get("effects") if isinstance(model, Mapping) else None
     return " and ".join(map(str, effects)) if effects else "nothing added"
@@ -141,7 +140,7 @@ def _draw_amended(run: RunFolder) -> Figure | None:
     for row, group in zip(axes, groups, strict=True):
         for axis, (title, runs) in zip(row, group, strict=False):
             axis.set_title(title)
-            (_draw_driven if runs[0].kind == "driven" else _draw_motion)(axis, runs)
+            _draw_panel(axis, runs)
         for axis in row[len(group) :]:
             axis.set_visible(False)
     handles = [handle("bed", BED, lw=1.0)] if any(r.bed is not None for r in run.runs) else []
@@ -182,30 +181,25 @@ def _by_speed(runs: Sequence[Run]) -> list[tuple[str, list[Run]]]:
     ]
 
 
-def _draw_driven(axis: Axes, runs: Sequence[Run]) -> None:
-    for r in runs:
-        if r.bed is not None:
-            axis.plot(1e3 * r.bed.depth, r.bed.force, color=BED, lw=0.7, alpha=0.6)
-    for series, colour, style in ((runs[0].model, MODEL, DASHED), (runs[0].amended, AMENDED, "-")):
-        if series is not None:
-            axis.plot(1e3 * series.depth, series.force, color=colour, ls=style, lw=1.8)
+def _draw_panel(axis: Axes, runs: Sequence[Run]) -> None:
+    """Force against depth of driven runs; of the others depth against the time since they came to depth 0."""
+    driven = runs[0].kind == "driven"
+    bed: Mapping[str, Any] = {"color": BED, "lw": 0.7, "alpha": 0.6} if driven else {"color": BED, "lw": 0.9}
+    lines: list[tuple[Series | None, Mapping[str, Any]]] = [(r.bed, bed) for r in runs]
+    lines.append((runs[0].model, {"color": MODEL, "ls": DASHED, "lw": 1.8}))
+    lines.append((runs[0].amended, {"color": AMENDED, "lw": 1.8}))
+    for series, style in lines:
+        if series is None:
+            continue
+        across, up = 1e3 * series.depth, series.force
+        if not driven:
+            inside = np.flatnonzero(series.depth > 0)
+            start = float(series.time[inside[0]]) if len(inside) else float(series.time[0])
+            across, up = 1e3 * (series.time - start), 1e3 * series.depth
+        axis.plot(across, up, **style)
     axis.axhline(0.0, color=GREY, lw=0.8)
-    axis.set(xlabel="depth of the tip [mm]", ylabel="force on the spike [N]")
-
-
-def _draw_motion(axis: Axes, runs: Sequence[Run]) -> None:
-    beds = [r.bed for r in runs if r.bed is not None]
-    others = [(runs[0].model, MODEL, DASHED, 1.8), (runs[0].amended, AMENDED, "-", 1.8)]
-    for series, colour, style, width in [*((bed, BED, "-", 0.9) for bed in beds), *others]:
-        if series is not None:
-            start = _touch(series)
-            axis.plot(1e3 * (series.time - start), 1e3 * series.depth, color=colour, ls=style, lw=width)
-    axis.axhline(0.0, color=GREY, lw=0.8)
-    axis.invert_yaxis()
-    axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")
-
-
-def _touch(series: Series) -> float:
-    """When it came to depth 0 [s]."""
-    inside = np.flatnonzero(series.depth > 0)
-    return float(series.time[inside[0]]) if len(inside) else float(series.time[0])
+    if driven:
+        axis.set(xlabel="depth of the tip [mm]", ylabel="force on the spike [N]")
+    else:
+        axis.invert_yaxis()
+        axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")

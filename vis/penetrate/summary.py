@@ -1,7 +1,7 @@
-"""What the report says, as plain words and formatted numbers; how it looks is `templates/report.html`'s business.
+"""The content of the report as plain text and formatted numbers; `templates/report.html` lays it out.
 
-`summarise(run)` turns a `RunFolder` into a dict of strings, lists and tables. Whatever the folder lacks is left out or
-reads "unknown"; nothing here raises for a part that is missing.
+`summarise(run)` turns a `RunFolder` into a dict of strings, lists and tables. What is missing in the folder is left out
+or reads "unknown"; nothing here raises for a part that is missing.
 """
 
 from __future__ import annotations
@@ -24,14 +24,16 @@ _REAL_GRAINS = {"sand": 2e-4}
 
 
 def summarise(run: RunFolder) -> dict[str, Any]:
-    """Everything the report says but its images.
+    """The whole content of the report but its images.
 
     Returns a dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "fit",
     "departures", "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing", "frames" and
     "reproduce"; "caveat" is what to know before any number.
     """
     result = run.result
-    quantities = words.mapping_of(result.get("quantities"))
+    quantities, spike = words.mapping_of(result.get("quantities")), dict(words.mapping_of(result.get("spike")))
+    if spike.get("tip") != "cone":
+        spike.pop("cone_angle", None)
     experiment = str(result.get("experiment") or words.setting_of(run, "command") or "")
     return {
         "title": str(result.get("title") or (f"hedgebed {experiment}" if experiment else "A hedgebed run")),
@@ -47,7 +49,9 @@ def summarise(run: RunFolder) -> dict[str, Any]:
         "departures": words.departures_part(result),
         "reference": words.reference_part(result),
         "bed": words.bed_part(result, quantities),
-        "spike": words.facts_table(_spike(words.mapping_of(result.get("spike")))),
+        "spike": words.facts_table(
+            {key: spike[key] for key in spike if key != "cone_angle" or spike.get("tip") == "cone"}
+        ),
         "runs": words.runs_table(run),
         "numbers": words.numbers_table(quantities),
         "settings": words.settings_table(run.settings),
@@ -61,9 +65,9 @@ def summarise(run: RunFolder) -> dict[str, Any]:
 def _banner(run: RunFolder) -> str:
     if run.status == "done":
         return ""
-    unknown = "" if run.result else "Whether this run was finished is not known."
-    known = {"stopped": say("status_stopped"), "failed": say("status_failed"), "running": say("status_running")}
-    text = known.get(run.status, unknown)
+    text = "" if run.result else "Whether this run was finished is not known."
+    if run.status in ("stopped", "failed", "running"):
+        text = say(f"status_{run.status}")
     reason = f" Reason: {words.sentence(run.reason)}" if run.reason and text else ""
     return text + reason
 
@@ -97,15 +101,15 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
 
 
 def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
-    said = [f"and damping C = {words.fitted(quantities, 'damping')}, for motion"]
+    parts = [f"and damping C = {words.fitted(quantities, 'damping')}, for motion"]
     drops = [r for r in run.of_kind("drop") if words.value_of(r.quantities, "stop_time") is not None]
     depths = [float(r.bed.depth.max()) for r in (*run.of_kind("driven"), *drops) if r.bed is not None]
-    said[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
+    parts[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
     if words.value_of(quantities, "stiffness_standing") is not None:
-        said.append(f"for a foot that stands K = {quantity(quantities['stiffness_standing'])}")
+        parts.append(f"for a foot that stands K = {quantity(quantities['stiffness_standing'])}")
     if words.std_of(quantities, "stiffness") is None and words.value_of(quantities, "stiffness_error") is not None:
-        said.append("± is the standard error of the fit")
-    return "; ".join(said)
+        parts.append("± is the standard error of the fit")
+    return "; ".join(parts)
 
 
 def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
@@ -127,11 +131,6 @@ def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
     return f"The grains are {words.joined(parts)}: these are numbers of that bed, not of a material."
 
 
-def _spike(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """What there is to say of this spike: only a cone has an angle."""
-    return {key: value for key, value in facts.items() if key != "cone_angle" or facts.get("tip") == "cone"}
-
-
 def _frames(run: RunFolder) -> list[str]:
     """The .pvd files and which run each shows."""
     known = {r.id: r for r in run.runs}
@@ -141,7 +140,7 @@ def _frames(run: RunFolder) -> list[str]:
 
 
 def _push(run: RunFolder) -> tuple[str, str] | None:
-    """The greatest force on the way in over all speeds, at which it was met, and the least of the other speeds'."""
+    """The largest force of loading over all speeds, the speed of it, and the peaks at the other speeds."""
     by_speed = _peaks(run, "driven", "peak_force")
     if not by_speed:
         return None
@@ -155,18 +154,18 @@ def _push(run: RunFolder) -> tuple[str, str] | None:
 
 
 def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
-    said = words.mapping_of(run.result.get("departures"))
+    remarks = words.mapping_of(run.result.get("departures"))
 
     def also(*names: str) -> str:
-        return "".join(f" {words.sentence(str(said[name]))}" for name in names if said.get(name))
+        return "".join(f" {words.sentence(str(remarks[name]))}" for name in names if remarks.get(name))
 
     answers = {"How far does it sink?": _sinks(run, quantities, also("set_down", "surface"))}
     if push := _push(run):
         text = f"{push[0]} {push[1]}."
         drops = _peaks(run, "drop", "peak_force")
         if drops:
-            told = [f"{quote(*peak, 'N')} at {speed:g}{words.NBSP}m/s" for speed, peak in drops]
-            text += f" Dropped, its force peaks at {words.joined(told)}."
+            peaks = [f"{quote(*peak, 'N')} at {speed:g}{words.NBSP}m/s" for speed, peak in drops]
+            text += f" Dropped, its force peaks at {words.joined(peaks)}."
         if words.value_of(quantities, "work_returned_dem") is not None:
             text += " " + _returned(quantities)
         answers["What does the sand push back with?"] = text
@@ -178,9 +177,9 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         )
         if worst := _worst(run.result):
             text += f" {worst}"
-        peaks = _peak_gap(run)
-        if peaks is not None:
-            text += f" In drops its peak force is {words.more_or_less(peaks, 'above', 'below')} the bed's on average."
+        gap = _peak_gap(run)
+        if gap is not None:
+            text += f" In drops its peak force is {words.more_or_less(gap, 'above', 'below')} the bed's on average."
         answers["How wrong is the spring-damper?"] = text
         answers["Which K, and when?"] = also("which_stiffness").strip()
     return [{"question": question, "answer": answer} for question, answer in answers.items() if answer]
@@ -209,7 +208,7 @@ def _restless(run: RunFolder, quantities: Mapping[str, Any]) -> bool:
 
 
 def _returned(quantities: Mapping[str, Any]) -> str:
-    """What the bed gives back of the work put in; where that is negative, pulling out takes work as well."""
+    """The share of the work of loading that the bed recovers; where it is negative, pulling out takes work as well."""
     share, entry = words.value_of(quantities, "work_returned_dem"), quantities["work_returned_dem"]
     model = f"(spring-damper: {quantity(quantities.get('work_returned_spring_damper'), unit='%')} given back)"
     if share is not None and share < 0.0:
@@ -266,6 +265,5 @@ def _peaks(run: RunFolder, kind: str, key: str) -> list[tuple[float, tuple[float
 
 
 def _deeper(ratio: float) -> str:
-    return (
-        f"{plain(ratio, 2)} times as deep" if ratio >= 2.0 else words.more_or_less(ratio - 1.0, "deeper", "less deep")
-    )
+    far = ratio >= 2.0
+    return f"{plain(ratio, 2)} times as deep" if far else words.more_or_less(ratio - 1.0, "deeper", "less deep")

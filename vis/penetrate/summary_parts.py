@@ -48,22 +48,20 @@ def fitted(quantities: Mapping[str, Any], key: str) -> str:
 
 @dataclass(frozen=True)
 class Departure:
-    """One row of the table of departures: mean forces of bed and law in a band of depth at one speed."""
+    """One row of the table of departures: mean forces of bed and law in a band of depth at one speed.
+
+    ``speed``: [m/s]. ``depth_from``, ``depth_to``: [m]. ``bed_force``, ``model_force``: [N], the bed's the mean over
+    the beds. ``beds``: How many; None where it is not stated. ``bed_std``: Standard deviation of the bed's force
+    between beds [N]; None where unknown.
+    """
 
     speed: float
-    """[m/s]."""
     depth_from: float
-    """[m]."""
     depth_to: float
-    """[m]."""
     bed_force: float
-    """[N], mean over the beds."""
     model_force: float
-    """[N]."""
     beds: float | None = None
-    """How many; None where it was not told."""
     bed_std: float | None = None
-    """Standard deviation of the bed's force between beds [N]; None where unknown."""
 
     @property
     def difference(self) -> float:
@@ -77,17 +75,17 @@ class Departure:
 
     @property
     def known(self) -> str:
-        """How well: ``one bed``, ``3 beds``; empty where it was not told."""
+        """How well: ``one bed``, ``3 beds``; empty where it is not stated."""
         return "" if self.beds is None else "one bed" if self.beds == 1 else f"{self.beds:.0f} beds"
 
 
 def departure_rows(result: Mapping[str, Any]) -> list[Departure]:
-    """The rows of the table of departures; one that lacks a number is left out."""
+    """The rows of the table of departures; one without all of its numbers is left out."""
     rows = []
     for entry in list_of(mapping_of(result.get("departures")).get("table")):
-        told = {field.name: plain_value(mapping_of(entry).get(field.name)) for field in fields(Departure)}
-        if all(told[field.name] is not None for field in fields(Departure) if field.default is MISSING):
-            rows.append(Departure(**told))  # type: ignore[arg-type]
+        numbers = {field.name: plain_value(mapping_of(entry).get(field.name)) for field in fields(Departure)}
+        if all(numbers[field.name] is not None for field in fields(Departure) if field.default is MISSING):
+            rows.append(Departure(**numbers))  # type: ignore[arg-type]
     return rows
 
 
@@ -221,9 +219,9 @@ def fit_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[s
     if one:
         notes = [say("fit_one_bed")] if value_of(quantities, "stiffness_error") is not None else []
     else:
-        told = any(fit_error(fit, key) is not None for fit in own for key in ("stiffness", "damping"))
+        known = any(fit_error(fit, key) is not None for fit in own for key in ("stiffness", "damping"))
         notes = [say("fit_errors", errors=joined(errors))] if errors else []
-        notes += [say("fit_spread")] if told else []
+        notes += [say("fit_spread")] if known else []
     return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": " ".join(notes)}
 
 
@@ -231,27 +229,27 @@ def departures_part(result: Mapping[str, Any]) -> dict[str, Any]:
     """Where bed and spring-damper depart: sentences and a table."""
     departures = mapping_of(result.get("departures"))
     entries, dash = departure_rows(result), "\N{EN DASH}"
-    told = any(row.beds is not None for row in entries)
+    counted = any(row.beds is not None for row in entries)
     unit, forces = column([force for row in entries for force in (row.bed_force, row.bed_std, row.model_force)], "N")
     rows = [
         [
             f"{row.speed:g}",
             f"{short(1e3 * row.depth_from)} to {short(1e3 * row.depth_to)}",
-            *([f"{row.beds:.0f}" if row.beds is not None else dash] if told else []),
+            *([f"{row.beds:.0f}" if row.beds is not None else dash] if counted else []),
             bed,
-            *([apart] if told else []),
+            *([apart] if counted else []),
             model,
             dash if row.share is None else signed_percent(row.share),
         ]
         for row, bed, apart, model in zip(entries, forces[::3], forces[1::3], forces[2::3], strict=True)
     ]
     answered = {sentence(str(departures.get(name, ""))) for name in ("which_stiffness", "surface", "set_down")}
-    said = [sentence(str(text)) for text in list_of(departures.get("sentences"))]
+    sentences = [sentence(str(text)) for text in list_of(departures.get("sentences"))]
     head = ["speed [m/s]", "depth [mm]", f"bed [{unit}]", f"spring-damper [{unit}]", "gap"]
-    if told:
+    if counted:
         head[2:3] = ["beds", f"bed, mean [{unit}]", f"std between beds [{unit}]"]
     return {
-        "sentences": [text for text in said if text not in answered],
+        "sentences": [text for text in sentences if text not in answered],
         "table": {"head": head, "rows": rows} if rows else None,
     }
 

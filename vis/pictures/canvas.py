@@ -1,7 +1,7 @@
 """The page around a picture of the bed: title, colour bar, depth scale. The same with OpenGL and without.
 
 A picture is 4:3. The three-dimensional image, or the cross-section that stands in for it, fills the page to the left of
-the colour bar; where a point of the bed lies on it is told by `place`, a function (n, 3) [m] -> (n, 2) in fractions of
+the colour bar; `place` gives where a point of the bed lies on it, a function (n, 3) [m] -> (n, 2) in fractions of
 the page from its lower left corner.
 """
 
@@ -19,10 +19,12 @@ from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from vis.page.style import INK, styled
+from vis.page.numbers import quote
+from vis.page.plots import INK, styled
 
 __all__ = [
-    "COLOURS", "Page", "blank_page", "colour_bar", "colour_values", "colourmap", "moved_since", "nice_above", "pixels",
+    "COLOURS", "FORCE", "HALO", "Page", "blank_page", "colour_values", "colourmap", "draw_force",
+    "draw_measure", "moved_since", "nice_above", "pixels",
 ]  # fmt: skip
 
 #: What grains are coloured by: name -> (label with unit, factor from SI).
@@ -32,6 +34,16 @@ COLOURS: dict[str, tuple[str, float]] = {
     "force": ("net contact force [mN]", 1e3),
     "coordination": ("contacts of the grain [1]", 1.0),
 }
+HALO = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
+"""Box of a word on a picture."""
+FORCE = {
+    "arrowstyle": "-|>,head_width=0.28,head_length=0.55", "color": "#B00020", "lw": 2.2, "shrinkA": 0, "shrinkB": 0,
+}  # fmt: skip
+"""How an arrow of a force is drawn."""
+_SHORTEST = 0.005
+"""A shorter arrow is not drawn, in fractions of the picture."""
+_RIM = 0.01
+"""Left free at the picture's edge by an arrow that is cut, in fractions of it."""
 Place = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -90,6 +102,8 @@ class Page:
 
     def colours(self, grains: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
         """Colours of the grains of a frame, shape (n, 4)."""
+        if not len(grains["position"]):
+            return np.zeros((0, 4))
         return np.asarray(self.map(self.norm(colour_values(grains, self.by))))
 
     def compose(
@@ -120,9 +134,16 @@ class Page:
             figure.text(0.03, 0.905, lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35)
             if note:
                 figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
-            bar = colour_bar(figure, (0.885, 0.2, 0.018, 0.5), self.norm, self.map, COLOURS[self.by][0], 11.5)
-            bar.ax.tick_params(labelsize=11)
+            self.colour_bar(figure, (0.885, 0.2, 0.018, 0.5), 11.5).ax.tick_params(labelsize=11)
             return pixels(figure)
+
+    def colour_bar(self, figure: Figure, place: tuple[float, float, float, float], fontsize: float) -> Colorbar:
+        """The bar of the colour scale: left, foot, width, height in fractions of the figure."""
+        scale = ScalarMappable(self.norm, self.map)
+        bar = figure.colorbar(scale, cax=figure.add_axes(place), extend="max", extendfrac=0.04)
+        bar.set_label(COLOURS[self.by][0], fontsize=fontsize)
+        bar.outline.set_visible(False)  # type: ignore[operator]
+        return bar
 
     def _rulers(self, axis: Any, place: Place, section: tuple[float, float, float, float, float]) -> None:
         """Depth below the surface along the left edge of the cut, a length along its foot."""
@@ -163,15 +184,6 @@ def blank_page(size: tuple[int, int], inches: float) -> Figure:
     return figure
 
 
-def colour_bar(figure: Figure, place: Any, norm: Normalize, colours: Colormap, label: str, fontsize: float) -> Colorbar:
-    """The bar of a colour scale: left, foot, width, height in fractions of the figure."""
-    cax = figure.add_axes(place)
-    bar = figure.colorbar(ScalarMappable(norm, colours), cax=cax, extend="max", extendfrac=0.04)
-    bar.set_label(label, fontsize=fontsize)
-    bar.outline.set_visible(False)  # type: ignore[operator]
-    return bar
-
-
 def pixels(figure: Figure) -> NDArray[np.uint8]:
     """A figure drawn, shape (height, width, 3)."""
     canvas = figure.canvas
@@ -184,3 +196,56 @@ def _ruler_step(length: float) -> float:
     rough = max(length, 1e-9) / 4.0
     power = 10.0 ** np.floor(np.log10(rough))
     return float(min((n * power for n in (1.0, 2.0, 5.0, 10.0)), key=lambda step: abs(np.log(step / rough))))
+
+
+# Arrows of forces: one that is too long for its picture ends at its edge, with the number beside it -------------------
+
+
+def draw_force(axis: Any, foot: NDArray[np.float64], head: NDArray[np.float64], force: float) -> None:
+    """An arrow from `foot` to `head`, places of shape (2,) in an `axis` from 0 to 1; `force` is its amount [N].
+
+    What would lie outside is cut off, and the number says so. Where nothing of it lies inside, nothing is drawn.
+    """
+    if np.linalg.norm(head - foot) <= _SHORTEST:
+        return
+    low, high = _inside(foot, head)
+    if low >= high:
+        return
+    start, end = foot + low * (head - foot), foot + high * (head - foot)
+    axis.annotate("", end, start, arrowprops=FORCE)
+    if high < 1.0:
+        _note(axis, end, f"{quote(force, unit='N')}, arrow cut")
+
+
+def draw_measure(sheet: Figure, *, right: float, height: float, length: float, weight: float) -> None:
+    """The weight [N] as an arrow of `length` [inch] above the pictures, where it hides and meets nothing.
+
+    right, height: where it ends on the sheet, in fractions of that.
+    """
+    wide = length / float(sheet.get_size_inches()[0])
+    axis = sheet.add_axes((right - wide, height - 0.01, wide, 0.02))
+    axis.set_axis_off()
+    axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    axis.annotate("", (1.0, 0.5), (0.0, 0.5), arrowprops=FORCE)
+    words = f"weight, {quote(weight, unit='N')}"
+    sheet.text(right - wide - 0.008, height, words, fontsize=10, ha="right", va="center", color=INK)
+
+
+def _inside(foot: NDArray[np.float64], head: NDArray[np.float64]) -> tuple[float, float]:
+    """From which share of the way to which it lies inside the rim (Liang and Barsky); from >= to: nowhere."""
+    low, high = 0.0, 1.0
+    for at, along in zip(foot, head - foot, strict=True):
+        if along == 0.0:
+            if not _RIM <= at <= 1.0 - _RIM:
+                return 1.0, 0.0
+            continue
+        first, last = sorted(((_RIM - at) / along, (1.0 - _RIM - at) / along))
+        low, high = max(low, first), min(high, last)
+    return low, high
+
+
+def _note(axis: Any, end: NDArray[np.float64], words: str) -> None:
+    """Words beside the end of an arrow and over its shaft, towards the middle."""
+    x, y = float(end[0]), float(np.clip(end[1] + 0.05, 0.06, 0.96))
+    aside, side = (0.03, "left") if x < 0.6 else (-0.03, "right")
+    axis.text(x + aside, y, words, fontsize=10, ha=side, va="center", color=INK, bbox=HALO)

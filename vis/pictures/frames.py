@@ -37,7 +37,10 @@ GRAIN_FIELDS: dict[str, tuple[int, str]] = {
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*\Z")
 Body = tuple[ArrayLike, ArrayLike]
 Cloud = tuple[ArrayLike, Mapping[str, ArrayLike]]
-_Part = tuple[str, NDArray[np.float32], dict[str, NDArray[Any]], NDArray[np.int64] | None]
+Points = NDArray[np.float32]
+Fields = dict[str, NDArray[Any]]
+Faces = NDArray[np.int64]
+_Part = tuple[str, Points, Fields, Faces | None]
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class HeightMap:
 
     origin: tuple[float, float]
     spacing: tuple[float, float]
-    fields: dict[str, NDArray[Any]]
+    fields: Fields
 
 
 class FrameWriter:
@@ -160,21 +163,19 @@ class Frame:
     """One frame of a run as it was written.
 
     ``time``: Time [s]. ``grains``: `position` [m], shape (n, 3), and the fields of `GRAIN_FIELDS` that were written.
-    ``bodies``: Name -> (points [m], shape (n, 3), triangles, shape (m, 3)). ``values``: Scalars of this frame (depth
-    [m], force [N], ...). ``clouds``: Name -> (points [m], shape (n, 3), fields), what glyphs are drawn of. ``maps``:
-    Name -> height map.
+    The others as `FrameWriter.write` takes them.
     """
 
     time: float
-    grains: dict[str, NDArray[Any]]
-    bodies: dict[str, tuple[NDArray[np.float64], NDArray[np.int64]]]
+    grains: Fields
+    bodies: dict[str, tuple[NDArray[np.float64], Faces]]
     values: dict[str, float]
-    clouds: dict[str, tuple[NDArray[np.float64], dict[str, NDArray[Any]]]] = field(default_factory=dict)
+    clouds: dict[str, tuple[NDArray[np.float64], Fields]] = field(default_factory=dict)
     maps: dict[str, HeightMap] = field(default_factory=dict)
 
 
 class Frames(Sequence[Frame]):
-    """The frames of one run; a frame is read from disk when it is asked for."""
+    """The frames of one run; a frame is read from disk at its use."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self.folder = folder
@@ -198,9 +199,9 @@ class Frames(Sequence[Frame]):
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         time = float(self.times[index])
-        grains: dict[str, NDArray[Any]] = {"position": np.zeros((0, 3))}
+        grains: Fields = {"position": np.zeros((0, 3))}
         bodies, values = {}, {}
-        clouds: dict[str, tuple[NDArray[np.float64], dict[str, NDArray[Any]]]] = {}
+        clouds: dict[str, tuple[NDArray[np.float64], Fields]] = {}
         maps: dict[str, HeightMap] = {}
         for entry in self._by_time[time]:
             if entry.file.endswith(".vti"):
@@ -258,11 +259,11 @@ def _read_pvd(path: Path) -> list[_Entry]:
     return sorted(entries, key=lambda entry: (entry.time, entry.part))
 
 
-def _grain_arrays(grains: Mapping[str, ArrayLike]) -> tuple[NDArray[np.float32], dict[str, NDArray[Any]]]:
+def _grain_arrays(grains: Mapping[str, ArrayLike]) -> tuple[Points, Fields]:
     if "position" not in grains:
         raise ValueError("grains has no 'position'")
     position = _checked("position", grains["position"], (3,))
-    fields: dict[str, NDArray[Any]] = {}
+    fields: Fields = {}
     for key, given in grains.items():
         if key in ("position", "spin"):  # spin is not kept: a sphere looks the same
             continue
@@ -275,9 +276,7 @@ def _grain_arrays(grains: Mapping[str, ArrayLike]) -> tuple[NDArray[np.float32],
     return position, fields
 
 
-def _body_arrays(
-    body: str, points: ArrayLike, triangles: ArrayLike
-) -> tuple[NDArray[np.float32], dict[str, NDArray[Any]], NDArray[np.int64]]:
+def _body_arrays(body: str, points: ArrayLike, triangles: ArrayLike) -> tuple[Points, Fields, Faces]:
     corners = _checked(body, points, (3,))
     faces = np.ascontiguousarray(triangles, dtype=np.int64)
     if faces.ndim != 2 or faces.shape[1] != 3:
@@ -287,11 +286,9 @@ def _body_arrays(
     return corners, {}, faces
 
 
-def _cloud_arrays(
-    cloud: str, points: ArrayLike, fields: Mapping[str, ArrayLike]
-) -> tuple[NDArray[np.float32], dict[str, NDArray[Any]]]:
+def _cloud_arrays(cloud: str, points: ArrayLike, fields: Mapping[str, ArrayLike]) -> tuple[Points, Fields]:
     at = _checked(cloud, np.asarray(points, dtype=float).reshape(-1, 3), (3,))
-    found: dict[str, NDArray[Any]] = {}
+    found: Fields = {}
     for key, given in fields.items():
         array = _checked(f"{cloud} {key}", given, (1, 3)) if len(at) else np.asarray(given, dtype=np.float32)
         if len(array) != len(at):
@@ -300,7 +297,7 @@ def _cloud_arrays(
     return at, found
 
 
-def _checked(name: str, given: ArrayLike, columns: tuple[int, ...]) -> NDArray[np.float32]:
+def _checked(name: str, given: ArrayLike, columns: tuple[int, ...]) -> Points:
     array = np.ascontiguousarray(given, dtype=np.float32)
     width = 1 if array.ndim == 1 else array.shape[1] if array.ndim == 2 else 0
     if width not in columns:
@@ -312,19 +309,13 @@ def _checked(name: str, given: ArrayLike, columns: tuple[int, ...]) -> NDArray[n
     return array
 
 
-def _write_vtu(
-    path: Path,
-    points: NDArray[np.float32],
-    fields: Mapping[str, NDArray[Any]],
-    triangles: NDArray[np.int64] | None,
-    values: Mapping[str, float],
-) -> None:
+def _write_vtu(path: Path, points: Points, fields: Fields, faces: Faces | None, values: Mapping[str, float]) -> None:
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import VTK_TRIANGLE, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-    cells = np.arange(len(points), dtype=np.int64).reshape(-1, 1) if triangles is None else triangles
+    cells = np.arange(len(points), dtype=np.int64).reshape(-1, 1) if faces is None else faces
     grid = vtkUnstructuredGrid()
     vertices = vtkPoints()
     vertices.SetData(numpy_to_vtk(points, deep=True))
@@ -332,10 +323,8 @@ def _write_vtu(
     polygons = vtkCellArray()
     offsets = np.arange(len(cells) + 1, dtype=np.int32) * cells.shape[1]
     polygons.SetData(numpy_to_vtk(offsets, deep=True), numpy_to_vtk(cells.astype(np.int32).ravel(), deep=True))
-    grid.SetCells(VTK_VERTEX if triangles is None else VTK_TRIANGLE, polygons)
-    _add_arrays(grid.GetPointData(), fields)
-    _add_arrays(grid.GetFieldData(), {name: np.array([value]) for name, value in values.items()})
-    _write_xml(path, vtkXMLUnstructuredGridWriter(), grid)
+    grid.SetCells(VTK_VERTEX if faces is None else VTK_TRIANGLE, polygons)
+    _write_xml(path, vtkXMLUnstructuredGridWriter(), grid, fields, values)
 
 
 def _write_vti(path: Path, name: str, grid: HeightMap, values: Mapping[str, float]) -> None:
@@ -351,23 +340,22 @@ def _write_vti(path: Path, name: str, grid: HeightMap, values: Mapping[str, floa
     image.SetOrigin(*grid.origin, 0.0)
     image.SetSpacing(*grid.spacing, 1.0)
     flat = {key: np.ascontiguousarray(field, dtype=np.float32).ravel() for key, field in grid.fields.items()}
-    _add_arrays(image.GetPointData(), flat)
-    _add_arrays(image.GetFieldData(), {key: np.array([value]) for key, value in values.items()})
-    _write_xml(path, vtkXMLImageDataWriter(), image)
+    _write_xml(path, vtkXMLImageDataWriter(), image, flat, values)
 
 
-def _add_arrays(attributes: Any, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Give VTK's data of points or of the whole field these arrays, by name."""
+def _write_xml(path: Path, writer: Any, content: Any, fields: Fields, values: Mapping[str, float]) -> None:
+    """Write content with fields of its points and values of the whole into a neighbour first: a file there is whole.
+
+    Raises OSError where it cannot.
+    """
     from vtkmodules.util.numpy_support import numpy_to_vtk
 
-    for name, array in arrays.items():
-        data = numpy_to_vtk(array, deep=True)
-        data.SetName(name)
-        attributes.AddArray(data)
-
-
-def _write_xml(path: Path, writer: Any, content: Any) -> None:
-    """Write into a neighbour first, so that a file that is there is whole. Raises OSError where it cannot."""
+    scalars = {name: np.array([value]) for name, value in values.items()}
+    for attributes, arrays in ((content.GetPointData(), fields), (content.GetFieldData(), scalars)):
+        for name, array in arrays.items():
+            data = numpy_to_vtk(array, deep=True)
+            data.SetName(name)
+            attributes.AddArray(data)
     temporary = path.with_name(path.name + ".part")
     writer.SetFileName(str(temporary))
     writer.SetInputData(content)
@@ -379,7 +367,7 @@ def _write_xml(path: Path, writer: Any, content: Any) -> None:
     temporary.replace(path)
 
 
-def _read(path: Path, reader: Any, kind: str) -> tuple[Any, dict[str, NDArray[Any]]]:
+def _read(path: Path, reader: Any, kind: str) -> tuple[Any, Fields]:
     """What VTK's `reader` finds in a file of its kind, and the fields of its points. Raises ValueError for another."""
     if not path.exists():
         raise ValueError(f"{path} is missing though its PVD lists it")
@@ -404,7 +392,7 @@ def _read_vti(path: Path) -> HeightMap:
     return HeightMap(image.GetOrigin()[:2], image.GetSpacing()[:2], shaped)
 
 
-def _read_vtu(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64], dict[str, NDArray[Any]], dict[str, float]]:
+def _read_vtu(path: Path) -> tuple[NDArray[np.float64], Faces, Fields, dict[str, float]]:
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 

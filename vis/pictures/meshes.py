@@ -95,12 +95,20 @@ def revolve(profile: ArrayLike, *, segments: int = 72) -> Mesh:
     following = (here + 1) % segments
     parts = [np.column_stack([np.zeros(segments, dtype=np.int64), 1 + following, 1 + here])]
     for ring in range(len(rings) - 1):
-        low, high = 1 + ring * segments, 1 + (ring + 1) * segments
-        parts.append(np.column_stack([low + here, low + following, high + following]))
-        parts.append(np.column_stack([low + here, high + following, high + here]))
+        parts += _sides(1 + ring * segments, 1 + (ring + 1) * segments, segments)
     low = 1 + (len(rings) - 1) * segments
     parts.append(np.column_stack([low + here, low + following, np.full(segments, len(points) - 1)]))
     return points, np.vstack(parts).astype(np.int64)
+
+
+def _sides(low: int, high: int, segments: int) -> list[NDArray[np.int64]]:
+    """Triangles between two rings of points, by the numbers of their first points."""
+    here = np.arange(segments)
+    following = (here + 1) % segments
+    return [
+        np.column_stack([low + here, low + following, high + following]),
+        np.column_stack([low + here, high + following, high + here]),
+    ]
 
 
 def spike_mesh(tip: str = "sphere", *, segments: int = 72, **sizes: Any) -> Mesh:
@@ -146,14 +154,6 @@ def in_place(points: ArrayLike, position: ArrayLike, turn: ArrayLike = (1.0, 0.0
     return given + q[0] * twist + np.cross(q[1:], twist) + np.asarray(position, dtype=np.float64)
 
 
-def _cylinder(shape: Any, segments: int) -> Mesh:
-    return _frustum(shape, shape.radius, shape.radius, segments)
-
-
-def _cone(shape: Any, segments: int) -> Mesh:
-    return _frustum(shape, shape.bottom_radius, shape.top_radius, segments)
-
-
 def _frustum(shape: Any, low: float, high: float, segments: int) -> Mesh:
     outline = [(0.0, shape.bottom), (low, shape.bottom), (high, shape.top), (0.0, shape.top)]
     return revolve([p for k, p in enumerate(outline) if k in (0, 3) or p[0] > 0.0], segments=segments)
@@ -169,8 +169,8 @@ def _capsule(shape: Any, segments: int) -> Mesh:
     return in_place(points, start, turn / np.linalg.norm(turn)), triangles
 
 
-def _ball(radius: float, segments: int, *, apart: float = 0.0) -> Mesh:
-    """Its middle in the origin; the upper half moved up by `apart`."""
+def _ball(radius: float, segments: int, *, centre: ArrayLike = (0.0, 0.0, 0.0), apart: float = 0.0) -> Mesh:
+    """A ball; its upper half moved up by `apart`."""
     count = 2 * max(1, math.ceil(segments / 4))
     angles = np.linspace(0.0, np.pi, count + 1)
     outline = radius * np.column_stack([np.sin(angles), -np.cos(angles)])
@@ -178,7 +178,8 @@ def _ball(radius: float, segments: int, *, apart: float = 0.0) -> Mesh:
     if apart > 0.0:
         outline = np.insert(outline, count // 2, outline[count // 2], axis=0)
         outline[count // 2 + 1 :, 1] += apart
-    return revolve(outline, segments=segments)
+    points, triangles = revolve(outline, segments=segments)
+    return points + np.asarray(centre), triangles
 
 
 def _box(shape: Any, segments: int) -> Mesh:
@@ -194,18 +195,8 @@ def _tube(shape: Any, segments: int) -> Mesh:
     rings += [(shape.inner_radius, shape.top), (shape.inner_radius, shape.bottom)]
     angle = 2.0 * np.pi * np.arange(segments) / segments
     points = [np.column_stack([r * np.cos(angle), r * np.sin(angle), np.full(segments, z)]) for r, z in rings]
-    here = np.arange(segments)
-    following = (here + 1) % segments
-    triangles = []
-    for k in range(4):
-        low, high = k * segments, (k + 1) % 4 * segments
-        triangles.append(np.column_stack([low + here, low + following, high + following]))
-        triangles.append(np.column_stack([low + here, high + following, high + here]))
+    triangles = [side for k in range(4) for side in _sides(k * segments, (k + 1) % 4 * segments, segments)]
     return np.concatenate(points), np.concatenate(triangles).astype(np.int64)
-
-
-def _triangles(shape: Any, segments: int) -> Mesh:
-    return np.array(shape.mesh.vertices, dtype=np.float64), np.array(shape.mesh.triangles, dtype=np.int64)
 
 
 def _placed(shape: Any, segments: int) -> Mesh:
@@ -214,19 +205,19 @@ def _placed(shape: Any, segments: int) -> Mesh:
     return in_place(points, shape.position, turn / np.linalg.norm(turn)), triangles
 
 
-def _ball_in_place(shape: Any, segments: int) -> Mesh:
-    points, triangles = _ball(shape.radius, segments)
-    return points + np.asarray(shape.center), triangles
+def _given(shape: Any, segments: int) -> Mesh:
+    """Of a mesh or a polyhedron, which has its triangles."""
+    return np.array(shape.mesh.vertices, dtype=np.float64), np.array(shape.mesh.triangles, dtype=np.int64)
 
 
 _SURFACES: dict[str, Callable[[Any, int], Mesh]] = {
-    "Ball": _ball_in_place,
+    "Ball": lambda shape, segments: _ball(shape.radius, segments, centre=shape.center),
     "Box": _box,
     "Capsule": _capsule,
-    "Cone": _cone,
-    "Cylinder": _cylinder,
-    "Mesh": _triangles,
+    "Cone": lambda shape, segments: _frustum(shape, shape.bottom_radius, shape.top_radius, segments),
+    "Cylinder": lambda shape, segments: _frustum(shape, shape.radius, shape.radius, segments),
+    "Mesh": _given,
     "Placed": _placed,
-    "Polyhedron": _triangles,
+    "Polyhedron": _given,
     "Tube": _tube,
 }

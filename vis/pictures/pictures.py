@@ -14,7 +14,7 @@ import select
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,15 +28,13 @@ from vis.page.plots import Array
 from vis.page.report import Progress
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
-from vis.pictures.render import PictureJob, View, run_job
+from vis.pictures.render import CUT, PictureJob, View, run_job
 
-__all__ = ["Counter", "Picture", "Pictures", "carry_out", "make_pictures", "opengl_available", "render_apart"]
+__all__ = ["Picture", "Pictures", "carry_out", "make_pictures", "opengl_available", "render_apart"]
 
 _STILLS = 6
 _STILL_COSTS = 4.0  # in frames of the animation, as measured in software
 _ANIMATED = 48
-_CUT = "cut open along the spike's mid-plane: what is in front is left out, of the spike too"
-_SLAB = "shown are those up to four diameters behind the spike's mid-plane, the farther the darker"
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ class Pictures:
 def opengl_available(*, timeout: float = 60.0) -> bool:
     """Whether a small off-screen picture comes out right, tried once in a child process of at most `timeout` seconds.
 
-    HEDGEBED_NO_OPENGL=1 in the environment says no without trying.
+    HEDGEBED_NO_OPENGL=1 in the environment switches it off without a test.
     """
     return os.environ.get("HEDGEBED_NO_OPENGL", "") in ("", "0") and _probe(timeout)
 
@@ -109,56 +107,43 @@ def make_pictures(
     if not stills:
         return Pictures(method="none", notes=[*notes, "There are no frames to draw pictures of."])
     costs = [1.0 if view["file"].endswith(".gif") else _STILL_COSTS for view in job["views"] for _ in view["frames"]]
-    counter = Counter(costs, progress)
-
-    def flat() -> None:
-        for view in job["views"]:
-            view["note"] = view["note"].replace(_CUT, _SLAB)
-        run_job(job, opengl=False, step=counter.step)
-
     method, note = carry_out(
-        job, counter, flat, stall=stall, failed="cross-sections stand in for the pictures",
+        job, run_job, costs, progress, stall=stall, failed="cross-sections stand in for the pictures",
         without="cross-sections stand in for them (Debian: apt install libegl1 libgl1-mesa-dri)",
     )  # fmt: skip
     return Pictures(stills, animation, method, notes + note)
 
 
-class Counter:
-    """Reports how much is done; a still may cost more than a frame of an animation."""
-
-    def __init__(self, costs: list[float], progress: Progress | None = None) -> None:
-        self.costs, self.progress, self.done = costs, progress, 0
-
-    def step(self) -> None:
-        """One more is done."""
-        self.done += 1
-        if self.progress is not None:
-            self.progress(min(1.0, sum(self.costs[: self.done]) / sum(self.costs)))
-
-
 def carry_out(
     job: Mapping[str, Any],
-    counter: Counter,
-    flat: Callable[[], None],
+    run: Callable[..., None],
+    costs: Sequence[float],
+    progress: Progress | None = None,
     *,
     failed: str,
     without: str,
-    module: str = "vis.pictures.render",
     stall: float = 120.0,
 ) -> tuple[str, list[str]]:
-    """Draw a job with OpenGL in a child process, `python -m module`, or where that does not do it by `flat`.
+    """Draw a job by `run` with OpenGL in a child process, or where that does not succeed flat in this one.
 
-    Returns "opengl" or "sections", and a note on what stands in: `failed` where OpenGL did not do it, `without` where
-    there is none.
+    ``costs``: Of each picture, in any unit, for the progress. Returns "opengl" or "sections", and a note on what stands
+    in: `failed` where OpenGL did not succeed, `without` where there is none.
     """
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(min(1.0, sum(costs[:done]) / sum(costs)))
+
     if not opengl_available():
         note = f"This machine has no OpenGL for off-screen pictures; {without}."
-    elif (failure := render_apart(job, stall, counter.step, module=module)) is None:
+    elif (failure := render_apart(job, stall, step, module=run.__module__)) is None:
         return "opengl", []
     else:
-        note = f"Rendering with OpenGL failed ({failure}); {failed}."
-        counter.done = 0
-    flat()
+        note, done = f"Rendering with OpenGL failed ({failure}); {failed}.", 0
+    run(job, opengl=False, step=step)
     return "sections", [note]
 
 
@@ -181,9 +166,9 @@ def render_apart(
             pipe = child.stdout.fileno()
             try:
                 while ready := select.select([pipe], [], [], stall)[0]:
-                    if not (said := os.read(pipe, 65536)):
+                    if not (output := os.read(pipe, 65536)):
                         break
-                    for _ in range(said.split().count(b"done")):
+                    for _ in range(output.split().count(b"done")):
                         step()
                 if not ready:
                     return f"no picture within {stall:g} s"
@@ -219,18 +204,18 @@ class _Story:
         return int(before[np.argmax(known >= top - 0.002 * abs(top))])
 
     def _before_the_way_out(self) -> NDArray[np.int64]:
-        """Indices of the frames before the run's first row of the way out; all where it has none, or no series."""
+        """Indices of the frames before the run's first row of unloading; all where it has none, or no series."""
         every, bed = np.arange(len(self.frames)), self.run.bed
-        out = np.flatnonzero(bed.phase == "out") if bed is not None and self.kind == "driven" else every[:0]
+        out = np.flatnonzero(bed.phase == "out") if bed is not None and self.run.kind == "driven" else every[:0]
         if bed is None or not len(out):
             return every
         before = every[np.asarray(self.frames.times) < bed.time[out[0]]]
         return before if len(before) else every
 
     def held(self, index: int) -> bool:
-        """Whether a driven spike was held still at this frame, its force falling off from what it was on the way in."""
+        """Whether a driven spike was held still at this frame, its force relaxing from that of loading."""
         bed = self.run.bed
-        if bed is None or self.kind != "driven":
+        if bed is None or self.run.kind != "driven":
             return False
         row = int(np.searchsorted(bed.time, self.frames.times[index], side="right")) - 1
         return bool(bed.phase[max(row, 0)] == "rest")
@@ -240,21 +225,13 @@ class _Story:
         """Whether it was set down and came to rest, so that its last frame shows it at rest."""
         sinkage = self.run.quantities.get("sinkage")
         value = sinkage.get("value") if isinstance(sinkage, dict) else sinkage
-        return self.kind == "set_down" and value is not None
-
-    @property
-    def kind(self) -> str:
-        return self.run.kind
-
-    @property
-    def speed(self) -> float:
-        return self.run.speed or 0.0
+        return self.run.kind == "set_down" and value is not None
 
     @property
     def title(self) -> str:
-        speed = f" at {self.speed:.3g} m/s"
+        speed = f" at {self.run.speed or 0.0:.3g} m/s"
         words = {"driven": f"Driven{speed}", "drop": f"Dropped{speed}", "set_down": "Set down"}
-        return words.get(self.kind, self.name)
+        return words.get(self.run.kind, self.name)
 
     def line(self, index: int) -> str:
         parts = [f"bed {self.run.seed}"] if self.run.seed is not None else []
@@ -308,8 +285,8 @@ def _plan(
             return
         file = figures / f"bed-{story.name}-{moment}.png"
         job["views"].append(_view(run, story, [index], by, upper, file, size))
-        said = f"{story.line(index)}.".replace("\n", ", ").replace("bed ", "Bed ", 1)
-        stills.append(Picture(file, f"{story.title}: {words}", said))
+        caption = f"{story.line(index)}.".replace("\n", ", ").replace("bed ", "Bed ", 1)
+        stills.append(Picture(file, f"{story.title}: {words}", caption))
 
     def deep(story: _Story) -> None:
         if story.rested:  # it moves grains far less than a drive does: its scale is its own
@@ -325,7 +302,7 @@ def _plan(
     if fast > 0.0:
         still(main, half, "speed", nice_above(fast), "speed", "the grains' speed half way in")
     last = len(main.frames) - 1
-    if last != main.deepest and main.kind == "driven":
+    if last != main.deepest and main.run.kind == "driven":
         inside = main.depth[last] > 0.0
         still(main, last, "displacement", top, "end", "near the end of the pull-out" if inside else "pulled out")
     for story in chosen[1:]:
@@ -341,15 +318,11 @@ def _plan(
 
 def _choose(stories: list[_Story]) -> list[_Story]:
     """The slowest and fastest driven run, the fastest drop and one set down; the first is animated."""
-    driven = sorted((s for s in stories if s.kind == "driven"), key=lambda s: (s.speed, -len(s.frames)))
-    drops = sorted((s for s in stories if s.kind == "drop"), key=lambda s: s.speed)
-    rest = [s for s in stories if s.kind == "set_down"]
+    driven = sorted((s for s in stories if s.run.kind == "driven"), key=lambda s: (s.run.speed or 0.0, -len(s.frames)))
+    drops = sorted((s for s in stories if s.run.kind == "drop"), key=lambda s: s.run.speed or 0.0)
+    rest = [s for s in stories if s.run.kind == "set_down"]
     wanted = [*driven[:1], *driven[-1:], *drops[-1:], *rest[:1]]
-    chosen: list[_Story] = []
-    for story in wanted or stories[:4]:
-        if story not in chosen:
-            chosen.append(story)
-    return chosen
+    return list(dict.fromkeys(wanted or stories[:4]))
 
 
 def _half_way(story: _Story) -> int:
@@ -390,7 +363,7 @@ def _view(
     count = f"{len(position):,}".replace(",", "\N{NO-BREAK SPACE}")
     return {
         "name": story.name, "frames": frames, "by": by, "top": top, "title": story.title,
-        "lines": [story.line(index) for index in frames], "note": f"{count} grains; {_CUT}", "low": low.tolist(),
+        "lines": [story.line(index) for index in frames], "note": f"{count} grains; {CUT}", "low": low.tolist(),
         "high": high.tolist(), "cut": cut, "radius": float(first.grains["radius"].mean()), "surface": surface,
         "file": str(file), "size": list(size),
     }  # fmt: skip

@@ -18,14 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageColor
 
-from vis.page.style import STATES
-from vis.pictures.arrows import FORCE
-from vis.pictures.canvas import Page, colourmap
+from vis.page.plots import STATES
+from vis.pictures.canvas import FORCE, Page, colourmap
 from vis.pictures.frames import read_frames
 from vis.pictures.scene import Scene
 from vis.pictures.sections import Section
 
-__all__ = ["PictureJob", "View", "main", "run_job", "write_gif", "write_pictures"]
+__all__ = ["CUT", "PictureJob", "View", "main", "run_job", "write_gif", "write_pictures"]
 
 
 class View(TypedDict):
@@ -55,6 +54,9 @@ class PictureJob(TypedDict):
     views: list[View]
 
 
+CUT = "cut open along the spike's mid-plane: what is in front is left out, of the spike too"
+_SLAB = "shown are those up to four diameters behind the spike's mid-plane, the farther the darker"
+"""In the small print of a picture with OpenGL, and of one without."""
 _GIF_LIMIT = 5_500_000  # bytes
 _KEPT = tuple(ImageColor.getrgb(colour)[:3] for colour in ("#ffffff", *STATES.values(), str(FORCE["color"])))
 """Colours that no film may change for one near it, as rare as they are: a legend's would come out alike."""
@@ -93,11 +95,12 @@ def _images(folder: Path, view: View, opengl: bool) -> Iterator[NDArray[np.uint8
     low, high = np.array(view["low"]), np.array(view["high"])
     page, frames = Page(size, view["by"], view["top"]), read_frames(folder, view["name"])
     section = (low[0], high[0], view["cut"], low[2], view["surface"])
+    note = view["note"] if opengl else view["note"].replace(CUT, _SLAB)
     drawer = (Scene if opengl else Section)(size, low, high, cut=view["cut"], radius=view["radius"])
     with closing(drawer):
         for index, line in zip(view["frames"], view["lines"], strict=True):
             draw = partial(drawer.draw, frame=frames[index], colours=page.colours(frames[index].grains))
-            yield page.compose(view["title"], line, draw, place=drawer.place, section=section, note=view["note"])
+            yield page.compose(view["title"], line, draw, place=drawer.place, section=section, note=note)
 
 
 def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80, limit: int = _GIF_LIMIT) -> None:

@@ -186,13 +186,14 @@ class Eye:
     """Where a point lies on a picture of `width` [m] across whose middle is at the focus.
 
     ``size``: Of the picture [pixels]. ``width``: What it shows across [m]. ``cut``: y of the plane that is looked at
-    [m]. ``pitch``: How far the view goes downwards [radians].
+    [m]. ``pitch``: How far the view goes downwards [radians]. Its `reach` is how far from the focus there is something
+    to be seen [m].
     """
 
     def __init__(self, size: tuple[int, int], *, width: float, cut: float, pitch: float = 0.0) -> None:
         self.size, self.width, self.cut = size, width, cut
         self.height = width * size[1] / size[0]
-        self.pitch = pitch
+        self.pitch, self.reach = pitch, 0.5 * width
 
     def place(self, points: Array, focus: tuple[float, float]) -> Array:
         """Fractions of the picture from its lower left corner, shape (n, 2), of points [m], shape (n, 3)."""
@@ -212,28 +213,18 @@ class Stage(Eye, Rendered):
     grain [m], for the shading of gaps; None: a block of ground in place of grains. (the others as `Eye`)
     """
 
-    def __init__(
-        self,
-        size: tuple[int, int],
-        *,
-        width: float,
-        cut: float,
-        low: Array,
-        high: Array,
-        radius: float | None,
-        pitch: float = 0.24,
-    ) -> None:
-        Eye.__init__(self, size, width=width, cut=cut, pitch=pitch)
+    def __init__(self, size: tuple[int, int], *, low: Array, high: Array, radius: float | None, **view: float) -> None:
+        Eye.__init__(self, size, **({"pitch": 0.24} | view))
         Rendered.__init__(self, size, centre=np.zeros(3), reach=1.0)
         thick = 0.03 * float(high[2] - low[2])
         if radius is None:
-            self.add_block((low[0], high[0], cut, high[1], low[2], high[2]), GROUND, 0.4, 0.7)
+            self.add_block((low[0], high[0], self.cut, high[1], low[2], high[2]), GROUND, 0.4, 0.7)
         else:
-            self.add_block((low[0], high[0], cut, high[1], low[2] - thick, low[2] - 1e-6), FLOOR, 0.25, 0.8)
-            if radius / width * size[0] > 4.0:  # on smaller grains the shading of gaps does not show
+            self.add_block((low[0], high[0], self.cut, high[1], low[2] - thick, low[2] - 1e-6), FLOOR, 0.25, 0.8)
+            if radius / self.width * size[0] > 4.0:  # on smaller grains the shading of gaps does not show
                 self._plotter.enable_ssao(radius=3.0 * radius, bias=0.3 * radius, kernel_size=32, blur=True)
         self._plotter.enable_parallel_projection()
-        self.reach = 0.5 * width + 2.0 * float(high[1] - low[1])
+        self.reach = 0.5 * self.width + 2.0 * float(high[1] - low[1])
 
     def render(self, frame: Frame, colours: Array, focus: tuple[float, float]) -> NDArray[np.uint8]:
         """Image of a frame with `focus` (x, z) [m] in its middle, shape (height, width, 3)."""

@@ -79,10 +79,8 @@ class FlatStage(Eye):
     Arguments as `Stage`.
     """
 
-    def __init__(
-        self, size: tuple[int, int], *, width: float, cut: float, low: Array, high: Array, radius: float | None
-    ) -> None:
-        super().__init__(size, width=width, cut=cut)
+    def __init__(self, size: tuple[int, int], *, low: Array, high: Array, radius: float | None, **view: float) -> None:
+        super().__init__(size, **view)
         self.low, self.high, self.radius = low, high, radius
 
     def close(self) -> None:

@@ -12,6 +12,8 @@ from vis.pictures.frames import HeightMap
 
 __all__ = ["height_map", "lying"]
 
+Array = NDArray[np.float64]
+
 NEAR = 1.1
 """Centres this near, over the sum of the radii, are of one heap [1]: grains that hop by less still lie."""
 
@@ -70,13 +72,7 @@ def height_map(
     return HeightMap((float(0.5 * step[0]), float(0.5 * step[1])), (float(step[0]), float(step[1])), {"height": shaped})
 
 
-def _raise(
-    height: NDArray[np.float64],
-    centres: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    step: NDArray[np.float64],
-) -> None:
+def _raise(height: Array, centres: Array, radii: Array, counts: NDArray[np.int64], step: Array) -> None:
     """Lift `height` to the spheres' upper sides, one offset of the grid after another for all grains at once."""
     base = np.floor(centres[:, :2] / step).astype(int)
     reach = np.ceil(radii.max() / step).astype(int)

@@ -14,10 +14,9 @@ from vis.film.reel import NAME, SpaceReel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity
 from vis.page.page import Block, Section, Tile, listing, text
-from vis.page.plots import DASHED, DOTTED, Array, legend_above, mean_over, sheet
-from vis.page.report import Report, Result, again, given, report_of
+from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, Array, legend_above, mean_over, sheet
+from vis.page.report import Report, Result, given, report_of
 from vis.page.states import States, draw_bands, draw_states, passages
-from vis.page.style import BED, GREY, INK, MODEL
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
 
@@ -53,14 +52,14 @@ def write_spatial_report(
     if pictures and NAME in frame_names(home):
         made = draw_runs([SpaceReel(home)], home, "space", by=colour, film=film, progress=report.rest())
         seen = [Section("Seen", [*shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)])]
-    told = result.get("transitions")  # an older folder has none
+    changes = result.get("transitions")  # an older folder has none
     sections = [
         Section("", [listing(result["departures"]["sentences"]), *drawn, *_grains(result)]),
         *seen,
-        *([Section("Transitions", passages(told, angle="turn", label="turn [degrees]"))] if told else []),
+        *([Section("Transitions", passages(changes, angle="turn", label="turn [degrees]"))] if changes else []),
         Section("The trial", [given(result["trial"])]),
         report.numbers(beside=(result.get("grains") or {}).get("beside") or {}),
-        again("hedgebed tumble spatial run.toml", f"With hedgebed {result['version']}, in this folder:"),
+        report.again("hedgebed tumble spatial run.toml"),
     ]
     quantities = result["quantities"]
     tiles = [
@@ -140,14 +139,14 @@ def _draw_ground(motion: Columns) -> Figure:
 
 
 def _draw_energy(motion: Columns) -> Figure:
-    drawing, book, left = _pair("energy [mJ]", "left over [µJ]")
+    drawing, energy, left = _pair("energy [mJ]", "left over [µJ]")
     time = motion["t_s"]
     gained = 1e3 * (motion["kinetic_J"] + motion["potential_J"])
     gained = gained - gained[0]
     work, taken = 1e3 * motion["torque_work_J"], 1e3 * (motion["taken_J"] - motion["taken_J"][0])
-    book.plot(time, work, color=BED, label="work of the torques")
-    book.plot(time, gained, color=MODEL, ls=DASHED, label="gained by the platform")
-    book.plot(time, taken, color=GREY, ls=DOTTED, label="taken by the ground")
+    energy.plot(time, work, color=BED, label="work of the torques")
+    energy.plot(time, gained, color=MODEL, ls=DASHED, label="gained by the platform")
+    energy.plot(time, taken, color=GREY, ls=DOTTED, label="taken by the ground")
     left.plot(time, 1e3 * (gained - work + taken), color=INK, lw=1.0)
-    legend_above(drawing, book.lines, 3)
+    legend_above(drawing, energy.lines, 3)
     return drawing

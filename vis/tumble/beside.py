@@ -34,7 +34,7 @@ def beside_rows(own: Quantities, beside: Quantities) -> list[tuple[str, str, str
 
 
 def beside_words(own: Quantities, beside: Quantities) -> str:
-    """Whether the platform went up or down in its first 10 mm, and what the spring-damper says, in a sentence."""
+    """Whether the platform went up or down in its first 10 mm, and on the spring-damper, in a sentence."""
     angles = [side["trajectory_angle"]["value"] for side in (own, beside)]
     words = [None if angle is None else _way(float(angle)) for angle in angles]
     if words[0] is None and words[1] is None:
@@ -50,7 +50,7 @@ def beside_words(own: Quantities, beside: Quantities) -> str:
 def _way(angle: float) -> str:
     """A trajectory angle [rad] in words: up, down or level, and the degrees."""
     degrees = math.degrees(angle)
-    told = f"{degrees:+.1f}".replace("-", "−")
-    if told[1:] == "0.0":
+    signed = f"{degrees:+.1f}".replace("-", "−")
+    if signed[1:] == "0.0":
         return "level (0.0 degrees)"
-    return f"{'up' if degrees > 0 else 'down'} ({told} degrees)"
+    return f"{'up' if degrees > 0 else 'down'} ({signed} degrees)"

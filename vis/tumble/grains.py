@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 
 from vis.page.numbers import short
 from vis.page.page import Section, table, text
-from vis.page.plots import DASHED, Array, legend_above, mean_over, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, as_it_lies, legend_above, mean_over, sheet
 from vis.page.report import Report
-from vis.page.style import BED, GREY, INK, MODEL, as_it_lies
 from vis.tumble.beside import HEAD, beside_rows, beside_words
 
 __all__ = ["grains_section"]
@@ -30,8 +29,8 @@ def grains_section(report: Report) -> Section:
         report.draw("feet", _draw_feet(columns["feet"])),
     ]
     if "damping_lost_J" in columns.get("bed", {}):
-        book = _books(report.columns("series/motion.csv"), columns["feet"], columns["bed"])
-        drawn.append(report.draw("books", _draw_books(book)))
+        balance = _balance(report.columns("series/motion.csv"), columns["feet"], columns["bed"])
+        drawn.append(report.draw("books", _draw_balance(balance)))
     grains = result["grains"]
     facts = (
         f"{grains['mode']}. {grains['grain_count']} grains, packing {short(grains['packing_fraction'], 3)}, "
@@ -52,7 +51,7 @@ def grains_section(report: Report) -> Section:
     return Section("On grains, beside the spring-damper", blocks)
 
 
-def _books(motion: Columns, feet: Columns, bed: Columns) -> Columns:
+def _balance(motion: Columns, feet: Columns, bed: Columns) -> Columns:
     """The books at the times of ``bed`` [mJ]."""
     time = bed["t_s"]
 
@@ -60,30 +59,30 @@ def _books(motion: Columns, feet: Columns, bed: Columns) -> Columns:
         values = 1e3 * np.interp(time, columns["t_s"], columns[name])
         return np.asarray(values - values[0])
 
-    book = {"time": time, "torque": at(motion, "torque_work_J"), "taken": at(feet, "taken_J")}
-    book["body"] = at(motion, "kinetic_J") + at(motion, "potential_J")
+    balance = {"time": time, "torque": at(motion, "torque_work_J"), "taken": at(feet, "taken_J")}
+    balance["body"] = at(motion, "kinetic_J") + at(motion, "potential_J")
     names = ("kinetic", "potential", "normal", "tangential", "turning")
     held = 1e3 * np.sum([bed[f"{name}_J"] for name in names], axis=0)
-    book["held"] = held - held[0]
+    balance["held"] = held - held[0]
     for name in ("damping", "friction", "rolling"):
-        book[name] = 1e3 * bed[f"{name}_lost_J"]
-    lost = book["damping"] + book["friction"] + book["rolling"]
-    book["coupling"] = book["body"] - book["torque"] + book["taken"]
-    book["all"] = book["body"] - book["torque"] + book["held"] + lost
-    return book
+        balance[name] = 1e3 * bed[f"{name}_lost_J"]
+    lost = balance["damping"] + balance["friction"] + balance["rolling"]
+    balance["coupling"] = balance["body"] - balance["torque"] + balance["taken"]
+    balance["all"] = balance["body"] - balance["torque"] + balance["held"] + lost
+    return balance
 
 
-def _draw_books(book: Columns) -> Figure:
+def _draw_balance(balance: Columns) -> Figure:
     drawing, ((where, left),) = sheet(1, 2, 3.4)
     lines = (
         ("torque", "work of the torque", INK), ("body", "platform", MODEL), ("held", "grains hold", "#56B4E9"),
         ("damping", "dashpots", "#E69F00"), ("friction", "friction", BED), ("rolling", "rolling resistance", "#CC79A7"),
     )  # fmt: skip
     for name, label, colour in lines:
-        where.plot(book["time"], book[name], color=colour, lw=1.4, label=label)
+        where.plot(balance["time"], balance[name], color=colour, lw=1.4, label=label)
     where.set(xlabel="time [s]", ylabel="energy [mJ]")
-    left.plot(book["time"], 1e3 * book["all"], color=INK, lw=1.2, label="all together")
-    left.plot(book["time"], 1e3 * book["coupling"], color=GREY, lw=1.2, ls=DASHED, label="platform and exchange")
+    left.plot(balance["time"], 1e3 * balance["all"], color=INK, lw=1.2, label="all together")
+    left.plot(balance["time"], 1e3 * balance["coupling"], color=GREY, lw=1.2, ls=DASHED, label="platform and exchange")
     left.set(xlabel="time [s]", ylabel="left over [µJ]")
     left.legend(frameon=False, fontsize="small")
     legend_above(drawing, where.lines, 6, fontsize="small")

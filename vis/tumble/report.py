@@ -19,11 +19,10 @@ from vis.film.reel import Reel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity, short
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
-from vis.page.plots import DASHED, DOTTED, Array, handle, legend_above, sheet
-from vis.page.report import Report, Result, again, given, report_of, tables
+from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
+from vis.page.report import Report, Result, given, report_of, tables, terms_text
 from vis.page.sentences import Sentences
 from vis.page.states import States, by_state, draw_states, legend_of_states, panels, passages
-from vis.page.style import BED, GREY, INK, MODEL, STATES
 from vis.pictures.canvas import COLOURS, nice_above
 from vis.pictures.pictures import Picture
 from vis.tumble.beside import HEAD
@@ -59,17 +58,14 @@ def write_tumble_report(
     title, caption = report.captions("moving.title"), report.captions("moving.caption", far=_FOLLOWED)
     movie = _animate(home / "animation.gif", result, numbers, states)
     moving = figure(movie, title=title, caption=caption, half=True, show_file=True)
+    settled = f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}."
     sections = [
         Section("", [path, turned, moving]),
         Section("Transitions", passages(result["transitions"], angle="theta", label="θ [degrees]")),
         Section("Energy", [energy]),
-        Section("The trial", [given(result["trial"]), _settled(result)]),
+        Section("The trial", [given(result["trial"]), text(f"{settled} {terms_text(result)}")]),
         report.numbers(),
-        again(
-            "hedgebed tumble run.toml",
-            f"With hedgebed {result['version']}, in this folder:",
-            "The same settings give the same trajectory.csv.",
-        ),
+        report.again("hedgebed tumble run.toml", "trajectory.csv"),
     ]
     if "sweep" in result:
         sections.insert(0, _sweep_section(report))
@@ -83,18 +79,6 @@ def write_tumble_report(
         sections.insert(1, _seen(report, colour, film))
     lead = ["tumble", f"{result['duration']:g} s", f"{len(numbers['t_s'])} rows"]
     return report.write(sections, lead=lead, tiles=_tiles(result))
-
-
-def _settled(result: Result) -> Block:
-    """What the trial was, in a sentence each."""
-    effects = [
-        f"{effect['id']} ({', '.join(f'{key} = {value:g}' for key, value in effect['parameters'].items())})"
-        for effect in result["effects"]
-    ]
-    return text(
-        f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}. "
-        f"Terms beyond the base model: {', '.join(effects) if effects else 'none'}.",
-    )
 
 
 def _seen(report: Report, colour: str, film: bool) -> Section:
@@ -175,12 +159,12 @@ def _energy(report: Report) -> Block:
     time = motion["t_s"]
     gained = 1e3 * (motion["energy_J"] - motion["energy_J"][0])
     work, lost = 1e3 * motion["torque_work_J"], 1e3 * motion["dissipated_J"]
-    drawing, (book, rest) = panels(2, 3.0)
-    book.plot(time, work, color=BED, label="work of the torque")
-    book.plot(time, gained, color=MODEL, ls=DASHED, label="energy gained")
-    book.plot(time, lost, color=GREY, ls=DOTTED, label="dissipated")
-    book.set(xlabel="time [s]", ylabel="energy [mJ]")
-    drawing.legend(handles=book.lines, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=3)
+    drawing, (energy, rest) = panels(2, 3.0)
+    energy.plot(time, work, color=BED, label="work of the torque")
+    energy.plot(time, gained, color=MODEL, ls=DASHED, label="energy gained")
+    energy.plot(time, lost, color=GREY, ls=DOTTED, label="dissipated")
+    energy.set(xlabel="time [s]", ylabel="energy [mJ]")
+    drawing.legend(handles=energy.lines, loc="upper left", bbox_to_anchor=(0.075, 1.0), ncols=3)
     residual = gained - work + lost
     most = float(np.abs(residual).max())
     unit, scale = next(((u, k) for u, k in _JOULES if most * k >= 0.999), _JOULES[-1])
@@ -299,8 +283,8 @@ def _sweep_section(report: Report) -> Section:
     drawing = _draw_sweep(sweep["keys"], report.columns(sweep["file"]))
     names = " and ".join(key["key"] for key in sweep["keys"])
     drawn = report.draw("sweep", drawing, trials=sweep["trials"], names=names)
-    told = tables(report.result) if "tables" in report.result else []
-    return Section("The sweep", [drawn, *told, listing(sweep["sentences"])])
+    made = tables(report.result) if "tables" in report.result else []
+    return Section("The sweep", [drawn, *made, listing(sweep["sentences"])])
 
 
 def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
@@ -309,8 +293,8 @@ def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
     if len(keys) == 1:
         for axis, (name, scale, label) in zip(axes, _PANELS, strict=True):
             axis.plot(columns[keys[0]["column"]], scale * columns[name], "o-", color=BED, ms=3.5, lw=1.4)
-            _say_if_empty(axis, keys[0], columns[name])
-            _label(axis, keys[0], label)
+            _note_if_empty(axis, keys[0], columns[name])
+            axis.set(xlabel=_words(keys[0]), ylabel=label)
         return drawing
     along, other = (0, 1) if shape[0] >= shape[1] else (1, 0)
     grids = [scale * np.moveaxis(columns[name].reshape(shape), along, 0) for name, scale, _ in _PANELS]
@@ -327,8 +311,8 @@ def _draw_sweep(keys: Sequence[Result], columns: Mapping[str, Array]) -> Figure:
     for axis, grid, (_, _, label) in zip(axes, grids, _PANELS, strict=True):
         for values, colour, value in zip(grid.T, colours, keys[other]["values"], strict=True):
             axis.plot(keys[along]["values"], values, "o-", color=colour, ms=3, lw=1.3, label=f"{value:g}")
-        _say_if_empty(axis, keys[along], grid)
-        _label(axis, keys[along], label)
+        _note_if_empty(axis, keys[along], grid)
+        axis.set(xlabel=_words(keys[along]), ylabel=label)
     legend_above(drawing, axes[0].lines, _MOST_LINES, title=_words(keys[other]))
     return drawing
 
@@ -337,11 +321,7 @@ def _words(key: Result) -> str:
     return key["key"] if key["unit"] == "1" else f"{key['key']} [{key['unit']}]"
 
 
-def _label(axis: Axes, key: Result, label: str) -> None:
-    axis.set(xlabel=_words(key), ylabel=label)
-
-
-def _say_if_empty(axis: Axes, key: Result, values: Array) -> None:
+def _note_if_empty(axis: Axes, key: Result, values: Array) -> None:
     if np.isnan(values).all():
         axis.set_xlim(min(key["values"]), max(key["values"]))
         axis.set_yticks([])

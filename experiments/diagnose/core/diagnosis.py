@@ -19,31 +19,8 @@ from experiments.diagnose.noise.lone_beds import lone_finding
 from experiments.diagnose.noise.replicates import Scatter, exchanged, groups_of, odd_trials, split_trials, trends
 from experiments.diagnose.noise.wander import Wander
 
-from .deciding import (
-    diverging_beside,
-    explains_nothing,
-    held_out_divergences,
-    missed,
-    unscattered,
-    verdict_of,
-)
+from . import deciding, renoised
 from .outcome import Diagnosis, Known, finish
-from .renoised import (
-    calmed,
-    coloured,
-    colours_of,
-    differ,
-    doubted,
-    jittered,
-    leaves_much,
-    lone_scatter_of,
-    plain,
-    recoloured,
-    rescattered,
-    scatter_of,
-    wander_of,
-    whitened_fit,
-)  # fmt: skip
 from .search import Choice, Search
 
 __all__ = ["diagnose"]
@@ -150,44 +127,46 @@ class _Course:
         problem.calm({})
         begun = asked.begun
         if begun is None or begun.jitters or not (asked.aside or asked.looked_at):  # or else all is fitted anew below
-            base, jitters = jittered(whitened_fit(Model(problem, Whitener.white(problem), fitted)), self.held_out)
+            base, jitters = renoised.jittered(
+                renoised.whitened_fit(Model(problem, Whitener.white(problem), fitted)), self.held_out
+            )
             odd = []
             if any(len(ids) > 2 for ids in groups_of(problem.trials).values()) or problem.contacts is None:
-                odd = odd_trials(whitened_fit(base.model.on([t.id for t in problem.trials])))
+                odd = odd_trials(renoised.whitened_fit(base.model.on([t.id for t in problem.trials])))
             begun = _Begun(base, jitters, odd)
         self.begun, self.jitters, base = begun, begun.jitters, begun.base
         if begun.odd:
             self.findings += begun.odd
             at_odds = {finding.trial for finding in begun.odd}
             fitted, self.held_out = split_trials([t for t in problem.trials if t.id not in at_odds])
-            base = whitened_fit(base.model.on(fitted))
+            base = renoised.whitened_fit(base.model.on(fitted))
         if asked.looked_at:
             fitted, self.held_out = exchanged(problem.trials, fitted, self.held_out, asked.looked_at)
-            base = whitened_fit(base.model.on(fitted))
+            base = renoised.whitened_fit(base.model.on(fitted))
         if asked.aside:
             self.findings += asked.aside
             gone = {finding.trial for finding in asked.aside}
             fitted = tuple(trial for trial in fitted if trial not in gone)
-            base = whitened_fit(base.model.on(fitted), beginnings=True)
+            base = renoised.whitened_fit(base.model.on(fitted), beginnings=True)
         self.base = base
 
     def _find_noise(self) -> None:
         """The scatter of replicates, readings in doubt, and the noise's colour."""
-        scatter = scatter_of(self.base, self.held_out)
+        scatter = renoised.scatter_of(self.base, self.held_out)
         self.findings += trends(scatter, self.problem.trials)
         self.model_std = scatter.model_std
-        base = rescattered(self.base, scatter) if scatter.parameters else self.base
+        base = renoised.rescattered(self.base, scatter) if scatter.parameters else self.base
         if self.asked.with_wander:
-            self.wander = wander_of(base, self.held_out)
-        base = doubted(calmed(base, self.wander), self.held_out)
-        self.colours = colours_of(base)
-        self.base = coloured(base, self.colours)
+            self.wander = renoised.wander_of(base, self.held_out)
+        base = renoised.doubted(renoised.calmed(base, self.wander), self.held_out)
+        self.colours = renoised.colours_of(base)
+        self.base = renoised.coloured(base, self.colours)
 
     def _ask_gate(self) -> None:
         """Whether the base model leaves anything; where it is rough and leaves little, also from the beginnings."""
         self.tell("is anything left?", 0.0)
         self.first = self._gate_of_base()
-        if self.first.passed or self.problem.contacts is None or leaves_much(self.base):
+        if self.first.passed or self.problem.contacts is None or renoised.leaves_much(self.base):
             return
         other = by_beginnings(self.base)
         if other is not self.base:
@@ -207,7 +186,7 @@ class _Course:
         )[1]  # fmt: skip
 
     def _recoloured(self, found: Fit) -> Fit:
-        return recoloured(found, self.colours)
+        return renoised.recoloured(found, self.colours)
 
     def _diverging(self, found: Fit) -> tuple[Finding, ...]:
         """Trials that diverge from a fit."""
@@ -235,7 +214,7 @@ class _Course:
             return choice
         if best.fit.chi_square > _MOST_LEFT * best.fit.count or not self._describes_motion(best):
             return choice
-        self.alone = fit(replace(self.base.model, scatter=()), unscattered(self.base))
+        self.alone = fit(replace(self.base.model, scatter=()), deciding.unscattered(self.base))
         self.problem.rewhiten(best.fit.values, best.fit.model.forms)
         self.base = fit(self.base.model, self.base.values)
         found = fit(best.fit.model, best.fit.values)
@@ -256,13 +235,13 @@ class _Course:
         best = choice.best
         if not self._describes_motion(best):
             return choice
-        scatter = scatter_of(best.fit, self.held_out)
-        wander = wander_of(best.fit, self.held_out) if self.asked.with_wander else self.wander
+        scatter = renoised.scatter_of(best.fit, self.held_out)
+        wander = renoised.wander_of(best.fit, self.held_out) if self.asked.with_wander else self.wander
         if set(scatter.model_std) == set(self.model_std) and not wander.other_than(self.wander):
             return choice
         self.tell("replicates are found to differ otherwise: choosing again", 0.0)
         self.model_std, self.wander = scatter.model_std, wander
-        self.base = coloured(calmed(rescattered(self.base, scatter), wander), self.colours)
+        self.base = renoised.coloured(renoised.calmed(renoised.rescattered(self.base, scatter), wander), self.colours)
         return self._chosen()
 
     def _scattered_beside(self, choice: Choice) -> Choice:
@@ -274,7 +253,7 @@ class _Course:
         for kinds, beside in itertools.product(((), *later), fits[1:] if named else fits):
             if choice.left.passed and not named:
                 break
-            scatter = scatter_of(beside, self.held_out, apart=True, kinds=kinds)
+            scatter = renoised.scatter_of(beside, self.held_out, apart=True, kinds=kinds)
             if not scatter.parameters or set(scatter.model_std) == set(self.model_std):
                 continue
             if named:
@@ -293,10 +272,10 @@ class _Course:
         found: list[tuple[Scatter, Fit]] = []
         fits, asked = (choice.best.fit, choice.base.fit), self.problem.lone_scatter
         for beside, kinds in itertools.product(fits[1:] if choice.left.passed else fits, asked):
-            scatter, findings = lone_scatter_of(beside, self.held_out, kinds=kinds)
+            scatter, findings = renoised.lone_scatter_of(beside, self.held_out, kinds=kinds)
             self.findings += [finding for finding in findings if finding not in self.findings]
             if scatter.parameters and all(scatter.model_std != other.model_std for other, _ in found):
-                found.append((scatter, rescattered(plain(self.base), scatter)))
+                found.append((scatter, renoised.rescattered(renoised.plain(self.base), scatter)))
         # Zeros of depth and force are next to the same in a stiff bed: the likeliest is asked first.
         for scatter, beside in sorted(found, key=lambda one: one[1].objective):
             self.tell("trials are found to differ without a rule: choosing again", 0.0)
@@ -335,9 +314,9 @@ class _Course:
     def _beside(self, scatter: Scatter, base: Fit | None) -> tuple[Fit, dict[str, Colour]]:
         """Take `scatter` into the base model, and the colour that shows then; fit and colours as they were."""
         before = self.base, self.colours
-        base = base or rescattered(plain(self.base), scatter)
-        self.colours = {**self.colours, **colours_of(base)}
-        self.base = coloured(base, self.colours)
+        base = base or renoised.rescattered(renoised.plain(self.base), scatter)
+        self.colours = {**self.colours, **renoised.colours_of(base)}
+        self.base = renoised.coloured(base, self.colours)
         return before
 
     def _compares(self, choice: Choice) -> bool:
@@ -355,7 +334,7 @@ class _Course:
         """Times that jitter, at the slopes of the motion as it is now known."""
         if not choice.best.effects:
             return choice
-        best, jitters = jittered(choice.best.fit, self.held_out, self.jitters)
+        best, jitters = renoised.jittered(choice.best.fit, self.held_out, self.jitters)
         if not jitters:
             return choice
         known = {jitter.channels for jitter in self.jitters}
@@ -369,19 +348,19 @@ class _Course:
 
     def _recoloured_choice(self, choice: Choice) -> Choice:
         """With a colour that shows only beside effects that describe the motion."""
-        white = plain(choice.best.fit)
-        fresh = colours_of(white)
-        if not differ(fresh, self.colours):
+        white = renoised.plain(choice.best.fit)
+        fresh = renoised.colours_of(white)
+        if not renoised.differ(fresh, self.colours):
             return choice
-        best = coloured(white, fresh)
-        self.base, self.colours = coloured(plain(self.base), fresh), fresh
+        best = renoised.coloured(white, fresh)
+        self.base, self.colours = renoised.coloured(renoised.plain(self.base), fresh), fresh
         return self._moved(choice, best)
 
     def _doubted(self, choice: Choice) -> Choice:
         """With readings in doubt that the best model makes so."""
         if not choice.best.effects:
             return choice
-        best = doubted(choice.best.fit, self.held_out)
+        best = renoised.doubted(choice.best.fit, self.held_out)
         if best is choice.best.fit:
             return choice
         self.base = fit(self.base.model, self.base.values)
@@ -398,14 +377,14 @@ class _Course:
         asked, held_out = self.asked, self.held_out
         self.tell("verdict", 0.0)
         choice = self._ended(choice)
-        if choice.best.effects and self.problem.contacts is not None and explains_nothing(choice, held_out):
+        if choice.best.effects and self.problem.contacts is not None and deciding.explains_nothing(choice, held_out):
             return self._nothing(choice.left)
         held = self._held_out_gate(choice.best.fit)
-        verdict = verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
+        verdict = deciding.verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
         # Where a second effect was called for, diverging trials were considered before it.
         before = verdict == "unknown" and choice.left.passed and len(choice.best.effects) > 1
         if not (asked.aside or before):
-            gone = diverging_beside(self.base, choice, verdict, self._diverging)
+            gone = deciding.diverging_beside(self.base, choice, verdict, self._diverging)
             if gone:
                 self.tell("a trial goes its own way: once more without it", 0.0)
                 anew = self._again(aside=gone, looked_at=asked.looked_at)
@@ -414,7 +393,7 @@ class _Course:
         explains = verdict == "unknown" and bool(choice.best.effects) and choice.left.passed
         if explains and not (asked.looked_at or asked.aside):
             # What no fitted trial shows of a form may show in these: an effect then has to explain all of them.
-            others = missed(choice.best.fit, held_out, asked.seed)
+            others = deciding.missed(choice.best.fit, held_out, asked.seed)
             if others:
                 self.tell("what the name leaves shows in trials that were held out: others are held out", 0.0)
                 anew = self._again(looked_at=others)
@@ -423,7 +402,7 @@ class _Course:
         sure: tuple[str, ...] = ()
         model_std = self.model_std
         if verdict == "unknown" and not asked.with_wander and choice.best.effects:
-            wander = wander_of(choice.best.fit, held_out)
+            wander = renoised.wander_of(choice.best.fit, held_out)
             if wander:
                 self.tell("replicates differ each in its own way: once more, against that", 0.0)
                 anew = self._again(
@@ -432,13 +411,13 @@ class _Course:
                 if anew.verdict == "named" and anew.choice is not None:
                     # Fitted, and the gap taken, with the sensors' noise alone.
                     sure = anew.effects
-                    best = settled(fit(self.base.model.with_forms(anew.forms), unscattered(anew.best)))
+                    best = settled(fit(self.base.model.with_forms(anew.forms), deciding.unscattered(anew.best)))
                     # The table of candidates, its base model with it, is of the likelihood in which it was made.
                     choice = replace(anew.choice, best=Hypothesis.of(best), left=choice.left)
                     held = self._held_out_gate(best)
                 model_std = {**model_std, **wander.model_std}
         if verdict in ("named", "ambiguous") and held is not None and not held.passed:
-            self.findings += held_out_divergences(choice.best.fit, held_out, asked.seed)
+            self.findings += deciding.held_out_divergences(choice.best.fit, held_out, asked.seed)
         return finish(self._known(model_std), self.base, choice, verdict, alone=self.alone, held=held, sure=sure)
 
     def _stands(self, anew: Diagnosis, gone: Sequence[Finding]) -> bool:
@@ -457,10 +436,10 @@ class _Course:
     def _nothing(self, last: Verdict | None = None) -> Diagnosis:
         """No effect is missing by the fitted trials; once more with others held out where these show more."""
         asked = self.asked
-        if others := () if asked.looked_at else missed(self.base, self.held_out, asked.seed):
+        if others := () if asked.looked_at else deciding.missed(self.base, self.held_out, asked.seed):
             self.tell("what is left shows in trials that were held out: others are held out", 0.0)
             return self._again(aside=asked.aside, looked_at=others)
-        self.findings += held_out_divergences(self.base, self.held_out, asked.seed)
+        self.findings += deciding.held_out_divergences(self.base, self.held_out, asked.seed)
         return finish(self._known(self.model_std), self.base, None, "none", alone=self.alone, last=last)
 
     def _known(self, model_std: Mapping[str, float]) -> Known:

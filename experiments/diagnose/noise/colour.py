@@ -21,10 +21,7 @@ __all__ = ["Colour", "colour_of", "find_colours", "find_white_noise", "together"
 
 _FAST = 0.15  # share of the band that counts as slow and is left out
 _FASTER = 0.5  # the same where a model leaves much: what a motion leaves falls with the frequency
-_QUIET, _LARGE = (
-    0.25,
-    1.5,
-)  # share of all pieces that count as the quiet ones, and their mean square over the stated one
+_QUIET, _LARGE = 0.25, 1.5  # share of all pieces that count as quiet, and their mean square over the stated one
 _SURE = 16.0  # twice the log likelihood that two more numbers must gain: chance 3e-4 under white noise
 _PIECES, _PIECE = 8, 24  # pieces of a recording, and samples of one at least, over which noise has to be alike
 _FEWEST = 100  # fast modes from which on a law is fitted

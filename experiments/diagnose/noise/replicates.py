@@ -146,9 +146,8 @@ def find_scatter(
 
 
 def with_scatter(model: Model, values: Values) -> Fit:
-    """The model's fit, from `values` and from where the problem's own search, which begins at what was stated, finds
-    it: a base model whose trials cannot differ bends what is shared, and ends on branches of stick and slip that nobody
-    measured."""
+    """The model's fit, from `values` and from the result of the problem's own search, which begins at what was stated:
+    a base model whose trials cannot differ bends what is shared, and ends on wrong branches of stick and slip."""
     found = fit(model, {p.name: values[p.name] for p in model.parameters if p.name in values})
     contacts = model.problem.contacts
     if contacts is None or inflation(found) == 1:

@@ -27,8 +27,8 @@ from experiments.diagnose.fit.problem import Form, Values
 from experiments.diagnose.noise.spectrum import line_rows
 from experiments.runs.folder import write_json, write_series, write_text
 
-from .candidates import candidate_rows
 from .gaps import Gaps
+from .sentences import candidate_rows
 
 __all__ = ["document", "write_diagnosis"]
 

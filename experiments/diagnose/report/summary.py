@@ -9,8 +9,16 @@ from experiments.diagnose.fit.evidence import SMALL
 from experiments.diagnose.fit.gaps import numeral, size_words
 from experiments.diagnose.noise.spectrum import line_sentence
 
-from .candidates import say, unnamed_sentence
-from .telling import remark_sentences, shares_words, size_sentences, small_names, sure_sentences, worse_sentences
+from .sentences import (
+    remark_sentences,
+    say,
+    shares_words,
+    size_sentences,
+    small_names,
+    sure_sentences,
+    unnamed_sentence,
+    worse_sentences,
+)
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 

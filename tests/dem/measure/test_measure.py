@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dem.grains.packing import draw_radii, rain_positions
-from dem.grains.profile import bulk_packing, packing_profile, surface_height
+from dem.grains.packing import bulk_packing, draw_radii, packing_profile, rain_positions, surface_height
 
 
 def test_the_packing_profile_integrates_to_the_solid_volume():

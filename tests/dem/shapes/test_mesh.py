@@ -11,7 +11,7 @@ import taichi as ti
 from dem import Mesh, Polyhedron, mesh_from_file
 from dem.engine import runtime
 from dem.engine.shape_table import ShapeTable
-from dem.shapes.mesh_tree import mesh_tree
+from dem.shapes.mesh import mesh_tree
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from experiments.bed.tests import quantity
 from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.runs.folder import read_series
 from vis.bed import tests as bed_cut
-from vis.bed.tests import said
+from vis.bed.tests import quoted
 
 GRAIN = 0.004
 SIZE = (0.072, 0.038, 0.02)
@@ -178,5 +178,5 @@ def test_the_line_above_which_a_face_has_fallen_is_drawn_where_it_falls():
     ("value", "std", "words"), [(0.164, 0.0143, "164 ± 14 mm"), (0.0584, 0.00504, "58 ± 5 mm"), (0.05, None, "50 mm")]
 )
 def test_a_tile_has_the_digits_that_its_error_lets_it_have(value, std, words):
-    told = said({"value": value, "std": std, "unit": "m"}, 1e3, " mm").replace("\N{NO-BREAK SPACE}", " ")
+    told = quoted({"value": value, "std": std, "unit": "m"}, 1e3, " mm").replace("\N{NO-BREAK SPACE}", " ")
     assert told.replace("50.0", "50") == words

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from campaign_files import change, tumble_folder
 from fake_bed import FakeBed
+from golden import golden
 from penetration_campaigns import campaign_of, driven_trial, drop_trial
 
 from experiments.campaign import Campaign, Recording, read_campaign, write_campaign
@@ -63,7 +64,7 @@ def test_a_new_campaign_is_checked_with_a_report(tmp_path, capsys):
     assert main(["campaign", "check", str(tmp_path / "c"), "--out", str(tmp_path / "run"), "--quiet"]) == 0
     said = capsys.readouterr().out
     assert "drop 0.4 m/s" in said and "nothing found" in " ".join(said.split())
-    assert "Nothing odd was found" in (tmp_path / "run" / "report.html").read_text()
+    assert "Nothing odd" in (tmp_path / "run" / "report.html").read_text()
     again = ["campaign", "check", str(tmp_path / "run" / "run.toml"), "--out", str(tmp_path / "again"), "--quiet"]
     assert main([*again, "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
@@ -105,7 +106,7 @@ def test_of_a_thousand_faults_of_one_kind_five_are_said_and_the_number(tmp_path)
     with pytest.raises(ValueError, match="omega_rad_s = 'x'") as error:
         read_campaign(folder)
     lines = str(error.value).splitlines()
-    assert len(lines) == 6 and lines[5].endswith("and 995 more lines of that kind")
+    assert len(lines) == 6 and "and 995 more" in lines[5]
 
 
 # check: what can be read but is odd
@@ -169,7 +170,7 @@ def test_what_is_odd_in_a_tumble_is_found_where_it_is_and_nowhere_else(tumbles, 
 def test_a_missing_sensor_is_said(tumbles):
     trials = tuple(t.model_copy(update={"imu": None}) if t.id == "005" else t for t in tumbles.tables.trial)
     (finding,) = find_faults(Campaign(tumbles.tables.model_copy(update={"trial": trials}), tumbles.recordings))
-    assert finding.what == "trial 005 has no recording of imu, others have"
+    assert finding.trial == "005" and "no recording of" in finding.what
 
 
 def test_a_push_at_odds_and_a_depth_that_jumps_are_found():
@@ -179,8 +180,7 @@ def test_a_push_at_odds_and_a_depth_that_jumps_are_found():
     drop["depth_m"][100:] += 0.004
     found = find_faults(campaign_of([*pushes, ("fall", "drop", 0.3, drop)]))
     assert {finding.trial for finding in found} == {"soft", "fall"}
-    assert any("trial fall: the depth jumps by" in finding.what for finding in found)
-    assert any("trial soft is at odds with its 3 replicates" in finding.what for finding in found)
+    golden("campaign/odd_pushes", [finding.what for finding in found])
 
 
 # from-run
@@ -259,7 +259,7 @@ def test_a_run_of_another_kind_is_refused_by_what_it_is(tmp_path, capsys, more):
     capsys.readouterr()
     assert main(["campaign", "from-run", str(tmp_path / "run"), str(tmp_path / "made"), *more]) == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert "is a run of 'tumble spatial': one of 'penetrate', or of 'tumble' in the plane, was expected" in said
+    assert "'tumble spatial'" in said and "'penetrate'" in said
 
 
 def test_only_a_finished_run_of_penetrate_becomes_a_campaign(grains, tmp_path):

@@ -114,10 +114,10 @@ def test_one_file_of_three_in_another_unit_is_set_aside_and_the_unit_said(factor
     problem = make_problem(campaign_of(trials))
     found = whitened_fit(Model(problem, Whitener.white(problem), tuple(trial.id for trial in problem.trials)))
     (odd,) = odd_trials(found)
-    assert odd.trial == "1" and odd.set_aside and ("as if it were in" in odd.what) == bool(unit)
-    assert f"as if it were in {unit}" in odd.what or not unit
+    assert odd.trial == "1" and odd.set_aside and ("as if it" in odd.what) == bool(unit)
+    assert f" in {unit}: " in odd.what or not unit
     (said,) = odd_replicates(campaign_of(trials))
-    assert said.trial == "1" and (f"as if it were in {unit}" in said.what) == bool(unit)
+    assert said.trial == "1" and (f" in {unit}: " in said.what) == bool(unit)
 
 
 def test_a_trial_at_odds_with_its_replicates_is_set_aside_and_said():

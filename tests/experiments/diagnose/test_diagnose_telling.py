@@ -13,17 +13,18 @@ from experiments.diagnose.core.next_steps import _follow
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.localise import Place
 from experiments.diagnose.noise.colour import Colour, together
-from experiments.diagnose.report.candidates import candidate_rows, unnamed_sentence
 from experiments.diagnose.report.gaps import Gaps
-from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
-from experiments.diagnose.report.telling import (
+from experiments.diagnose.report.sentences import (
+    candidate_rows,
     remark_sentences,
     size_sentences,
     sure_sentences,
     told_tables,
+    unnamed_sentence,
     where_sentences,
     worse_sentences,
 )
+from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
 
 
 def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():

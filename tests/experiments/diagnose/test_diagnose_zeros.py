@@ -58,7 +58,7 @@ def test_zeros_of_the_force_are_read_above_the_surface():
 def test_a_zero_that_differs_by_one_noise_is_nothing_missing_and_is_said():
     found = diagnose(problem_of(straight, zeros=FORCE_STD * OFF))
     assert found.verdict == "none" and found.model_std["force zero"] == pytest.approx(FORCE_STD, rel=0.3)
-    assert any("zero of the force differs by 0.0" in finding.what for finding in found.findings)
+    assert any("differs by 0.0" in finding.what for finding in found.findings)
     # The gap stays that of the stated noise.
     assert 1.5 < found.after.fit < 3.0
 
@@ -87,13 +87,13 @@ def test_a_force_zero_of_each_push_in_noise_that_is_correlated_is_nothing_missin
     """The colour shows once the zeros are out of the way, and with it nothing is left."""
     found = diagnose(make_problem(campaign_of(on_the_surface(ALONE, BEDS / 0.05, 0.7), depth_std=2e-5)))
     assert found.verdict == "none" and set(found.model_std) == {"force zero"}
-    assert any("as a zero that is set anew does" in finding.what for finding in found.findings)
+    assert any("a zero that" in finding.what for finding in found.findings)
 
 
 def test_a_stiffness_that_goes_with_the_speed_is_no_scatter():
     found = diagnose(problem_of(straight, ALONE, beds=np.sort(BEDS)))
     assert found.verdict != "none"
-    assert any("it goes with the trial's speed" in finding.what for finding in found.findings)
+    assert any("the trial's speed" in finding.what for finding in found.findings)
 
 
 def test_pushes_and_drops_that_differ_are_no_scatter():
@@ -107,7 +107,7 @@ def test_pushes_and_drops_that_differ_are_no_scatter():
 def test_one_bed_that_is_another_is_no_scatter():
     found = diagnose(problem_of(straight, ALONE, beds=np.where(np.arange(8) == 3, 0.2, 0.0)))
     assert found.verdict != "none"
-    assert any("another in trial 3 than in all others" in finding.what for finding in found.findings)
+    assert any(finding.trial == "3" and "another in trial" in finding.what for finding in found.findings)
 
 
 def on_the_surface(speeds, offs, persistence=0.0):

@@ -1,6 +1,7 @@
-"""Sentences and tables of a diagnosis: what is left by phase and channel, and in which settings the model fails."""
+"""Sentences and tables of a diagnosis: where the model fails, how large and how sure effects are, the candidates."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -8,27 +9,31 @@ from typing import Any
 from experiments.diagnose.core.effect_texts import meaning
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Finding
-
-from .candidates import candidate_rows, no_better, say, unnamed_sentence
+from vis.page.sentences import Sentences
 
 __all__ = [
-    "findings_in_words", "remark_sentences", "setting_words", "shares_words", "size_sentences",
-    "small_names", "sure_sentences", "told_tables", "where_sentences", "worse_sentences",
+    "candidate_rows", "findings_in_words", "remark_sentences", "say", "setting_words", "shares_words",
+    "size_sentences", "small_names", "sure_sentences", "told_tables", "unnamed_sentence",
+    "where_sentences", "worse_sentences",
 ]  # fmt: skip
 
+say = Sentences(__package__)
+
+Row = Mapping[str, Any]
+
+_MORE = 0.05  # nats by which a set of effects must beat each of its parts to be listed
+_SETS = 4  # sets of effects that are listed beside the one that is named
+_WORTH_SAYING = 1.0  # nats by which a candidate must beat what is named to be mentioned
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
 _OTHER = 0.01  # relative difference from which on two settings are two
-_SMALL_SHARE, _SMALL_BESIDE = (
-    0.05,
-    0.2,
-)  # of the force, and of the largest effect's signature, for an effect to be small
+_SMALL_SHARE, _SMALL_BESIDE = 0.05, 0.2  # of the force, and of the largest signature, up to which an effect is small
 _STANDING = 2.0  # chi-square per sample of a platform that stands from which on it is explained
 _WORSE_OF_ALL, _WORSE_CELL, _WORSE_SHOWN = 1.1, 1.5, 3
 """Factor from which a condition, and a channel in a phase, has got worse; how many of each are reported."""
 _MAINLY = 0.5  # share of what is beyond the noise from which a phase, a channel or a setting holds most of it
 
 
-def where_sentences(said: Mapping[str, Any]) -> list[str]:
+def where_sentences(said: Row) -> list[str]:
     """Where the base model fails, in one or two sentences; none where it does not."""
     places = said["where"]
     if not places:
@@ -39,7 +44,7 @@ def where_sentences(said: Mapping[str, Any]) -> list[str]:
     return [first, *([f"Sample for sample most of it is at {settings}."] if settings else []), *_parted(said)]
 
 
-def sure_sentences(said: Mapping[str, Any]) -> list[str]:
+def sure_sentences(said: Row) -> list[str]:
     """What is named, how sure that is against the nearest rival, and how it predicts the trials held out."""
     if said["verdict"] not in ("named", "ambiguous") or not said["effects"]:
         return []
@@ -62,7 +67,7 @@ def sure_sentences(said: Mapping[str, Any]) -> list[str]:
             *unnamed_sentence(said)]  # fmt: skip
 
 
-def size_sentences(said: Mapping[str, Any]) -> list[str]:
+def size_sentences(said: Row) -> list[str]:
     """How large each effect is, the largest first, in a sentence; what is small is called so."""
     sizes = said.get("sizes", [])
     if not sizes:
@@ -71,12 +76,12 @@ def size_sentences(said: Mapping[str, Any]) -> list[str]:
     return [f"How large: {'; '.join(_size_words(size, is_small=_is_small(size, most)) for size in sizes)}."]
 
 
-def remark_sentences(said: Mapping[str, Any]) -> list[str]:
+def remark_sentences(said: Row) -> list[str]:
     """Which numbers are implausible."""
     return [f"Hard to believe: {remark}." for remark in said.get("remarks", [])]
 
 
-def worse_sentences(said: Mapping[str, Any]) -> list[str]:
+def worse_sentences(said: Row) -> list[str]:
     """Which conditions, phases and channels the best model explains less well than the base model, in a sentence; none
     where there are none, or where it is the base model. A cell counts where it is worse by half and past noise."""
     conditions = said.get("by_condition", [])
@@ -93,24 +98,24 @@ def worse_sentences(said: Mapping[str, Any]) -> list[str]:
     return [f"It makes worse, in chi-square per sample: {'; '.join(parts)}."] if parts else []
 
 
-def _common(conditions: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+def _common(conditions: Sequence[Row]) -> dict[str, float]:
     """The settings that all conditions share."""
     first = conditions[0]["settings"] if conditions else {}
     return {name: value for name, value in first.items()
             if all(row["settings"].get(name) == value for row in conditions)}  # fmt: skip
 
 
-def _worst(rows: Sequence[Mapping[str, Any]], factor: float) -> list[Mapping[str, Any]]:
+def _worst(rows: Sequence[Row], factor: float) -> list[Row]:
     """Those that grow by `factor` and are past noise then, at most three, by what is added over all samples."""
     grown = [row for row in rows if row["after"] > max(factor * row["before"], _STANDING)]
     return sorted(grown, key=lambda row: row["samples"] * (row["before"] - row["after"]))[:_WORSE_SHOWN]
 
 
-def _from_to(row: Mapping[str, Any]) -> str:
+def _from_to(row: Row) -> str:
     return f"from {numeral(row['before'])} to {numeral(row['after'])}"
 
 
-def small_names(said: Mapping[str, Any]) -> dict[str, str]:
+def small_names(said: Row) -> dict[str, str]:
     """Effects that are small beside another one, and how small: effect -> 0.1 % of the force."""
     sizes = said.get("sizes", [])
     if len(sizes) < 2:
@@ -123,12 +128,12 @@ def small_names(said: Mapping[str, Any]) -> dict[str, str]:
     }  # fmt: skip
 
 
-def _is_small(size: Mapping[str, Any], most: float) -> bool:
+def _is_small(size: Row, most: float) -> bool:
     share = size["share"]
     return (share is not None and share <= _SMALL_SHARE) or size["signature"] <= _SMALL_BESIDE * most
 
 
-def _size_words(size: Mapping[str, Any], *, is_small: bool) -> str:
+def _size_words(size: Row, *, is_small: bool) -> str:
     """shaft-friction changes the force by 0.4 N (root mean square, 1.2 N at most), 21 % of it, 9 times the noise"""
     times = f"{numeral(size['signature'], 2)} times the noise of all readings"
     if size["channel"] is None:
@@ -137,7 +142,7 @@ def _size_words(size: Mapping[str, Any], *, is_small: bool) -> str:
     return say("is_small" if is_small else "changes", size=size, share=share, times=times)
 
 
-def _parted(said: Mapping[str, Any]) -> list[str]:
+def _parted(said: Row) -> list[str]:
     """Which channel first leaves the base model, and when; and what a camera's zero at its end means."""
     sentences = []
     parted = [row for row in said.get("parted", []) if row["at_s"] >= 0]
@@ -159,7 +164,7 @@ def _parted(said: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def shares_words(places: Sequence[Mapping[str, Any]], key: str) -> str:
+def shares_words(places: Sequence[Row], key: str) -> str:
     """The largest shares of the excess up to `_MAINLY` of it, at most two."""
     total = sum(place["excess"] for place in places)
     sums: dict[str, float] = {}
@@ -170,7 +175,7 @@ def shares_words(places: Sequence[Mapping[str, Any]], key: str) -> str:
     return " and ".join(f"{name} ({100 * value / total:.0f} %)" for name, value in shown)
 
 
-def _settings(said: Mapping[str, Any]) -> str:
+def _settings(said: Row) -> str:
     """Values of settings at which a sample holds most of what is beyond the noise, where trials differ in them."""
     rows = [row for row in said.get("by_condition", []) if row["before"] > 1.0]
     shown = []
@@ -198,7 +203,7 @@ def setting_words(name: str, value: float) -> str:
     return f"{name.removesuffix(f'_{unit}').replace('_', ' ')} {value:.4g} {_UNITS[unit]}"
 
 
-def told_tables(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+def told_tables(said: Row) -> list[dict[str, Any]]:
     """What the terminal shows: what is left by phase and channel, and the candidates, one form a set of effects."""
     tables = []
     if said["by_phase"] and said["verdict"] != "none":
@@ -222,7 +227,7 @@ _STAGES = ("fitted: before", "after", "held out: before", "after")
 
 
 def _by_stage(
-    rows: Sequence[Mapping[str, Any]], keys: tuple[str, str], prefix: str, written: Callable[[float], str]
+    rows: Sequence[Row], keys: tuple[str, str], prefix: str, written: Callable[[float], str]
 ) -> list[list[str]]:
     """A row for each pair of `keys`, with the numbers of `_STAGES`; - where there is none."""
     cells = {(row[keys[0]], row[keys[1]], row["held_out"]): row for row in rows}
@@ -233,7 +238,7 @@ def _by_stage(
     ]
 
 
-def _in_units(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _in_units(said: Row) -> list[dict[str, Any]]:
     """The gap by channel in its unit, and by condition where there are several."""
     tables = []
     if channels := said.get("by_channel", []):
@@ -269,3 +274,105 @@ def findings_in_words(found: Sequence[Finding]) -> list[Finding]:
         together = pattern.replace("*", names).replace(" has no ", " have no ")
         merged.append(replace(alike[0], what=together) if len(alike) > 1 else alike[0])
     return merged
+
+
+def candidate_rows(said: Row) -> list[dict[str, Any]]:
+    """``candidates`` of diagnosis.json: the best form of each effect, of what is named, and of the sets of effects that
+    beat all of their parts; the likeliest first, those no better than the base model last."""
+    best: dict[frozenset[str], Row] = {}
+    tried = Counter(frozenset(row["effects"]) for row in said.get("evidence", []))
+    for row in said.get("evidence", []):
+        names = frozenset(row["effects"])
+        if names not in best or row["score"] > best[names]["score"]:
+            best[names] = row
+    alone = {name: row["score"] for names, row in best.items() for name in names if len(names) == 1}
+    order = _told(said)
+    told = frozenset(order)
+    sets = [names for names, row in best.items()
+            if len(names) > 1 and all(row["score"] > alone.get(name, 0.0) + _MORE for name in names)]  # fmt: skip
+    sets.sort(key=lambda names: -best[names]["score"])
+    shown = [names for names in best if len(names) == 1 or names == told or names in sets[:_SETS]]
+    shown.sort(key=lambda names: -best[names]["score"])
+    base = said.get("evidence_base", {}).get("left")
+
+    def left(row: Row) -> float | None:
+        """At amplitude 0 every form is the base model, which was fitted once more after the candidates."""
+        return min(row["left"], base) if "left" in row and base is not None else row.get("left")
+
+    return [
+        {"candidate": _written(best[names], alone, order), "effects": _ordered(names, alone, order),
+         "score": best[names]["score"], "left": left(best[names]), "closes": best[names].get("closes"),
+         "tried": tried[names], "better": best[names]["score"] > 0, "note": _note(said, names, best, told)}
+        for names in shown
+    ]  # fmt: skip
+
+
+def no_better(rows: Sequence[Row]) -> str:
+    """The effects that are no better than the base model, as a clause; empty where all are."""
+    names = [" + ".join(row["effects"]) for row in rows if not row["better"]]
+    return f"no better than the base model with its parameters fitted: {', '.join(names)}" if names else ""
+
+
+def unnamed_sentence(said: Row) -> list[str]:
+    """A candidate that is likelier than what is named: which, and why it is not named."""
+    rows = candidate_rows(said)
+    own = next((row for row in rows if {*row["effects"]} == {*_told(said)}), None)
+    ahead = [row for row in rows if own is not None and row["score"] > own["score"] + _WORTH_SAYING and row["note"]]
+    if own is None or not ahead:
+        return []
+    row = ahead[0]
+    what = "is not told" if said["effects"] else "does not lead"
+    names, ours = (" + ".join(one["effects"]) for one in (row, own))
+    return [say("most_evidence", names=names, more=row["score"] - own["score"], own=ours, what=what, row=row)]
+
+
+def _told(said: Row) -> tuple[str, ...]:
+    """The effects that are named, or of an unknown the best model's, in order."""
+    names = tuple(effect["id"] for effect in said.get("effects", ()))
+    leading = tuple(said.get("leading", {}).get("effects", ()))
+    return leading if said["verdict"] == "unknown" and leading else names
+
+
+def _ordered(names: frozenset[str], alone: Mapping[str, float], told: Sequence[str]) -> list[str]:
+    """What is named first, then those that explain most alone."""
+    place = {name: k for k, name in enumerate(told)}
+    return sorted(names, key=lambda name: (place.get(name, len(place)), -alone.get(name, -1e300), name))
+
+
+def _written(row: Row, alone: Mapping[str, float], told: Sequence[str]) -> str:
+    """``a:one + two + b:three``: effects in order, each once, with its forms."""
+    forms: dict[str, list[str]] = {}
+    for part in row.get("candidate", " + ".join(row["effects"])).split(" + "):
+        effect, _, form = part.partition(":")
+        forms.setdefault(effect, []).append(form)
+    order = _ordered(frozenset(forms), alone, told)
+    return " + ".join(f"{effect}:{' + '.join(forms[effect])}".removesuffix(":") for effect in order)
+
+
+def _note(said: Row, names: frozenset[str], best: Mapping[frozenset[str], Row], told: frozenset[str]) -> str:
+    """How a candidate relates to the one that is named; of one that is likelier, why it is not named."""
+    if names == told:
+        return {"named": "told", "ambiguous": "told, or another"}.get(said["verdict"], "leads")
+    if not told or told not in best:
+        return ""
+    if said["verdict"] == "ambiguous" and any(names == {other, *_told(said)[1:]} for other in said["alternatives"]):
+        return "cannot be told from it"
+    own, row = best[told], best[names]
+    more = row["score"] - own["score"]
+    if more <= 0:
+        return ""
+    together = " + ".join(_told(said))
+    if names > told or len(names) > len(told):
+        if said.get("gate", {}).get("after", {}).get("passed"):
+            return f"is not needed: {together} leaves no more than noise"
+        left, whole = own.get("left") or 0.0, said.get("evidence_base", {}).get("left") or 0.0
+        if left <= 0:
+            return f"takes up noise: what {together} leaves is no more"
+        what = "a further name" if names > told else f"{len(names)} names in the place of {together}"
+        share = f"{100 * (left - row['left']) / left:.0f} % of what {together} leaves"
+        of_base = f", {100 * (left - row['left']) / whole:.2g} % of what the base model leaves" if whole > 0 else ""
+        return f"gains {more:.1f} nats, {share}{of_base}: less than {what} must"
+    other = next((r for r in said.get("equivalence", [])[1:] if r["effect"] in names - told), None)
+    if other is not None and (other.get("left_out_behind") or 0.0) > 0:
+        return f"predicts conditions that were left out worse, by {other['left_out_behind']:.0f} nats"
+    return "does not stand when noise and names are looked at together"
