@@ -107,7 +107,7 @@ _MODULES = {
         "experiments.diagnose.tumble": (
             "tumble_checks=checks tumble_data=data tumble_follow=latent tumble_forms=forms "
             "tumble_forward=forward tumble_guess=guess tumble_latent=latent tumble_problem=problem "
-            "tumble_readings=readings tumble_spikes=spikes"
+            "tumble_readings=readings tumble_spikes=checks"
         ),
     },
     "experiments.plausible": {

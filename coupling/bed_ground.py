@@ -173,10 +173,7 @@ class BedGround:
         """The bed's own [s]."""
         return float(self.bed.time_step)
 
-    @property
-    def lag(self) -> float:
-        """The bed's step (see `Ground.lag`) [s]."""
-        return float(self.bed.time_step)
+    lag = time_step  # See `Ground.lag`
 
     @property
     def gravity(self) -> float:

@@ -12,11 +12,10 @@ from experiments.campaign import Campaign, Recording
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
 from experiments.diagnose.fit.forms import load_own
 from experiments.diagnose.noise.replicates import find_scatter
-from experiments.diagnose.tumble.checks import checked
+from experiments.diagnose.tumble.checks import checked, spikes
 from experiments.diagnose.tumble.data import CHANNELS, tumble_data
 from experiments.diagnose.tumble.forward import Forward
 from experiments.diagnose.tumble.problem import TumbleProblem
-from experiments.diagnose.tumble.spikes import spikes
 from rigid import Effect
 
 RISES = Path(experiments.__file__).parent / "terms" / "torque_rise.py"
