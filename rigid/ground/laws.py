@@ -60,6 +60,9 @@ class SurfaceLaw:
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
         """All parameters, as given or by default. Raises ValueError as `check_parameters`."""
+        known = [parameter.name for parameter in self.parameters]
+        if unknown := [key for key in given if key not in known]:
+            raise ValueError(f"{unknown[0]} is no parameter of {self.name}: there is {', '.join(known)}")
         return check_parameters(self.parameters, given, self.name)
 
     def numbers(self, given: Mapping[str, float], *, count: float = 1.0) -> tuple[float, ...]:
