@@ -277,16 +277,16 @@ def _penetration_left(problem: Any, values: Mapping[str, float], trial: str, for
         if force is not None:
             extra = force(_state(state["depth_m"], state["velocity_m_s"], state["retreat_m"]))[:, 0]
         return (told["force"]["measured"] - told["force"]["model"] - extra) / force_std(problem, values, trial)
-    if force is None:
-        return np.concatenate([
-            (told[name]["measured"] - told[name]["model"]) / samples.std[samples.channel == name]
-            for name in ("depth", "accel") if name in told
-        ])  # fmt: skip
-    table = next(one for one in problem.tables.trial if one.id == trial)
-    time, depth, accel = _fall(problem, values, table, max(float(one["t_s"].max()) for one in told.values()), force)
+    columns = {name: one["model"] for name, one in told.items()}
+    if force is not None:
+        table = next(one for one in problem.tables.trial if one.id == trial)
+        end = max(float(one["t_s"].max()) for one in told.values())
+        time, *found = _fall(problem, values, table, end, force)
+        fell = dict(zip(("depth", "accel"), found, strict=True))
+        columns = {name: np.interp(one["t_s"], time, fell[name]) for name, one in told.items() if name in fell}
     return np.concatenate([
-        (told[name]["measured"] - np.interp(told[name]["t_s"], time, column)) / samples.std[samples.channel == name]
-        for name, column in (("depth", depth), ("accel", accel)) if name in told
+        (told[name]["measured"] - columns[name]) / samples.std[samples.channel == name]
+        for name in ("depth", "accel") if name in told
     ])  # fmt: skip
 
 

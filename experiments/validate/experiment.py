@@ -9,7 +9,7 @@ import json
 import math
 import time
 import traceback
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -176,10 +176,19 @@ def _is_checkout() -> bool:
 
 
 def keep(cases: Sequence[Json], *, command: str) -> None:
-    """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of."""
+    """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of.
+
+    A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run.
+    """
     path = _ROOT / _KEPT
     before = dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
-    result: Json = plain(_result(_merged(before["cases"] if before else (), cases, command), before is not None))
+    now = [dict(row) | {"command": command} for row in cases]
+    known = {row["id"]: row for row in [*(before["cases"] if before else ()), *now] if row["status"] in _RAN}
+    rows = [case.about() | known[case.id] if case.id in known else case.head() for case in SUITE]
+    for case, row in zip(SUITE, rows, strict=True):
+        if row["status"] == "fail":
+            row["reason"] = case.reason or row.get("reason", "")
+    result: Json = plain(_result(rows, before is not None))
     if before is not None:
         result |= {key: before[key] for key in ("version", "code", "date")}
     _keep_result(result)
@@ -192,20 +201,6 @@ def _keep_result(result: Json) -> None:
     slim["cases"] = [{key: value for key, value in row.items() if key != "plots"} for row in result["cases"]]
     (_ROOT / _KEPT).parent.mkdir(parents=True, exist_ok=True)
     write_text(_ROOT / _KEPT, json.dumps(slim, indent=0) + "\n")
-
-
-def _merged(before: Iterable[Mapping[str, Any]], now: Iterable[Mapping[str, Any]], command: str) -> list[Json]:
-    """A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run."""
-    ran = {row["id"]: dict(row) | {"command": command} for row in now if row["status"] in _RAN}
-    old = {row["id"]: dict(row) for row in before if row["status"] in _RAN}
-    rows = []
-    for case in SUITE:
-        known = ran.get(case.id) or old.get(case.id)
-        row = case.about() | known if known else case.head()
-        if row["status"] == "fail":
-            row["reason"] = case.reason or row.get("reason", "")
-        rows.append(row)
-    return rows
 
 
 _RAN = ("pass", "fail")
