@@ -10,8 +10,8 @@ import numpy as np
 from experiments.runs.types import Json
 
 __all__ = [
-    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "near_zero", "told", "within",
-    "worst",
+    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "listed", "near_zero", "told",
+    "within", "worst",
 ]  # fmt: skip
 Item = TypeVar("Item")
 
@@ -125,6 +125,11 @@ def within(tell: Tell, start: float, end: float) -> Tell:
 def worst(found: Any, wanted: float) -> float:
     """Of several numbers the one that is farthest off."""
     return float(np.ravel(found)[np.argmax(np.abs(found - wanted))])
+
+
+def listed(values: Iterable[float], form: str) -> str:
+    """Numbers in a sentence."""
+    return ", ".join(format(value, form) for value in values)
 
 
 def near_zero(quantity: str, ours: float, band: float, unit: str = "1") -> Comparison:

@@ -18,7 +18,7 @@ from experiments.validate.base.drops import first_touch
 from experiments.validate.base.peers import PEERS, data_file, deck_of, digits, run_peer
 from experiments.validate.base.spheres import mass_of, upright_walls
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "Setup", "grains"]
 

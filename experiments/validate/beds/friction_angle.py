@@ -37,7 +37,7 @@ from experiments.calibrate.tests import mohr_circle, summary_of, triaxial_angle
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, within
 from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, lammps_restitution, run_peer, spheres
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "Sheared", "in_lammps", "lammps_law", "mohr_angle"]
 

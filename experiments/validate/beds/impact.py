@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told
 from experiments.validate.base.drops import BEADS, Drop
 
-from .words import say
+from . import say
 
 __all__ = ["BALL", "CASES", "K_OVER_M", "MASS", "energy", "fit_law"]
 

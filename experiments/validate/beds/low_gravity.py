@@ -15,7 +15,7 @@ import numpy as np
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 from experiments.validate.base.drops import BEADS, Drop
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "collapsed", "power_of"]
 
@@ -65,13 +65,12 @@ def _time_down(run: dict[str, np.ndarray]) -> float:
     return float(np.interp(MOSTLY * run["depth"][-1], run["depth"], run["time"]))
 
 
+_ACROSS = " x ".join(f"{share * (BALL + GRAIN) / GRAIN:.3g}" for share in BOX)
+_ABOUT = say("beads", beads=BEADS, across=_ACROSS, grain=BALL / GRAIN)
+
+
 def _name(gravity: float, seed: int) -> str:
     return f"{gravity:g} m/s2, bed {seed}"
-
-
-def _about() -> str:
-    across = " x ".join(f"{share * (BALL + GRAIN) / GRAIN:.3g}" for share in BOX)
-    return say("beads", beads=BEADS, across=across, grain=BALL / GRAIN)
 
 
 def _sweep(speed_over: float) -> list[Drop]:
@@ -102,7 +101,7 @@ def _sink(tell: Tell) -> Outcome:
     curves.append(Curve("bed", gravities, np.array(depths) / BALL))
     plot = Plot("How deep a ball sinks from rest", "gravity [m/s2]", "depth over the ball's diameter [1]", curves, "x")
     remark = say(
-        "from_rest", about=_about(), steel=STEEL, spread=100 * spread, longest=LONGEST, count=len(runs),
+        "from_rest", about=_ABOUT, steel=STEEL, spread=100 * spread, longest=LONGEST, count=len(runs),
         creeping=sum(not run["stopped"] for run in runs),
     )  # fmt: skip
     return Outcome(rows, [plot], [remark])
@@ -130,7 +129,7 @@ def _one_froude(tell: Tell, others: Sequence[Drop] = (), names: Sequence[str] = 
     plot = Plot("One Froude number", "t sqrt(g / (D + d)) [1]", "depth over D + d [1]", curves)
     ends = depths[: len(SWEEP) * len(PLACES), -1]
     remark = say(
-        "at_one_froude", about=_about(), froude=FROUDE, beds=len(SWEEP),
+        "at_one_froude", about=_ABOUT, froude=FROUDE, beds=len(SWEEP),
         scatter=100 * float(np.std(ends, ddof=1)) / final,
     )  # fmt: skip
     return Outcome(rows, [plot], [remark])
@@ -171,7 +170,7 @@ def _murdoch(tell: Tell) -> Outcome:
         near_zero("exponent of g in the duration", of_time[1], 0.1),
         near_zero("exponent of the speed in the duration", of_time[2], 0.1),
     ]
-    remark = say("murdoch", about=_about(), aluminium=ALUMINIUM)
+    remark = say("murdoch", about=_ABOUT, aluminium=ALUMINIUM)
     plot = Plot("A ball of 10 cm in low gravity", "speed [m/s]", "depth [mm]", curves)
     return Outcome(rows, [plot], [remark])
 

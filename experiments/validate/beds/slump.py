@@ -21,8 +21,8 @@ from experiments.bed.tests import stiff_enough
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told, within
 from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, run_peer, spheres
 
+from . import say
 from .friction_angle import lammps_law
-from .words import say
 
 __all__ = ["CASES", "Heap", "in_lammps", "slumped"]
 

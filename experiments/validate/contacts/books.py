@@ -1,6 +1,7 @@
 """Many grains: the books of momentum, angular momentum and energy; the floor carries the weight."""
 
 import math
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -13,7 +14,7 @@ from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tel
 from experiments.validate.base.energy import Book, keep_book
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, row_of_grains
 
-__all__ = ["CASES", "PARTS", "ROUGH", "cluster", "hertz_energy", "moments"]
+__all__ = ["CASES", "PARTS", "ROUGH", "cluster", "hertz_energy", "moments", "shares"]
 
 ROUGH = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
 GAS = Material("gas", 2600, 1e6, 0.25, 0.0, 1.0)
@@ -140,12 +141,16 @@ def _energy(material: Material, tell: Tell, *, gravity: Any = 0.0, tensile: bool
         near_zero("what a dashpot or friction gives back, over the first energy", back, 1e-3),
     ]
     named = {key: name for key, name in PARTS.items() if key in fine.parts}
-    shares = {name: fine.parts[key][-1] / first for key, name in named.items()}
-    said = ", ".join(f"{100 * share:.2f} % {name}" for name, share in shares.items())
-    curves = [Curve(name, 1e3 * fine.time, fine.parts[key] / first, False) for key, name in named.items()]
-    curves.append(Curve("sum", 1e3 * fine.time, fine.total / first))
+    curves, said = shares({name: fine.parts[key] for key, name in named.items()}, 1e3 * fine.time, first)
     plot = Plot("Where the energy goes", "time [ms]", "share of the first energy [1]", curves)
     return Outcome(rows, [plot], [f"Of the first energy at the end: {said}."])
+
+
+def shares(parts: Mapping[str, np.ndarray], time: np.ndarray, first: float) -> tuple[list[Curve], str]:
+    """Curves of the parts of an energy, over the first, and of their sum; the shares at the end in words."""
+    curves = [Curve(name, time, part / first, False) for name, part in parts.items()]
+    curves.append(Curve("sum", time, np.sum(list(parts.values()), axis=0) / first))
+    return curves, ", ".join(f"{100 * (part[-1] / first):.2f} % {name}" for name, part in parts.items())
 
 
 def _floor_weight(tell: Tell) -> Outcome:

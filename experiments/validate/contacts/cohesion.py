@@ -19,7 +19,7 @@ from experiments.runs.types import Json
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, worst
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
 
-from .books import PARTS, cluster, moments
+from .books import PARTS, cluster, moments, shares
 
 __all__ = ["CASES", "Law"]
 
@@ -33,9 +33,8 @@ MASS = mass_of(DENSITY, RADIUS)
 class Law:
     """A law's closed forms for a pair of effective radius [m] and modulus [Pa].
 
-    Attributes:
-        pull: pull-off force [N]. load: what it adds to the load in the bound of friction [N].
-        free: overlap at no load [m]. end: overlap at which it parts [m].
+    Pull-off force and what it adds to the load in the bound of friction [N]; overlaps at no load (`free`) and at which
+    it parts (`end`) [m].
     """
 
     def __init__(self, name: str, radius: float, young: float):
@@ -251,10 +250,8 @@ def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
         about = f"rough: gap of the book over the first energy, steps of {1e6 * step:g} us"
         found.append(near_zero(about, np.abs(total - total[0]).max() / total[0], 2e-4 * (step / 4e-6) ** 2))
         tell(0.9 + 0.05 * k)
-    curves = [Curve(words, time, part / total[0], False) for words, part in zip(_PARTS, parts, strict=True)]
-    curves.append(Curve("sum", time, total / total[0]))
-    shares = ", ".join(f"{100 * part[-1] / total[0]:.2f} % {words}" for words, part in zip(_PARTS, parts, strict=True))
-    remark = f"Of the rough grains' first energy at the end (the surfaces' counted from where pairs part): {shares}."
+    curves, ends = shares(dict(zip(_PARTS, parts, strict=True)), time, total[0])
+    remark = f"Of the rough grains' first energy at the end (the surfaces' counted from where pairs part): {ends}."
     return found, Plot("Book of the rough cluster, steps of 2 us", "time [ms]", "over the first energy", curves), remark
 
 

@@ -15,8 +15,8 @@ from dem.contact.timestep import time_step_for
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told, worst
 from experiments.validate.base.spheres import ALUMINA, CAST_IRON, RADIUS, SIXTEEN, contact_of, row_of_grains
 
+from . import say
 from .law_alone import staggered_rebound
-from .words import say
 
 __all__ = ["CASES", "force_curve", "rebound"]
 

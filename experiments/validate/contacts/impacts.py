@@ -11,11 +11,22 @@ from functools import partial
 import numpy as np
 
 from dem import Bed, Grains, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, near_zero, told, worst
+from experiments.validate.base.case import (
+    Comparison,
+    Curve,
+    Outcome,
+    Plot,
+    Tell,
+    compared,
+    listed,
+    near_zero,
+    told,
+    worst,
+)
 from experiments.validate.base.spheres import ALUMINA, RADIUS, contact_of, hertz, mass_of, meet_floor, plane_modulus
 
+from . import say
 from .law_alone import LARGEST, one_spring, sliding_share, tangential_restitution
-from .words import say
 
 __all__ = ["ANGLES", "CASES", "E_N", "MU", "STEP", "oblique", "spin_impact"]
 
@@ -102,7 +113,7 @@ def _t4_spin(tell: Tell) -> Outcome:
     remarks = [
         say("figure_read", reading=reading, worth=worth, band=100 * PUBLISHED_BAND),
         say("law_alone", angle=angles[ten], finer=np.abs(fine - found).max(), book=100 * book, **alone),
-        say("rings", **{name: ", ".join(f"{v:.4g}" for v in values[:3]) for name, values in lists.items()}),
+        say("rings", **{name: listed(values[:3], ".4g") for name, values in lists.items()}),
     ]
     curves.append(Curve("rings that slip one by one", angles, slipping, False))
     return Outcome(rows, [Plot("Spin after the impact", "angle of impact [deg]", "spin [rad/s]", curves)], remarks)

@@ -12,7 +12,7 @@ from dem.contact.law import effective_moduli
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, contact_of, mass_of, row_of_grains
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "errors_of_pair", "oblique_pair"]
 
