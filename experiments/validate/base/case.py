@@ -10,7 +10,7 @@ import numpy as np
 from experiments.runs.types import Json
 
 __all__ = [
-    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "listed", "near_zero", "told",
+    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "listed", "near_zero", "tracked",
     "within", "worst",
 ]  # fmt: skip
 Item = TypeVar("Item")
@@ -109,8 +109,8 @@ Tell = Callable[[float], None]  # takes how far a case is, 0 to 1
 Compute = Callable[[Tell], Outcome]  # computes a case
 
 
-def told(items: Iterable[Item], tell: Tell) -> Iterator[Item]:
-    """The items one by one; each is told as done when the next one is asked for."""
+def tracked(items: Iterable[Item], tell: Tell) -> Iterator[Item]:
+    """The items one by one; each is reported as done when the next one is asked for."""
     rows = list(items)
     for done, item in enumerate(rows, 1):
         yield item

@@ -24,7 +24,7 @@ from scipy.optimize import least_squares
 from dem import Cone, Cylinder
 from dem.measure.element import shear_element
 from experiments.calibrate.tests import summary_of
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, told, within
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, tracked, within
 from experiments.validate.base.drops import BEADS, SPREAD, drive_down, part, prepared
 from rigid.ground.laws import find_law
 from rigid.ground.rft import flat_plate, stress_gradient, tractions
@@ -107,7 +107,7 @@ def _between(run: dict[str, np.ndarray], depths: tuple[float, float]) -> tuple[n
 
 
 def _compute(tell: Tell) -> Outcome:
-    samples = [_sheared(seed) for seed in told(SAMPLES, within(tell, 0.0, 0.4))]
+    samples = [_sheared(seed) for seed in tracked(SAMPLES, within(tell, 0.0, 0.4))]
     means_of = {key: np.array([float(one[key]) for one in samples]) for key in ("over_mean", "over_normal", "packing")}
     mu, density = float(means_of["over_mean"].mean()), float(means_of["packing"].mean()) * BEADS.density
     gradient = stress_gradient(bulk_density=density, friction=mu, gravity=GRAVITY)
@@ -115,7 +115,7 @@ def _compute(tell: Tell) -> Outcome:
     cone_shape = Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE))
     cones = [_driven("cone", cone_shape, place, CONE_DEPTHS[1] + 0.5) for place in PLACES]
     pushes, means, curves = [], [], []
-    for across in told(PLATES, within(tell, 0.5, 1.0)):
+    for across in tracked(PLATES, within(tell, 0.5, 1.0)):
         diameter = across * GRAIN
         shape, name = Cylinder(0.0, GRAIN, 0.5 * diameter), f"plate {across:g}"
         runs = [_driven(name, shape, place, PLATE_DEPTHS[1] + 0.5) for place in PLACES]

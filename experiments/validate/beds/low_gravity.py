@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked
 from experiments.validate.base.drops import BEADS, Drop
 
 from . import say
@@ -84,7 +84,7 @@ def _means(values: Sequence[float]) -> list[float]:
 
 def _sink(tell: Tell) -> Outcome:
     settings = _sweep(0.0)
-    runs = [one.run() for one in told(settings, tell)]
+    runs = [one.run() for one in tracked(settings, tell)]
     depths, times = [float(run["depth"][-1]) for run in runs], [_time_down(run) for run in runs]
     gravities, mean = [one.gravity for one in settings], float(np.mean(depths))
     rows = [
@@ -111,7 +111,7 @@ def _one_froude(tell: Tell, others: Sequence[Drop] = (), names: Sequence[str] = 
     """The sweep at one Froude number and beside it other beds; held to the mean curve of the sweep are the others, or
     its own beds where there are none."""
     settings = [*_sweep(FROUDE), *others]
-    runs = [one.run() for one in told(settings, tell)]
+    runs = [one.run() for one in tracked(settings, tell)]
     lengths = [one.ball + GRAIN for one in settings]
     units = [math.sqrt(length / one.gravity) for length, one in zip(lengths, settings, strict=True)]
     grid, depths = collapsed(runs, lengths, units)
@@ -151,7 +151,7 @@ def _murdoch(tell: Tell) -> Outcome:
         setting(g, seed, at, ALUMINIUM, speed) for g, seed in MURDOCH_GRAVITIES for speed in MURDOCH_SPEEDS
         for at in PLACES
     ]  # fmt: skip
-    runs = [one.run() for one in told(settings, tell)]
+    runs = [one.run() for one in tracked(settings, tell)]
     shape, speeds = (len(MURDOCH_GRAVITIES), len(MURDOCH_SPEEDS)), np.array(MURDOCH_SPEEDS)
     depths = np.array(_means([run["depth"][-1] for run in runs])).reshape(shape)
     times = np.array(_means([_time_down(run) for run in runs])).reshape(shape)

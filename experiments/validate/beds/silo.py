@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from dem import Bed, Facing, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, near_zero, tracked
 from experiments.validate.base.spheres import upright_walls
 
 from . import say
@@ -81,7 +81,7 @@ def carried(weight: np.ndarray | float, scale: float) -> np.ndarray:
 
 
 def _compute(tell: Tell) -> Outcome:
-    found = [fill(depth) for depth in told(DEPTHS, tell)]
+    found = [fill(depth) for depth in tracked(DEPTHS, tell)]
     weights, floors = (np.array([getattr(one, name) for one in found]) for name in ("weight", "floor"))
     fit = minimize_scalar(
         lambda s: float((((carried(weights, s) - floors) / floors) ** 2).sum()),

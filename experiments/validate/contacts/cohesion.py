@@ -1,4 +1,4 @@
-"""Cohesion: force, pull-off, separation and the overlap at no load of DMT's and JKR's laws; the books with them.
+"""Cohesion: force, pull-off, separation and the overlap at no load of DMT's and JKR's laws; their balances.
 
 w = 2 gamma is the work of adhesion. The closed forms are written anew here, JKR's from the contact radius a:
     DMT: F = 4/3 E* sqrt(R) d^1.5 - 2 pi w R;
@@ -19,7 +19,7 @@ from experiments.runs.types import Json
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, worst
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
 
-from .books import PARTS, cluster, moments, shares
+from .balances import PARTS, cluster, moments, shares
 
 __all__ = ["CASES", "Law"]
 
@@ -199,7 +199,7 @@ def _energies(bed: Bed, law: Law, count: int) -> tuple[np.ndarray, np.ndarray]:
     return times, energies
 
 
-def _books(name: str, tell: Tell) -> Outcome:
+def _balances(name: str, tell: Tell) -> Outcome:
     law, curves, rows = Law(name, REDUCED["pair"], STAR["pair"]), [], []
     for k, step in enumerate((2e-6, 1e-6), 1):
         bed = cluster(_stuff(name, friction=0.0, restitution=1.0, rolling_friction=0.0), time_step=step, spin=0.0)
@@ -233,7 +233,7 @@ def _books(name: str, tell: Tell) -> Outcome:
 
 
 def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
-    """The bed's own book of the rough cluster: what is held and what contacts took is the first energy."""
+    """The bed's own energy balance of the rough cluster: what is held and what contacts took is the first energy."""
     found = []
     for k, step in enumerate((4e-6, 2e-6), 1):
         bed = cluster(_stuff(name), time_step=step)
@@ -259,5 +259,5 @@ _PARTS = ["kinetic", "in normal springs and surfaces", *list(PARTS.values())[2:7
 
 CASES = {
     **{law: partial(_pull_off, law) for law in ("dmt", "jkr")},
-    **{f"energy-{law}": partial(_books, law) for law in ("dmt", "jkr")},
+    **{f"energy-{law}": partial(_balances, law) for law in ("dmt", "jkr")},
 }

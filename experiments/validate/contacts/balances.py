@@ -1,4 +1,4 @@
-"""Many grains: the books of momentum, angular momentum and energy; the floor carries the weight."""
+"""Many grains: the balances of momentum, angular momentum and energy; the floor carries the weight."""
 
 import math
 from collections.abc import Mapping
@@ -10,8 +10,8 @@ import numpy as np
 from dem import Bed, Material
 from dem.contact.law import effective_moduli
 from experiments.validate.base import cloud
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
-from experiments.validate.base.energy import Book, keep_book
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked
+from experiments.validate.base.energy import EnergyRecord, record_energy
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, row_of_grains
 
 __all__ = ["CASES", "PARTS", "ROUGH", "cluster", "hertz_energy", "moments", "shares"]
@@ -78,7 +78,7 @@ def _angular_momentum(tell: Tell) -> Outcome:
     """The sum of x x m v + I w of a cluster that reaches no boundary; pairs' torques balance at the contact point."""
     bed = cluster(ROUGH, time_step=4e-6)
     _, orbital, own = moments(bed)
-    for _ in told(range(5), tell):
+    for _ in tracked(range(5), tell):
         bed.advance(200)
     _, later, own_later = moments(bed)
     change = (later + own_later - orbital - own).sum(axis=0)
@@ -92,7 +92,7 @@ def _angular_momentum(tell: Tell) -> Outcome:
 def _elastic_gas(tell: Tell) -> Outcome:
     """Frictionless, restitution 1: kinetic and Hertz energy together; the error falls as dt^2."""
     steps, worst, curves = (2e-5, 1e-5, 5e-6), [], []
-    for step in told(steps, tell):
+    for step in tracked(steps, tell):
         bed = cluster(GAS, flat=True, time_step=step)
         first, drift, times = bed.kinetic_energy, [], []
         for _ in range(20):
@@ -124,16 +124,16 @@ _STRONG = (30.0, 0.0, -100.0)  # gravity that does as much work in that time as 
 
 
 def _energy(material: Material, tell: Tell, *, gravity: Any = 0.0, tensile: bool = False) -> Outcome:
-    books: list[Book] = []
+    records: list[EnergyRecord] = []
     for k, step in enumerate((4e-6, 2e-6)):
         bed = cluster(material, gravity=gravity, time_step=step, tensile=tensile)
-        books.append(keep_book(bed, round(_DURATION / step), tensile=tensile))
+        records.append(record_energy(bed, round(_DURATION / step), tensile=tensile))
         tell((1 + 2 * k) / 3)
-    fine = books[1]
+    fine = records[1]
     first = fine.parts["kinetic"][0]
-    gaps = [float(np.abs(book.gap).max() / first) for book in books]
-    off = max(book.force_error for book in books)
-    back = max(fine.given_back(part) for part in ("damped", "rubbed", "turned")) / first
+    gaps = [float(np.abs(record.gap).max() / first) for record in records]
+    off = max(record.force_error for record in records)
+    back = max(fine.largest_return(part) for part in ("damped", "rubbed", "turned")) / first
     rows = [
         near_zero("gap of the book over the first energy, steps of 4 us", gaps[0], 1e-3),
         Comparison("order of the gap in the step", "1", 2.0, math.log2(gaps[0] / gaps[1]), 0.5, False),
