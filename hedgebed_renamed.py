@@ -119,8 +119,15 @@ _MODULES = {
         "experiments.validate.base": "case cloud drops energy kept=drops parts=drops peers spheres",
         "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
         "experiments.validate.contacts": (
-            "books cohesion collisions integrator large_body laws=other_codes microslip=law_alone oblique=impacts "
-            "one_grain restitution=collisions sliding=other_codes spinning=impacts"
+            "books=balances cohesion collisions integrator large_body laws=other_codes microslip=law_alone "
+            "oblique=impacts one_grain restitution=collisions sliding=other_codes spinning=impacts"
+        ),
+    },
+    "experiments.validate.base": {"experiments.validate.base": "parts=drops"},
+    "experiments.validate.contacts": {
+        "experiments.validate.contacts": (
+            "books=balances laws=other_codes microslip=law_alone oblique=impacts restitution=collisions "
+            "sliding=other_codes spinning=impacts"
         ),
     },
     "rigid": {
@@ -245,6 +252,12 @@ _NAMES = {
     },
     "experiments.tumble.result": {
         "experiments.grains.bed_result": "residual_warning reversal_warning unsettled_warning",
+    },
+    "experiments.validate.base.energy": {
+        "experiments.validate.base.energy": "Book=EnergyRecord keep_book=record_energy",
+    },
+    "experiments.validate.base.peers": {
+        "experiments.validate.contacts.other_codes": "Assembly dense pairs",
     },
     "rigid.batch": {
         "rigid.batch.simulate": "BatchTrajectory simulate_batch",

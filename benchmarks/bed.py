@@ -10,6 +10,7 @@ HEDGEBED_BENCH_STEPS (timed ones), HEDGEBED_BENCH_SHOWN=0 (nothing that is only 
 """
 
 import os
+import shutil
 import statistics
 import tempfile
 import time
@@ -18,20 +19,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-from benchmarks.race import table
-from benchmarks.race.entrants import (
-    GRAVITY,
-    LAMMPS,
-    LIGGGHTS,
-    TIME_STEP,
-    WARM_STEPS,
-    Entrant,
-    Heat,
-    Ours,
-    Peer,
-    Theirs,
-    find_mpirun,
-)  # fmt: skip
+from benchmarks.race import entrants, table
+from benchmarks.race.entrants import LAMMPS, LIGGGHTS, WARM_STEPS, Entrant, Heat, Ours, Peer, Theirs
 from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
 from benchmarks.race.machine import begin_timing, environment_numbers, wide_console
 from experiments.runs.types import Json
@@ -130,19 +119,20 @@ def run(out: Path, *, progress: Any) -> Json:
         "case": {
             "diameter": DIAMETER, "spread": SPREAD,
             "material": {key: value for key, value in asdict(BENCH).items() if key != "sources"},
-            "gravity": GRAVITY, "time_step": TIME_STEP, "warm_steps": WARM_STEPS,
+            "gravity": entrants.GRAVITY, "time_step": entrants.TIME_STEP, "warm_steps": WARM_STEPS,
         },
         "ratios": {}, "beds": [], "remarks": remarks,
     }  # fmt: skip
     for count in settings.sizes:
         bed, lanes = _race(count, settings, peers, cores, progress)
         best = pick_best(lanes)
-        entrants = [lane.as_dict() for lane in lanes]
-        bench["beds"].append(bed | {"best_peer": best.label if best else None, "entrants": entrants})
+        ran = {"best_peer": best.label if best else None, "entrants": [lane.as_dict() for lane in lanes]}
+        bench["beds"].append(bed | ran)
         ours, theirs = lanes[0].speed, best and best.speed
         bench["ratios"][str(count)] = ours / theirs if ours and theirs else None
-        ran = [(lane.entrant, lane.heats[-1]) for lane in lanes if lane.heats]
-        bench["peers"] |= {entrant.peer.name: heat.version for entrant, heat in ran if isinstance(entrant, Theirs)}
+        for lane in lanes:
+            if lane.heats and isinstance(lane.entrant, Theirs):
+                bench["peers"][lane.entrant.peer.name] = lane.heats[-1].version
         remarks += [f"{count:,} grains: {remark}" for lane in lanes for remark in _remarks(lane)]
     progress.close()
     table.show(bench, wide_console())
@@ -156,7 +146,7 @@ def _find_peers() -> tuple[list[Peer], list[str]]:
         f"{peer.name} is not installed and is left out (apt install {peer.package})"
         for peer in (LIGGGHTS, LAMMPS) if peer not in peers
     ]  # fmt: skip
-    if peers and not find_mpirun():
+    if peers and not shutil.which("mpirun"):
         names = " and ".join(peer.name for peer in peers)
         remarks.append(f"mpirun is not installed, so {names} cannot use all cores: left out (apt install openmpi-bin)")
         peers = []

@@ -106,10 +106,11 @@ def _try(
                  "points_to": sorted(points_to(learnt.terms)) if alarm else []}  # fmt: skip
     if alarm:
         known = np.concatenate([learnt.predict(one.state) for one in rows])
+        bounds, std = (known.min(axis=0), known.max(axis=0)), rows[0].std
 
         def force(state: Array) -> Array:
             """[row_count, target_count], never beyond what was learnt: neither knows what lies outside."""
-            return np.clip(learnt.predict(state), known.min(axis=0), known.max(axis=0)) * rows[0].std
+            return np.clip(learnt.predict(state), *bounds) * std
 
         told["after"] = {"fit": None, "held_out": held_out_gap(problem, values, held_out, force)}
     return told

@@ -135,7 +135,7 @@ def _penetration(problem: Any, values: Mapping[str, float], trial: str) -> Rows:
     if "force" in told:
         latent = problem.latent(values, (), trial)
         depth, speed, back = latent["depth_m"], latent["velocity_m_s"], latent["retreat_m"]
-        force, std = latent["latent_force_N"], float(np.median(force_std(problem, values, trial)))
+        force, std = latent["latent_force_N"], float(np.median(problem.gap_std(values, (), trial)))
     elif "accel" in told and "depth" in told:  # m (g - a) less the bed's force at the measured depth
         mass, stiffness, damping, gravity = fall_numbers(problem, values, trial)
         time = told["accel"]["t_s"]
@@ -161,11 +161,6 @@ def fall_numbers(problem: Any, values: Mapping[str, float], trial: str) -> tuple
         for name in ("stiffness", "damping")
     )
     return float(tables.spike.mass), stiffness, damping, table.gravity
-
-
-def force_std(problem: Any, values: Mapping[str, float], trial: str) -> Array:
-    """Noise of a driven trial's residual force [N], shape [row_count]: the sensor's and what the depth's error adds."""
-    return np.asarray(problem.gap_std(values, (), trial))
 
 
 def held_out_gap(problem: Any, values: Mapping[str, float], trials: Sequence[str], force: Force | None) -> float | None:
@@ -276,17 +271,17 @@ def _penetration_left(problem: Any, values: Mapping[str, float], trial: str, for
         extra = np.zeros(len(state["t_s"]))
         if force is not None:
             extra = force(_state(state["depth_m"], state["velocity_m_s"], state["retreat_m"]))[:, 0]
-        return (told["force"]["measured"] - told["force"]["model"] - extra) / force_std(problem, values, trial)
-    if force is None:
-        return np.concatenate([
-            (told[name]["measured"] - told[name]["model"]) / samples.std[samples.channel == name]
-            for name in ("depth", "accel") if name in told
-        ])  # fmt: skip
-    table = next(one for one in problem.tables.trial if one.id == trial)
-    time, depth, accel = _fall(problem, values, table, max(float(one["t_s"].max()) for one in told.values()), force)
+        return (told["force"]["measured"] - told["force"]["model"] - extra) / problem.gap_std(values, (), trial)
+    columns = {name: one["model"] for name, one in told.items()}
+    if force is not None:
+        table = next(one for one in problem.tables.trial if one.id == trial)
+        end = max(float(one["t_s"].max()) for one in told.values())
+        time, *found = _fall(problem, values, table, end, force)
+        fell = dict(zip(("depth", "accel"), found, strict=True))
+        columns = {name: np.interp(one["t_s"], time, fell[name]) for name, one in told.items() if name in fell}
     return np.concatenate([
-        (told[name]["measured"] - np.interp(told[name]["t_s"], time, column)) / samples.std[samples.channel == name]
-        for name, column in (("depth", depth), ("accel", accel)) if name in told
+        (told[name]["measured"] - columns[name]) / samples.std[samples.channel == name]
+        for name in ("depth", "accel") if name in told
     ])  # fmt: skip
 
 

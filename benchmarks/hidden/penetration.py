@@ -109,14 +109,14 @@ def make_hidden(
     if kind != "null":
         shape = _shape(random, plan, effects, outside)
         low, high = math.log(1e-4), math.log(30.0)
-        few = list(range(0, len(clean), max(1, len(clean) // 4)))
+        few = {k: clean[k] for k in range(0, len(clean), max(1, len(clean) // 4))}
         for _ in range(9):  # amplitude by halving: the signature grows with it
             amplitude = math.exp(0.5 * (low + high))
             settings = shape(amplitude)
-            measure = _signature(plan, [clean[k] for k in few], [_trial(plan, k, settings) for k in few], few)
+            measure = _signature(plan, few, [_trial(plan, k, settings) for k in few])
             low, high = (math.log(amplitude), high) if measure < strength else (low, math.log(amplitude))
         made = [_trial(plan, k, settings) for k in range(len(clean))]
-        measure = _signature(plan, clean, made, list(range(len(clean))))
+        measure = _signature(plan, dict(enumerate(clean)), made)
     # Drawn apart, so that a seed goes on making the same campaign but for this.
     apart = np.random.default_rng((seed, 1))
     persistence = float(apart.uniform(0.3, 0.8)) if apart.random() < _COLOURED_DEPTH else 0.0
@@ -285,10 +285,10 @@ def _drop(plan: Json, this: Json, law: _Law, s: dict[str, float]) -> _Columns:
     return {"time": time, "depth": depth, "other": acceleration}
 
 
-def _signature(plan: Json, clean: list[_Columns], made: list[_Columns], which: list[int]) -> float:
+def _signature(plan: Json, clean: dict[int, _Columns], made: list[_Columns]) -> float:
     """Root mean square of the change over the noise, what a change of K would explain taken out."""
     change, slope = [], []
-    for one, other, index in zip(clean, made, which, strict=True):
+    for (index, one), other in zip(clean.items(), made, strict=True):
         nudged = _trial({**plan, "k": plan["k"] * 1.01}, index, {})
         noises = {"depth": plan["noise_depth"], "other": plan["noise_accel"]}
         if plan["trials"][index]["driven"]:

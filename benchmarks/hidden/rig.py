@@ -216,7 +216,8 @@ def make_rig(
         amplitude = _amplitude(rig, laws, clean, strength)
         made = [_moved(rig, trial, laws, amplitude) for trial in rig.trials]
     if made is not clean:
-        measure = _signature([_change(rig, *three) for three in zip(rig.trials, clean, made, strict=True)])
+        slopes = [_slopes(rig, *pair) for pair in zip(rig.trials, clean, strict=True)]
+        measure = _signature(rig, list(zip(rig.trials, clean, made, slopes, strict=True)))
     campaign, left = _record(random, rig, made)
     parameters = {f"{own.name}.{key}": value for own in laws for key, value in own.numbers.items()}
     coloured = rig.persistence["force"] > 0.0
@@ -250,15 +251,12 @@ def _amplitude(rig: Rig, laws: Sequence[Law], clean: Sequence[_Columns], strengt
     for index, trial in enumerate(rig.trials):
         first.setdefault((trial.driven, trial.speed, trial.size), index)
     few = [(rig.trials[index], clean[index]) for index in sorted(first.values())]
-    uncertain = [_slopes(rig, trial, one) for trial, one in few]
+    known = [(*pair, _slopes(rig, *pair)) for pair in few]
     low, high = math.log(1e-4), math.log(30.0)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        changes = [
-            _change(rig, trial, one, _moved(rig, trial, laws, math.exp(middle)), slopes)
-            for (trial, one), slopes in zip(few, uncertain, strict=True)
-        ]
-        low, high = (middle, high) if _signature(changes) < strength else (low, middle)
+        made = [(trial, one, _moved(rig, trial, laws, math.exp(middle)), slopes) for trial, one, slopes in known]
+        low, high = (middle, high) if _signature(rig, made) < strength else (low, middle)
     return math.exp(0.5 * (low + high))
 
 
@@ -300,21 +298,17 @@ def _slopes(rig: Rig, trial: Trial, clean: _Columns) -> dict[str, Array]:
     return {name: slope for name, slope in found.items() if slope.any()}
 
 
-def _change(
-    rig: Rig, trial: Trial, clean: _Columns, made: _Columns, slopes: dict[str, Array] | None = None
-) -> tuple[Array, dict[str, Array]]:
-    """What is changed in a trial, over the noise, and the slopes of what is uncertain."""
-    change = {name: made[name] - clean[name] for name in ("depth", "other")}
-    return _over_noise(rig, trial, change), _slopes(rig, trial, clean) if slopes is None else slopes
-
-
-def _signature(changes: Sequence[tuple[Array, dict[str, Array]]]) -> float:
+def _signature(rig: Rig, trials: Sequence[tuple[Trial, _Columns, _Columns, dict[str, Array]]]) -> float:
     """sqrt(d' S^-1 d / n): d the change over the noise, S = 1 + X X' with the slopes X of all that is uncertain to
     first order, times its standard deviations (S^-1 by Woodbury's identity)."""
-    d = np.concatenate([change for change, _ in changes])
+    changes = [
+        _over_noise(rig, trial, {name: made[name] - clean[name] for name in ("depth", "other")})
+        for trial, clean, made, _ in trials
+    ]
+    d = np.concatenate(changes)
     columns: dict[str, Array] = {}
     start = 0
-    for number, (change, slopes) in enumerate(changes):
+    for number, (change, (*_, slopes)) in enumerate(zip(changes, trials, strict=True)):
         for name, slope in slopes.items():
             column = columns.setdefault(name.replace("*", f"of {number}"), np.zeros(len(d)))
             column[start : start + len(slope)] = slope

@@ -97,13 +97,9 @@ def draw_law(random: np.random.Generator, name: str, depth: float, kind: str | N
 class Bed:
     """The bed's force on a spike, upwards, with what it remembers; one object a trial.
 
-    Args:
-        k: stiffness [N/m]
-        c: damping on the way in [N s/m]
-        laws: what it does beside, all with the same `amplitude`, 0 for nothing.
-        full: force to which an amplitude of 1 refers [N], of the middle diameter.
-        size: diameter over the middle one: sections go with its square, shafts with itself.
-        event: time at which the frame is struck [s]
+    `k`: stiffness [N/m]. `c`: damping on the way in [N s/m]. `laws`: what it does beside, all with the same
+    `amplitude`, 0 for nothing. `full`: force to which an amplitude of 1 refers [N], of the middle diameter. `size`:
+    diameter over the middle one: sections go with its square, shafts with itself. `event`: of the blow [s].
     """
 
     def __init__(

@@ -28,6 +28,8 @@ EFFECTS = (
 )  # fmt: skip
 OUTSIDE = ("floor-vibration", "magnet", "loose-mass", "shock", "unbalance", "wind")
 _RIG = ("pendulum", "rig-friction", "pulley-inertia")
+_STIFF, _GRAVEL, _SAND = (1.5e4, 60.0), (3e3, 25.0), (500.0, 8.0)  # K [N/m] and C [N s/m]
+_SURFACES = {"steel": (*_STIFF, 0.25), "brick": (*_STIFF, 0.5), "gravel": (*_GRAVEL, 0.55), "sand": (*_SAND, 0.6)}
 _PRIORS = ("mass", "inertia", "stiffness", "damping", "mu_s", "mu_d")
 _GRAVITY = 9.80665
 _Numbers = Mapping[str, float]
@@ -116,12 +118,8 @@ def make_hidden_tumble(
 
 def _plan(random: Random, *, rig: bool, count: int | None) -> _Plan:
     rig = rig or bool(random.random() < 0.8)
-    surface, stiffness, damping, mu = (
-        ("steel", 1.5e4, 60.0, 0.25),
-        ("brick", 1.5e4, 60.0, 0.5),
-        ("gravel", 3e3, 25.0, 0.55),
-        ("sand", 500.0, 8.0, 0.6),
-    )[int(random.choice(4, p=(0.3, 0.35, 0.2, 0.15)))]
+    surface = list(_SURFACES)[int(random.choice(4, p=(0.3, 0.35, 0.2, 0.15)))]
+    stiffness, damping, mu = _SURFACES[surface]
     stated = {"mass": 5.3, "inertia": 0.06, "stiffness": stiffness, "damping": damping, "mu_s": mu, "mu_d": mu / 2}
     stated = {name: round(value * float(random.uniform(0.9, 1.1)), 4) for name, value in stated.items()}
     sigma = {"mass": 0.002, "inertia": 0.03, "stiffness": 0.1, "damping": 0.2, "mu_s": 0.05, "mu_d": 0.05}
@@ -211,17 +209,17 @@ class _Signature:
 
     def __init__(self, plan: _Plan, true: _Numbers, gravity: np.ndarray) -> None:
         self._plan, self._true, self._gravity = plan, true, gravity
-        clean = _measure(plan, true, gravity, {}, _COARSE)
+        clean, step = _measure(plan, true, gravity, {}, _COARSE), 0.1
         self._base = self._stacked(clean)
-        self._channel = np.concatenate(
-            [np.full(len(one[name]), k) for one in clean for k, name in enumerate(_CHANNELS)]
+        self._channel = np.repeat(
+            *np.array([(k, len(one[name])) for one in clean for k, name in enumerate(_CHANNELS)]).T
         )
-        rows, step = [], 0.1
-        for name in _PRIORS:
-            moved = dict(true) | {name: true[name] * (1 + step * plan.sigma[name])}
-            rows.append((self._stacked(_measure(plan, moved, gravity, {}, _COARSE)) - self._base) / step)
-        lifted = _measure(plan, true, gravity * (1 + step * plan.sigma_gravity), {}, _COARSE)
-        by_gravity = (self._stacked(lifted) - self._base) / step
+
+        def slope(true: _Numbers, gravity: np.ndarray) -> np.ndarray:
+            return (self._stacked(_measure(plan, true, gravity, {}, _COARSE)) - self._base) / step
+
+        rows = [slope({**true, name: true[name] * (1 + step * plan.sigma[name])}, gravity) for name in _PRIORS]
+        by_gravity = slope(true, gravity * (1 + step * plan.sigma_gravity))
         edges = np.cumsum([0, *(sum(len(one[name]) for name in _CHANNELS) for one in clean)])
         for low, high in pairwise(edges):  # a trial's gravity changes that trial
             own = np.zeros(len(self._base))
@@ -247,7 +245,7 @@ def _amplitude(seen: _Signature, form: Any, strength: float) -> float:
     A signature may jump with the amplitude, where a trial takes another branch of sticking and slipping: then one side
     of the jump is as near as it gets.
     """
-    amplitude, most = form[2], form[3]
+    _, _, amplitude, most = form
     below, above = 0.0, math.inf
     found: list[tuple[float, float]] = []
     for _ in range(_TRIES):
@@ -255,10 +253,7 @@ def _amplitude(seen: _Signature, form: Any, strength: float) -> float:
         found.append((abs(math.log(signature / strength)), amplitude))
         if found[-1][0] < 0.2 or (amplitude == most and signature < strength):
             break
-        if signature < strength:
-            below = amplitude
-        else:
-            above = amplitude
+        below, above = (amplitude, above) if signature < strength else (below, amplitude)
         step = amplitude * float(np.clip(strength / signature, 0.05, 20.0))
         amplitude = step if below < step < above else math.sqrt(max(below, 1e-3 * above) * above)
         amplitude = min(amplitude, most)

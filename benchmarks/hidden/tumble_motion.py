@@ -90,15 +90,13 @@ def state_of(mode):
 
 
 @ti.func
-def wires(p: ti.template(), x, rise, fx, fy):
-    """Forces with those of wires that are a true pendulum."""
+def wires(p: ti.template(), x, rise, f):
+    """Forces (x, y, theta) with those of wires that are a true pendulum."""
     if p.wire_curvature > 0.0:
         L = 1.0 / p.wire_curvature - rise
         reach = ti.sqrt(L * L + x * x)
-        tension = p.counterweight * p.gravity_at_mass
-        fx -= tension * x / reach
-        fy += tension * (L / reach - 1.0)
-    return fx, fy
+        f += p.counterweight * p.gravity_at_mass * ti.Vector([-x / reach, L / reach - 1.0, 0.0])
+    return f
 
 
 @ti.func
@@ -113,7 +111,7 @@ def shaken_floor(p: ti.template(), t, settling):
 
 
 @ti.func
-def contacts(p: ti.template(), y, th, vx, vy, om, floor, floor_speed, belt, arm, top, mode, settling, fx, fy, ft):
+def contacts(p: ti.template(), y, th, vx, vy, om, floor, floor_speed, belt, arm, top, mode, settling, f):
     """Normal forces and heights of the rows, what touches, and the forces with them."""
     N = ti.Vector([0.0 for _ in range(_COUNT)])
     H = ti.Vector([0.0 for _ in range(_COUNT)])
@@ -134,18 +132,16 @@ def contacts(p: ti.template(), y, th, vx, vy, om, floor, floor_speed, belt, arm,
                 rate = 0.0
             press, pull = spring(p, depth, top[n], rate)
             N[n] = ti.max(press, 0.0)
-            fy += N[n] - pull
-            ft += (N[n] - pull) * d
+            f += (N[n] - pull) * ti.Vector([0.0, 1.0, d])
             if mode[n] == 0:
                 mode[n] = 2
             touching += 1
             if p.drag_side > 0.0 and not settling:
                 u = vx - om * h - belt
-                fx -= p.drag_side * ti.abs(u) * u
-                ft += p.drag_side * ti.abs(u) * u * h
+                f += p.drag_side * ti.abs(u) * u * ti.Vector([-1.0, 0.0, h])
         else:
             mode[n] = 0
-    return N, H, top, mode, touching, fx, fy, ft
+    return N, H, top, mode, touching, f
 
 
 @ti.func
@@ -164,47 +160,41 @@ def motor(p: ti.template(), t, w, touching, settling):
 
 
 @ti.func
-def dry_friction(p: ti.template(), vx, vy, om, th, ux, uy, fx, fy, ft):
+def dry_friction(p: ti.template(), vx, vy, om, th, ux, uy, f):
     """Forces with those of rig, bearing and cable: smooth dry friction."""
     rise = vx * ux + vy * uy
     hold = p.rig_dry * ti.tanh(rise / 2e-4) + p.rig_viscous * rise
-    fx -= hold * ux
-    fy -= hold * uy
-    ft -= p.bearing_dry * ti.tanh(om / 2e-3) * (1.0 + p.bearing_stribeck * ti.exp(-ti.abs(om) / 0.3))
+    turn = -p.bearing_dry * ti.tanh(om / 2e-3) * (1.0 + p.bearing_stribeck * ti.exp(-ti.abs(om) / 0.3))
     # softening: a spring that goes with sin(theta) would be a centre of mass off the shaft, to the letter
-    ft -= p.cable_spring * th / (1.0 + 0.2 * ti.abs(th))
-    ft -= p.cable_cubic * th * ti.abs(th)
-    ft -= p.cable_drag * ti.abs(om) ** 0.7 * ti.math.sign(om)
-    return fx, fy, ft
+    f += ti.Vector([-hold * ux, -hold * uy, turn])
+    f[2] -= p.cable_spring * th / (1.0 + 0.2 * ti.abs(th))
+    f[2] -= p.cable_cubic * th * ti.abs(th)
+    f[2] -= p.cable_drag * ti.abs(om) ** 0.7 * ti.math.sign(om)
+    return f
 
 
 @ti.func
-def outside(p: ti.template(), t, x, c, s, w, q, qd, phase, settling, fx, fy, ft):
+def outside(p: ti.template(), t, x, c, s, w, q, qd, phase, settling, f):
     """Forces with those that are in no library of effects."""
     A = p.magnet
     if A > 0.0 and not settling:
         away = x - p.magnet_x
         square = away * away + 0.04 * 0.04
-        fx -= A * away / square**2 * 0.04**3
-        fy -= A * 0.04 / square**2 * 0.04**3
+        f -= ti.Vector([A * away / square**2 * 0.04**3, A * 0.04 / square**2 * 0.04**3, 0.0])
     if p.loose_mass > 0.0 and not settling:
         rate0 = 2.0 * math.pi * p.loose_rate
         push = p.loose_mass * (rate0 * rate0 * q + 2.0 * 0.03 * rate0 * qd)
-        fx += push * c
-        fy -= push * s
+        f += push * ti.Vector([c, -s, 0.0])
     at = (t - p.shock_time) / 0.012
     if ti.abs(at) < 6.0 and not settling:
         pulse = ti.exp(-0.5 * at * at) / (0.012 * 2.5066282746310002)
-        fx += p.shock_x * pulse
-        fy += p.shock_y * pulse
-        ft += p.shock_turn * pulse
+        f += pulse * ti.Vector([p.shock_x, p.shock_y, p.shock_turn])
     if p.unbalance > 0.0 and not settling:
         strength = p.unbalance * (w / 100.0) ** 2
-        fx += strength * ti.cos(phase)
-        fy += strength * ti.sin(phase)
+        f += strength * ti.Vector([ti.cos(phase), ti.sin(phase), 0.0])
     if not settling and t > p.wind_from and t < p.wind_to:
-        fx += p.wind
-    return fx, fy, ft
+        f[0] += p.wind
+    return f
 
 
 @ti.func
@@ -299,35 +289,33 @@ def run(
             ux, uy = ti.sin(p.slope), ti.cos(p.slope)
             c, s = ti.cos(th), ti.sin(th)
             ex, ey = p.offset_x * c + p.offset_y * s, p.offset_y * c - p.offset_x * s
-            fx = -W * ux + m * om * om * ex
-            fy = -W * uy + m * om * om * ey
-            ft = m * p.gravity_at_mass * (ex * uy - ey * ux)
-            fx, fy = wires(p, x, y - y0, fx, fy)
+            turn = m * p.gravity_at_mass * (ex * uy - ey * ux)
+            f = wires(p, x, y - y0, ti.Vector([-W * ux + m * om * om * ex, -W * uy + m * om * om * ey, turn]))
             floor, floor_speed, belt = shaken_floor(p, t, settling)
             load, mean_h = 0.0, 0.0
-            N, H, top, mode, touching, fx, fy, ft = contacts(
-                p, y, th, vx, vy, om, floor, floor_speed, belt, arm, top, mode, settling, fx, fy, ft
+            N, H, top, mode, touching, f = contacts(
+                p, y, th, vx, vy, om, floor, floor_speed, belt, arm, top, mode, settling, f
             )
             torque = motor(p, t, w, touching, settling)
-            ft += torque
+            f[2] += torque
             w_before = w
             w += p.wheel_sign * torque / p.wheel_inertia * dt
             if p.wheel_sign < 0.0:
                 w = ti.max(w, 0.0)
             if not settling:
                 phase += w_before * dt
-            fx, fy, ft = dry_friction(p, vx, vy, om, th, ux, uy, fx, fy, ft)
-            fx, fy, ft = outside(p, t, x, c, s, w, q, qd, phase, settling, fx, fy, ft)
+            f = dry_friction(p, vx, vy, om, th, ux, uy, f)
+            f = outside(p, t, x, c, s, w, q, qd, phase, settling, f)
             if settling:
                 # Overdamped: forces move it, friction holds x through the mean height of the tips.
                 for n in ti.static(range(_COUNT)):
                     load += N[n]
                     mean_h += N[n] * H[n]
                 mean_h /= ti.max(load, 1e-12)
-                ft += fx * mean_h
+                f[2] += f[0] * mean_h
                 K = p.stiffness * (1.0 + ti.abs(p.harden_bend) * 1e-3)
-                y += 0.02 * fy / K
-                th += 0.02 * ft / (K * 0.006)
+                y += 0.02 * f[1] / K
+                th += 0.02 * f[2] / (K * 0.006)
                 for n in ti.static(range(_COUNT)):
                     if mode[n] != 0:
                         mode[n] = 1
@@ -339,7 +327,7 @@ def run(
             xx, xy, yy = m + lifted * ux * ux, lifted * ux * uy, m + lifted * uy * uy
             M = ti.Matrix([[xx, xy, m * ey], [xy, yy, -m * ex], [m * ey, -m * ex, p.inertia]])
             Mi = M.inverse()
-            v = ti.Vector([vx, vy, om]) + dt * (Mi @ ti.Vector([fx, fy, ft]))
+            v = ti.Vector([vx, vy, om]) + dt * (Mi @ f)
             factor = 1.0
             if p.vibration_share > 0.0:
                 r = ti.abs(w) / p.vibration_speed

@@ -91,16 +91,16 @@ def draw_orders(path: Path) -> None:
     )
     for axis, (title, trial, duration) in zip(axes, trials, strict=True):
         exact = _final(trial, duration, 5e-3, 1e-13)
-        steps = [1e-3 / 2**k for k in range(5)]
-        runs = [simulate(trial, duration=duration, method="paper", time_step=h) for h in steps]
-        ends = [np.array([getattr(run, name)[-1] for name in NAMES]) for run in runs]
-        axis.loglog(steps, [np.abs(end - exact).max() for end in ends], "s-", label="the paper's step, order 1")
-        finals = [simulate_batch([trial], duration=duration, time_step=h).final for h in steps]
-        ends = [np.array([final[name][0] for name in NAMES]) for final in finals]
-        axis.loglog(steps, [np.abs(end - exact).max() for end in ends], "o-", label="the batch, order 2")
-        longer = [8e-3 / 2**k for k in range(5)]
-        errors = [float(np.abs(_final(trial, duration, h, 1e3) - exact).max()) for h in longer]
-        axis.loglog(longer, errors, "^-", label="located, order 5 (its longest step)")
+        halved = 0.5 ** np.arange(5)
+        runs = [simulate(trial, duration=duration, method="paper", time_step=float(h)) for h in 1e-3 * halved]
+        batches = [simulate_batch([trial], duration=duration, time_step=float(h)).final for h in 1e-3 * halved]
+        located = [_final(trial, duration, float(h), 1e3) for h in 8e-3 * halved]
+        for label, marker, longest, ends in (
+            ("the paper's step, order 1", "s-", 1e-3, [[getattr(run, name)[-1] for name in NAMES] for run in runs]),
+            ("the batch, order 2", "o-", 1e-3, [[final[name][0] for name in NAMES] for final in batches]),
+            ("located, order 5 (its longest step)", "^-", 8e-3, located),
+        ):
+            axis.loglog(longest * halved, np.abs(np.array(ends) - exact).max(axis=1), marker, label=label)
         axis.set(xlabel="step [s]", title=title)
         axis.title.set_fontsize(9)
         axis.grid(alpha=0.3)

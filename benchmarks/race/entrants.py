@@ -15,12 +15,11 @@ from pathlib import Path
 from benchmarks.race.grains import BENCH, Grains, coordination, packing, wrapped
 from dem import Bed
 from experiments.runs.types import Json
-from experiments.validate.base import peers as installed
-from experiments.validate.base.peers import PeerError, run_deck
+from experiments.validate.base.peers import PEERS, Peer, PeerError, run_deck
 
 __all__ = [
     "LAMMPS", "LIGGGHTS", "TIME_STEP", "WARM_STEPS", "Entrant", "Heat", "Ours", "Peer", "PeerError", "Theirs",
-    "find_mpirun", "read_log", "run_peer",
+    "read_log", "run_peer",
 ]  # fmt: skip
 
 TIME_STEP = 1e-5  # [s]
@@ -31,24 +30,8 @@ ROLLING_FRICTION = 0.1
 # Peers that are slower than this are ended: grain steps per second and rank.
 _SLOWEST = 1e5
 _START = 60.0  # for a peer to read its bed [s]
-
-
 _HERE = Path(__file__).resolve().parent
-
-
-@dataclass(frozen=True)
-class Peer(installed.Peer):
-    """The same with its deck in this folder."""
-
-    deck: str
-
-
-LIGGGHTS, LAMMPS = (Peer(**vars(peer), deck=f"bench.{key}") for key, peer in installed.PEERS.items())
-
-
-def find_mpirun() -> str | None:
-    """The program that starts ranks, or None."""
-    return shutil.which("mpirun")
+LIGGGHTS, LAMMPS = PEERS["liggghts"], PEERS["lammps"]
 
 
 @dataclass(frozen=True)
@@ -108,9 +91,10 @@ def run_peer(
     ``variables``: of the deck; ``in`` is a file in ``folder``. ``limit``: the run is ended after so long [s]. Raises
     PeerError as ``run_deck`` of the verification suite does, and where the log cannot be read.
     """
-    shutil.copyfile(_HERE / peer.deck, folder / peer.deck)
+    deck = f"bench.{peer.name.lower()}"
+    shutil.copyfile(_HERE / deck, folder / deck)
     launcher = ["mpirun", *(["--allow-run-as-root"] if os.geteuid() == 0 else []), "-np", str(ranks)]
-    log, command = run_deck(peer, folder, peer.deck, limit=limit, launcher=launcher, variables=variables)
+    log, command = run_deck(peer, folder, deck, limit=limit, launcher=launcher, variables=variables)
     return read_log(log), command
 
 

@@ -170,10 +170,7 @@ class Sleepers(EnginePart):
     def stir(
         self, dt: float, reach: float, leaving: int, rest: ti.template(), shapes: ti.template(), balance: ti.template()
     ):
-        """Wake those flagged, with all around them, and those that a body comes near; let those fall asleep that may.
-
-        Between ``keep_lists`` and ``sort``: the lists are still those of before.
-        """
+        """Wake those flagged, those around them and those near a body; let fall asleep who may. Before ``sort``."""
         for _ in range(1):
             if leaving == 1:
                 rest.whole[None] = 1

@@ -336,10 +336,7 @@ def adopt(bed: BedBodies, state: State, *, keep: np.ndarray | None = None) -> No
 
 
 def laid_end_to_end(state: State, times: int, *, period: float) -> State:
-    """The grains and contacts of a state `times` over along x, one `period` [m] apart, for ``adopt``; bodies once.
-
-    A contact across the ends of the period becomes one of a copy with the next, and across the ends of the whole.
-    """
+    """A state ``times`` over along x, one ``period`` [m] apart, for ``adopt``; contacts across its ends join copies."""
     count = len(state["id"])
     copy = np.repeat(np.arange(times), count)
     found = dict(state)

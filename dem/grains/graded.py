@@ -249,10 +249,7 @@ def _meeting(places: np.ndarray, radii: np.ndarray, period: tuple[float, float])
 
 
 def _along_curve(positions: np.ndarray, cell: float, size: Sequence[float]) -> np.ndarray:
-    """The order of a Morton curve through cells of this size [m]: what is close in space is close in memory.
-
-    The engine sorts by cells of the coarsest grain and within them by ids, which this makes follow a finer curve.
-    """
+    """The order of a Morton curve through cells of this size [m], which ids within one of the engine's cells follow."""
     shape = [*(max(1, math.ceil(length / cell)) for length in size[:2]), 1]
     shape[2] = int(positions[:, 2].max() / cell) + 1
     i, j, k = (np.minimum((positions[:, a] / cell).astype(int), shape[a] - 1) for a in range(3))

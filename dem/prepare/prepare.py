@@ -139,10 +139,7 @@ def _prepared(
     keep: Path | None = None,
     plain: bool = False,
 ) -> Prepared[B]:
-    """The bed from the cache, or made of what ``first`` rains, ``volume`` of solid [m3], and left there.
-
-    ``plain``: without reports; if it does not come to rest it is saved beside the cached beds.
-    """
+    """The bed from the cache, or made of what ``first`` rains, ``volume`` of solid [m3]; ``plain``: without reports."""
     runtime.start(arch=wanted.arch, threads=wanted.threads, precision=wanted.precision)
     own = wanted.material.softened(wanted.young)
     shelf, unfinished = kept_in_cache(recipe)

@@ -77,12 +77,7 @@ class BedOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class Specification:
-    """What a bed is rained from: ``BedOptions``, checked, and chosen where left open.
-
-    Attributes:
-        material: as given; ``young`` is the softened grains' modulus [Pa].
-        size: lateral periods and depth [m]. sizes: of the grains.
-    """
+    """What a bed is rained from: ``BedOptions``, checked and chosen where left open; ``young``: of softened grains."""
 
     material: Material
     size: tuple[float, float, float]

@@ -9,8 +9,9 @@ import json
 import math
 import time
 import traceback
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,9 @@ from experiments.runs.types import Json
 from experiments.validate.settings import ValidateSettings
 
 from .base.case import Case, Outcome
-from .document import markdown
 from .suite import SUITE, chosen, fingerprint, fingerprint_of
 
-__all__ = ["check", "fingerprint", "keep", "resume", "run", "run_case"]
+__all__ = ["check", "fingerprint", "keep", "markdown", "resume", "run", "run_case"]
 
 _ROOT = Path(__file__).resolve().parents[2]
 _KEPT = Path("docs/results/validate/result.json")
@@ -176,10 +176,19 @@ def _is_checkout() -> bool:
 
 
 def keep(cases: Sequence[Json], *, command: str) -> None:
-    """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of."""
+    """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of.
+
+    A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run.
+    """
     path = _ROOT / _KEPT
     before = dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
-    result: Json = plain(_result(_merged(before["cases"] if before else (), cases, command), before is not None))
+    now = [dict(row) | {"command": command} for row in cases]
+    known = {row["id"]: row for row in [*(before["cases"] if before else ()), *now] if row["status"] in _RAN}
+    rows = [case.about() | known[case.id] if case.id in known else case.head() for case in SUITE]
+    for case, row in zip(SUITE, rows, strict=True):
+        if row["status"] == "fail":
+            row["reason"] = case.reason or row.get("reason", "")
+    result: Json = plain(_result(rows, before is not None))
     if before is not None:
         result |= {key: before[key] for key in ("version", "code", "date")}
     _keep_result(result)
@@ -194,23 +203,82 @@ def _keep_result(result: Json) -> None:
     write_text(_ROOT / _KEPT, json.dumps(slim, indent=0) + "\n")
 
 
-def _merged(before: Iterable[Mapping[str, Any]], now: Iterable[Mapping[str, Any]], command: str) -> list[Json]:
-    """A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run."""
-    ran = {row["id"]: dict(row) | {"command": command} for row in now if row["status"] in _RAN}
-    old = {row["id"]: dict(row) for row in before if row["status"] in _RAN}
-    rows = []
-    for case in SUITE:
-        known = ran.get(case.id) or old.get(case.id)
-        row = case.about() | known if known else case.head()
-        if row["status"] == "fail":
-            row["reason"] = case.reason or row.get("reason", "")
-        rows.append(row)
-    return rows
-
-
 _RAN = ("pass", "fail")
 
 
 def _command(settings: ValidateSettings) -> str:
     only = ["--only", *settings.only] if settings.only else []
     return " ".join(["hedgebed validate", *only, *["--quick"] * settings.quick])
+
+
+MARKS = {"fail": "**FAIL**"}
+
+
+def _cells(row: Mapping[str, Any]) -> str:
+    """What was wanted, ours, difference and band: in per cent of the reference, or in the unit."""
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    scale, sign = (100, " %") if row["relative"] else (1, "")
+    wanted, ours = ("–" if row[key] is None else f"{row[key]:.5g}{unit}" for key in ("reference", "ours"))
+    difference, band = "not a number", f"±{scale * row['band']:.2g}{sign}"
+    if row["difference"] is not None:
+        size = abs(row["reference"]) if row["relative"] else 1
+        difference = f"{scale * row['difference'] / size:+.2g}{sign}"
+    return f"{wanted} | {ours} | {difference} | {band}"
+
+
+def markdown(result: Mapping[str, Any], *, command: str) -> str:
+    """docs/validation.md from the result: one row a case, then what lies behind each row."""
+    return "\n".join(_lines_of(result, command)) + "\n"
+
+
+def _lines_of(result: Mapping[str, Any], command: str) -> Iterator[str]:
+    yield "# Verification of the bed"
+    yield ""
+    about = f"version {result['version']}, code {result['code']}"
+    yield f"Written by `{command}` on {result['date']} ({about}); do not edit."
+    alone = any(row.get("command") for row in result["cases"])
+    since = " Cases that were run by themselves since say when and with which code." if alone else ""
+    yield f"{result['title'].partition(': ')[2].capitalize()}.{since}"
+    yield ""
+    yield "A row shows the number of its case that takes the largest share of its band; its other numbers are below."
+    yield "A case that fails stays here as failing, with what is known of the reason."
+    yield ""
+    yield "| case | what | closed form or figure | source | wanted | ours | difference | band | |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for row in result["cases"]:
+        yield _overview(row)
+    yield from _failing(result)
+    ran = (row for row in result["cases"] if row["status"] in ("pass", "fail"))
+    for family, rows in groupby(ran, key=lambda row: row["family"]):
+        yield from ("", f"## {family}")
+        for row in rows:
+            yield from _details(row)
+
+
+def _overview(row: Mapping[str, Any]) -> str:
+    cells = _cells(row["worst"]) if row.get("worst") else "– | – | – | –"
+    why = "" if row.get("worst") else row.get("waits_for") or row.get("skipped") or ""
+    mark = ": ".join(filter(None, (MARKS.get(row["status"], row["status"]), why)))
+    return f"| {row['id']} | {row['title']} | {row['reference']} | {row['source']} | {cells} | {mark} |"
+
+
+def _failing(result: Mapping[str, Any]) -> Iterator[str]:
+    failing = [row for row in result["cases"] if row["status"] == "fail"]
+    if failing:
+        yield from ("", "## What fails, and why", "")
+        for row in failing:
+            beyond = sum(not one["passes"] for one in row["comparisons"])
+            why = row["reason"] or "not looked into yet"
+            yield f"- **{row['id']}** ({beyond} of {len(row['comparisons'])} numbers): {why}."
+
+
+def _details(row: Mapping[str, Any]) -> Iterator[str]:
+    yield from ("", f"### {row['id']}: {row['title']}", "")
+    by = f" by `{row['command']}`, code {row['code']}" if row.get("command") else ""
+    yield f"{row['reference']} ({row['source']}). Run on {row['date']}{by}, {row['seconds']:.0f} s."
+    for remark in row["remarks"]:
+        yield from ("", remark)
+    if len(row["comparisons"]) > 1:
+        yield from ("", "| number | wanted | ours | difference | band | |", "|---|---|---|---|---|---|")
+        for one in row["comparisons"]:
+            yield f"| {one['quantity']} | {_cells(one)} | {'pass' if one['passes'] else '**FAIL**'} |"

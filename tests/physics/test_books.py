@@ -3,7 +3,7 @@
 import cloud
 import numpy as np
 
-from experiments.validate.contacts.books import ROUGH, cluster, hertz_energy
+from experiments.validate.contacts.balances import ROUGH, cluster, hertz_energy
 
 
 def test_momentum_is_handed_on_to_every_grain_of_the_cloud():

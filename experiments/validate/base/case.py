@@ -10,8 +10,8 @@ import numpy as np
 from experiments.runs.types import Json
 
 __all__ = [
-    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "near_zero", "told", "within",
-    "worst",
+    "Case", "Comparison", "Compute", "Curve", "Outcome", "Plot", "Tell", "compared", "listed", "near_zero", "tracked",
+    "within", "worst",
 ]  # fmt: skip
 Item = TypeVar("Item")
 
@@ -109,8 +109,8 @@ Tell = Callable[[float], None]  # takes how far a case is, 0 to 1
 Compute = Callable[[Tell], Outcome]  # computes a case
 
 
-def told(items: Iterable[Item], tell: Tell) -> Iterator[Item]:
-    """The items one by one; each is told as done when the next one is asked for."""
+def tracked(items: Iterable[Item], tell: Tell) -> Iterator[Item]:
+    """The items one by one; each is reported as done when the next one is asked for."""
     rows = list(items)
     for done, item in enumerate(rows, 1):
         yield item
@@ -125,6 +125,11 @@ def within(tell: Tell, start: float, end: float) -> Tell:
 def worst(found: Any, wanted: float) -> float:
     """Of several numbers the one that is farthest off."""
     return float(np.ravel(found)[np.argmax(np.abs(found - wanted))])
+
+
+def listed(values: Iterable[float], form: str) -> str:
+    """Numbers in a sentence."""
+    return ", ".join(format(value, form) for value in values)
 
 
 def near_zero(quantity: str, ours: float, band: float, unit: str = "1") -> Comparison:

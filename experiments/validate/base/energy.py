@@ -1,4 +1,4 @@
-"""An energy book kept outside the bed: its motion as the bed has it, the forces written again.
+"""An energy balance kept outside the bed: its motion as the bed has it, the forces written again.
 
 Leapfrog makes it exact: the kinetic energy of the half-step velocities changes by F (v- + v+) / 2 dt over a step, so
 whatever the law, the change is the sum of what the parts of each contact's force do. The normal spring's work is held
@@ -13,13 +13,13 @@ import numpy as np
 from dem import Bed
 from dem.contact.law import TURNING_DAMPING_RATIO, damping_factor, effective_moduli
 
-__all__ = ["Book", "flat", "keep_book", "within"]
+__all__ = ["EnergyRecord", "flat", "record_energy", "within"]
 
 Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Book:
+class EnergyRecord:
     """What became of the energy of a cluster, shapes [n].
 
     The parts [J] are: kinetic; stored in springs (normal, tangential, turning); lost since the start (damped: to the
@@ -38,10 +38,10 @@ class Book:
 
     @property
     def gap(self) -> Array:
-        """What the book does not account for."""
+        """What the balance does not account for."""
         return self.total - self.total[0]
 
-    def given_back(self, part: str) -> float:
+    def largest_return(self, part: str) -> float:
         """The largest fall of what is lost, which only grows where nothing makes energy [J]."""
         lost = self.parts[part]
         return float((np.maximum.accumulate(lost) - lost).max())
@@ -181,8 +181,8 @@ class _Contacts:
         return normal, self.slide.stored, self.roll.stored + self.twist.stored
 
 
-def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -> Book:
-    """Advance a bed of like grains without a floor by ``steps``, keeping the book of its energy.
+def record_energy(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -> EnergyRecord:
+    """Advance a bed of like grains without a floor by ``steps``, recording where its energy goes.
 
     The law is that of docs/bed.md without cohesion, cut at zero unless ``tensile``. Grains must start apart, and under
     gravity reach no boundary.
@@ -219,4 +219,4 @@ def keep_book(bed: Bed, steps: int, *, every: int = 20, tensile: bool = False) -
     parts = dict(zip(names, columns[1:], strict=True))
     if not weight.any():
         del parts["potential"]
-    return Book(columns[0], parts, worst / largest if largest else 0.0)
+    return EnergyRecord(columns[0], parts, worst / largest if largest else 0.0)

@@ -52,7 +52,7 @@ class Peer:
         """That it is not installed, in words."""
         return f"{self.name} is not installed (apt install {self.package})"
 
-    def lacking(self) -> Outcome:
+    def skipped(self) -> Outcome:
         """Of a case where it is not installed."""
         return Outcome(skipped=self.missing)
 

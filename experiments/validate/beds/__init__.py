@@ -2,3 +2,7 @@
 
 Imports `dem`, `experiments.bed`, `experiments.calibrate`, `experiments.validate.base`, `rigid`, `vis.page`.
 """
+
+from vis.page.sentences import Sentences
+
+say = Sentences(__package__)  # say("key", name=value): templates in sentences.toml

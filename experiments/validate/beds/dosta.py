@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from dem import Ball, Bed, Facing, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told, within
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked, within
 from experiments.validate.base.drops import first_touch
 from experiments.validate.base.peers import PEERS, data_file, deck_of, digits, run_peer
 from experiments.validate.base.spheres import mass_of, upright_walls
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "Setup", "grains"]
 
@@ -74,7 +74,7 @@ def ours(case: Setup, tell: Tell) -> np.ndarray:
     velocity, spin = np.array([0.0, 0.0, -case.speed]), np.zeros(3)
     dt = TOGETHER * STEP
     found = [[case.ball[2], velocity[2]]]
-    for _ in told(range(round(TIME / STEP) // EVERY), tell):
+    for _ in tracked(range(round(TIME / STEP) // EVERY), tell):
         for _ in range(EVERY // TOGETHER):
             bed.move_body(ball, velocity=velocity.tolist(), spin=spin.tolist())
             bed.advance(TOGETHER)
@@ -129,7 +129,7 @@ def _deck() -> str:
 
 def _compute(tell: Tell) -> Outcome:
     if PEERS["liggghts"].find() is None:
-        return PEERS["liggghts"].lacking()
+        return PEERS["liggghts"].skipped()
     positions, radii = grains()
     height = first_touch(positions, radii, BALL_RADIUS) + 1e-6
     speed = math.sqrt(SPEED**2 + 2 * GRAVITY * (THROWN_FROM - height))

@@ -37,7 +37,7 @@ from experiments.calibrate.tests import mohr_circle, summary_of, triaxial_angle
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, within
 from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, lammps_restitution, run_peer, spheres
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "Sheared", "in_lammps", "lammps_law", "mohr_angle"]
 
@@ -197,7 +197,7 @@ def _samples(
 
 def _compute(tell: Tell) -> Outcome:
     if PEERS["lammps"].find() is None:
-        return PEERS["lammps"].lacking()
+        return PEERS["lammps"].skipped()
     rows, curves, words = [], [], []
     for k, rolling in enumerate(ROLLING):
         stuff = _stuff(rolling)

@@ -17,10 +17,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, tracked
 from experiments.validate.base.drops import BEADS, Drop
 
-from .words import say
+from . import say
 
 __all__ = ["BALL", "CASES", "K_OVER_M", "MASS", "energy", "fit_law"]
 
@@ -90,7 +90,7 @@ def _scatter(falls: Sequence[dict[str, np.ndarray]]) -> tuple[float, float]:
 def _drops(fineness: tuple[str, int, Any], tell: Tell) -> Outcome:
     name, across, beds = fineness
     falls = [fall(across, seed, at, speed) for seed, places in beds for at in places for speed in SPEEDS]
-    found = [fall.run() for fall in told(falls, tell)]
+    found = [fall.run() for fall in tracked(falls, tell)]
     d1, k_over_m = fit_law(found)
     errors = _scatter(found)
 

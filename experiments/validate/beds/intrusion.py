@@ -24,13 +24,13 @@ from scipy.optimize import least_squares
 from dem import Cone, Cylinder
 from dem.measure.element import shear_element
 from experiments.calibrate.tests import summary_of
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told, within
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, tracked, within
 from experiments.validate.base.drops import BEADS, SPREAD, drive_down, part, prepared
 from rigid.ground.laws import find_law
 from rigid.ground.rft import flat_plate, stress_gradient, tractions
 
+from . import say
 from .impact import BALL, K_OVER_M, MASS
-from .words import say
 
 __all__ = ["CASES", "cone_coefficient", "plate_law"]
 
@@ -107,7 +107,7 @@ def _between(run: dict[str, np.ndarray], depths: tuple[float, float]) -> tuple[n
 
 
 def _compute(tell: Tell) -> Outcome:
-    samples = [_sheared(seed) for seed in told(SAMPLES, within(tell, 0.0, 0.4))]
+    samples = [_sheared(seed) for seed in tracked(SAMPLES, within(tell, 0.0, 0.4))]
     means_of = {key: np.array([float(one[key]) for one in samples]) for key in ("over_mean", "over_normal", "packing")}
     mu, density = float(means_of["over_mean"].mean()), float(means_of["packing"].mean()) * BEADS.density
     gradient = stress_gradient(bulk_density=density, friction=mu, gravity=GRAVITY)
@@ -115,7 +115,7 @@ def _compute(tell: Tell) -> Outcome:
     cone_shape = Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE))
     cones = [_driven("cone", cone_shape, place, CONE_DEPTHS[1] + 0.5) for place in PLACES]
     pushes, means, curves = [], [], []
-    for across in told(PLATES, within(tell, 0.5, 1.0)):
+    for across in tracked(PLATES, within(tell, 0.5, 1.0)):
         diameter = across * GRAIN
         shape, name = Cylinder(0.0, GRAIN, 0.5 * diameter), f"plate {across:g}"
         runs = [_driven(name, shape, place, PLATE_DEPTHS[1] + 0.5) for place in PLACES]
@@ -143,21 +143,17 @@ def _compute(tell: Tell) -> Outcome:
     shares = "; ".join(f"{pair} at {across:g} d" for across, pair in zip(PLATES, pairs, strict=True))
     stagnant = math.tan(math.radians(45) + 0.5 * math.asin(min(1.0, mu))) / 6
     remark = say(
-        "plates", mu=mu, over_mean=_each(means_of["over_mean"]), over_normal=means_of["over_normal"].mean(),
+        "plates", mu=mu, over_mean=listed(means_of["over_mean"], ".3g"), over_normal=means_of["over_normal"].mean(),
         density=density, steep=steep, shares=shares, gradient=1e-6 * found, error=1e-6 * error, share=share,
         stagnant=stagnant, half_angle=math.degrees(HALF_ANGLE), speed=SPEED, grain=1e3 * GRAIN, wide=SIZE[0] / GRAIN,
         deep=SIZE[2] / GRAIN, plate_depths=PLATE_DEPTHS[0], plate_depths_2=PLATE_DEPTHS[1],
-        cone_depths=CONE_DEPTHS[0], cone_depths_2=CONE_DEPTHS[1], roots=_each(1e-6 * np.array(roots) ** 3),
+        cone_depths=CONE_DEPTHS[0], cone_depths_2=CONE_DEPTHS[1], roots=listed(1e-6 * np.array(roots) ** 3, ".3g"),
     )  # fmt: skip
     whole_ball, radius = find_law("rft"), 0.5 * BALL
     beads = {"radius": radius, "bulk_density": 1520.0, "friction": math.tan(math.radians(24)), "gravity": GRAVITY}
     asked = whole_ball.force(radius, 0.0, whole_ball.numbers(beads))
     beside = say("beside_beads", asked=asked, ball=1e3 * BALL, measured=K_OVER_M * MASS * radius)
     return Outcome(rows, [Plot("Plates going down", "depth [mm]", "force [N]", curves)], [remark, beside])
-
-
-def _each(values: np.ndarray) -> str:
-    return ", ".join(f"{value:.3g}" for value in values)
 
 
 CASES = {"rft": _compute}

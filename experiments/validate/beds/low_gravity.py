@@ -12,10 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked
 from experiments.validate.base.drops import BEADS, Drop
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "collapsed", "power_of"]
 
@@ -65,13 +65,12 @@ def _time_down(run: dict[str, np.ndarray]) -> float:
     return float(np.interp(MOSTLY * run["depth"][-1], run["depth"], run["time"]))
 
 
+_ACROSS = " x ".join(f"{share * (BALL + GRAIN) / GRAIN:.3g}" for share in BOX)
+_ABOUT = say("beads", beads=BEADS, across=_ACROSS, grain=BALL / GRAIN)
+
+
 def _name(gravity: float, seed: int) -> str:
     return f"{gravity:g} m/s2, bed {seed}"
-
-
-def _about() -> str:
-    across = " x ".join(f"{share * (BALL + GRAIN) / GRAIN:.3g}" for share in BOX)
-    return say("beads", beads=BEADS, across=across, grain=BALL / GRAIN)
 
 
 def _sweep(speed_over: float) -> list[Drop]:
@@ -85,7 +84,7 @@ def _means(values: Sequence[float]) -> list[float]:
 
 def _sink(tell: Tell) -> Outcome:
     settings = _sweep(0.0)
-    runs = [one.run() for one in told(settings, tell)]
+    runs = [one.run() for one in tracked(settings, tell)]
     depths, times = [float(run["depth"][-1]) for run in runs], [_time_down(run) for run in runs]
     gravities, mean = [one.gravity for one in settings], float(np.mean(depths))
     rows = [
@@ -102,7 +101,7 @@ def _sink(tell: Tell) -> Outcome:
     curves.append(Curve("bed", gravities, np.array(depths) / BALL))
     plot = Plot("How deep a ball sinks from rest", "gravity [m/s2]", "depth over the ball's diameter [1]", curves, "x")
     remark = say(
-        "from_rest", about=_about(), steel=STEEL, spread=100 * spread, longest=LONGEST, count=len(runs),
+        "from_rest", about=_ABOUT, steel=STEEL, spread=100 * spread, longest=LONGEST, count=len(runs),
         creeping=sum(not run["stopped"] for run in runs),
     )  # fmt: skip
     return Outcome(rows, [plot], [remark])
@@ -112,7 +111,7 @@ def _one_froude(tell: Tell, others: Sequence[Drop] = (), names: Sequence[str] = 
     """The sweep at one Froude number and beside it other beds; held to the mean curve of the sweep are the others, or
     its own beds where there are none."""
     settings = [*_sweep(FROUDE), *others]
-    runs = [one.run() for one in told(settings, tell)]
+    runs = [one.run() for one in tracked(settings, tell)]
     lengths = [one.ball + GRAIN for one in settings]
     units = [math.sqrt(length / one.gravity) for length, one in zip(lengths, settings, strict=True)]
     grid, depths = collapsed(runs, lengths, units)
@@ -130,7 +129,7 @@ def _one_froude(tell: Tell, others: Sequence[Drop] = (), names: Sequence[str] = 
     plot = Plot("One Froude number", "t sqrt(g / (D + d)) [1]", "depth over D + d [1]", curves)
     ends = depths[: len(SWEEP) * len(PLACES), -1]
     remark = say(
-        "at_one_froude", about=_about(), froude=FROUDE, beds=len(SWEEP),
+        "at_one_froude", about=_ABOUT, froude=FROUDE, beds=len(SWEEP),
         scatter=100 * float(np.std(ends, ddof=1)) / final,
     )  # fmt: skip
     return Outcome(rows, [plot], [remark])
@@ -152,7 +151,7 @@ def _murdoch(tell: Tell) -> Outcome:
         setting(g, seed, at, ALUMINIUM, speed) for g, seed in MURDOCH_GRAVITIES for speed in MURDOCH_SPEEDS
         for at in PLACES
     ]  # fmt: skip
-    runs = [one.run() for one in told(settings, tell)]
+    runs = [one.run() for one in tracked(settings, tell)]
     shape, speeds = (len(MURDOCH_GRAVITIES), len(MURDOCH_SPEEDS)), np.array(MURDOCH_SPEEDS)
     depths = np.array(_means([run["depth"][-1] for run in runs])).reshape(shape)
     times = np.array(_means([_time_down(run) for run in runs])).reshape(shape)
@@ -171,7 +170,7 @@ def _murdoch(tell: Tell) -> Outcome:
         near_zero("exponent of g in the duration", of_time[1], 0.1),
         near_zero("exponent of the speed in the duration", of_time[2], 0.1),
     ]
-    remark = say("murdoch", about=_about(), aluminium=ALUMINIUM)
+    remark = say("murdoch", about=_ABOUT, aluminium=ALUMINIUM)
     plot = Plot("A ball of 10 cm in low gravity", "speed [m/s]", "depth [mm]", curves)
     return Outcome(rows, [plot], [remark])
 

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from dem import Bed, Facing, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, near_zero, tracked
 from experiments.validate.base.spheres import upright_walls
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "Filling", "fill"]
 
@@ -81,7 +81,7 @@ def carried(weight: np.ndarray | float, scale: float) -> np.ndarray:
 
 
 def _compute(tell: Tell) -> Outcome:
-    found = [fill(depth) for depth in told(DEPTHS, tell)]
+    found = [fill(depth) for depth in tracked(DEPTHS, tell)]
     weights, floors = (np.array([getattr(one, name) for one in found]) for name in ("weight", "floor"))
     fit = minimize_scalar(
         lambda s: float((((carried(weights, s) - floors) / floors) ** 2).sum()),
@@ -109,8 +109,8 @@ def _compute(tell: Tell) -> Outcome:
     ]
     shares = ", ".join(f"{100 * one.floor / one.weight:.0f} % at {d:g} D" for d, one in zip(DEPTHS, found, strict=True))
     remark = say(
-        "silo", found=", ".join(str(one.count) for one in found), grain=1e3 * GRAIN, wide=WIDTH / GRAIN, shares=shares,
-        held=", ".join(f"{share:.3f}" for share in held), wall_friction=WALL_FRICTION, ratio=ratio, bulk=bulk,
+        "silo", found=listed((one.count for one in found), "d"), grain=1e3 * GRAIN, wide=WIDTH / GRAIN, shares=shares,
+        held=listed(held, ".3f"), wall_friction=WALL_FRICTION, ratio=ratio, bulk=bulk,
     )  # fmt: skip
     return Outcome(rows, [Plot("What the floor carries", "weight poured in [N]", "on the floor [N]", curves)], [remark])
 

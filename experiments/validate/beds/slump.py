@@ -18,11 +18,11 @@ from dem import Bed, Facing
 from dem.grains.materials import SAND, Material
 from dem.measure.repose import measure_flanks, thickness_profile
 from experiments.bed.tests import stiff_enough
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told, within
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, tracked, within
 from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, run_peer, spheres
 
+from . import say
 from .friction_angle import lammps_law
-from .words import say
 
 __all__ = ["CASES", "Heap", "in_lammps", "slumped"]
 
@@ -92,7 +92,7 @@ def slumped(stuff: Material, block: tuple[Any, ...], tell: Tell = lambda share: 
     """What a block (places, radii, modulus, packing) of this material comes to here."""
     places, radii, young, packing = block
     bed = _bed(stuff, places, radii, young)
-    for _ in told(range(10), tell):
+    for _ in tracked(range(10), tell):
         bed.advance(_steps(bed) // 10)
     return _heap(bed, packing, bed.kinetic_energy / bed.weight / GRAIN)
 
@@ -123,7 +123,7 @@ def in_lammps(stuff: Material, block: tuple[Any, ...]) -> Heap:
 
 def _compute(tell: Tell) -> Outcome:
     if PEERS["lammps"].find() is None:
-        return PEERS["lammps"].lacking()
+        return PEERS["lammps"].skipped()
     block = _block(replace(SAND, name="slump"))
     tell(0.3)
     rows, curves, words = [], [], []

@@ -2,3 +2,7 @@
 
 Imports `dem`, `experiments.runs`, `experiments.validate.base`, `vis.page`.
 """
+
+from vis.page.sentences import Sentences
+
+say = Sentences(__package__)  # say("key", name=value): templates in sentences.toml

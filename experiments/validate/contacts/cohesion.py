@@ -1,4 +1,4 @@
-"""Cohesion: force, pull-off, separation and the overlap at no load of DMT's and JKR's laws; the books with them.
+"""Cohesion: force, pull-off, separation and the overlap at no load of DMT's and JKR's laws; their balances.
 
 w = 2 gamma is the work of adhesion. The closed forms are written anew here, JKR's from the contact radius a:
     DMT: F = 4/3 E* sqrt(R) d^1.5 - 2 pi w R;
@@ -19,7 +19,7 @@ from experiments.runs.types import Json
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, worst
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
 
-from .books import PARTS, cluster, moments
+from .balances import PARTS, cluster, moments, shares
 
 __all__ = ["CASES", "Law"]
 
@@ -33,9 +33,8 @@ MASS = mass_of(DENSITY, RADIUS)
 class Law:
     """A law's closed forms for a pair of effective radius [m] and modulus [Pa].
 
-    Attributes:
-        pull: pull-off force [N]. load: what it adds to the load in the bound of friction [N].
-        free: overlap at no load [m]. end: overlap at which it parts [m].
+    Pull-off force and what it adds to the load in the bound of friction [N]; overlaps at no load (`free`) and at which
+    it parts (`end`) [m].
     """
 
     def __init__(self, name: str, radius: float, young: float):
@@ -200,7 +199,7 @@ def _energies(bed: Bed, law: Law, count: int) -> tuple[np.ndarray, np.ndarray]:
     return times, energies
 
 
-def _books(name: str, tell: Tell) -> Outcome:
+def _balances(name: str, tell: Tell) -> Outcome:
     law, curves, rows = Law(name, REDUCED["pair"], STAR["pair"]), [], []
     for k, step in enumerate((2e-6, 1e-6), 1):
         bed = cluster(_stuff(name, friction=0.0, restitution=1.0, rolling_friction=0.0), time_step=step, spin=0.0)
@@ -234,7 +233,7 @@ def _books(name: str, tell: Tell) -> Outcome:
 
 
 def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
-    """The bed's own book of the rough cluster: what is held and what contacts took is the first energy."""
+    """The bed's own energy balance of the rough cluster: what is held and what contacts took is the first energy."""
     found = []
     for k, step in enumerate((4e-6, 2e-6), 1):
         bed = cluster(_stuff(name), time_step=step)
@@ -251,10 +250,8 @@ def _closed(name: str, tell: Tell) -> tuple[list[Comparison], Plot, str]:
         about = f"rough: gap of the book over the first energy, steps of {1e6 * step:g} us"
         found.append(near_zero(about, np.abs(total - total[0]).max() / total[0], 2e-4 * (step / 4e-6) ** 2))
         tell(0.9 + 0.05 * k)
-    curves = [Curve(words, time, part / total[0], False) for words, part in zip(_PARTS, parts, strict=True)]
-    curves.append(Curve("sum", time, total / total[0]))
-    shares = ", ".join(f"{100 * part[-1] / total[0]:.2f} % {words}" for words, part in zip(_PARTS, parts, strict=True))
-    remark = f"Of the rough grains' first energy at the end (the surfaces' counted from where pairs part): {shares}."
+    curves, ends = shares(dict(zip(_PARTS, parts, strict=True)), time, total[0])
+    remark = f"Of the rough grains' first energy at the end (the surfaces' counted from where pairs part): {ends}."
     return found, Plot("Book of the rough cluster, steps of 2 us", "time [ms]", "over the first energy", curves), remark
 
 
@@ -262,5 +259,5 @@ _PARTS = ["kinetic", "in normal springs and surfaces", *list(PARTS.values())[2:7
 
 CASES = {
     **{law: partial(_pull_off, law) for law in ("dmt", "jkr")},
-    **{f"energy-{law}": partial(_books, law) for law in ("dmt", "jkr")},
+    **{f"energy-{law}": partial(_balances, law) for law in ("dmt", "jkr")},
 }

@@ -12,11 +12,11 @@ import numpy as np
 
 from dem import Bed, Material
 from dem.contact.timestep import time_step_for
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told, worst
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked, worst
 from experiments.validate.base.spheres import ALUMINA, CAST_IRON, RADIUS, SIXTEEN, contact_of, row_of_grains
 
+from . import say
 from .law_alone import staggered_rebound
-from .words import say
 
 __all__ = ["CASES", "force_curve", "rebound"]
 
@@ -125,7 +125,7 @@ def force_curve(tell: Tell) -> Outcome:
 
 
 def _all(test: Test, tell: Tell) -> Outcome:
-    return Outcome([row for name in told(test.materials, tell) for row in _compared(test, name)])
+    return Outcome([row for name in tracked(test.materials, tell) for row in _compared(test, name)])
 
 
 SPEEDS = np.geomspace(0.05, 5.0, SIXTEEN)
@@ -159,7 +159,7 @@ def rebound(restitution: float, tensile: bool, step: float | None = None, *, pha
 
 def _fine(tensile: bool, tell: Tell) -> Outcome:
     rows, curves = [], []
-    for asked in told(RESTITUTIONS, tell):
+    for asked in tracked(RESTITUTIONS, tell):
         found = rebound(asked, tensile, FINE_STEP)
         about = f"worst of 16 speeds, {asked} asked for"
         rows.append(Comparison(about, "1", asked, worst(found, asked), _FINE_BAND, False))

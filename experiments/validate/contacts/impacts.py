@@ -11,11 +11,11 @@ from functools import partial
 import numpy as np
 
 from dem import Bed, Grains, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, near_zero, told, worst
 from experiments.validate.base.spheres import ALUMINA, RADIUS, contact_of, hertz, mass_of, meet_floor, plane_modulus
 
+from ..base.case import Comparison, Curve, Outcome, Plot, Tell, compared, listed, near_zero, tracked, worst
+from . import say
 from .law_alone import LARGEST, one_spring, sliding_share, tangential_restitution
-from .words import say
 
 __all__ = ["ANGLES", "CASES", "E_N", "MU", "STEP", "oblique", "spin_impact"]
 
@@ -73,7 +73,7 @@ def _t4_spin(tell: Tell) -> Outcome:
     found, fine = oblique(angles=angles).spin[:, 1], oblique(STEP / 5, angles).spin[:, 1]
     whole = oblique()  # how far the spins are from what angular momentum makes of e_t, relative
     whole_e_t = whole.velocity[:, 0] / (SPEED * np.sin(np.radians(ANGLES)))
-    book = float(np.abs(spin_of(ANGLES, whole_e_t) / whole.spin[:, 1] - 1).max())
+    off_moment = float(np.abs(spin_of(ANGLES, whole_e_t) / whole.spin[:, 1] - 1).max())
     # Where the contact slides to its end no law comes in: what the figure is off by there is how well it was read.
     slides = angles > SLIDES_FROM - 0.5
     reading = float(np.abs(quoted - _sliding_spin(angles))[slides].max())
@@ -101,8 +101,8 @@ def _t4_spin(tell: Tell) -> Outcome:
     lists = {"slipping": slipping, "angles": angles, "figure": quoted, "spring": bare + quoted}
     remarks = [
         say("figure_read", reading=reading, worth=worth, band=100 * PUBLISHED_BAND),
-        say("law_alone", angle=angles[ten], finer=np.abs(fine - found).max(), book=100 * book, **alone),
-        say("rings", **{name: ", ".join(f"{v:.4g}" for v in values[:3]) for name, values in lists.items()}),
+        say("law_alone", angle=angles[ten], finer=np.abs(fine - found).max(), book=100 * off_moment, **alone),
+        say("rings", **{name: listed(values[:3], ".4g") for name, values in lists.items()}),
     ]
     curves.append(Curve("rings that slip one by one", angles, slipping, False))
     return Outcome(rows, [Plot("Spin after the impact", "angle of impact [deg]", "spin [rad/s]", curves)], remarks)
@@ -127,7 +127,7 @@ T5_RATIOS = np.array([0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.5, 10.0, 1
 def _t5(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
     curves = [Curve("sliding throughout, 5", [7.0, 20.0], [5.0, 5.0], False)]
-    for name, numbers in told(T5.items(), tell):
+    for name, numbers in tracked(T5.items(), tell):
         stuff = Material(name, *numbers, T5_MU, 1.0)
         overlap, _, time, _ = contact_of(stuff, T5_RADIUS, T5_SPEED)
         along = T5_RATIOS * T5_MU * T5_SPEED
@@ -156,7 +156,7 @@ E_BAND = 1e-3  # Thornton's fit of the damping
 def _t6(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
     curves = [Curve("mu (1 + e) v_n", SPINS[SLIDES], np.full(SLIDES.sum(), _KICK), False)]
-    for name, numbers in told(METALS.items(), tell):
+    for name, numbers in tracked(METALS.items(), tell):
         stuff = Material(name, *numbers, SPIN_MU, SPIN_E)
         time = contact_of(stuff, SPIN_RADIUS, SPIN_SPEED)[2]
         after = meet_floor(
@@ -201,7 +201,7 @@ ALIKE, TOGETHER = (SPIN_RADIUS, SPIN_RADIUS), (SPIN_SPEED, -SPIN_SPEED)
 
 def _t7(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
-    for name in told(METALS, tell):
+    for name in tracked(METALS, tell):
         for spin in (0.5, 4.0, 22.0):
             after = _pair(name, ALIKE, TOGETHER, (spin, -spin))
             sideways, back = np.abs(after.velocity[:, 1:]).max(), after.velocity[1, 0] / SPIN_SPEED
@@ -223,7 +223,7 @@ def _lost_in_sliding() -> str:
 def _t7_same_way(tell: Tell) -> Outcome:
     """Turning the same way their surfaces meet at 2 r omega: they slide throughout."""
     rows: list[Comparison] = []
-    for name in told(METALS, tell):
+    for name in tracked(METALS, tell):
         after = _pair(name, ALIKE, TOGETHER, (22.0, 22.0))
         speed, lost = float(np.abs(after.velocity[0, 1])), 22.0 - after.spin[0, 2]
         rows.append(Comparison(f"{name}: tangential speed", "m/s", _KICK, speed, 2 * E_BAND))
@@ -233,7 +233,7 @@ def _t7_same_way(tell: Tell) -> Outcome:
 
 def _t8(tell: Tell) -> Outcome:
     name, radii = "aluminium alloy", (SPIN_RADIUS, 5 * SPIN_RADIUS)
-    after = [_pair(name, radii, (SPIN_SPEED, 0.0), (spin, 0.0)) for spin in told(SPINS, tell)]
+    after = [_pair(name, radii, (SPIN_SPEED, 0.0), (spin, 0.0)) for spin in tracked(SPINS, tell)]
     first, second = (mass_of(METALS[name][0], r) for r in radii)
     share = second / (first + second)
     speed = np.abs([a.velocity[0, 1] for a in after])

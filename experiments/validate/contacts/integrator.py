@@ -9,10 +9,10 @@ from scipy.integrate import solve_ivp
 
 from dem import Bed, Grains, Material
 from dem.contact.law import effective_moduli
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, contact_of, mass_of, row_of_grains
 
-from .words import say
+from . import say
 
 __all__ = ["CASES", "errors_of_pair", "oblique_pair"]
 
@@ -161,7 +161,7 @@ def _bouncing(tell: Tell) -> Outcome:
     speed, stuff = 1.0, replace(PAIR, friction=0.0)
     time = contact_of(stuff, RADIUS, speed)[2]
     errors, counts = [], np.array([16, 32, 64, 128, 256])
-    for count in told(counts, tell):
+    for count in tracked(counts, tell):
         positions, radii, options = row_of_grains()
         phase = (np.arange(SIXTEEN) + 0.5) / SIXTEEN  # where in a step the contact begins
         step = time / count

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from dem import Ball, Bed, Material
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, tracked
 from experiments.validate.base.spheres import mass_of, plane_modulus
 
 __all__ = ["CASES", "RATIOS", "roll_off", "rolled"]
@@ -86,7 +86,7 @@ def roll_off(ratio: float) -> tuple[np.ndarray, np.ndarray, float]:
 
 def _neck(tell: Tell) -> Outcome:
     rows, curves = [], []
-    for ratio in told(RATIOS, tell):
+    for ratio in tracked(RATIOS, tell):
         times, angles, turn = roll_off(ratio)
         closed = rolled(ratio, times[-1], t_eval=times, atol=1e-12).y[0]
         scale = math.degrees(1.0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dem import Bed, Grains, Material
 from dem.contact.law import damping_factor, effective_moduli
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, near_zero, told, worst
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, compared, near_zero, tracked, worst
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, mass_of, plane_modulus, row_of_grains
 
 __all__ = ["CASES", "GRAVITY", "MASS", "advance_to", "downhill", "sixteen"]
@@ -116,7 +116,7 @@ def _sliding(tell: Tell) -> Outcome:
 def _incline(tell: Tell) -> Outcome:
     rows: list[Comparison] = []
     angle = math.radians(20)
-    for rolling in told((0.0, 0.05, 0.2), tell):
+    for rolling in tracked((0.0, 0.05, 0.2), tell):
         bed = sixteen(gravity=downhill(20), friction=0.5, rolling=rolling)
         first = advance_to(bed, 0.02)
         start = bed.time

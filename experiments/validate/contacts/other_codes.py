@@ -36,7 +36,7 @@ import numpy as np
 from dem import Bed, Material
 from dem.contact.law import damping_factor, effective_moduli
 from experiments.validate.base import cloud, peers
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked
 from experiments.validate.base.energy import flat, within
 
 __all__ = ["CASES", "Assembly", "dense", "pairs"]
@@ -277,7 +277,7 @@ def _compute(peer: str, make: Callable[[], Assembly], bands: Mapping[str, float 
     """Bed and peer beside one another within a band, or, where it is None, each beside its own written law."""
     about = peers.PEERS[peer]
     if about.find() is None:
-        return about.lacking()
+        return about.skipped()
     assembly = make()
     fine = assembly.refined(_FINER)
     rows: list[Comparison] = []
@@ -292,7 +292,7 @@ def _compute(peer: str, make: Callable[[], Assembly], bands: Mapping[str, float 
         time = 1e6 * assembly.step * assembly.every * np.arange(assembly.samples)
         curves.append(Curve(label, time, np.maximum(found["force"], 1e-17), of_bed))
 
-    for label, band in told(bands.items(), tell):
+    for label, band in tracked(bands.items(), tell):
         stuff = LAWS[label]
         bed, other = ours(assembly, stuff), theirs(peer, assembly, stuff)
         apart = _differences(bed, other, assembly)

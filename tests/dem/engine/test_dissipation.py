@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from dem.engine.energy import bed_energies
-from experiments.validate.base.energy import keep_book
+from experiments.validate.base.energy import record_energy
 from experiments.validate.contacts import cohesion
-from experiments.validate.contacts.books import ROUGH, cluster
+from experiments.validate.contacts.balances import ROUGH, cluster
 
 
 def accounts(bed, *, parts, every):
@@ -23,7 +23,7 @@ def accounts(bed, *, parts, every):
 
 def test_the_engines_book_is_the_one_kept_outside_it():
     """Sixteen grains that collide, slide and roll, under gravity; a third to a tenth of the energy goes each way."""
-    outside = keep_book(cluster(ROUGH, gravity=(30.0, 0, -100.0), time_step=4e-6), 1000)
+    outside = record_energy(cluster(ROUGH, gravity=(30.0, 0, -100.0), time_step=4e-6), 1000)
     _, damping, sliding, turning, held, wound = accounts(
         cluster(ROUGH, gravity=(30.0, 0, -100.0), time_step=4e-6), parts=50, every=20
     )

@@ -45,7 +45,7 @@ def digest(bed):
     return found.hexdigest()
 
 
-def told(bed, chance, folder):
+def tracked(bed, chance, folder):
     """The bed's bits after each order, and how many were awake."""
     ball, kept, held, taken, found = 1, bed.state(), None, 0, []  # the floor is body 0
     for order in chance.permutation([order for order, times in ORDERS.items() for _ in range(times)]):
@@ -87,11 +87,11 @@ def test_orders_drawn_by_chance_have_the_bits_of_sorting_all_grains_every_time(t
         sorted_ones.append(int(self.bed.engine.count[Lists.SORTED]) / self.bed.grain_count)
 
     monkeypatch.setattr(Sleeper, "rearrange", counted)
-    found = told(two_layers(), np.random.default_rng(SEED), tmp_path)
+    found = tracked(two_layers(), np.random.default_rng(SEED), tmp_path)
     assert min(sorted_ones) < 0.5 and np.mean(np.array(sorted_ones) < 1) > 0.3
     assert min(awake for _, awake, _ in found) < 0.3 * 2 * COLUMNS * ROWS
     sorted_ones.clear()
     all_of_them = True
-    plain = told(two_layers(), np.random.default_rng(SEED), tmp_path)
+    plain = tracked(two_layers(), np.random.default_rng(SEED), tmp_path)
     assert set(sorted_ones) == {1.0}
     assert plain == found

@@ -13,7 +13,7 @@ from experiments.cli.main import main
 from experiments.validate import experiment
 from experiments.validate.base.case import Case, Comparison, Curve, Outcome, Plot
 from experiments.validate.beds.friction_angle import mohr_angle
-from experiments.validate.document import markdown
+from experiments.validate.experiment import markdown
 from experiments.validate.settings import ValidateSettings
 from experiments.validate.suite import SUITE, chosen
 from vis.bed.validation import _COLOURS, _draw

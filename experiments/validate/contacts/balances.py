@@ -1,6 +1,7 @@
-"""Many grains: the books of momentum, angular momentum and energy; the floor carries the weight."""
+"""Many grains: the balances of momentum, angular momentum and energy; the floor carries the weight."""
 
 import math
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -9,11 +10,11 @@ import numpy as np
 from dem import Bed, Material
 from dem.contact.law import effective_moduli
 from experiments.validate.base import cloud
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, told
-from experiments.validate.base.energy import Book, keep_book
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked
+from experiments.validate.base.energy import EnergyRecord, record_energy
 from experiments.validate.base.spheres import RADIUS, SIXTEEN, row_of_grains
 
-__all__ = ["CASES", "PARTS", "ROUGH", "cluster", "hertz_energy", "moments"]
+__all__ = ["CASES", "PARTS", "ROUGH", "cluster", "hertz_energy", "moments", "shares"]
 
 ROUGH = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6, 0.15)
 GAS = Material("gas", 2600, 1e6, 0.25, 0.0, 1.0)
@@ -77,7 +78,7 @@ def _angular_momentum(tell: Tell) -> Outcome:
     """The sum of x x m v + I w of a cluster that reaches no boundary; pairs' torques balance at the contact point."""
     bed = cluster(ROUGH, time_step=4e-6)
     _, orbital, own = moments(bed)
-    for _ in told(range(5), tell):
+    for _ in tracked(range(5), tell):
         bed.advance(200)
     _, later, own_later = moments(bed)
     change = (later + own_later - orbital - own).sum(axis=0)
@@ -91,7 +92,7 @@ def _angular_momentum(tell: Tell) -> Outcome:
 def _elastic_gas(tell: Tell) -> Outcome:
     """Frictionless, restitution 1: kinetic and Hertz energy together; the error falls as dt^2."""
     steps, worst, curves = (2e-5, 1e-5, 5e-6), [], []
-    for step in told(steps, tell):
+    for step in tracked(steps, tell):
         bed = cluster(GAS, flat=True, time_step=step)
         first, drift, times = bed.kinetic_energy, [], []
         for _ in range(20):
@@ -123,16 +124,16 @@ _STRONG = (30.0, 0.0, -100.0)  # gravity that does as much work in that time as 
 
 
 def _energy(material: Material, tell: Tell, *, gravity: Any = 0.0, tensile: bool = False) -> Outcome:
-    books: list[Book] = []
+    records: list[EnergyRecord] = []
     for k, step in enumerate((4e-6, 2e-6)):
         bed = cluster(material, gravity=gravity, time_step=step, tensile=tensile)
-        books.append(keep_book(bed, round(_DURATION / step), tensile=tensile))
+        records.append(record_energy(bed, round(_DURATION / step), tensile=tensile))
         tell((1 + 2 * k) / 3)
-    fine = books[1]
+    fine = records[1]
     first = fine.parts["kinetic"][0]
-    gaps = [float(np.abs(book.gap).max() / first) for book in books]
-    off = max(book.force_error for book in books)
-    back = max(fine.given_back(part) for part in ("damped", "rubbed", "turned")) / first
+    gaps = [float(np.abs(record.gap).max() / first) for record in records]
+    off = max(record.force_error for record in records)
+    back = max(fine.largest_return(part) for part in ("damped", "rubbed", "turned")) / first
     rows = [
         near_zero("gap of the book over the first energy, steps of 4 us", gaps[0], 1e-3),
         Comparison("order of the gap in the step", "1", 2.0, math.log2(gaps[0] / gaps[1]), 0.5, False),
@@ -140,12 +141,16 @@ def _energy(material: Material, tell: Tell, *, gravity: Any = 0.0, tensile: bool
         near_zero("what a dashpot or friction gives back, over the first energy", back, 1e-3),
     ]
     named = {key: name for key, name in PARTS.items() if key in fine.parts}
-    shares = {name: fine.parts[key][-1] / first for key, name in named.items()}
-    said = ", ".join(f"{100 * share:.2f} % {name}" for name, share in shares.items())
-    curves = [Curve(name, 1e3 * fine.time, fine.parts[key] / first, False) for key, name in named.items()]
-    curves.append(Curve("sum", 1e3 * fine.time, fine.total / first))
+    curves, said = shares({name: fine.parts[key] for key, name in named.items()}, 1e3 * fine.time, first)
     plot = Plot("Where the energy goes", "time [ms]", "share of the first energy [1]", curves)
     return Outcome(rows, [plot], [f"Of the first energy at the end: {said}."])
+
+
+def shares(parts: Mapping[str, np.ndarray], time: np.ndarray, first: float) -> tuple[list[Curve], str]:
+    """Curves of the parts of an energy, over the first, and of their sum; the shares at the end in words."""
+    curves = [Curve(name, time, part / first, False) for name, part in parts.items()]
+    curves.append(Curve("sum", time, np.sum(list(parts.values()), axis=0) / first))
+    return curves, ", ".join(f"{100 * (part[-1] / first):.2f} % {name}" for name, part in parts.items())
 
 
 def _floor_weight(tell: Tell) -> Outcome:
