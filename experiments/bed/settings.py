@@ -42,49 +42,34 @@ class BedSettings(StrictSettings):
     """A bed prepared as in a laboratory, stage by stage."""
 
     material: GrainMaterial = "sand"
-    stages: tuple[str, ...] = Field(
-        ("rain", "level"),
-        min_length=1,
-        description="What is done, in this order: rain[:dry|:FRICTION], stick, level[:HEIGHT], fluff[:TIMES], "
-        "compact:PACKING[@lid], compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES.",
-    )
+    stages: tuple[str, ...] = Field(("rain", "level"), min_length=1)
+    """What is done, in this order: rain[:dry|:FRICTION], stick, level[:HEIGHT], fluff[:TIMES], compact:PACKING[@lid],
+    compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES."""
     size: BedSize = (0.04, 0.04, 0.03)
     grain: Grain = 0.004
     spread: Spread = 0.15
-    distribution: Distribution = Field(
-        "uniform",
-        description="Of the diameters, about `grain`: uniform, normal or log-normal by number; sieve: a table by mass, "
-        "enlarged until its grains have that mean.",
-    )
-    deviation: Positive | None = Field(
-        None, description="Standard deviation over the mean (normal), or of ln diameter (log-normal) [1]."
-    )
-    cut: Positive | None = Field(
-        None, description="Where normal and log-normal are cut off [standard deviations]; 2 if not given."
-    )
+    distribution: Distribution = "uniform"
+    """Of the diameters, about `grain`: uniform, normal or log-normal by number; sieve: a table by mass, enlarged until
+    its grains have that mean."""
+    deviation: Positive | None = None
+    """Standard deviation over the mean (normal), or of ln diameter (log-normal) [1]."""
+    cut: Positive | None = None
+    """Where normal and log-normal are cut off [standard deviations]; 2 if not given."""
     openings: tuple[Positive, ...] = Field((), description="A sieve table: openings, ascending [m].")
-    passing: tuple[Annotated[float, Field(ge=0, le=1)], ...] = Field(
-        (), description="A sieve table: share of the mass that passes each, from 0 to 1 [1]."
-    )
-    keep: Kept = Field(
-        "strength",
-        description="What stays the same of a material that sticks, in grains of another size than it was found for: "
-        "their strength (pull-off over d^2), their Bond number (pull-off over weight), or the surface energy.",
-    )
-    coarse: Positive | None = Field(
-        None,
-        description="A graded bed: mean diameter of the coarsest grains, away from the footprints, under which "
-        "it is `grain` [m]; one size throughout if not given.",
-    )
-    footprints: tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...] = Field(
-        (), description="A graded bed: along x, where each strip of fine grains begins and ends [m]."
-    )
-    fine_depth: Positive | None = Field(
-        None, description="A graded bed: how deep the fine grains reach [m]; to the floor if not given."
-    )
-    growth: Positive | None = Field(
-        None, description="A graded bed: growth of the mean diameter with distance [1]; 0.15 if not given."
-    )
+    passing: tuple[Annotated[float, Field(ge=0, le=1)], ...] = ()
+    """A sieve table: share of the mass that passes each, from 0 to 1 [1]."""
+    keep: Kept = "strength"
+    """What stays the same of a material that sticks, in grains of another size than it was found for: their strength
+    (pull-off over d^2), their Bond number (pull-off over weight), or the surface energy."""
+    coarse: Positive | None = None
+    """A graded bed: mean diameter of the coarsest grains, away from the footprints, under which it is `grain` [m]; one
+    size throughout if not given."""
+    footprints: tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...] = ()
+    """A graded bed: along x, where each strip of fine grains begins and ends [m]."""
+    fine_depth: Positive | None = None
+    """A graded bed: how deep the fine grains reach [m]; to the floor if not given."""
+    growth: Positive | None = None
+    """A graded bed: growth of the mean diameter with distance [1]; 0.15 if not given."""
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
     seed: SeedNumber = Field(1, description="Seed of sizes and positions.")
     name: ShelfName = None
@@ -156,11 +141,9 @@ class BedRefineSettings(StrictSettings):
 
     bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
     grain: Positive | None = Field(None, description="Mean grain diameter [m]; half of the bed's own if not given.")
-    keep: Kept = Field(
-        "strength",
-        description="What stays the same of grains that stick: their strength (pull-off over d^2), their Bond number "
-        "(pull-off over weight), or the surface energy.",
-    )
+    keep: Kept = "strength"
+    """What stays the same of grains that stick: their strength (pull-off over d^2), their Bond number (pull-off over
+    weight), or the surface energy."""
     seed: SeedNumber | None = Field(None, description="Seed of sizes and positions; the bed's own if not given.")
     name: ShelfName = None
     threads: Threads = None

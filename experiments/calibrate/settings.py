@@ -87,92 +87,53 @@ class Target:
 class CalibrateSettings(StrictSettings):
     """Grain parameters found from bulk figures: a response surface over simulated shear tests, and the fit to it."""
 
-    name: str = Field(
-        "calibrated",
-        pattern=r"^[a-z0-9][a-z0-9._+-]*$",
-        description="Name of the material: small letters, digits, '.', '_', '+', '-'.",
-    )
-    material: str = Field(
-        "sand", description="The material whose numbers it has where they are neither fixed nor free."
-    )
-    fixed: dict[str, float | str] = Field(
-        {}, description="Numbers of its own that are not free, as [fixed] density = 2900.0; keys of a material file."
-    )
+    name: str = Field("calibrated", pattern=r"^[a-z0-9][a-z0-9._+-]*$")
+    """Name of the material: small letters, digits, '.', '_', '+', '-'."""
+    material: str = "sand"
+    """The material whose numbers it has where they are neither fixed nor free."""
+    fixed: dict[str, float | str] = Field({})
+    """Numbers of its own that are not free, as [fixed] density = 2900.0; keys of a material file."""
     sources: dict[str, str] = Field({}, description="Where the fixed numbers come from, in words, key by key.")
-    free: dict[str, tuple[float, float]] = Field(
-        {},
-        description="What is found, with its range: [free] rolling_friction = [0.05, 0.8]; friction, rolling_friction "
-        "[1], surface_energy [J/m2] or bond_number (pull-off force of two grains over the weight of one) [1].",
-    )
-    targets: dict[str, Json] = Field(
-        {},
-        description="The figures: [targets.critical_friction_angle] value = 31.5, tolerance = 1.5, source = '...'; "
-        "also figure = '...' where it has another name, plane = 'shear', 'triaxial' or 'mohr', through = 'tests' or "
-        "'origin', state = 'loose' or 'dense', fit = false to compare only.",
-    )
+    free: dict[str, tuple[float, float]] = Field({})
+    """What is found, with its range: [free] rolling_friction = [0.05, 0.8]; friction, rolling_friction [1],
+    surface_energy [J/m2] or bond_number (pull-off force of two grains over the weight of one) [1]."""
+    targets: dict[str, Json] = Field({})
+    """The figures: [targets.critical_friction_angle] value = 31.5, tolerance = 1.5, source = '...'; also figure = '...'
+    where it has another name, plane = 'shear', 'triaxial' or 'mohr', through = 'tests' or 'origin', state = 'loose'
+    or 'dense', fit = false to compare only."""
     grain: Positive = Field(0.004, description="Mean grain diameter [m]; surface energies hold for it.")
     spread: Spread = 0.15
-    max_overlap: float = Field(
-        0.05,
-        ge=0.005,
-        le=0.1,
-        description="Overlap [of a diameter] to which the grains of a sheared sample are softened; the worst of its "
-        "contacts go past it, to three times as much at most. Soft grains count their overlaps in the density.",
-    )
-    size: tuple[Positive, Positive, Positive] = Field(
-        (10.0, 8.0, 10.0), description="Sample that is sheared: both periods and the height [mean diameters]."
-    )
-    dense_friction: float = Field(
-        0.1,
-        ge=0,
-        le=1,
-        description="Friction of the grains while a dense sample is pressed [1]; 0: as dense as can be.",
-    )
-    loose_friction: float | None = Field(
-        None,
-        ge=0,
-        le=10,
-        description="Friction of the grains while a loose sample is pressed, without rolling friction [1]; their own, "
-        "rolling friction as well, if not given.",
-    )
-    pressures: tuple[Positive, ...] = Field(
-        (500.0, 1000.0),
-        min_length=1,
-        description="Normal stresses of the shear tests [Pa]; without cohesion the last alone: strength goes with it.",
-    )
+    max_overlap: float = Field(0.05, ge=0.005, le=0.1)
+    """Overlap [of a diameter] to which the grains of a sheared sample are softened; the worst of its contacts go past
+    it, to three times as much at most. Soft grains count their overlaps in the density."""
+    size: tuple[Positive, Positive, Positive] = (10.0, 8.0, 10.0)
+    """Sample that is sheared: both periods and the height [mean diameters]."""
+    dense_friction: float = Field(0.1, ge=0, le=1)
+    """Friction of the grains while a dense sample is pressed [1]; 0: as dense as can be."""
+    loose_friction: float | None = Field(None, ge=0, le=10)
+    """Friction of the grains while a loose sample is pressed, without rolling friction [1]; their own, rolling friction
+    as well, if not given."""
+    pressures: tuple[Positive, ...] = Field((500.0, 1000.0), min_length=1)
+    """Normal stresses of the shear tests [Pa]; without cohesion the last alone: strength goes with it."""
     strain: float = Field(1.2, ge=0.2, le=20, description="Shear strain of a test [1]; critical: its second half.")
     inertial_number: Positive = Field(5e-3, le=0.05, description="Rate of shear times d sqrt(density / pressure) [1].")
     gravity: Positive = Field(STANDARD_GRAVITY, description="Of bond_number and of laboratory beds [m/s2].")
-    points: int = Field(
-        6, ge=3, le=200, description="Points simulated first: an even design, or a Latin hypercube [1]."
-    )
+    points: int = Field(6, ge=3, le=200)
+    """Points simulated first: an even design, or a Latin hypercube [1]."""
     most_points: int = Field(10, ge=3, le=500, description="Points simulated at most, before the check [1].")
-    enough: float = Field(
-        0.5,
-        gt=0,
-        le=10,
-        description="No further points once the surface is known to this share of every tolerance [1].",
-    )
-    seed: SeedNumber = Field(
-        1, description="Seed of the design and of the first sample explored; the others have this and thousands more."
-    )
-    check_seeds: tuple[SeedNumber, ...] = Field(
-        (2, 3), min_length=1, description="Seeds of the samples with which the parameters found are checked."
-    )
-    checks: int = Field(
-        2,
-        ge=1,
-        le=10,
-        description="Checks at most: another one where a figure is off by more than half its tolerance [1].",
-    )
-    bed_size: tuple[Positive, Positive, Positive] = Field(
-        (0.04, 0.04, 0.035), description="Laboratory beds, for packing fractions: widths and depth [m]."
-    )
-    repose_size: tuple[Positive, Positive, Positive] = Field(
-        (32.0, 6.0, 8.0),
-        description="Bed that is drained for an angle of repose: widths (periodic; slopes along the first) and depth "
-        "[mean diameters].",
-    )
+    enough: float = Field(0.5, gt=0, le=10)
+    """No further points once the surface is known to this share of every tolerance [1]."""
+    seed: SeedNumber = 1
+    """Seed of the design and of the first sample explored; the others have this and thousands more."""
+    check_seeds: tuple[SeedNumber, ...] = Field((2, 3), min_length=1)
+    """Seeds of the samples with which the parameters found are checked."""
+    checks: int = Field(2, ge=1, le=10)
+    """Checks at most: another one where a figure is off by more than half its tolerance [1]."""
+    bed_size: tuple[Positive, Positive, Positive] = (0.04, 0.04, 0.035)
+    """Laboratory beds, for packing fractions: widths and depth [m]."""
+    repose_size: tuple[Positive, Positive, Positive] = (32.0, 6.0, 8.0)
+    """Bed that is drained for an angle of repose: widths (periodic; slopes along the first) and depth [mean
+    diameters]."""
     threads: Threads = None
 
     @model_validator(mode="after")

@@ -40,30 +40,24 @@ class PenetrateSettings(StrictSettings):
     """A spike driven into, dropped on and set down on a bed of grains, beside the spring-damper fitted to it."""
 
     # The bed
-    bed: str | None = Field(
-        None,
-        min_length=1,
-        description="A bed of `hedgebed bed make`: its file, its run's folder, or its name on the shelf. Decides "
-        "material, bed_size, grain, spread, gravity, seeds and softness; a bed is prepared if not given.",
-    )
+    bed: str | None = Field(None, min_length=1)
+    """A bed of `hedgebed bed make`: its file, its run's folder, or its name on the shelf. Decides material, bed_size,
+    grain, spread, gravity, seeds and softness; a bed is prepared if not given."""
     material: GrainMaterial = "sand"
     bed_size: BedSize = (0.072, 0.072, 0.0508)
     grain: Grain = 0.0024
     spread: Spread = 0.15
-    packing: float | None = Field(
-        None, gt=0.5, le=0.64, description="Packing fraction to prepare the bed to [1]; as it settles if not given."
-    )
+    packing: float | None = Field(None, gt=0.5, le=0.64)
+    """Packing fraction to prepare the bed to [1]; as it settles if not given."""
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2]; 1 g even in the rig.")
     seeds: Seeds = (1, 2, 3)
 
     # The spike
     tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip.")
     tip_diameter: Positive = Field(0.012, description="Diameter of the tip [m].")
-    shaft_diameter: Positive | None = Field(
-        None,
-        description="Diameter of the shaft [m]: at most the tip's and at least a grain, with a flat tip the tip's own; "
-        "the tip's if not given.",
-    )
+    shaft_diameter: Positive | None = None
+    """Diameter of the shaft [m]: at most the tip's and at least a grain, with a flat tip the tip's own; the tip's if
+    not given."""
     shaft_length: Positive = Field(0.06, description="Length of the shaft above the tip's widest point [m].")
     cone_angle: float = Field(60.0, ge=1, lt=180, description="Full angle of a conical tip [degrees].")
     spike_friction: NotNegative = Field(0.5, description="Friction coefficient of spike and grains [1].")
@@ -71,31 +65,23 @@ class PenetrateSettings(StrictSettings):
 
     # What rests on it
     platform_mass: Positive = Field(5.3, description="Mass of the platform [kg]; a spike carries a quarter.")
-    rig: NotNegative = Field(
-        0.0085, lt=1, description="Simulated gravity of the offloading rig [9.80665 m/s2]; 0: no rig, `gravity` rules."
-    )
-    load: Positive | None = Field(
-        None,
-        description="Weight on the spike, set down and dropped [N]. If not given, a quarter of the platform's: in the "
-        "rig (m + m_b) g_sim / 4, which is (5.3 kg platform + 5.2 kg counterweight) x 0.0085 g / 4 = 0.219 N by "
-        "default; without a rig m g / 4.",
-    )
-    mass: Positive = Field(
-        0.1,
-        description="Mass that a drop moves, under `load` [kg]. The shipped 0.1 kg stops within a shallow bed; the "
-        "platform's own share in the rig, (m + m_b) / 4, is 2.63 kg, and a free drop in a laboratory has load = m g.",
-    )
+    rig: NotNegative = Field(0.0085, lt=1)
+    """Simulated gravity of the offloading rig [9.80665 m/s2]; 0: no rig, `gravity` rules."""
+    load: Positive | None = None
+    """Weight on the spike, set down and dropped [N]. If not given, a quarter of the platform's: in the rig (m + m_b)
+    g_sim / 4, which is (5.3 kg platform + 5.2 kg counterweight) x 0.0085 g / 4 = 0.219 N by default; without a rig m
+    g / 4."""
+    mass: Positive = 0.1
+    """Mass that a drop moves, under `load` [kg]. The shipped 0.1 kg stops within a shallow bed; the platform's own
+    share in the rig, (m + m_b) / 4, is 2.63 kg, and a free drop in a laboratory has load = m g."""
 
     # What is done with it
     speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of driven runs [m/s].")
     depth: Positive = Field(0.012, description="Depth of driven runs [m].")
     hold: NotNegative = Field(0.01, description="How long a driven spike is held at depth [s].")
     retreat_speed: Positive = Field(0.4, description="Speed of the pull-out [m/s].")
-    drop_speeds: tuple[Positive, ...] = Field(
-        (0.1, 0.15, 0.2),
-        description="Speeds at the surface of dropped runs [m/s]; none: no drops, on no seed unless other_drop_speeds "
-        "is given.",
-    )
+    drop_speeds: tuple[Positive, ...] = (0.1, 0.15, 0.2)
+    """Speeds at the surface of dropped runs [m/s]; none: no drops, on no seed unless other_drop_speeds is given."""
     after_stop: Positive = Field(0.03, description="How long a drop is followed after its first stop [s].")
     drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
     lowering_speed: Positive = Field(0.1, description="Speed at which a spike is lowered to be set down [m/s].")
@@ -104,20 +90,13 @@ class PenetrateSettings(StrictSettings):
     other_drop_speeds: tuple[Positive, ...] = Field((0.15,), description="Drops on the seeds after the first [m/s].")
 
     # Beside it
-    ground: Literal["bed", "spring-damper"] = Field(
-        "bed", description="What the spike goes into: the bed, or, without a bed, the spring-damper of `model`."
-    )
-    model: str | None = Field(
-        None,
-        min_length=1,
-        description="A model.toml of penetration, as diagnose writes it: its law, effects and all, is run beside bed "
-        "and spring-damper. Without a bed its spike, mass and load are taken where they are not given.",
-    )
-    campaign: str | None = Field(
-        None,
-        min_length=1,
-        description="Folder for the bed's runs as a campaign of measured trials, seen through noisy sensors.",
-    )
+    ground: Literal["bed", "spring-damper"] = "bed"
+    """What the spike goes into: the bed, or, without a bed, the spring-damper of `model`."""
+    model: str | None = Field(None, min_length=1)
+    """A model.toml of penetration, as diagnose writes it: its law, effects and all, is run beside bed and
+    spring-damper. Without a bed its spike, mass and load are taken where they are not given."""
+    campaign: str | None = Field(None, min_length=1)
+    """Folder for the bed's runs as a campaign of measured trials, seen through noisy sensors."""
     campaign_rate: Positive = Field(1000.0, description="Rate of the campaign's samples [Hz].")
     campaign_depth_std: Positive = Field(5e-5, description="Noise of the campaign's depth [m].")
     campaign_force_std: Positive = Field(0.02, description="Noise of the campaign's force, driven [N].")
@@ -138,11 +117,9 @@ class PenetrateSettings(StrictSettings):
     # What is kept
     frame_count: int = Field(30, ge=0, le=2000, description="Frames of each shown run [1]; 0 for none.")
     checkpoint_interval: Positive = Field(20.0, description="Time between checkpoints [s of waiting].")
-    reference: str | None = Field(
-        None,
-        description="A result.json to compare stiffness, damping and sinkage with, or 'shipped' for that of the case "
-        "that ships; none if not given.",
-    )
+    reference: str | None = None
+    """A result.json to compare stiffness, damping and sinkage with, or 'shipped' for that of the case that ships; none
+    if not given."""
 
     @model_validator(mode="before")
     @classmethod
