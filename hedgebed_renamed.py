@@ -115,6 +115,7 @@ _MODULES = {
             "findings force_units=pushes penetration=pushes tumble=tumbles turning=tumbles words zeros=pushes"
         ),
     },
+    "experiments.tumble": {"experiments.grains": "words=bed_result"},
     "experiments.validate": {
         "experiments.validate.base": "case cloud drops energy kept=drops parts=drops peers spheres",
         "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
@@ -161,6 +162,9 @@ _MODULES = {
         "vis.pictures": "arrows=canvas canvas frames meshes render scene sections stage=scene tracks",
         "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=report tumble_sweep=report",
     },
+    "vis.compare": {"vis.page": "figures=states"},
+    "vis.paper": {"vis.page": "run=plots"},
+    "vis.penetrate": {"vis.page": "plot_parts=plots"},
 }
 """Package of before -> package of today -> its modules, `old=new` where the name is another, too."""
 
