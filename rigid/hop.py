@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rigid.checks import check_above_zero, check_friction, check_not_negative
+from rigid.checks import Coulomb, check_above_zero, check_friction, check_not_negative
 
 __all__ = [
     "Flight", "Launch", "Tumbler", "brake_launch", "escape_speed", "flight", "impulsive_launch", "launch",
@@ -40,7 +40,7 @@ PHASES = 60  # A launch with more changes between stick and slip than this fails
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tumbler:
+class Tumbler(Coulomb):
     """The numbers of the planar model that a launch depends on. Raises ValueError for those that cannot be."""
 
     mass: float  # m [kg]
@@ -68,11 +68,6 @@ class Tumbler:
     def weight(self) -> float:
         """W on the ground [N]."""
         return self.mass_y * self.gravity
-
-    @property
-    def sliding_friction(self) -> float:
-        """mu_d, as given or by default."""
-        return 0.5 * self.mu_s if self.mu_d is None else self.mu_d
 
     @property
     def tipping_torque(self) -> float:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "Parameter", "check_above_zero", "check_friction", "check_not_negative", "check_parameters", "is_number",
-    "check_rig", "sample_times",
+    "Coulomb", "Parameter", "check_above_zero", "check_friction", "check_not_negative", "check_parameters", "check_rig",
+    "is_number", "sample_times",
 ]  # fmt: skip
 
 
@@ -76,6 +76,18 @@ def _check(unit: str, allowed: str, numbers: Mapping[str, Any], fits: Callable[[
     for key, value in numbers.items():
         if not (is_number(value) and math.isfinite(value) and fits(value)):
             raise ValueError(f"{key} = {value} must be {allowed}" + (f" ({unit})" if unit else ""))
+
+
+class Coulomb:
+    """Base of classes with coefficients of static and sliding friction, `mu_s` and `mu_d` [1]."""
+
+    mu_s: float
+    mu_d: float | None
+
+    @property
+    def sliding_friction(self) -> float:
+        """mu_d [1], as given, or by default half of mu_s."""
+        return 0.5 * self.mu_s if self.mu_d is None else self.mu_d
 
 
 def check_friction(mu_s: float, mu_d: float | None, *, endless: bool = False) -> None:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigid.checks import check_above_zero, check_friction
+from rigid.checks import Coulomb, check_above_zero, check_friction
 
 from .laws import SurfaceLaw, find_law
 from .reaction import Contact, Facts, Reaction, State, Turned
@@ -26,7 +26,7 @@ difference of works, which would lose digits."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class _LawGround:
+class _LawGround(Coulomb):
     """What all grounds with a surface law share. `_setting` says which law and with which parameters."""
 
     mu_s: float = 0.5  # Coefficient of static friction [1]
@@ -105,8 +105,7 @@ class _LawGround:
             self._deepest[0] = max(self._deepest[0], start, end) if end > 0.0 else 0.0
         if normal == 0.0:
             return Reaction(np.zeros(3), np.zeros(3))
-        mu_d = 0.5 * self.mu_s if self.mu_d is None else self.mu_d
-        contact = Contact(at.copy(), normal, mu_s=self.mu_s, mu_d=mu_d)
+        contact = Contact(at.copy(), normal, mu_s=self.mu_s, mu_d=self.sliding_friction)
         return Reaction(np.array([0.0, 0.0, normal]), np.zeros(3), (contact,))
 
     def energies(self) -> dict[str, float]:

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from rigid.checks import check_above_zero, check_friction, check_not_negative, check_rig
+from rigid.checks import Coulomb, check_above_zero, check_friction, check_not_negative, check_rig
 from rigid.ground.laws import SurfaceLaw, find_law
 from rigid.terms import Term, find_effect, load_effect
 
@@ -80,7 +80,7 @@ class Ground:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trial:
+class Trial(Coulomb):
     """One tumble. The names are those of a measured trial; SI units; stiffness and damping are a row's.
 
     Raises ValueError, naming the key, the value found and what was expected: for mass or inertia that no body can have
@@ -183,11 +183,6 @@ class Trial:
             if effect.id == id:
                 return effect.values
         return None
-
-    @property
-    def sliding_friction(self) -> float:
-        """mu_d [1], as given or by default."""
-        return 0.5 * self.mu_s if self.mu_d is None else self.mu_d
 
     @property
     def weight(self) -> float:

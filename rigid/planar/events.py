@@ -114,13 +114,8 @@ def resolve(
 ) -> list[float]:
     """Decide in `modes` whether what may stick now does; stop in `z` what sticking does not allow; return dz/dt.
 
-    Args:
-        system: the trial's equations of motion.
-        time: of the event [s].
-        z: state vector; speeds that sticking forbids (rounding, or a tip that just stopped) are taken out.
-        modes: changed in place.
-        spikes: those whose slip speed is zero now, besides those that stick already.
-        dry: which dry frictions may hold now: 0 the rig's, 1 the bearing's.
+    `spikes`: those whose slip speed is zero now, besides those that stick already. `dry`: which dry frictions may hold
+    now, 0 the rig's and 1 the bearing's.
     """
     fresh = [n for n in spikes if n in modes.touching]
     for n in fresh:

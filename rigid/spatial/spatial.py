@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import root
 
-from rigid.checks import check_above_zero, check_friction, sample_times
+from rigid.checks import Coulomb, check_above_zero, check_friction, sample_times
 from rigid.ground.laws import find_law
 from rigid.platform.actuation import TorqueHistory
 from rigid.platform.platform import Platform
@@ -31,7 +31,7 @@ Numbers = Sequence[float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SpatialTrial:
+class SpatialTrial(Coulomb):
     """A platform on flat ground, or above it. Raises ValueError, naming the key, for what cannot be."""
 
     platform: Platform
@@ -89,11 +89,6 @@ class SpatialTrial:
         if isinstance(self.gravity, int | float):
             return np.array([0.0, 0.0, -mass * self.gravity])
         return mass * np.asarray(self.gravity, dtype=float)
-
-    @property
-    def sliding_friction(self) -> float:
-        """mu_d [1]."""
-        return 0.5 * self.mu_s if self.mu_d is None else self.mu_d
 
     def motion(self) -> Motion:
         """Its equations of motion."""
