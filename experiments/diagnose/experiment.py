@@ -90,8 +90,8 @@ def _compute(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) 
     for finding in said_once(found.findings):
         progress.message(finding.what)
     with threadpool_limits(1):
-        said = write_diagnosis(folder.path, found)
-    return _result(found, said)
+        diagnosis = write_diagnosis(folder.path, found)
+    return _result(found, diagnosis)
 
 
 run, resume = computed_run("diagnose", DiagnoseSettings, _compute, check=lambda settings: None)
@@ -109,14 +109,14 @@ _UNITS = {"force": "N, each in its own way", "depth": "m, each in its own way", 
 """Of channels and zeros in `model_std`, which holds relative numbers otherwise."""
 
 
-def _result(found: Diagnosis, said: Json) -> Result:
+def _result(found: Diagnosis, diagnosis: Json) -> Result:
     parts = [(stage, part) for stage in ("before", "after") for part in ("fit", "held_out")]
     quantities: Json = {
-        f"gap_{stage}_{part}": {"value": said["gap"][stage][part], "std": None, "unit": "1",
+        f"gap_{stage}_{part}": {"value": diagnosis["gap"][stage][part], "std": None, "unit": "1",
                                 "note": "chi-square per sample"}
         for stage, part in parts
     }  # fmt: skip
-    if weighed := said.get("gap_with_scatter"):
+    if weighed := diagnosis.get("gap_with_scatter"):
         note = "chi-square per sample, what replicates differ by added to the sensors' variance"
         quantities |= {
             f"gap_with_scatter_{stage}_{part}": {"value": weighed[stage][part], "unit": "1",
@@ -125,15 +125,15 @@ def _result(found: Diagnosis, said: Json) -> Result:
         }  # fmt: skip
     at_end = {
         stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
-        for stage, bounds in said["at_bounds"].items()
+        for stage, bounds in diagnosis["at_bounds"].items()
     }
     for stage in ("before", "after"):
-        for name, entry in said["base"][stage].items():
+        for name, entry in diagnosis["base"][stage].items():
             quantities[f"{name}_{stage}"] = _quantity(entry, at_end=name in at_end[stage])
-    for effect in said["effects"]:
+    for effect in diagnosis["effects"]:
         for name, entry in effect["parameters"].items():
             quantities[f"{effect['id']}.{name}"] = _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
-    sentences = [*where_sentences(said), *found.problem.remarks(found.best_values, found.forms)]
+    sentences = [*where_sentences(diagnosis), *found.problem.remarks(found.best_values, found.forms)]
     noises = [together([colour]) for colour in found.colours.values()]
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
     whose = "the bed's" if found.problem.granular else "the surface's, the rig's or the start's"
@@ -159,6 +159,6 @@ def _result(found: Diagnosis, said: Json) -> Result:
         if ends:
             warnings.append(f"fitted by {model} to the end of its range: {', '.join(ends)}")
     return Result.make(
-        "diagnose", title=title_words(said), verdict=found.verdict, summary=summary_sentences(said),
-        quantities=quantities, tables=told_tables(said), departures={"sentences": sentences}, warnings=warnings,
+        "diagnose", title=title_words(diagnosis), verdict=found.verdict, summary=summary_sentences(diagnosis),
+        quantities=quantities, tables=told_tables(diagnosis), departures={"sentences": sentences}, warnings=warnings,
     )  # fmt: skip

@@ -40,7 +40,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
     """diagnosis.json."""
     effects = [{"id": effect, "parameters": found.parameters(effect)} for effect in found.effects]
     settings = {trial.id: dict(trial.settings) for trial in found.problem.trials}
-    said: dict[str, Any] = {
+    diagnosis: dict[str, Any] = {
         "format": "hedgehog-diagnosis/1",
         "verdict": found.verdict,
         "effects": effects,
@@ -50,36 +50,36 @@ def document(found: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
     if (weighed := found.gap_with_scatter) is not None:
         stages = {"before": weighed.before, "after": weighed.after, "after_std": weighed.after_std}
-        said["gap_with_scatter"] = {
+        diagnosis["gap_with_scatter"] = {
             stage: {"fit": fitted, "held_out": held_out} for stage, (fitted, held_out) in stages.items()
         } | {"freedom": weighed.freedom}
     if found.verdict == "unknown":
-        said["leading"] = _leading(found)
-        said["left"] = [asdict(p) for p in found.left]
+        diagnosis["leading"] = _leading(found)
+        diagnosis["left"] = [asdict(p) for p in found.left]
         words, shares = found.dependence
-        said["latent"] = {"file": "latent.csv", "depends_on": words, "explained": shares,
+        diagnosis["latent"] = {"file": "latent.csv", "depends_on": words, "explained": shares,
                           "lines": line_rows(found.lines)}  # fmt: skip
-    said["base"] = _base_values(found)
+    diagnosis["base"] = _base_values(found)
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
-    said["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
+    diagnosis["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
     bounds = {"before": found.bounds_before, "after": found.bounds_after}
-    said["at_bounds"] = {stage: [asdict(bound) for bound in met] for stage, met in bounds.items()}
-    said["evidence"] = _evidence(found)
-    said["evidence_base"] = _evidence_base(found)
-    said["sizes"] = _sizes(found)
-    said["remarks"] = list(found.remarks)
-    said["equations"] = equations_of(
+    diagnosis["at_bounds"] = {stage: [asdict(bound) for bound in met] for stage, met in bounds.items()}
+    diagnosis["evidence"] = _evidence(found)
+    diagnosis["evidence_base"] = _evidence_base(found)
+    diagnosis["sizes"] = _sizes(found)
+    diagnosis["remarks"] = list(found.remarks)
+    diagnosis["equations"] = equations_of(
         found.problem.kind, found.forms,
         lambda form: {name: unit for name, (_, unit) in found.problem.reported(found.best_values, form).items()},
     )  # fmt: skip
-    said["symbols"] = SYMBOLS if found.problem.kind == "penetration" and found.forms else ""
-    said["equivalence"] = _equivalence(found)
-    said["candidates"] = candidate_rows(said)
-    said["noise"] = _noise(found)
-    said["model_std"] = dict(found.model_std)
-    said["findings"] = [asdict(finding) for finding in found.findings]
-    said["next_experiment"] = found.next_experiment
-    return said
+    diagnosis["symbols"] = SYMBOLS if found.problem.kind == "penetration" and found.forms else ""
+    diagnosis["equivalence"] = _equivalence(found)
+    diagnosis["candidates"] = candidate_rows(diagnosis)
+    diagnosis["noise"] = _noise(found)
+    diagnosis["model_std"] = dict(found.model_std)
+    diagnosis["findings"] = [asdict(finding) for finding in found.findings]
+    diagnosis["next_experiment"] = found.next_experiment
+    return diagnosis
 
 
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
@@ -152,13 +152,13 @@ def _size(found: Diagnosis, values: Values, rest: tuple[Form, ...]) -> dict[str,
 def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     """Write all files into `folder` and return diagnosis.json."""
     problem = found.problem
-    said = document(found)
+    diagnosis = document(found)
     if found.verdict == "unknown":
         write_series(folder / "latent.csv", found.latent())
     path = folder / "model.toml"
     problem.write_model(str(path), found.best_values, found.forms)
-    write_text(path, with_comments(path.read_text(encoding="utf-8"), said["equations"], problem.kind))
-    if rows := said["evidence"]:
+    write_text(path, with_comments(path.read_text(encoding="utf-8"), diagnosis["equations"], problem.kind))
+    if rows := diagnosis["evidence"]:
         write_series(folder / "evidence.csv", {
             "candidate": [r["candidate"] for r in rows], "effects": [" + ".join(r["effects"]) for r in rows],
             "score": [r["score"] for r in rows], "excess_per_sample": [r["left"] for r in rows],
@@ -186,10 +186,10 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
                 gaps.add(trial.id, channel, columns["t_s"], rest, rest_after, std[channel], std_after[channel],
                          phases=phases[own], settings=trial.settings, held_out=trial.id in found.held_out)  # fmt: skip
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
-    said["by_phase"], said["by_channel"] = gaps.by_phase, gaps.by_channel
-    said["by_condition"], said["parted"] = gaps.by_condition, gaps.parted
-    write_json(folder / "diagnosis.json", said)
-    return said
+    diagnosis["by_phase"], diagnosis["by_channel"] = gaps.by_phase, gaps.by_channel
+    diagnosis["by_condition"], diagnosis["parted"] = gaps.by_condition, gaps.parted
+    write_json(folder / "diagnosis.json", diagnosis)
+    return diagnosis
 
 
 def _noise(found: Diagnosis) -> dict[str, dict[str, float]]:

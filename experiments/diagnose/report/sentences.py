@@ -33,58 +33,58 @@ _WORSE_OF_ALL, _WORSE_CELL, _WORSE_SHOWN = 1.1, 1.5, 3
 _MAINLY = 0.5  # share of what is beyond the noise from which a phase, a channel or a setting holds most of it
 
 
-def where_sentences(said: Row) -> list[str]:
+def where_sentences(diagnosis: Row) -> list[str]:
     """Where the base model fails, in one or two sentences; none where it does not."""
-    places = said["where"]
+    places = diagnosis["where"]
     if not places:
         return []
     first = say("fails_most", phase=shares_words(places, "phase"), channel=shares_words(places, "channel"),
                 first=places[0])  # fmt: skip
-    settings = _settings(said)
-    return [first, *([f"Sample for sample most of it is at {settings}."] if settings else []), *_parted(said)]
+    settings = _settings(diagnosis)
+    return [first, *([f"Sample for sample most of it is at {settings}."] if settings else []), *_parted(diagnosis)]
 
 
-def sure_sentences(said: Row) -> list[str]:
+def sure_sentences(diagnosis: Row) -> list[str]:
     """What is named, how sure that is against the nearest rival, and how it predicts the trials held out."""
-    if said["verdict"] not in ("named", "ambiguous") or not said["effects"]:
+    if diagnosis["verdict"] not in ("named", "ambiguous") or not diagnosis["effects"]:
         return []
-    names = [effect["id"] for effect in said["effects"]]
+    names = [effect["id"] for effect in diagnosis["effects"]]
     sentences = [words for name in names if (words := meaning(name))]
-    best = next((row for row in said["evidence"] if set(row["effects"]) == set(names)), None)
+    best = next((row for row in diagnosis["evidence"] if set(row["effects"]) == set(names)), None)
     parts = [] if best is None else [f"{' + '.join(names)} is {best['score']:.0f} nats likelier than the base model"]
-    before, after = (said["gap"][stage]["held_out"] for stage in ("before", "after"))
+    before, after = (diagnosis["gap"][stage]["held_out"] for stage in ("before", "after"))
     if before is not None:
         parts.append(f"on the trials that took no part it takes the gap from {numeral(before)} to {numeral(after)} "
                      "(1 is noise)")  # fmt: skip
     sure = f"How sure: {'; '.join(parts)}" if parts else ""
-    if rivals := said["equivalence"][1:]:
+    if rivals := diagnosis["equivalence"][1:]:
         near = min(rivals, key=lambda row: row["evidence_behind"])
         apart = "these trials tell the two apart" if near["told_apart"] else "these trials do not tell the two apart"
         if sure:
             sure += f"; the nearest other name, {near['effect']}, is {near['evidence_behind']:.0f} nats behind, "
         sure += f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
-    return [*sentences, *size_sentences(said), *remark_sentences(said), *([f"{sure}."] if sure else []),
-            *unnamed_sentence(said)]  # fmt: skip
+    return [*sentences, *size_sentences(diagnosis), *remark_sentences(diagnosis), *([f"{sure}."] if sure else []),
+            *unnamed_sentence(diagnosis)]  # fmt: skip
 
 
-def size_sentences(said: Row) -> list[str]:
+def size_sentences(diagnosis: Row) -> list[str]:
     """How large each effect is, the largest first, in a sentence; what is small is called so."""
-    sizes = said.get("sizes", [])
+    sizes = diagnosis.get("sizes", [])
     if not sizes:
         return []
     most = max(size["signature"] for size in sizes)
     return [f"How large: {'; '.join(_size_words(size, is_small=_is_small(size, most)) for size in sizes)}."]
 
 
-def remark_sentences(said: Row) -> list[str]:
+def remark_sentences(diagnosis: Row) -> list[str]:
     """Which numbers are implausible."""
-    return [f"Hard to believe: {remark}." for remark in said.get("remarks", [])]
+    return [f"Hard to believe: {remark}." for remark in diagnosis.get("remarks", [])]
 
 
-def worse_sentences(said: Row) -> list[str]:
+def worse_sentences(diagnosis: Row) -> list[str]:
     """Which conditions, phases and channels the best model explains less well than the base model, in a sentence; none
     where there are none, or where it is the base model. A cell counts where it is worse by half and past noise."""
-    conditions = said.get("by_condition", [])
+    conditions = diagnosis.get("by_condition", [])
     common = _common(conditions)
     varied = [name for name in (conditions[0]["settings"] if conditions else ()) if name not in common]
     parts = []
@@ -92,7 +92,7 @@ def worse_sentences(said: Row) -> list[str]:
         settings = ", ".join(setting_words(name, row["settings"][name]) for name in varied if name in row["settings"])
         trials = f"trial{'s' if len(row['trials']) > 1 else ''} {', '.join(row['trials'])}"
         parts.append(f"{trials}{f' ({settings})' if settings else ''} {_from_to(row)}")
-    for row in _worst(said.get("by_phase", []), _WORSE_CELL):
+    for row in _worst(diagnosis.get("by_phase", []), _WORSE_CELL):
         held = " of trials held out" if row["held_out"] else ""
         parts.append(f"{row['channel']} in phase {row['phase']}{held} {_from_to(row)}")
     return [f"It makes worse, in chi-square per sample: {'; '.join(parts)}."] if parts else []
@@ -115,9 +115,9 @@ def _from_to(row: Row) -> str:
     return f"from {numeral(row['before'])} to {numeral(row['after'])}"
 
 
-def small_names(said: Row) -> dict[str, str]:
+def small_names(diagnosis: Row) -> dict[str, str]:
     """Effects that are small beside another one, and how small: effect -> 0.1 % of the force."""
-    sizes = said.get("sizes", [])
+    sizes = diagnosis.get("sizes", [])
     if len(sizes) < 2:
         return {}
     most = max(size["signature"] for size in sizes)
@@ -142,10 +142,10 @@ def _size_words(size: Row, *, is_small: bool) -> str:
     return say("is_small" if is_small else "changes", size=size, share=share, times=times)
 
 
-def _parted(said: Row) -> list[str]:
+def _parted(diagnosis: Row) -> list[str]:
     """Which channel first leaves the base model, and when; and what a camera's zero at its end means."""
     sentences = []
-    parted = [row for row in said.get("parted", []) if row["at_s"] >= 0]
+    parted = [row for row in diagnosis.get("parted", []) if row["at_s"] >= 0]
     if parted:
         times = [
             min(row["at_s"] for row in parted if row["trial"] == trial) for trial in {row["trial"] for row in parted}
@@ -153,7 +153,7 @@ def _parted(said: Row) -> list[str]:
         first = min(parted, key=lambda row: row["at_s"])
         sentences.append(say("parts_at", first_s=min(times), last_s=max(times), first=first))
     standing = dict.fromkeys(
-        row["channel"] for row in said.get("by_phase", []) if row["phase"] == "stand" and row["before"] > _STANDING
+        row["channel"] for row in diagnosis.get("by_phase", []) if row["phase"] == "stand" and row["before"] > _STANDING
     )
     names = [name for name in standing if name in ("x", "y", "theta")]
     if names:
@@ -175,13 +175,13 @@ def shares_words(places: Sequence[Row], key: str) -> str:
     return " and ".join(f"{name} ({100 * value / total:.0f} %)" for name, value in shown)
 
 
-def _settings(said: Row) -> str:
+def _settings(diagnosis: Row) -> str:
     """Values of settings at which a sample holds most of what is beyond the noise, where trials differ in them."""
-    rows = [row for row in said.get("by_condition", []) if row["before"] > 1.0]
+    rows = [row for row in diagnosis.get("by_condition", []) if row["before"] > 1.0]
     shown = []
     for name in dict.fromkeys(name for row in rows for name in row["settings"]):
         beyond: dict[float, list[float]] = {}
-        for row in said["by_condition"]:
+        for row in diagnosis["by_condition"]:
             value = row["settings"].get(name)
             if value is not None:
                 sums = beyond.setdefault(value, [0.0, 0.0])
@@ -203,16 +203,16 @@ def setting_words(name: str, value: float) -> str:
     return f"{name.removesuffix(f'_{unit}').replace('_', ' ')} {value:.4g} {_UNITS[unit]}"
 
 
-def told_tables(said: Row) -> list[dict[str, Any]]:
+def told_tables(diagnosis: Row) -> list[dict[str, Any]]:
     """What the terminal shows: what is left by phase and channel, and the candidates, one form a set of effects."""
     tables = []
-    if said["by_phase"] and said["verdict"] != "none":
-        tables += _in_units(said)
+    if diagnosis["by_phase"] and diagnosis["verdict"] != "none":
+        tables += _in_units(diagnosis)
         tables.append({
             "title": "chi-square per sample by phase and channel", "head": ["phase", "channel", *_STAGES],
-            "rows": _by_stage(said["by_phase"], ("phase", "channel"), "", numeral),
+            "rows": _by_stage(diagnosis["by_phase"], ("phase", "channel"), "", numeral),
         })  # fmt: skip
-    rows = candidate_rows(said)
+    rows = candidate_rows(diagnosis)
     if rows:
         worse = no_better(rows)
         tables.append({
@@ -238,16 +238,16 @@ def _by_stage(
     ]
 
 
-def _in_units(said: Row) -> list[dict[str, Any]]:
+def _in_units(diagnosis: Row) -> list[dict[str, Any]]:
     """The gap by channel in its unit, and by condition where there are several."""
     tables = []
-    if channels := said.get("by_channel", []):
+    if channels := diagnosis.get("by_channel", []):
         tables.append({
             "title": "measured less modelled, root mean square (after: with the sensors' noise)",
             "head": ["channel", "unit", *_STAGES],
             "rows": _by_stage(channels, ("channel", "unit"), "rms_", "{:.3g}".format),
         })  # fmt: skip
-    conditions = said.get("by_condition", [])
+    conditions = diagnosis.get("by_condition", [])
     if len(conditions) > 1:
         common = _common(conditions)
         shared = ", ".join(setting_words(*pair) for pair in common.items())
@@ -276,24 +276,24 @@ def findings_in_words(found: Sequence[Finding]) -> list[Finding]:
     return merged
 
 
-def candidate_rows(said: Row) -> list[dict[str, Any]]:
+def candidate_rows(diagnosis: Row) -> list[dict[str, Any]]:
     """``candidates`` of diagnosis.json: the best form of each effect, of what is named, and of the sets of effects that
     beat all of their parts; the likeliest first, those no better than the base model last."""
     best: dict[frozenset[str], Row] = {}
-    tried = Counter(frozenset(row["effects"]) for row in said.get("evidence", []))
-    for row in said.get("evidence", []):
+    tried = Counter(frozenset(row["effects"]) for row in diagnosis.get("evidence", []))
+    for row in diagnosis.get("evidence", []):
         names = frozenset(row["effects"])
         if names not in best or row["score"] > best[names]["score"]:
             best[names] = row
     alone = {name: row["score"] for names, row in best.items() for name in names if len(names) == 1}
-    order = _told(said)
-    told = frozenset(order)
+    order = _named(diagnosis)
+    named = frozenset(order)
     sets = [names for names, row in best.items()
             if len(names) > 1 and all(row["score"] > alone.get(name, 0.0) + _MORE for name in names)]  # fmt: skip
     sets.sort(key=lambda names: -best[names]["score"])
-    shown = [names for names in best if len(names) == 1 or names == told or names in sets[:_SETS]]
+    shown = [names for names in best if len(names) == 1 or names == named or names in sets[:_SETS]]
     shown.sort(key=lambda names: -best[names]["score"])
-    base = said.get("evidence_base", {}).get("left")
+    base = diagnosis.get("evidence_base", {}).get("left")
 
     def left(row: Row) -> float | None:
         """At amplitude 0 every form is the base model, which was fitted once more after the candidates."""
@@ -302,7 +302,7 @@ def candidate_rows(said: Row) -> list[dict[str, Any]]:
     return [
         {"candidate": _written(best[names], alone, order), "effects": _ordered(names, alone, order),
          "score": best[names]["score"], "left": left(best[names]), "closes": best[names].get("closes"),
-         "tried": tried[names], "better": best[names]["score"] > 0, "note": _note(said, names, best, told)}
+         "tried": tried[names], "better": best[names]["score"] > 0, "note": _note(diagnosis, names, best, named)}
         for names in shown
     ]  # fmt: skip
 
@@ -313,66 +313,67 @@ def no_better(rows: Sequence[Row]) -> str:
     return f"no better than the base model with its parameters fitted: {', '.join(names)}" if names else ""
 
 
-def unnamed_sentence(said: Row) -> list[str]:
+def unnamed_sentence(diagnosis: Row) -> list[str]:
     """A candidate that is likelier than what is named: which, and why it is not named."""
-    rows = candidate_rows(said)
-    own = next((row for row in rows if {*row["effects"]} == {*_told(said)}), None)
+    rows = candidate_rows(diagnosis)
+    own = next((row for row in rows if {*row["effects"]} == {*_named(diagnosis)}), None)
     ahead = [row for row in rows if own is not None and row["score"] > own["score"] + _WORTH_SAYING and row["note"]]
     if own is None or not ahead:
         return []
     row = ahead[0]
-    what = "is not told" if said["effects"] else "does not lead"
+    what = "is not told" if diagnosis["effects"] else "does not lead"
     names, ours = (" + ".join(one["effects"]) for one in (row, own))
     return [say("most_evidence", names=names, more=row["score"] - own["score"], own=ours, what=what, row=row)]
 
 
-def _told(said: Row) -> tuple[str, ...]:
+def _named(diagnosis: Row) -> tuple[str, ...]:
     """The effects that are named, or of an unknown the best model's, in order."""
-    names = tuple(effect["id"] for effect in said.get("effects", ()))
-    leading = tuple(said.get("leading", {}).get("effects", ()))
-    return leading if said["verdict"] == "unknown" and leading else names
+    names = tuple(effect["id"] for effect in diagnosis.get("effects", ()))
+    leading = tuple(diagnosis.get("leading", {}).get("effects", ()))
+    return leading if diagnosis["verdict"] == "unknown" and leading else names
 
 
-def _ordered(names: frozenset[str], alone: Mapping[str, float], told: Sequence[str]) -> list[str]:
+def _ordered(names: frozenset[str], alone: Mapping[str, float], named: Sequence[str]) -> list[str]:
     """What is named first, then those that explain most alone."""
-    place = {name: k for k, name in enumerate(told)}
+    place = {name: k for k, name in enumerate(named)}
     return sorted(names, key=lambda name: (place.get(name, len(place)), -alone.get(name, -1e300), name))
 
 
-def _written(row: Row, alone: Mapping[str, float], told: Sequence[str]) -> str:
+def _written(row: Row, alone: Mapping[str, float], named: Sequence[str]) -> str:
     """``a:one + two + b:three``: effects in order, each once, with its forms."""
     forms: dict[str, list[str]] = {}
     for part in row.get("candidate", " + ".join(row["effects"])).split(" + "):
         effect, _, form = part.partition(":")
         forms.setdefault(effect, []).append(form)
-    order = _ordered(frozenset(forms), alone, told)
+    order = _ordered(frozenset(forms), alone, named)
     return " + ".join(f"{effect}:{' + '.join(forms[effect])}".removesuffix(":") for effect in order)
 
 
-def _note(said: Row, names: frozenset[str], best: Mapping[frozenset[str], Row], told: frozenset[str]) -> str:
+def _note(diagnosis: Row, names: frozenset[str], best: Mapping[frozenset[str], Row], named: frozenset[str]) -> str:
     """How a candidate relates to the one that is named; of one that is likelier, why it is not named."""
-    if names == told:
-        return {"named": "told", "ambiguous": "told, or another"}.get(said["verdict"], "leads")
-    if not told or told not in best:
+    if names == named:
+        return {"named": "told", "ambiguous": "told, or another"}.get(diagnosis["verdict"], "leads")
+    if not named or named not in best:
         return ""
-    if said["verdict"] == "ambiguous" and any(names == {other, *_told(said)[1:]} for other in said["alternatives"]):
+    rest = _named(diagnosis)[1:]
+    if diagnosis["verdict"] == "ambiguous" and any(names == {other, *rest} for other in diagnosis["alternatives"]):
         return "cannot be told from it"
-    own, row = best[told], best[names]
+    own, row = best[named], best[names]
     more = row["score"] - own["score"]
     if more <= 0:
         return ""
-    together = " + ".join(_told(said))
-    if names > told or len(names) > len(told):
-        if said.get("gate", {}).get("after", {}).get("passed"):
+    together = " + ".join(_named(diagnosis))
+    if names > named or len(names) > len(named):
+        if diagnosis.get("gate", {}).get("after", {}).get("passed"):
             return f"is not needed: {together} leaves no more than noise"
-        left, whole = own.get("left") or 0.0, said.get("evidence_base", {}).get("left") or 0.0
+        left, whole = own.get("left") or 0.0, diagnosis.get("evidence_base", {}).get("left") or 0.0
         if left <= 0:
             return f"takes up noise: what {together} leaves is no more"
-        what = "a further name" if names > told else f"{len(names)} names in the place of {together}"
+        what = "a further name" if names > named else f"{len(names)} names in the place of {together}"
         share = f"{100 * (left - row['left']) / left:.0f} % of what {together} leaves"
         of_base = f", {100 * (left - row['left']) / whole:.2g} % of what the base model leaves" if whole > 0 else ""
         return f"gains {more:.1f} nats, {share}{of_base}: less than {what} must"
-    other = next((r for r in said.get("equivalence", [])[1:] if r["effect"] in names - told), None)
+    other = next((r for r in diagnosis.get("equivalence", [])[1:] if r["effect"] in names - named), None)
     if other is not None and (other.get("left_out_behind") or 0.0) > 0:
         return f"predicts conditions that were left out worse, by {other['left_out_behind']:.0f} nats"
     return "does not stand when noise and names are looked at together"

@@ -28,78 +28,79 @@ _SHOWN = 3  # candidates that are reported where none is certain
 _LOST = 100.0  # a standard error over the value itself past which it is none: the curvature there is round-off
 
 
-def _strained(said: Mapping[str, Any], stage: str) -> list[Mapping[str, Any]]:
+def _strained(diagnosis: Mapping[str, Any], stage: str) -> list[Mapping[str, Any]]:
     """Parameters far from the stated value."""
-    return [bound for bound in said["at_bounds"][stage] if bound["sigmas"] is not None]
+    return [bound for bound in diagnosis["at_bounds"][stage] if bound["sigmas"] is not None]
 
 
-def _only_stated_wrong(said: Mapping[str, Any]) -> str:
+def _only_stated_wrong(diagnosis: Mapping[str, Any]) -> str:
     """The numbers that were stated otherwise, where the base model leaves no more than noise with them; else empty."""
-    if said["verdict"] != "unknown":
+    if diagnosis["verdict"] != "unknown":
         return ""
-    gaps = [gap for gap in said["gap"]["before"].values() if gap is not None]
-    far = [bound["parameter"] for bound in _strained(said, "before")]
+    gaps = [gap for gap in diagnosis["gap"]["before"].values() if gap is not None]
+    far = [bound["parameter"] for bound in _strained(diagnosis, "before")]
     return " and ".join(far) if far and max(gaps) <= SMALL else ""
 
 
-def title_words(said: Mapping[str, Any]) -> str:
+def title_words(diagnosis: Mapping[str, Any]) -> str:
     """The verdict in one line."""
-    if wrong := _only_stated_wrong(said):
+    if wrong := _only_stated_wrong(diagnosis):
         return f"Unknown: {wrong} is not what campaign.toml says; with another number the model explains the trials"
-    small = small_names(said)
-    names = " and ".join([effect["id"] for effect in said["effects"] if effect["id"] not in small]
+    small = small_names(diagnosis)
+    names = " and ".join([effect["id"] for effect in diagnosis["effects"] if effect["id"] not in small]
                          + [f"{name} (small: {size})" for name, size in small.items()])  # fmt: skip
-    if said["verdict"] == "none":
+    if diagnosis["verdict"] == "none":
         return "Nothing is missing: the model with its fitted parameters explains the trials"
-    if said["verdict"] == "named":
+    if diagnosis["verdict"] == "named":
         return f"Missing: {names}"
-    if said["verdict"] == "ambiguous":
-        return f"Missing: {names}, or {' or '.join(said['alternatives'])}: these trials cannot tell"
+    if diagnosis["verdict"] == "ambiguous":
+        return f"Missing: {names}, or {' or '.join(diagnosis['alternatives'])}: these trials cannot tell"
     if names:
         return f"Unknown: {names} for certain, and something beside it that no effect of the library explains"
-    likeliest = _likeliest(said)
+    likeliest = _likeliest(diagnosis)
     also = f"; the likeliest is {likeliest}, not for certain" if likeliest else ""
     return f"Unknown: something is missing that no effect of the library explains{also}"
 
 
-def summary_sentences(said: Mapping[str, Any]) -> list[str]:
+def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     """What stands first in the report and on the terminal."""
-    ask = said["next_experiment"]
-    if said["verdict"] == "none":
-        gap = said["gap"]["after"]
+    ask = diagnosis["next_experiment"]
+    if diagnosis["verdict"] == "none":
+        gap = diagnosis["gap"]["after"]
         out = "" if gap["held_out"] is None else f" and {numeral(gap['held_out'])} of those held out"
         first = [
             f"The base model leaves {numeral(gap['fit'])} a sample of the trials that were fitted{out} (1 is noise)."
         ]
-    elif wrong := _only_stated_wrong(said):
-        off = [f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in _strained(said, "before")]
+    elif wrong := _only_stated_wrong(diagnosis):
+        off = [f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in _strained(diagnosis, "before")]
         first, ask = [say("stated_wrong", said_so="; ".join(off), wrong=wrong)], say("check_units", wrong=wrong)
-    elif said["verdict"] == "unknown":
-        first = [*_candidates(said), *_left(said), *worse_sentences(said)]
+    elif diagnosis["verdict"] == "unknown":
+        first = [*_candidates(diagnosis), *_left(diagnosis), *worse_sentences(diagnosis)]
     else:
-        first = [*sure_sentences(said), *worse_sentences(said)]
-    return [*_doubts(said), *first, *scatter_sentence(said), f"Next experiment: {ask}"]
+        first = [*sure_sentences(diagnosis), *worse_sentences(diagnosis)]
+    return [*_doubts(diagnosis), *first, *scatter_sentence(diagnosis), f"Next experiment: {ask}"]
 
 
-def _doubts(said: Mapping[str, Any]) -> list[str]:
+def _doubts(diagnosis: Mapping[str, Any]) -> list[str]:
     """Faults of the recordings that may be all there is behind an effect."""
-    found = [finding["what"] for finding in said.get("findings", []) if finding.get("doubt")]
-    if not found or (said["verdict"] == "none" and said["gap"]["after"]["fit"] <= SMALL):
+    found = [finding["what"] for finding in diagnosis.get("findings", []) if finding.get("doubt")]
+    if not found or (diagnosis["verdict"] == "none" and diagnosis["gap"]["after"]["fit"] <= SMALL):
         return []
     more = f" (and {len(found) - 1} more, see the warnings)" if len(found) > 1 else ""
     return [f"To be put right first, for it may be all that is behind this: {found[0]}{more}."]
 
 
-def scatter_sentence(said: Mapping[str, Any]) -> list[str]:
+def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
     """The gap weighed against what replicates differ by as well, where they differ by more than the sensors."""
-    weighed = said.get("gap_with_scatter")
+    weighed = diagnosis.get("gap_with_scatter")
     if weighed is None:
         return []
-    kinds = [f"{kind.replace('_', ' ')} {size_words(kind, std)}" for kind, std in said.get("model_std", {}).items()]
+    scatter = diagnosis.get("model_std", {})
+    kinds = [f"{kind.replace('_', ' ')} {size_words(kind, std)}" for kind, std in scatter.items()]
     freedom = weighed.get("freedom")
     s = "" if freedom == 1 else "s"
     return [say(
-        "weighed_none" if said["verdict"] == "none" else "weighed_both",
+        "weighed_none" if diagnosis["verdict"] == "none" else "weighed_both",
         scatter=f" ({', '.join(kinds)})" if kinds else "", before=_both(weighed["before"], {}),
         after=_both(weighed["after"], weighed.get("after_std", {})),
         rests_on=f"; what replicates differ by rests on {freedom} degree{s} of freedom" if freedom else "",
@@ -117,22 +118,22 @@ def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -
     return f"{written('fit')} fitted{out}"
 
 
-def _likeliest(said: Mapping[str, Any]) -> str:
+def _likeliest(diagnosis: Mapping[str, Any]) -> str:
     """The effects of the best model, or the candidate that closes most; empty where it is little."""
-    leading = said.get("leading", {})
+    leading = diagnosis.get("leading", {})
     names, near = leading.get("effects", []), leading.get("nearest")
     if names:
         also = near is not None and not near["told_apart"] and near["evidence_behind"] < _AS_LIKELY
         return " + ".join(names) + (f" or {near['effect']}" if also else "")
-    rows = _singles(said)
+    rows = _singles(diagnosis)
     return str(rows[0]["effects"][0]) if rows and (rows[0].get("closes") or 0.0) >= _WORTH_SAYING else ""
 
 
-def _candidates(said: Mapping[str, Any]) -> list[str]:
+def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
     """Which effects lead, how far each closes the gap, and how sure it is."""
-    leading = said.get("leading", {"effects": [], "certain": [], "nearest": None})
+    leading = diagnosis.get("leading", {"effects": [], "certain": [], "nearest": None})
     if not leading["effects"]:
-        rows = _singles(said)
+        rows = _singles(diagnosis)
         if not rows:
             return ["No effect of the library could be tried."]
         listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_SHOWN])
@@ -142,20 +143,21 @@ def _candidates(said: Mapping[str, Any]) -> list[str]:
     sentences = [words for name in leading["effects"] if (words := meaning(name))]
     sure = f"Certain: {' and '.join(certain)}" if certain else ""
     maybe = f"{'likeliest' if certain else 'Likeliest'}, but not certain: {' and '.join(others)}" if others else ""
-    row = next((r for r in said["evidence"] if sorted(r["effects"]) == sorted(leading["effects"])), None)
-    nats = "" if row is None else f" ({row['score']:.0f} nats over the base model{_weighed(said)})"
+    row = next((r for r in diagnosis["evidence"] if sorted(r["effects"]) == sorted(leading["effects"])), None)
+    nats = "" if row is None else f" ({row['score']:.0f} nats over the base model{_weighed(diagnosis)})"
     parts = "; ".join(part for part in (sure, maybe) if part)
-    first = f"{parts}{nats}: it takes the gap {_closes(said['gap'])}"
+    first = f"{parts}{nats}: it takes the gap {_closes(diagnosis['gap'])}"
     near = leading["nearest"]
     if near is not None:
         apart = "these trials tell the two apart" if near["told_apart"] else "these trials do not tell the two apart"
         first += say("nearest", near=near, apart=apart)
     sentences.append(f"{first}.")
-    sentences += [*_numbers(leading), *size_sentences(said), *remark_sentences(said), *unnamed_sentence(said)]
-    rest = [row for row in _singles(said) if row["effects"][0] not in leading["effects"]][: _SHOWN - 1]
+    sentences += [*_numbers(leading), *size_sentences(diagnosis), *remark_sentences(diagnosis)]
+    sentences += unnamed_sentence(diagnosis)
+    rest = [row for row in _singles(diagnosis) if row["effects"][0] not in leading["effects"]][: _SHOWN - 1]
     if rest and not certain:
-        sentences.append(f"Of what the base model leaves beyond the noise{_weighed(said)}, {_closing(rest)}.")
-    return [*sentences, *_why_unknown(said)]
+        sentences.append(f"Of what the base model leaves beyond the noise{_weighed(diagnosis)}, {_closing(rest)}.")
+    return [*sentences, *_why_unknown(diagnosis)]
 
 
 def _numbers(leading: Mapping[str, Any]) -> list[str]:
@@ -170,9 +172,9 @@ def _numbers(leading: Mapping[str, Any]) -> list[str]:
     return [f"Its numbers, should it be that: {', '.join(parts)}."] if parts else []
 
 
-def _why_unknown(said: Mapping[str, Any]) -> list[str]:
+def _why_unknown(diagnosis: Mapping[str, Any]) -> list[str]:
     """What keeps the leading candidate from being the verdict."""
-    gate = said["gate"]
+    gate = diagnosis["gate"]
     failed = [
         f"{numeral(score['score'])} on {which} (a right model: {score['threshold']:.3g} at most)"
         for which, score in (("the fitted trials", gate["after"]), ("those held out", gate.get("held_out")))
@@ -180,19 +182,20 @@ def _why_unknown(said: Mapping[str, Any]) -> list[str]:
     ]
     reasons = [f"the gate stands at {' and at '.join(failed)}"] if failed else []
     reasons += [f"it needs {bound['parameter']} {bound['sigmas']:+.1f} sigma off what was stated"
-                for bound in _strained(said, "after")]  # fmt: skip
+                for bound in _strained(diagnosis, "after")]  # fmt: skip
     return [f"It is not the whole answer: {'; '.join(reasons)}."] if reasons else []
 
 
-def _weighed(said: Mapping[str, Any]) -> str:
+def _weighed(diagnosis: Mapping[str, Any]) -> str:
     """A clause where candidates were compared against more than the sensors' noise."""
-    return ", weighed against what replicates differ by" if said.get("evidence_base", {}).get("with_scatter") else ""
+    with_scatter = diagnosis.get("evidence_base", {}).get("with_scatter")
+    return ", weighed against what replicates differ by" if with_scatter else ""
 
 
-def _singles(said: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def _singles(diagnosis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """The best form of every single effect, the likeliest first."""
     best: dict[str, Mapping[str, Any]] = {}
-    for row in said["evidence"]:
+    for row in diagnosis["evidence"]:
         if len(row["effects"]) == 1:
             best.setdefault(row["effects"][0], row)
     return list(best.values())
@@ -222,14 +225,14 @@ def _closes(gap: Mapping[str, Any]) -> str:
     return " and ".join(parts)
 
 
-def _left(said: Mapping[str, Any]) -> list[str]:
+def _left(diagnosis: Mapping[str, Any]) -> list[str]:
     """Where the best model still fails, and what the missing force correlates with."""
     sentences = []
-    if places := said.get("left", []):
-        beyond = ", beyond what replicates differ by," if "gap_with_scatter" in said else ""
+    if places := diagnosis.get("left", []):
+        beyond = ", beyond what replicates differ by," if "gap_with_scatter" in diagnosis else ""
         phase, channel = (shares_words(places, key) for key in ("phase", "channel"))
         sentences.append(say("left", beyond=beyond, phase=phase, channel=channel, first=places[0]))
-    if "latent" in said:
-        sentences.append(f"The force that is missing goes with {said['latent']['depends_on']}.")
-        sentences += [line_sentence(row) for row in said["latent"].get("lines", [])]
+    if "latent" in diagnosis:
+        sentences.append(f"The force that is missing goes with {diagnosis['latent']['depends_on']}.")
+        sentences += [line_sentence(row) for row in diagnosis["latent"].get("lines", [])]
     return sentences
