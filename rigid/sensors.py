@@ -99,8 +99,9 @@ class SensorSet:
         for id, names in _FIELDS.items():
             for parameter in self.effects.get(id, ()):
                 object.__setattr__(self, names[parameter], self.effects[id][parameter])
-        for term in (EFFECTS[id] for id in _FIELDS):
-            term.values({parameter: getattr(self, name) for parameter, name in _FIELDS[term.id].items()})
+        for id, names in _FIELDS.items():
+            for parameter in EFFECTS[id].parameters:
+                parameter.check(getattr(self, names[parameter.name]), names[parameter.name])
 
     def true_times(self, written: Array) -> Array:
         """True times [s] of times on the IMU's clock."""

@@ -196,7 +196,7 @@ def _one_varied(trial: Trial, vary: Mapping[str, ArrayLike] | None) -> tuple[Tri
         if key in own:
             id, parameter = own[key]
             for extreme in (value.min(), value.max()):
-                parameter.check(float(extreme), id)
+                parameter.check(float(extreme), f"{id}.{parameter.name}")
         elif key in (*POSITIVE, "stiffness"):
             check_above_zero(**{key: value.min()})
         else:

@@ -33,16 +33,16 @@ class Parameter:
     visible: tuple[float, float] | None = None
     """Range of values whose effect can be seen, for benchmarks and tests; None: they leave it at its default."""
 
-    def check(self, value: Any, owner: str) -> float:
-        """`value` as a float. Raises ValueError, naming it and what is allowed."""
+    def check(self, value: Any, key: str) -> float:
+        """`value` as a float. Raises ValueError with `key`, what a user calls it, and what is allowed."""
         if not is_number(value) or math.isnan(value):
-            raise ValueError(f"{owner}.{self.name} = {value!r} must be a number ({self.unit})")
+            raise ValueError(f"{key} = {value!r} must be a number ({self.unit})")
         low = value > self.lowest if self.above_lowest else value >= self.lowest
         if not (low and value <= self.highest) or (math.isinf(value) and value != self.default):
             least = "" if self.lowest == -math.inf else f"{'above' if self.above_lowest else 'from'} {self.lowest:g}"
             most = "" if self.highest == math.inf else f"at most {self.highest:g}"
             raise ValueError(
-                f"{owner}.{self.name} = {value!r} must be {' and '.join(filter(None, (least, most))) or 'finite'} "
+                f"{key} = {value!r} must be {' and '.join(filter(None, (least, most))) or 'finite'} "
                 f"({self.unit}; {self.summary})"
             )
         return float(value)
@@ -54,7 +54,7 @@ def check_parameters(parameters: Sequence[Parameter], given: Mapping[str, Any], 
     for key in given:
         if key not in known:
             raise ValueError(f"{owner}.{key} is no parameter; there is {', '.join(known) or 'none'}")
-    return {key: parameter.check(given.get(key, parameter.default), owner) for key, parameter in known.items()}
+    return {key: parameter.check(given.get(key, parameter.default), f"{owner}.{key}") for key, parameter in known.items()}
 
 
 def is_number(value: Any) -> bool:

@@ -53,16 +53,19 @@ class Rig:
     counterweight: float  # m_b [kg]
     gravity_sim: float  # Free-fall acceleration of the pair [m/s2]
     gravity: float = STANDARD_GRAVITY  # Local gravity [m/s2]
+    wire_length: float | None = None  # From the pulley down to the shaft [m]; for the pendulum of the wires
 
     def __post_init__(self) -> None:
         check_above_zero("kg", mass=self.mass, counterweight=self.counterweight)
         check_above_zero("m/s2", gravity=self.gravity, gravity_sim=self.gravity_sim)
+        if self.wire_length is not None:
+            check_above_zero("m", wire_length=self.wire_length)
         check_rig(self.mass, self.counterweight, gravity=self.gravity, gravity_sim=self.gravity_sim)
 
     @classmethod
     def offloading(
         cls, mass: float, gravity_stated: float, *, reading: Reading = "pair", counterweight: float | None = None,
-        gravity: float = STANDARD_GRAVITY,
+        gravity: float = STANDARD_GRAVITY, wire_length: float | None = None,
     ) -> "Rig":  # fmt: skip
         """The rig that a stated gravity [m/s2] means for a platform of `mass` [kg].
 
@@ -74,7 +77,10 @@ class Rig:
         elif reading not in get_args(Reading):
             raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
         share = 1.0 if reading == "pair" else mass / (mass + counterweight)
-        return cls(mass=mass, counterweight=counterweight, gravity_sim=gravity_stated * share, gravity=gravity)
+        return cls(
+            mass=mass, counterweight=counterweight, gravity_sim=gravity_stated * share, gravity=gravity,
+            wire_length=wire_length,
+        )  # fmt: skip
 
     @property
     def weight(self) -> float:

@@ -182,7 +182,7 @@ def test_the_zero_of_the_camera_stays_within_three_std():
         ({"pose_std": (0.1, 0.1)}, "three numbers"),
         ({"imu_window": -0.1}, "imu_window"),
         ({"camera_scale": 0.0}, "camera_scale"),
-        ({"clock_offset": math.nan}, "clock-offset.offset = nan"),
+        ({"clock_offset": math.nan}, "clock_offset = nan"),
     ],
 )
 def test_a_sensor_that_cannot_be_is_refused_by_name(change, said):

@@ -65,6 +65,7 @@ def test_the_balance_is_the_counterweight_that_belongs_to_the_gravity():
         ({"gravity_sim": math.nan}, "gravity_sim = nan"),
         ({"mass": -1.0}, "mass = -1.0"),
         ({"gravity": math.inf}, "gravity = inf"),
+        ({"wire_length": 0.0}, "wire_length = 0.0"),
     ],
 )
 def test_a_rig_that_cannot_be_is_refused_by_name(change, said):
