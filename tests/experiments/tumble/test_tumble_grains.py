@@ -456,7 +456,8 @@ def test_a_run_on_a_bed_may_pass_the_overlap_that_its_step_is_chosen_for_up_to_t
 def test_a_checkpoint_of_before_takes_the_bound_on_overlaps_that_a_run_has_now(tmp_path, monkeypatch):
     """One that ended at its `max_overlap` of 9 % goes on with the bound of today, and with all else as it was."""
     settings = on_bed(**SMALL | {"max_overlap": 0.09, "frame_count": 0})
-    old, new = (PlanarOnBed(settings).stepper(small_bed(settings)) for _ in range(2))
+    of_today = PlanarOnBed(settings)
+    old, new = (of_today.stepper(small_bed(settings)) for _ in range(2))
     old.ground.bed.overlap_limit = 0.09
     for _ in range(3):
         old.master.step()
@@ -469,10 +470,7 @@ def test_a_checkpoint_of_before_takes_the_bound_on_overlaps_that_a_run_has_now(t
 
     monkeypatch.setattr(following, "held_back", stopping)
     with pytest.raises(KeyboardInterrupt):
-        following.follow(
-            new, folder, Progress(), frames=lambda resumed: None, checkpoint_interval=60.0, sinkage=float,
-            write_series=dict,
-        )  # fmt: skip
+        of_today.follow(new, folder, Progress())
     assert new.ground.bed.overlap_limit == run_limit(0.09) > 0.09
     assert new.ground.bed.steps == old.ground.bed.steps + settings.substeps
 
