@@ -54,7 +54,9 @@ def check_parameters(parameters: Sequence[Parameter], given: Mapping[str, Any], 
     for key in given:
         if key not in known:
             raise ValueError(f"{owner}.{key} is no parameter; there is {', '.join(known) or 'none'}")
-    return {key: parameter.check(given.get(key, parameter.default), f"{owner}.{key}") for key, parameter in known.items()}
+    return {
+        key: parameter.check(given.get(key, parameter.default), f"{owner}.{key}") for key, parameter in known.items()
+    }
 
 
 def is_number(value: Any) -> bool:
