@@ -100,8 +100,8 @@ class SensorSet:
             for parameter in self.effects.get(id, ()):
                 object.__setattr__(self, names[parameter], self.effects[id][parameter])
         for id, names in _FIELDS.items():
-            for parameter in EFFECTS[id].parameters:
-                parameter.check(getattr(self, names[parameter.name]), names[parameter.name])
+            for number in EFFECTS[id].parameters:
+                number.check(getattr(self, names[number.name]), names[number.name])
 
     def true_times(self, written: Array) -> Array:
         """True times [s] of times on the IMU's clock."""
