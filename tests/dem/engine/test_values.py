@@ -29,7 +29,7 @@ def test_a_bed_says_what_it_is():
 def test_old_names_of_a_bed_warn_and_do_the_same():
     bed = cloud.make()
     with pytest.warns(DeprecationWarning, match=r"use Bed\.track_contact_work"):
-        bed.record_energy()
+        bed.keep_book()
     with pytest.warns(DeprecationWarning, match=r"use Bed\.contact_work"):
         assert bed.work_taken == bed.contact_work
     with pytest.warns(DeprecationWarning, match=r"use Bed\.checkpoint"):
