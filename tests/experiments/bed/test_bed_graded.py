@@ -49,6 +49,7 @@ def test_a_graded_bed_is_made_told_of_and_refined(made):
     assert (finer.fine, finer.coarse, finer.footprints) == (0.001, 0.0015, SIZES.footprints)
 
 
+@pytest.mark.long
 def test_a_graded_bed_stays_graded_when_it_is_shaken(made):
     """Half of g along x, to and fro: grains move by half a diameter and more, none so that it could drain."""
     bed = Bed.load(made / "bed.npz", threads=1)

@@ -96,6 +96,7 @@ def test_the_gaps_of_a_run_moved_by_a_known_amount_are_that_amount(runs, tmp_pat
     assert weight == pytest.approx(0.1) and columns["lift_N_1"].max() > weight
 
 
+@pytest.mark.long
 def test_grains_and_spring_damper_stand_side_by_side_in_curves_and_flat_pictures(runs, tmp_path, monkeypatch):
     monkeypatch.setenv("HEDGEBED_NO_OPENGL", "1")
     out = tmp_path / "both"
@@ -123,6 +124,7 @@ def test_grains_and_spring_damper_stand_side_by_side_in_curves_and_flat_pictures
     assert seen == {f"seen-{name}.png" for name in ("start", "middle", "end")}
 
 
+@pytest.mark.long
 def test_a_run_without_frames_has_its_curves_compared_and_says_why_there_is_no_picture(runs, tmp_path):
     bare = tmp_path / "bare"
     shutil.copytree(runs / "moved", bare)
@@ -131,6 +133,7 @@ def test_a_run_without_frames_has_its_curves_compared_and_says_why_there_is_no_p
     assert "(frame_count = 0)" in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("other", "said"),
     [
@@ -155,6 +158,7 @@ def test_what_cannot_be_compared_is_refused_by_name(runs, tmp_path, capsys, othe
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_numbers_of_a_run_in_space_until_a_time_within_it_are_those_of_its_series_until_then(runs):
     """At the end of the run itself they are its own; at 20 ms displacement and largest values are those of then."""
     result = json.loads((runs / "law" / "result.json").read_text())
