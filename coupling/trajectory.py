@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid.result import Result, quantities_of, toml_value, write_text
-from rigid.series import __version__, read_series, write_series
+from rigid.series import read_series, write_series
+from rigid.version import __version__
 
 __all__ = ["PHASES", "Penetration"]
 

@@ -17,7 +17,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StrictFloat, StrictInt, ValidationError, model_validator
 
-from .series import RESULT_FORMAT, ResultFormat, __version__, pandas, replacing
+from .series import RESULT_FORMAT, ResultFormat, pandas, replacing
+from .version import __version__
 
 __all__ = [
     "Departures", "Quantity", "Result", "Table", "plain", "quantities_of", "quantity", "read_json", "schema",

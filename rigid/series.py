@@ -17,14 +17,12 @@ __all__ = [
     "RESULT_FORMAT",
     "ResultFormat",
     "Series",
-    "__version__",
     "pandas",
     "read_series",
     "replacing",
     "write_series",
 ]
 
-__version__ = "0.1.0"  # Of hedgebed
 ResultFormat = Literal["hedgebed-result/1"]
 RESULT_FORMAT: ResultFormat = get_args(ResultFormat)[0]
 """`format` of every result.json."""

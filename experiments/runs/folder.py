@@ -147,7 +147,7 @@ class RunFolder:
             )
         if path.exists() and not path.is_dir():
             raise ValueError(f"{where} is a file: name a folder that is empty or does not exist yet")
-        if held := sorted(item.name for item in path.glob("*")):
+        if path.exists() and (held := sorted(item.name for item in path.iterdir())):
             what = ", ".join(held[:3]) + (", ..." if len(held) > 3 else "")
             remedy = _what_else(path) if "run.toml" in held else ""
             raise ValueError(

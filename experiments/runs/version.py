@@ -1,5 +1,5 @@
-"""The version of hedgebed, which `rigid.series` has."""
+"""The version of hedgebed, which `rigid.version` states."""
 
-from rigid.series import __version__
+from rigid.version import __version__
 
 __all__ = ["__version__"]

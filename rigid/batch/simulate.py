@@ -226,7 +226,7 @@ def _check_together(trial: Trial, given: Mapping[str, Array]) -> None:
         ("com-offset.x, y must be below sqrt(J / m)", mass * square >= inertia),
     ):
         if np.any(wrong):
-            raise ValueError(f"vary: {name}; it is not in trial {int(np.flatnonzero(wrong)[0])}")
+            raise ValueError(f"vary: {name}; not so in trial {int(np.flatnonzero(wrong)[0])}")
 
 
 def _check_stiffest(first: Trial, numbers: Array, time_step: float) -> None:

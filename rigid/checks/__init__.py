@@ -6,14 +6,15 @@ Imports nothing of ours.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "Coulomb", "Parameter", "check_above_zero", "check_friction", "check_not_negative", "check_parameters", "check_rig",
-    "is_number", "sample_times",
+    "Coulomb", "Parameter", "check_above_zero", "check_counterweight", "check_friction", "check_not_negative",
+    "check_parameters", "check_simulated_gravity", "is_number", "sample_times",
 ]  # fmt: skip
 
 
@@ -60,8 +61,8 @@ def check_parameters(parameters: Sequence[Parameter], given: Mapping[str, Any], 
 
 
 def is_number(value: Any) -> bool:
-    """Whether `value` is an int or a float, and not a bool."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether `value` is a real number, of numpy too, and not a bool."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def check_above_zero(unit: str = "", /, **numbers: Any) -> None:
@@ -74,10 +75,14 @@ def check_not_negative(unit: str = "", /, **numbers: Any) -> None:
     _check(unit, "0 or more", numbers, lambda value: value >= 0)
 
 
+def _shown(value: Any) -> str:
+    return str(value) if is_number(value) else repr(value)
+
+
 def _check(unit: str, allowed: str, numbers: Mapping[str, Any], fits: Callable[[Any], bool]) -> None:
     for key, value in numbers.items():
         if not (is_number(value) and math.isfinite(value) and fits(value)):
-            raise ValueError(f"{key} = {value} must be {allowed}" + (f" ({unit})" if unit else ""))
+            raise ValueError(f"{key} = {_shown(value)} must be {allowed}" + (f" ({unit})" if unit else ""))
 
 
 class Coulomb:
@@ -100,27 +105,34 @@ def check_friction(mu_s: float, mu_d: float | None, *, endless: bool = False) ->
         raise ValueError(f"mu_d = {mu_d} must be from 0 to mu_s = {mu_s}")
 
 
-def check_rig(mass: float, counterweight: float, *, gravity: float, **simulated: float) -> None:
-    """Raise ValueError for a counterweight that lifts the platform, or a simulated gravity not below the local one.
-
-    `simulated`: one gravity [m/s2] by its name. Without a counterweight there is nothing to check but that.
-    """
+def check_counterweight(mass: float, counterweight: float) -> None:
+    """Raise ValueError for a counterweight that lifts the platform; both masses in kg."""
     if counterweight >= mass:
         raise ValueError(
             f"counterweight = {counterweight:g} kg must be below mass = {mass:g} kg: a heavier one would lift the "
             f"platform off the ground"
         )
+
+
+def check_simulated_gravity(gravity: float, **simulated: float) -> None:
+    """Raise ValueError for a gravity in the rig that is not below the local `gravity`; all in m/s2."""
     for key, value in simulated.items():
-        if counterweight > 0 and value >= gravity:
+        if value >= gravity:
             raise ValueError(
                 f"{key} = {value:g} m/s2 must be below gravity = {gravity:g} m/s2: a rig can only take weight away"
             )
 
 
-def sample_times(duration: float, interval: float, times: ArrayLike | None) -> NDArray[np.float64]:
+def _rise(steps: NDArray[np.float64], strict: bool) -> bool:
+    return bool((steps > 0).all() if strict else (steps >= 0).all())
+
+
+def sample_times(
+    duration: float, interval: float, times: ArrayLike | None, *, strict: bool = False
+) -> NDArray[np.float64]:
     """Sample times [s], shape [n]: every `interval` from 0 to `duration`, the end included, or `times` where given.
 
-    Raises ValueError for given times that are not finite, fall, or lie outside 0 to `duration`.
+    Raises ValueError for given times that are not finite, fall, lie outside 0 to `duration` or, where `strict`, repeat.
     """
     if times is None:
         every = interval * np.arange(math.floor(duration / interval * (1 + 1e-12)) + 1)
@@ -128,7 +140,7 @@ def sample_times(duration: float, interval: float, times: ArrayLike | None) -> N
             every = np.append(every, duration)
         return np.minimum(every, duration)
     given = np.asarray(times, dtype=float)
-    if given.ndim != 1 or len(given) == 0 or not np.isfinite(given).all() or (np.diff(given) < 0).any():
+    if given.ndim != 1 or len(given) == 0 or not np.isfinite(given).all() or not _rise(np.diff(given), strict):
         raise ValueError("times must be a list of finite numbers that rise")
     if given[0] < 0 or given[-1] > duration:
         raise ValueError(f"times must lie within 0 to duration = {duration:g} s, not {given[0]:g} to {given[-1]:g} s")

@@ -7,7 +7,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from rigid.checks import Coulomb, check_above_zero, check_friction, check_not_negative, check_rig
+from rigid.checks import (
+    Coulomb,
+    check_above_zero,
+    check_counterweight,
+    check_friction,
+    check_not_negative,
+    check_simulated_gravity,
+)
 from rigid.ground.laws import SurfaceLaw, find_law
 from rigid.terms import Term, find_effect, load_effect
 
@@ -138,7 +145,9 @@ class Trial(Coulomb):
                 f"inertia = {self.inertia:g} kg m2 must exceed wheel_inertia = {self.wheel_inertia:g} kg m2: it leaves "
                 f"this wheel's spin out, but holds the two wheels across it, J_w / 2 each at least, and all the rest"
             )
-        check_rig(self.mass, self.counterweight, gravity=self.gravity, gravity_sim=self.gravity_sim)
+        check_counterweight(self.mass, self.counterweight)
+        if self.counterweight > 0:
+            check_simulated_gravity(self.gravity, gravity_sim=self.gravity_sim)
         if self.actuator not in ("motor", "brake"):
             raise ValueError(f"actuator = {self.actuator!r} must be 'motor' or 'brake'")
         if math.isnan(self.torque_until) or self.torque_until < 0:

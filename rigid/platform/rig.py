@@ -13,7 +13,7 @@ The two are almost a factor of two apart.
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from rigid.checks import check_above_zero, check_rig
+from rigid.checks import check_above_zero, check_counterweight, check_simulated_gravity
 
 __all__ = ["STANDARD_GRAVITY", "Reading", "Rig", "counterweight_for"]
 
@@ -35,7 +35,7 @@ def counterweight_for(
         raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
     check_above_zero("kg", mass=mass)
     check_above_zero("m/s2", gravity=gravity, gravity_stated=gravity_stated)
-    check_rig(mass, 0.5 * mass, gravity=gravity, gravity_stated=gravity_stated)
+    check_simulated_gravity(gravity, gravity_stated=gravity_stated)
     if reading == "pair":
         return mass * (gravity - gravity_stated) / (gravity + gravity_stated)
     return mass * (1 - gravity_stated / gravity)
@@ -60,7 +60,8 @@ class Rig:
         check_above_zero("m/s2", gravity=self.gravity, gravity_sim=self.gravity_sim)
         if self.wire_length is not None:
             check_above_zero("m", wire_length=self.wire_length)
-        check_rig(self.mass, self.counterweight, gravity=self.gravity, gravity_sim=self.gravity_sim)
+        check_counterweight(self.mass, self.counterweight)
+        check_simulated_gravity(self.gravity, gravity_sim=self.gravity_sim)
 
     @classmethod
     def offloading(

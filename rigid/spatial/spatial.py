@@ -218,7 +218,7 @@ def simulate(
     check_above_zero(duration=duration, sample_interval=sample_interval, tolerance=tolerance)
     if time_step is not None:
         check_above_zero("s", time_step=time_step)
-    samples = sample_times(duration, sample_interval, times)
+    samples = sample_times(duration, sample_interval, times, strict=True)
     motion = trial.motion()
     z = _start(trial, motion, position, quaternion, velocity, angular_velocity)
     run = Integration(motion, trial.histories, trial.torque_in_flight, z, tolerance=tolerance, time_step=time_step)

@@ -163,12 +163,13 @@ def render_apart(
             subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment) as child,
         ):
             assert child.stdout is not None
-            pipe = child.stdout.fileno()
+            pipe, unread = child.stdout.fileno(), b""
             try:
                 while ready := select.select([pipe], [], [], stall)[0]:
                     if not (output := os.read(pipe, 65536)):
                         break
-                    for _ in range(output.split().count(b"done")):
+                    *lines, unread = (unread + output).split(b"\n")
+                    for _ in range(lines.count(b"done")):
                         step()
                 if not ready:
                     return f"no picture within {stall:g} s"
@@ -179,8 +180,8 @@ def render_apart(
                 child.kill()
         if child.returncode == 0:
             return None
-        lines = log.read_text(errors="replace").strip().splitlines()
-        return f"exit status {child.returncode}" + (f", {lines[-1][:200]}" if lines else "")
+        errors_said = log.read_text(errors="replace").strip().splitlines()
+        return f"exit status {child.returncode}" + (f", {errors_said[-1][:200]}" if errors_said else "")
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,10 +41,10 @@ import itertools, os, signal, sys
 from pathlib import Path
 part, cores, folder = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3])
 os.sched_getaffinity = lambda pid: set(range(cores))
-import dem.prepare.stages
+import dem.prepare.laboratory
 from experiments.grains import bed_progress
 from experiments.penetrate import experiment as penetrate
-dem.prepare.stages._KEEP_INTERVAL = 0.2
+dem.prepare.laboratory._KEEP_INTERVAL = 0.2
 calls = itertools.count()
 
 def perhaps(kept):
@@ -62,7 +62,8 @@ def share_of_bed(self, done):
     return bed_share(self, done)
 
 penetrate.share_done, bed_progress.BedProgress._share = share_done, share_of_bed
-penetrate.write_report = lambda *given: None
+import experiments.runs.whole_runs
+experiments.runs.whole_runs.write_report = lambda *given: None
 from experiments.cli.main import main
 sys.exit(main(sys.argv[4:]))
 """
