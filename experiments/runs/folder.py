@@ -28,7 +28,8 @@ from filelock import FileLock, Timeout
 from pydantic import BaseModel
 
 from rigid.result import plain, read_json, toml_value, write_json, write_text
-from rigid.series import __version__, read_series, replacing, write_series
+from rigid.series import read_series, replacing, write_series
+from rigid.version import __version__
 
 __all__ = [
     "RunFolder",
