@@ -10,6 +10,7 @@ from functools import wraps
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from operator import attrgetter
 from types import ModuleType
 from typing import Any, TypeVar, cast
 
@@ -343,12 +344,12 @@ MOVED = {module: _listed(places) for module, places in _NAMES.items()}
 
 
 def renamed(old: str, new: str) -> Any:
-    """A property `old` that gives the attribute `new`, with a DeprecationWarning."""
+    """A property `old` that gives the attribute `new`, dotted where it is a part's, with a DeprecationWarning."""
 
     def get(owner: object) -> Any:
         kind = type(owner).__name__
         warnings.warn(f"{kind}.{old} is now {new}: use {kind}.{new}", DeprecationWarning, stacklevel=2)
-        return getattr(owner, new)
+        return attrgetter(new)(owner)
 
     return property(get, doc=f"Old name of `{new}`.")
 

@@ -61,7 +61,7 @@ class EnergyBalance:
         raise NotImplementedError
 
     def _start_balance(self) -> None:
-        """Count from here."""
+        """Start the energy balance at the present time."""
         self.master.start_balance()
         self._samples.clear()
         self._momentum, self._angular_momentum = self.body.momentum.copy(), self._turning.copy()

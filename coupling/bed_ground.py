@@ -74,6 +74,8 @@ class BedGround:
     name = "bed"
     gives_friction = True
     hold, take_back = renamed("hold", "checkpoint"), renamed("take_back", "rollback")
+    set_gravity = renamed("set_gravity", "bed.set_gravity")
+    keep_book = renamed("keep_book", "bed.track_contact_work")
 
     @renamed_keywords(members="body", spike="body")
     def __init__(
@@ -177,7 +179,7 @@ class BedGround:
 
     @property
     def gravity(self) -> float:
-        """Of the grains [m/s2]."""
+        """Magnitude of the gravity that acts on the grains [m/s2]."""
         return math.hypot(*self.bed.gravity)
 
     @property
@@ -229,8 +231,10 @@ class BedGround:
     def step(
         self, position: ArrayLike, velocity: ArrayLike, dt: float, turn: Turned = None, spin: Turned = None
     ) -> Reaction:
-        """Raises LeftTheBedError, ValueError where dt is no multiple of the bed's step, and what the
-        bed raises."""
+        """Advance the bed by `dt` [s] under the moving body and return the mean reaction on it (see `Ground.step`).
+
+        Raises LeftTheBedError, ValueError where dt is no multiple of the bed's step, and what the bed raises.
+        """
         pose, twist = Pose.of(position, turn), Twist.of(velocity, spin)
         steps = round(dt / self.time_step)
         if steps < 1 or not math.isclose(steps * self.time_step, dt, rel_tol=1e-9):
@@ -348,7 +352,7 @@ class BedGround:
         return distance, normal @ matrix.T, curvature
 
     def momentum(self) -> Vector:
-        """Of the grains less the impulse of gravity and floor on them, `copies` times [N s], shape (3,).
+        """Momentum of the grains less the impulse of gravity and floor on them, `copies` times [N s], shape (3,).
 
         With the velocities half a step ahead of the positions: what changes it is the body, to round-off.
         """
@@ -376,7 +380,7 @@ class BedGround:
         self.impulse, self._used = impulse.copy(), list(used)
 
     def state(self) -> State:
-        """The bed's, which contains the bodies and their contacts."""
+        """All that the next steps depend on: the bed's state, with the bodies and their contacts, and this ground's."""
         return prefixed("bed", self.bed.state()) | {
             "impulse": self.impulse.copy(),
             "used": np.array(self._used),

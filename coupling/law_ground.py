@@ -74,6 +74,7 @@ class LawGround:
 
     @property
     def name(self) -> str:
+        """Name of the surface law."""
         return self.grounds[0].name
 
     @property
@@ -90,7 +91,7 @@ class LawGround:
             self.grounds[row].step(ends[row], still.velocity, self.time_step)
 
     def clear_height(self, pose: Pose) -> float:
-        """How far a body must be lifted from `pose` to start there [m]: a law bears it as deep as it is."""
+        """Height by which a body must be lifted from `pose` to start there [m]: 0, as it may start at any depth."""
         return 0.0
 
     def step(
@@ -125,9 +126,11 @@ class LawGround:
         return {"springs": float(sum(held))}
 
     def checkpoint(self) -> State:
+        """The state that `rollback` goes back to."""
         return self.state()
 
     def rollback(self, kept: State) -> None:
+        """Go back to what `checkpoint` gave."""
         self.restore(kept)
 
     def state(self) -> State:
@@ -138,6 +141,7 @@ class LawGround:
         return kept
 
     def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
         self._depths = np.array(state["depths"], dtype=float)
         for row, ground in enumerate(self.grounds):
             ground.restore(part_of(state, str(row)))

@@ -143,7 +143,7 @@ class Master:
         return f"Master({self.body!r} on {self.ground!r}, macro step {self.macro_step:.3g} s, {self.count} done)"
 
     def start_balance(self) -> None:
-        """Count from here."""
+        """Start the energy balance at the present time: `exchange` is set to 0."""
         self.exchange = Exchange()
         self._held = None
 

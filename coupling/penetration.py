@@ -238,14 +238,17 @@ class Drive(Run):
 
     @property
     def fraction(self) -> float:
+        """Fraction of its macro steps that are done, 0 to 1."""
         whole = self._approach + self._in + self._hold + self._out
         return 1.0 if self.done else self.count / whole
 
     @property
     def at_bottom(self) -> bool:
+        """Whether the step just done ended the way in."""
         return self.count - self._approach == self._in
 
     def settings(self) -> Facts:
+        """What was asked for, SI units."""
         return super().settings() | {
             "depth": self.target, "hold": self.hold, "retreat": self._retreat, "retreat_speed": self.retreat_speed
         }  # fmt: skip
@@ -303,9 +306,11 @@ class Drop(Run):
 
     @property
     def at_bottom(self) -> bool:
+        """Whether the spike first stopped in the step just done."""
         return self._stopped_at == self.time
 
     def settings(self) -> Facts:
+        """What was asked for, SI units."""
         return super().settings() | {
             "mass": self.mass, "load": self.load, "rest_time": self.rest_time, "rest_tolerance": self.rest_tolerance,
             "after_stop": self.after_stop if math.isfinite(self.after_stop) else None, "max_time": self.max_time,
@@ -372,9 +377,11 @@ class SetDown(Drop):
 
     @property
     def at_bottom(self) -> bool:
-        return False  # its end is
+        """Always False: a spike set down is deepest at the end of the run."""
+        return False
 
     def settings(self) -> Facts:
+        """What was asked for, SI units."""
         return super().settings() | {"lowering_speed": self.speed}
 
     def _held_velocity(self) -> float:

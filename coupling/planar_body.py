@@ -39,14 +39,15 @@ class PlacedBody:
     hold_more_firmly = renamed("hold_more_firmly", "slow_placement")
     held_by_hand = renamed("held_by_hand", "in_placement")
     _next_touching = False
-    _ARRAYS: tuple[str, ...]  # What a state has as numbers, in its order: arrays,
-    _NUMBERS: tuple[str, ...]  # then numbers and flags
+    _ARRAYS: tuple[str, ...]  # Attributes in a state's vector of numbers, in its order: arrays,
+    _NUMBERS: tuple[str, ...]  # then numbers, of which
+    _FLAGS = ("touching", "in_placement")  # are true or false
 
     @staticmethod
     def _spare(dt: float, lag: float) -> float:
         """Half of what of a step `dt` is beyond the ground's lag [s]. Raises ValueError for a shorter step."""
         if lag > dt * (1 + 1e-9):
-            raise ValueError(f"dt = {dt} s is shorter than the footing's own step of {lag} s")
+            raise ValueError(f"dt = {dt} s is shorter than the ground's own step of {lag} s")
         return 0.5 * max(dt - lag, 0.0)
 
     def _numbers(self) -> Vector:
@@ -59,7 +60,7 @@ class PlacedBody:
         for name, array in zip(self._ARRAYS, arrays, strict=True):
             setattr(self, name, array.copy())
         for name, number in zip(self._NUMBERS, rest, strict=True):
-            setattr(self, name, bool(number) if isinstance(getattr(self, name), bool) else float(number))
+            setattr(self, name, bool(number) if name in self._FLAGS else float(number))
 
 
 class PlanarBody(PlacedBody):
@@ -99,6 +100,10 @@ class PlanarBody(PlacedBody):
         """When a motor's wheel came to `max_wheel_speed` [s], counted as `time`; None if it has not."""
         return None if math.isnan(self._at_limit) else self._at_limit
 
+    @wheel_at_limit.setter
+    def wheel_at_limit(self, time: float | None) -> None:
+        self._at_limit = math.nan if time is None else time
+
     def begin_placement(self, lowering_speed: float, *, pace: float = 1.0, step: float = 0.0) -> None:
         """It is lowered from here on: c = W / lowering_speed [m/s] resists, and its mass is 2 ms c.
 
@@ -137,6 +142,7 @@ class PlanarBody(PlacedBody):
         return Pose(np.array([x, 0.0, z]), np.array([math.cos(0.5 * theta), 0.0, math.sin(0.5 * theta), 0.0]))
 
     def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
+        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench, whose lag is `lag` [s]."""
         half = self._spare(dt, lag)
         self._torque = self._mean_torque(dt)
         push = self._applied() + _generalised(guess)
@@ -144,6 +150,7 @@ class PlanarBody(PlacedBody):
         return _twist(held)
 
     def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
+        """The ground's whole wrench: `reaction` over `dt` [s] plus the friction that its Coulomb bounds allow."""
         bounded = {row: contact for row, contact in reaction.by_member.items() if contact.tangential_force is None}
         self._next_modes = np.full(len(self.modes), _OPEN, dtype=np.int8)
         self._next_touching = bool(reaction.contacts)
@@ -153,6 +160,7 @@ class PlanarBody(PlacedBody):
         return Wrench(reaction.force + force[0], reaction.torque + force[1])
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
+        """Make the step of `dt` [s]: move along `twist`, with the impulse of `wrench`."""
         held = np.array([twist.velocity[0], twist.velocity[2], twist.spin[1]])
         push = self._applied() + _generalised(wrench)
         self.place = self.place + dt * held
@@ -160,7 +168,7 @@ class PlanarBody(PlacedBody):
         self.acceleration = push / self.inertia
         self.torque_work += self._torque * held[2] * dt
         if self.wheel_at_limit is None and self._until_limit <= dt:
-            self._at_limit = self.time + max(0.0, self._until_limit)
+            self.wheel_at_limit = self.time + max(0.0, self._until_limit)
         sign = 1.0 if self.trial.actuator == "motor" else -1.0
         self.wheel_speed += sign * self._torque * dt / self.trial.wheel_inertia
         self.modes, self.touching = self._next_modes, self._next_touching
@@ -205,9 +213,11 @@ class PlanarBody(PlacedBody):
         return self.trial.weight * float(self.place[1])
 
     def state(self) -> State:
+        """All that its next steps depend on."""
         return {"numbers": self._numbers(), "modes": self.modes.copy()}
 
     def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
         self._restore_numbers(state["numbers"])
         self.modes = np.array(state["modes"], dtype=np.int8)
 

@@ -107,6 +107,7 @@ class SpatialBody(PlacedBody):
         self.momentum, self.angular_momentum = self._masses * velocity, self._spin_to_momentum(spin)
 
     def slow_placement(self, factor: float) -> None:
+        """Multiply drag and mass of the placement by `factor` [1], as `PlanarBody.slow_placement`."""
         wheels = self._wheels_at(self.wheels, self.turn)
         self._masses, self._inertia, self._drag = (factor * held for held in (self._masses, self._inertia, self._drag))
         self.momentum = factor * self.momentum
@@ -120,6 +121,7 @@ class SpatialBody(PlacedBody):
         self.time = self.torque_work = 0.0
 
     def lift(self, height: float) -> None:
+        """Raise it by `height` [m]."""
         self.place[2] += height
 
     def start(self, lag: float) -> None:
@@ -134,9 +136,11 @@ class SpatialBody(PlacedBody):
 
     @property
     def pose(self) -> Pose:
+        """Position of the centre of mass [m] and orientation."""
         return Pose(self.place, self.turn)
 
     def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
+        """The twist to hold over the next `dt` [s], under the guess at the ground's wrench, whose lag is `lag` [s]."""
         self._lag, half = lag, self._spare(dt, lag)
         self._torques = self._mean_torques(dt)
         drag = self._drag
@@ -154,6 +158,7 @@ class SpatialBody(PlacedBody):
         return Twist(momentum / self._masses, spin)
 
     def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
+        """The ground's whole wrench: `reaction` over `dt` [s] plus the friction that its Coulomb bounds allow."""
         bounded = {tip: contact for tip, contact in reaction.by_member.items() if contact.tangential_force is None}
         self._next_sliding, self._next_sticking = dict[int, Vector](), frozenset[int]()
         self._next_touching = bool(reaction.contacts)
@@ -165,6 +170,7 @@ class SpatialBody(PlacedBody):
         return Wrench(reaction.force + force, reaction.torque + torque)
 
     def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
+        """Make the step of `dt` [s]: move along `twist`, with the impulse of `wrench`."""
         middle = to_matrix(moved(self.pose, twist, 0.5 * dt).turn)
         self.torque_work += dt * float(self._torques @ (self.axes @ (middle.T @ twist.spin)))
         end = moved(self.pose, twist, dt)
@@ -220,6 +226,7 @@ class SpatialBody(PlacedBody):
         return self.wheels / np.array(inertias[:3])
 
     def state(self) -> State:
+        """All that its next steps depend on."""
         slides = sorted(self.sliding)
         return {
             "numbers": self._numbers(),
@@ -229,6 +236,7 @@ class SpatialBody(PlacedBody):
         }
 
     def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
         self._restore_numbers(state["numbers"])
         self._inertia = np.array(state["inertia"], dtype=float)
         rows = np.asarray(state["sliding"], dtype=float).reshape(-1, 3)

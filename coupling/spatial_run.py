@@ -41,7 +41,9 @@ class SpatialRun(PlatformRun):
     position : of the centre of mass at the start [m], z from the undisturbed surface; None: level above (0, 0), its
         lowest tips at the surface, on a bed lifted until it is clear of the grains.
     quaternion, velocity, angular_velocity : as `SpatialBody` has them; a platform that is placed starts at rest.
-    options : `duration`, `lowering_speed` and `energy_interval` of `PlatformRun`, and those of `Master`.
+    lowering_speed : of a placement before time begins [m/s]; None: none.
+    energy_interval : between measurements of what the ground holds [s].
+    options : those of `Master`.
 
     Raises ValueError for a start in overlap with grains, and for what `Master` and `SpatialBody` refuse.
     """
@@ -55,13 +57,16 @@ class SpatialRun(PlatformRun):
         trial: SpatialTrial,
         ground: Ground,
         *,
+        duration: float,
         position: Sequence[float] | None = None,
         quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
         velocity: Sequence[float] = (0.0, 0.0, 0.0),
         angular_velocity: Sequence[float] = (0.0, 0.0, 0.0),
+        lowering_speed: float | None = None,
+        energy_interval: float = 0.02,
         **options: Any,
     ) -> None:
-        if options.get("lowering_speed") is not None:
+        if lowering_speed is not None:
             if np.any(velocity) or np.any(angular_velocity):
                 raise ValueError("lowering_speed is given with a velocity: a platform that is placed starts at rest")
             if not trial.weight[2] < 0:
@@ -74,7 +79,8 @@ class SpatialRun(PlatformRun):
         )  # fmt: skip
         self._places = np.vstack([tips, -trial.platform.centre_of_mass])  # the hull last
         super().__init__(
-            trial, ground, body, lift=position is None, weight=np.asarray(trial.weight), members=self._places,
+            trial, ground, body, duration=duration, lift=position is None, weight=np.asarray(trial.weight),
+            members=self._places, lowering_speed=lowering_speed, energy_interval=energy_interval,
             first_guess=Wrench.none(), **options,
         )  # fmt: skip
         if self.placed:
@@ -154,5 +160,6 @@ class SpatialRun(PlatformRun):
         return max(float(np.abs(rows["torque_work"]).max()), lifted, float(rows["kinetic_energy"][0]), 1e-300)
 
     def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
         super().restore(state)
         self._feet = [np.array(state["run.feet"], dtype=float)]

@@ -125,11 +125,13 @@ class TumblesInARow(CoupledTumble):
         self.body.trial = replace(self.trial, torque_until=math.inf if on else self.body.time)
 
     def state(self) -> State:
+        """All that the rest of the run depends on."""
         numbers = [self._on, self._from, self._quiet_since, self._ended, self._seen]
         rests = np.array(self._rests, dtype=float).reshape(-1, len(NOTED))
         return super().state() | prefixed("row", {"numbers": np.array(numbers, dtype=float), "rests": rests})
 
     def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
         super().restore(state)
         own = part_of(state, "row")
         on, self._from, self._quiet_since, self._ended, seen = (float(value) for value in own["numbers"])

@@ -48,8 +48,9 @@ class CoupledTumble(PlatformRun):
     height : of the centre at the start [m]; None: on a law where the law carries it, on a bed just clear of the grains.
     max_wheel_speed : where a motor has no torque left [rad/s].
     lower_gravity : whether the placement goes on until gravity has fallen from the bed's to the trial's.
-    options : `duration`, `lowering_speed` (None: no placement, the platform starts at `height`) and `energy_interval`
-        of `PlatformRun`, and those of `Master`.
+    lowering_speed : of the placement [m/s]; None: none, the platform starts at `height`.
+    energy_interval : between measurements of what the ground holds [s].
+    options : those of `Master`.
 
     Raises ValueError for a start in overlap with grains, a gravity to be lowered where there is no placement, no bed or
     a rig, and for what `Master`, `PlanarBody` and `LoweredGravity` refuse.
@@ -65,8 +66,11 @@ class CoupledTumble(PlatformRun):
         trial: Trial,
         ground: Ground,
         *,
+        duration: float,
         tip_radius: float = 0.0,
+        lowering_speed: float | None = None,
         height: float | None = None,
+        energy_interval: float = 0.02,
         max_wheel_speed: float = math.inf,
         lower_gravity: bool = False,
         **options: Any,
@@ -78,17 +82,17 @@ class CoupledTumble(PlatformRun):
         start = self.level if height is None else float(height)
         if height is None and isinstance(ground, LawGround):
             start -= _sinkage(ground, 0.5 * trial.weight)
-        placed = options.get("lowering_speed") is not None
-        rests = not placed and height is None
+        rests = lowering_speed is None and height is None
         carried = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
         super().__init__(
-            trial, ground, PlanarBody(trial, z=start), lift=height is None, weight=np.array([0.0, 0.0, -trial.weight]),
-            members=trial.spike_count, first_guess=carried, **options,
+            trial, ground, PlanarBody(trial, z=start), duration=duration, lift=height is None,
+            weight=np.array([0.0, 0.0, -trial.weight]), members=trial.spike_count, lowering_speed=lowering_speed,
+            energy_interval=energy_interval, first_guess=carried, **options,
         )  # fmt: skip
         self.body.max_wheel_speed = max_wheel_speed
         self.lowered: LoweredGravity | None = None
         if lower_gravity:
-            if not isinstance(ground, BedGround) or not placed or trial.counterweight > 0:
+            if not isinstance(ground, BedGround) or lowering_speed is None or trial.counterweight > 0:
                 raise ValueError("lower_gravity is for a platform that is placed on a bed, without a rig")
             self.lowered = LoweredGravity(ground, last=trial.gravity_sim, duration=self.duration)
         if self.placed:
@@ -234,10 +238,12 @@ class CoupledTumble(PlatformRun):
         )
 
     def state(self) -> State:
+        """All that the rest of the run depends on."""
         own = {"lowered": self.lowered.numbers()} if self.lowered is not None else {}
         return prefixed("tumble", own) | super().state()
 
     def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
         if self.lowered is not None:
             self.lowered.restore(np.asarray(state["tumble.lowered"], dtype=float))
             self._weigh()

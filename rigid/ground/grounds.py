@@ -50,7 +50,7 @@ class _LawGround(Coulomb):
         law = find_law(law_name)
         check_friction(self.mu_s, self.mu_d)
         check_above_zero("in s", time_step=self.time_step)
-        values = {"_law": law, "_numbers": law.numbers(parameters), "_rebound": law.rebound(parameters)}
+        values = {"_law": law, "_numbers": law.numbers(parameters), "_rebound": law.rebound(parameters) or 1.0}
         for key, value in (values | {"_deepest": [0.0], "_depth": [0.0], "name": self.name or law.name}).items():
             object.__setattr__(self, key, value)
 
@@ -120,7 +120,13 @@ class _LawGround(Coulomb):
         """Go back to what `state` gave."""
         self._deepest[0] = float(state["deepest"]) if self._law.has_memory else 0.0
 
-    checkpoint, rollback = state, restore  # It is all that a macro step changes
+    def checkpoint(self) -> State:
+        """The state that `rollback` goes back to."""
+        return self.state()
+
+    def rollback(self, kept: State) -> None:
+        """Go back to what `checkpoint` gave."""
+        self.restore(kept)
 
     def _mean(self, start: float, end: float, rate: float) -> float:
         """Mean force on the way from depth `start` to `end` [m] at `rate` [m/s]."""

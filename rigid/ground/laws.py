@@ -71,9 +71,9 @@ class SurfaceLaw:
         p = tuple(values[slot] for slot in self.slots) if self.make is None else self.make(values)
         return tuple(count * value if k in self.extensive else value for k, value in enumerate(p))
 
-    def rebound(self, given: Mapping[str, float]) -> float:
-        """Share of the deepest depth that springs back [1]; 1 for a law without memory."""
-        return self.values(given)["rebound"] if self.has_memory else 1.0
+    def rebound(self, given: Mapping[str, float]) -> float | None:
+        """Share of the deepest depth that springs back [1], above 0; None for a law without memory."""
+        return self.values(given)["rebound"] if self.has_memory else None
 
     def force(self, depth: float, rate: float, p: Numbers, *, top: float | None = None, rebound: float = 1.0) -> float:
         """Force [N] at `depth` [m] and `rate` [m/s], both positive downwards; `top` is the deepest depth so far [m].

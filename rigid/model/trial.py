@@ -83,7 +83,7 @@ class Ground:
     @property
     def rebound(self) -> float:
         """Share of the deepest depth that springs back [1]; 1 for a law without memory."""
-        return self.law.rebound(self.parameters)
+        return self.law.rebound(self.parameters) or 1.0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,7 @@ import importlib
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -106,6 +107,14 @@ def test_a_ground_is_held_and_taken_back_as_before():
     with pytest.warns(DeprecationWarning, match="LawGround.take_back is now rollback"):
         law.take_back(held)
     assert isinstance(coupling.BedGround.hold, property)
+
+
+@pytest.mark.parametrize(("old", "today"), [("set_gravity", "set_gravity"), ("keep_book", "track_contact_work")])
+def test_a_ground_calls_its_bed_by_the_names_of_before(old, today):
+    ground = coupling.BedGround.__new__(coupling.BedGround)
+    ground.bed = SimpleNamespace(**{today: lambda *given: (today, *given)})
+    with pytest.warns(DeprecationWarning, match=f"BedGround.{old} is now bed.{today}"):
+        assert getattr(ground, old)(1.6) == (today, 1.6)
 
 
 @pytest.mark.parametrize("old", ["members", "spike"])

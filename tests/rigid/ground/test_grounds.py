@@ -191,3 +191,12 @@ def test_sideways_the_grains_oppose_the_motion_and_more_with_depth():
     # Far below the ball the shaft rules: a wall's capacity grows with the square of the depth.
     deep = [sideways_capacity(z, **grains) for z in (0.6, 1.2)]
     assert deep[1] / deep[0] == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_checkpoint_is_that_of_a_subclass_with_a_state_of_its_own():
+    class Counting(SurfaceGround):
+        def state(self):
+            return super().state() | {"count": 7}
+
+    assert Counting(law="power").checkpoint() == {"count": 7}
+    assert GROUNDS["power"].rebound({}) is None and GROUNDS["rft"].rebound({"rebound": 0.1}) == 0.1
