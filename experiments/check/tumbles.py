@@ -185,7 +185,7 @@ def _wheel(tables: TumbleCampaign, trial: TumbleTrial, wheel: Recording) -> Iter
         if words is not None or abs(there - trial.wheel_speed_0) > max(10 * sensor.std[0], 0.05 * trial.wheel_speed_0):
             expected_speed = f"wheel_speed_0 = {trial.wheel_speed_0:g}"
             turns = f"the wheel turns at {there:.4g} rad/s at the start where {expected_speed}"
-            yield Odd("wheel", turns if words is None else f"; {words}")
+            yield Odd("wheel", turns if words is None else f"{turns}; {words}")
             return
     rows = (wheel.time >= 0) & (wheel.time <= until) & np.isfinite(speed)
     if rows.sum() < 6 or abs(expected) * np.ptp(wheel.time[rows]) < 20 * sensor.std[0]:

@@ -55,6 +55,7 @@ def lost_for_a_while(columns: dict[str, np.ndarray]) -> None:
         ("tumble", "001", "pose", times("y_m", 1.0, 0.02), "m at the start where 0.18"),
         ("tumble", "001", "imu", times("ay_m_s2", 1 / GRAVITY), "units of g"),
         ("tumble", "001", "wheel", times("omega_rad_s", 9.55), "revolutions per minute"),
+        ("tumble", "002", "wheel", times("omega_rad_s", 9.55), "1913 rad/s at the start where wheel_speed_0 = 200; "),
         ("tumble", "001", "wheel", times("t_s", 1.0, 0.2), "begins to change at 0.199 s"),
         ("penetration", "001", "data", times("depth_m", 1e3), "depth_mm would say so"),
         ("penetration", "001", "data", times("depth_m", -1.0), "hardly into the bed"),
