@@ -21,7 +21,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 _MODULES = {
     "coupling": {
         "coupling": (
-            "bed_footing=bed_ground books=balance followed=platform_run footing=ground spatial_friction=spatial_body"
+            "bed_footing=bed_ground books=balance deprecated=planar_body followed=platform_run footing=ground "
+            "spatial_friction=spatial_body"
         ),
     },
     "dem": {
@@ -34,6 +35,10 @@ _MODULES = {
         "dem.prepare": "bedfile laboratory pouring=laboratory recipe stages",
         "dem.shapes": "mesh mesh_tree=mesh solids",
     },
+    "dem.engine": {"dem.engine": "checkpoint=state"},
+    "dem.grains": {"dem.grains": "curve=packing profile=packing"},
+    "dem.prepare": {"dem.prepare": "pouring=laboratory"},
+    "dem.shapes": {"dem.shapes": "mesh_tree=mesh"},
     "experiments": {
         "experiments": "plausible=check",
         "experiments.bed": (
@@ -86,6 +91,15 @@ _MODULES = {
         ),
         "experiments.validate": "validate_settings=settings",
     },
+    "experiments.bed": {"experiments.bed": "words=settings"},
+    "experiments.calibrate": {"experiments.calibrate": "words=settings"},
+    "experiments.campaign": {"experiments.campaign": "templates=files"},
+    "experiments.check": {
+        "experiments.check": (
+            "force_units=pushes lags=tumbles penetration=pushes tumble=tumbles turning=tumbles zeros=pushes"
+        ),
+    },
+    "experiments.compare": {"experiments.compare": "common=experiment"},
     "experiments.diagnose": {
         "experiments.check": "lags=tumbles unit_factors=words",
         "experiments.diagnose.core": (
@@ -111,13 +125,40 @@ _MODULES = {
             "tumble_readings=readings tumble_spikes=checks"
         ),
     },
+    "experiments.diagnose.core": {
+        "experiments.diagnose.core": (
+            "effect_equations=effect_texts effect_words=effect_texts equivalence=rivals finishing=outcome "
+            "own_ways=deciding prediction=rivals"
+        ),
+        "experiments.diagnose.report": "sizes=document",
+    },
+    "experiments.diagnose.fit": {"experiments.diagnose.fit": "own=forms slopes=localise"},
+    "experiments.diagnose.noise": {"experiments.diagnose.noise": "astray=diverging unrest=wander"},
+    "experiments.diagnose.report": {"experiments.diagnose.report": "candidates=sentences telling=sentences"},
+    "experiments.diagnose.tumble": {
+        "experiments.diagnose.fit": "fit=fitting steps=fitting",
+        "experiments.diagnose.tumble": "spikes=checks",
+    },
+    "experiments.grains": {"experiments": "sentences=grains", "experiments.grains": "box=sizes"},
+    "experiments.hop": {"experiments.hop": "words=experiment"},
+    "experiments.paper": {"experiments.paper": "variants=experiment"},
+    "experiments.penetrate": {
+        "experiments.penetrate": "amended_runs=amended frames=experiment plan=units remarks=result",
+    },
+    "experiments.platform": {"experiments.platform": "kept_platform=numbers lengths=settled tips=numbers"},
     "experiments.plausible": {
         "experiments.check": (
             "findings force_units=pushes penetration=pushes tumble=tumbles turning=tumbles words zeros=pushes"
         ),
     },
-    "experiments.tumble": {"experiments.grains": "words=bed_result"},
+    "experiments.runs": {"experiments.runs": "reporting=whole_runs"},
+    "experiments.spatial": {"experiments.spatial": "frames=result on_law=on_grains"},
+    "experiments.suite": {"experiments.suite": "cost=cases"},
+    "experiments.tumble": {
+        "experiments.tumble": "campaign_tables=synthesis on_grains_frames=on_grains_result words=result",
+    },
     "experiments.validate": {
+        "experiments.validate": "document=experiment",
         "experiments.validate.base": "case cloud drops energy kept=drops parts=drops peers spheres",
         "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
         "experiments.validate.contacts": (
@@ -126,7 +167,9 @@ _MODULES = {
         ),
     },
     "experiments.validate.base": {"experiments.validate.base": "parts=drops"},
+    "experiments.validate.beds": {"experiments.validate": "words=beds"},
     "experiments.validate.contacts": {
+        "experiments.validate": "words=contacts",
         "experiments.validate.contacts": (
             "books=balances laws=other_codes microslip=law_alone oblique=impacts restitution=collisions "
             "sliding=other_codes spinning=impacts"
@@ -143,12 +186,13 @@ _MODULES = {
         "rigid.platform": "actuation inertia platform_files=files rig solids spike",
         "rigid.spatial": "quaternions spatial_motion=motion spatial_steps=steps",
     },
+    "rigid.batch.kernel": {"rigid.batch.kernel": "contacts=forces holds=forces samples=advance"},
     "rigid.batch_kernel": {
         "rigid.batch.kernel": "advance changes=events columns=parts dry=forces parts samples=advance stand",
     },
-    "rigid.terms": {
-        "rigid.terms.body": "wires=wire_compliance",
-    },
+    "rigid.model": {"rigid.model": "mechanics=model"},
+    "rigid.planar": {"rigid.planar": "dormand_prince=methods implicit=methods modes=events rest=statics"},
+    "rigid.terms": {"rigid.terms": "mobilised=curves", "rigid.terms.body": "wires=wire_compliance"},
     "vis": {
         "vis.bed": "bed_cone=tests bed_cut=tests bed_repose=tests bed_shear=tests bed_tests=tests calibrate validation",
         "vis.compare": "compare_figures=report compare_spatial=report",
@@ -163,16 +207,18 @@ _MODULES = {
         "vis.pictures": "arrows=canvas canvas frames meshes render scene sections stage=scene tracks",
         "vis.tumble": "tumble_beside=beside tumble_grains=grains tumble_pictures=report tumble_sweep=report",
     },
-    "vis.compare": {"vis.page": "figures=states"},
-    "vis.paper": {"vis.page": "run=plots"},
-    "vis.penetrate": {"vis.page": "plot_parts=plots"},
+    "vis.compare": {"vis.compare": "figures=report"},
+    "vis.diagnose": {"vis.diagnose": "inspection=campaign"},
+    "vis.page": {"vis.page": "columns=page style=plots tumble_series=states"},
+    "vis.paper": {"vis.paper": "run=figures"},
+    "vis.penetrate": {"vis.penetrate": "amended=report plot_parts=plot_drag plots=report"},
+    "vis.pictures": {"vis.pictures": "arrows=canvas stage=scene"},
+    "vis.tumble": {"vis.tumble": "pictures=report sweep=report"},
 }
 """Package of before -> package of today -> its modules, `old=new` where the name is another, too."""
 
 _NAMES = {
-    "coupling.balance": {
-        "coupling.balance": "Books=EnergyBalance",
-    },
+    "coupling.balance": {"coupling.balance": "Books=EnergyBalance"},
     "coupling.bed_ground": {
         "coupling.bed_ground": "BedFooting=BedGround",
         "coupling.members": "FEWEST_SLOTS ball_member platform_members slots_of spatial_members",
@@ -181,15 +227,12 @@ _NAMES = {
         "coupling.ground": "FootReaction=Reaction Footing=Ground",
         "coupling.law_ground": "LawFooting=LawGround row_tips",
     },
-    "coupling.master": {
-        "coupling.master": "StepBooks=Exchange",
-    },
+    "coupling.master": {"coupling.master": "StepBooks=Exchange"},
     "coupling.planar_body": {
         "coupling.planar_body": "HAND_STEP=PLACEMENT_STEP HAND_TIME=PLACEMENT_TIME hand_time=placement_time",
+        "hedgebed_renamed": "renamed_keywords",
     },
-    "coupling.platform_run": {
-        "coupling.platform_run": "Followed=PlatformRun",
-    },
+    "coupling.platform_run": {"coupling.platform_run": "Followed=PlatformRun"},
     "dem.contact": {
         "dem.contact.law": (
             "PAIR_WIDTH adhesive_range contact_force damping_factor effective_moduli pair_parameters turning_torque"
@@ -199,18 +242,10 @@ _NAMES = {
         "dem.engine.engine": "Engine MOST_PRIMITIVES STEPS_PER_LAUNCH take_engine",
         "dem.engine.lists": "MOST_BODIES",
     },
-    "dem.engine.state": {
-        "dem.engine.state": "Held=Checkpoint",
-    },
-    "dem.engine.dissipation": {
-        "dem.engine.dissipation": "Bookkeeping=BalanceKernels Ledger=Balance",
-    },
-    "dem.engine.lists": {
-        "dem.grains.packing": "curve_ranks",
-    },
-    "dem.measure": {
-        "dem.grains.packing": "bulk_packing packing_profile surface_height",
-    },
+    "dem.engine.state": {"dem.engine.state": "Held=Checkpoint"},
+    "dem.engine.dissipation": {"dem.engine.dissipation": "Bookkeeping=BalanceKernels Ledger=Balance"},
+    "dem.engine.lists": {"dem.grains.packing": "curve_ranks"},
+    "dem.measure": {"dem.grains.packing": "bulk_packing packing_profile surface_height"},
     "dem.prepare": {
         "dem.prepare.prepare": "prepare_bed",
         "dem.prepare.specification": (
@@ -221,101 +256,68 @@ _NAMES = {
         "dem.prepare.prepare": "prepare_as",
         "dem.prepare.report": "Prepared",
     },
-    "dem.shapes": {
-        "dem.shapes.basic": "Ball Cone Cylinder Plane Primitive distance_to",
-    },
+    "dem.shapes": {"dem.shapes.basic": "Ball Cone Cylinder Plane Primitive distance_to"},
+    "dem.shapes.solids": {"dem.shapes.basic": "PLACE_WIDTH"},
     "experiments.cli": {
         "experiments.cli.main": "build_app",
         "experiments.cli.runs": "BAD_INPUT DONE FAILED STOPPED",
     },
-    "experiments.diagnose.core.outcome": {
-        "experiments.diagnose.core.outcome": "Told=Known",
+    "experiments.diagnose.core.deciding": {"experiments.diagnose.core.deciding": "held_out_ways=held_out_divergences"},
+    "experiments.diagnose.core.outcome": {"experiments.diagnose.core.outcome": "Told=Known"},
+    "experiments.diagnose.core.renoised": {"experiments.diagnose.core.renoised": "unrest_of=wander_of"},
+    "experiments.diagnose.fit.fitting": {"experiments.diagnose.tumble.data": "LOST ZERO_STD whiten"},
+    "experiments.diagnose.fit.gaps": {"experiments.diagnose.report.gaps": "Gaps"},
+    "experiments.diagnose.fit.localise": {"experiments.diagnose.fit.localise": "places_in=places"},
+    "experiments.diagnose.noise.colour": {"experiments.diagnose.noise.colour": "find_loud=find_white_noise"},
+    "experiments.diagnose.noise.diverging": {
+        "experiments.diagnose.noise.diverging": (
+            "allowed=most_diverging astray=diverging_trials astray_finding=divergence_finding "
+            "astray_held_out=diverging_held_out"
+        ),
     },
-    "experiments.paper": {
-        "experiments.paper.experiment": "Job plan_jobs",
-    },
-    "experiments.penetrate": {
-        "experiments.penetrate.beds": "choose_softness fingerprint",
-    },
-    "experiments.penetrate.recorded": {
-        "experiments.campaign.files": "place_campaign",
-    },
-    "experiments.penetrate.settings": {
-        "experiments.grains.sizes": "expected_grain_count",
-    },
-    "experiments.platform.numbers": {
-        "experiments.tumble.trial": "Spikes spikes_of",
-    },
-    "experiments.suite": {
-        "experiments.suite.cases": "Case EXPERIMENTS KEPT LONGEST do_case estimate keep standing",
-    },
-    "experiments.tumble": {
-        "experiments.tumble.result": "motion_columns quantities_of result_of trajectory_columns",
-    },
-    "experiments.tumble.campaign_settings": {
-        "experiments.diagnose.settings": "CheckSettings",
-    },
+    "experiments.diagnose.noise.wander": {"experiments.diagnose.noise.wander": "Unrest=Wander find_unrest=find_wander"},
+    "experiments.grains.on_bed": {"coupling.platform_run": "PlatformRun"},
+    "experiments.paper": {"experiments.paper.experiment": "Job plan_jobs"},
+    "experiments.penetrate": {"experiments.penetrate.beds": "choose_softness fingerprint"},
+    "experiments.penetrate.recorded": {"experiments.campaign.files": "place_campaign"},
+    "experiments.penetrate.settings": {"experiments.grains.sizes": "expected_grain_count"},
+    "experiments.platform.numbers": {"experiments.tumble.trial": "Spikes spikes_of"},
+    "experiments.suite": {"experiments.suite.cases": "Case EXPERIMENTS KEPT LONGEST do_case estimate keep standing"},
+    "experiments.tumble": {"experiments.tumble.result": "motion_columns quantities_of result_of trajectory_columns"},
+    "experiments.tumble.campaign_settings": {"experiments.diagnose.settings": "CheckSettings"},
+    "experiments.tumble.coupled": {"experiments.tumble.steppers": "law_feet=row_feet"},
+    "experiments.tumble.on_grains_result": {"experiments.tumble.steppers": "sinkage_start"},
     "experiments.tumble.result": {
         "experiments.grains.bed_result": "residual_warning reversal_warning unsettled_warning",
     },
+    "experiments.validate.base.case": {"experiments.validate.base.case": "told=tracked"},
     "experiments.validate.base.energy": {
         "experiments.validate.base.energy": "Book=EnergyRecord keep_book=record_energy",
     },
-    "experiments.validate.base.peers": {
-        "experiments.validate.contacts.other_codes": "Assembly dense pairs",
-    },
-    "rigid.batch": {
-        "rigid.batch.simulate": "BatchTrajectory simulate_batch",
-    },
-    "rigid.model": {
-        "rigid.model.model": "Model State assemble make_parameters model_source parameter_names",
-    },
-    "rigid.planar": {
-        "rigid.planar.simulate": "Method check_step longest_step step_bound",
-    },
-    "rigid.platform": {
-        "rigid.platform.platform": "Platform Stance",
-    },
-    "rigid.spatial": {
-        "rigid.spatial.spatial": "SpatialTrajectory SpatialTrial simulate standing",
-    },
-    "vis.bed": {
-        "vis.bed.report": "write_bed_report",
-    },
-    "vis.compare": {
-        "vis.compare.report": "write_compare_report",
-    },
-    "vis.compare.report": {
-        "vis.page.states": "draw_states",
-    },
-    "vis.diagnose": {
-        "vis.diagnose.report": "write_diagnosis_report",
-    },
+    "experiments.validate.base.peers": {"experiments.validate.contacts.other_codes": "Assembly CASES dense pairs"},
+    "rigid.batch": {"rigid.batch.simulate": "BatchTrajectory simulate_batch"},
+    "rigid.model": {"rigid.model.model": "Model State assemble make_parameters model_source parameter_names"},
+    "rigid.planar": {"rigid.planar.simulate": "Method check_step longest_step step_bound"},
+    "rigid.platform": {"rigid.platform.platform": "Platform Stance"},
+    "rigid.spatial": {"rigid.spatial.spatial": "SpatialTrajectory SpatialTrial simulate standing"},
+    "vis.bed": {"vis.bed.report": "write_bed_report"},
+    "vis.bed.tests": {"vis.bed.tests": "said=quoted"},
+    "vis.compare": {"vis.compare.report": "write_compare_report"},
+    "vis.compare.report": {"vis.page.states": "draw_states"},
+    "vis.diagnose": {"vis.diagnose.report": "write_diagnosis_report"},
     "vis.film.film": {
         "vis.pictures.render": "View",
         "vis.pictures.scene": "Scene",
     },
-    "vis.page": {
-        "vis.page.page": "Block Page Section Tile code figure listing table text write_page",
-    },
-    "vis.paper": {
-        "vis.paper.report": "write_paper_report",
-    },
-    "vis.page.states": {
-        "vis.page.folder": "read_columns",
-    },
-    "vis.paper.figures": {
-        "vis.page.plots": "WIDTH new_figure",
-    },
-    "vis.penetrate.plot_drag": {
-        "vis.page.plots": "WIDTH shades",
-    },
-    "vis.pictures": {
-        "vis.pictures.pictures": "Picture Pictures make_pictures opengl_available render_apart",
-    },
-    "vis.spatial": {
-        "vis.spatial.report": "write_spatial_report",
-    },
+    "vis.page": {"vis.page.page": "Block Page Section Tile code figure listing table text write_page"},
+    "vis.paper": {"vis.paper.report": "write_paper_report"},
+    "vis.page.plots": {"vis.penetrate.plot_drag": "Plot"},
+    "vis.page.states": {"vis.page.folder": "read_columns"},
+    "vis.paper.figures": {"vis.page.plots": "WIDTH new_figure"},
+    "vis.penetrate.plot_drag": {"vis.page.plots": "WIDTH shades"},
+    "vis.pictures": {"vis.pictures.pictures": "Picture Pictures make_pictures opengl_available render_apart"},
+    "vis.pictures.scene": {"vis.pictures.sections": "FlatStage"},
+    "vis.spatial": {"vis.spatial.report": "write_spatial_report"},
     "vis.tumble": {
         "vis.page.folder": "read_columns",
         "vis.page.states": "state_runs",

@@ -3,6 +3,7 @@
 import importlib
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +14,47 @@ from hedgebed_renamed import MOVED, RENAMED
 from rigid import Trial
 
 ROOT = Path(__file__).resolve().parents[2]
+NAMES_OF_BEFORE = {  # as they were public in earlier versions; this list stays as it is
+    "coupling": "BedGround CoupledTumble LawGround Master Penetration SpatialRun TumblesInARow drive drop set_down",
+    "coupling.bed_footing": "BedFooting platform_members",
+    "coupling.deprecated": "PlacedBody renamed_keywords",
+    "coupling.footing": "FootReaction Footing LawFooting",
+    "dem": "Ball Bed BedFailure Box Grains Material Mesh Prepared Sieve Sleep material measure_grading",
+    "dem.bed": "Bed BedFailure",
+    "dem.engine.checkpoint": "Checkpoint",
+    "dem.grains.curve": "curve_ranks",
+    "dem.grains.profile": "bulk_packing packing_profile surface_height",
+    "dem.laboratory": "Prepared prepare_as",
+    "dem.shapes": "Ball Cone Cylinder Plane",
+    "dem.shapes.mesh_tree": "MeshTree mesh_tree",
+    "experiments.bed.settings": "BedSettings",
+    "experiments.campaign": "Campaign Recording Settings read_campaign run write_campaign",
+    "experiments.campaign.templates": "TEMPLATES new_campaign",
+    "experiments.diagnose.core.equivalence": "CLOSE Rival compare",
+    "experiments.diagnose.noise.astray": "astray astray_held_out",
+    "experiments.diagnose.noise.unrest": "Unrest find_unrest",
+    "experiments.diagnose": "Settings check resume run",
+    "experiments.grains.box": "carried_height expected_grain_count",
+    "experiments.grains.on_bed": "PlatformOnBed PlatformRun",
+    "experiments.hop.settings": "HopSettings",
+    "experiments.paper.variants": "Variant variants",
+    "experiments.penetrate.plan": "PenetratePlan",
+    "experiments.penetrate": "Settings check resume run",
+    "experiments.runs.reporting": "PictureCosts write_report",
+    "experiments.spatial.frames": "SpatialFrames",
+    "experiments.tumble": "Settings check resume run",
+    "experiments.tumble.words": "MOST stayed_words tumble_sentences way_through",
+    "experiments.validate.document": "markdown",
+    "rigid": "Platform Reaction SpatialTrial Trial Tumbler read_platform simulate simulate_batch simulate_spatial",
+    "rigid.model.mechanics": "contact_arms divide_mass",
+    "rigid.planar.implicit": "Implicit",
+    "vis": "FrameWriter read_frames write_report",
+    "vis.page.style": "BED INK MODEL styled",
+    "vis.paper.run": "VARIANTS PaperRun in_order",
+    "vis.penetrate.plot_parts": "Plot above_surface by_speed has_model spread_words",
+    "vis.pictures": "Picture Pictures make_pictures",
+    "vis.pictures.stage": "Eye FlatStage Stage",
+}
 
 
 @pytest.mark.parametrize("old", RENAMED)
@@ -30,6 +72,27 @@ def test_a_name_that_has_left_its_module_warns_and_is_what_it_is_today(module, o
     with pytest.warns(DeprecationWarning, match=f"{module}.{old} is deprecated: use {place}.{today}"):
         found = getattr(importlib.import_module(module), old)
     assert found is getattr(importlib.import_module(place), today)
+
+
+@pytest.mark.parametrize("old", NAMES_OF_BEFORE)
+def test_a_public_name_of_before_is_found_and_warns_where_it_has_moved(old):
+    if old in RENAMED:
+        sys.modules.pop(old, None)
+    with warnings.catch_warnings(record=True) as imported:
+        warnings.simplefilter("always")
+        module = importlib.import_module(old)
+    assert any(f"{old} is deprecated" in str(warned.message) for warned in imported) == (old in RENAMED)
+    today = module.__name__
+    for name in NAMES_OF_BEFORE[old].split():
+        with warnings.catch_warnings(record=True) as asked:
+            warnings.simplefilter("always")
+            found = getattr(module, name)
+        moved = MOVED.get(today, {}).get(name)
+        if moved is not None:
+            assert f"{today}.{name} is deprecated: use {'.'.join(moved)}" in str(asked[0].message)
+            assert found is getattr(importlib.import_module(moved[0]), moved[1])
+        else:
+            assert not asked, name
 
 
 def test_no_old_name_hides_a_file_or_a_name_of_today():
