@@ -250,7 +250,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def read_file(path: Path) -> tuple[BedSettings, State, str]:
-    """Settings, state and precision of a bed that ``write_file`` wrote. Raises ValueError where there is none."""
+    """Settings, state and precision of a bed that ``BedState.save`` wrote. Raises ValueError where there is none."""
     try:
         with Path(path).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             stored = {name: file[name] for name in file.files}
