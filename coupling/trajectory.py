@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hedgebed_renamed import renamed
 from rigid.result import Result, quantities_of, toml_value, write_text
 from rigid.series import read_series, write_series
 from rigid.version import __version__
@@ -47,8 +48,8 @@ class Penetration:
     """What was asked for: speed, depth, load, mass and so on, SI units."""
 
     @property
-    def way_in(self) -> NDArray[np.bool_]:
-        """Rows of the first way in, shape [n]: in the surface and going down, up to the first stop."""
+    def loading(self) -> NDArray[np.bool_]:
+        """Rows of the first loading, shape [n]: the spike is in the ground and goes down, up to its first stop."""
         inside = self.phase == "in"
         if not inside.any():
             return inside
@@ -58,6 +59,8 @@ class Penetration:
         rows = np.zeros(len(inside), dtype=bool)
         rows[first:last] = True
         return rows
+
+    way_in = renamed("way_in", "loading")
 
     @property
     def work_in(self) -> float:
@@ -94,7 +97,7 @@ class Penetration:
     @property
     def stop_time(self) -> float | None:
         """Time from the surface to the first stop [s]; None where it never stopped."""
-        rows = np.flatnonzero(self.way_in)
+        rows = np.flatnonzero(self.loading)
         if not rows.size or rows[-1] + 1 >= len(self.time):
             return None
         return float(self.time[rows[-1]] + 0.5 * self.macro_step)

@@ -161,7 +161,7 @@ class CoupledTumble(PlatformRun):
             raise RuntimeError(
                 f"platform and grains did not come to rest in {LONGEST_CALM * lowered.sees:.3g} s under "
                 f"{lowered.last:.3g} m/s2: grains move at {speeds[2]:.2g} m/s, the platform at {max(speeds[:2]):.2g}, "
-                f"{mean[0]:.2g} of {self._weight:.2g} N are lacking; a smaller settle_gravity would do"
+                f"{mean[0]:.2g} of {self._weight:.2g} N are missing; choose a smaller settle_gravity"
             )
 
     def _row(self, reaction: Reaction | None, now: Twist) -> list[float]:

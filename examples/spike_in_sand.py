@@ -15,7 +15,7 @@ depth = 0.5 * diameter
 run = drive(Spike(diameter=diameter), into=bed, speed=0.1, depth=depth)
 for share in (0.25, 0.5, 0.75, 1.0):
     deepest = run.depth <= share * depth
-    print(f"{1e3 * share * depth:5.1f} mm deep: {run.force[deepest & run.way_in][-1]:.2f} N")
+    print(f"{1e3 * share * depth:5.1f} mm deep: {run.force[deepest & run.loading][-1]:.2f} N")
 print(f"work in {1e3 * run.work_in:.2f} mJ, out {1e3 * abs(run.work_out):.2f} mJ")
 
 assert abs(run.max_depth - depth) < 0.02 * depth, "the spike went as deep as it was told to"

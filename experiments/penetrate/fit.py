@@ -52,7 +52,7 @@ def fit_rows(run: Penetration) -> NDArray[np.bool_]:
     """Rows that are fitted, shape [n]: of the first loading; none of a set-down or a drop ended near the floor."""
     if run.kind == "set_down" or run.ended == "max_depth":
         return np.zeros(len(run.time), dtype=bool)
-    return run.way_in & (run.depth > 0)
+    return run.loading & (run.depth > 0)
 
 
 @dataclass(frozen=True)

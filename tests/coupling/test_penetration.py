@@ -29,7 +29,9 @@ def test_driven_keeps_its_speeds_and_ends_where_told():
     assert run.max_depth == pytest.approx(0.0101, rel=1e-12)
     assert set(run.phase) == {"free", "in", "rest", "out"}
     assert run.depth[-1] == pytest.approx(0.0, abs=2e-5)
-    inside = run.way_in
+    inside = run.loading
+    with pytest.warns(DeprecationWarning, match=r"Penetration\.loading"):
+        assert np.array_equal(run.way_in, inside)
     assert np.allclose(run.velocity[inside][:-1], 0.1)
     assert np.allclose(run.force[inside], 100.0 * run.depth[inside], rtol=1e-9)
     # t = 0 at the surface, exactly
@@ -79,7 +81,7 @@ def test_a_drop_comes_to_rest_on_a_bed_that_keeps_what_it_takes():
     run = drop(SPIKE, into=bed, speed=0.06, mass=2.63, load=0.219, max_time=3.0)
     stop = math.sqrt(2.63 / 100.0) * 0.5 * math.pi
     assert run.stop_time == pytest.approx(stop, rel=0.3)
-    assert run.way_in.sum() * run.macro_step == pytest.approx(run.stop_time, rel=1e-9)
+    assert run.loading.sum() * run.macro_step == pytest.approx(run.stop_time, rel=1e-9)
 
 
 def test_set_down_ends_at_the_sinkage_that_carries_the_load():
