@@ -99,7 +99,6 @@ class SensorSet:
         for id, names in _FIELDS.items():
             for parameter in self.effects.get(id, ()):
                 object.__setattr__(self, names[parameter], self.effects[id][parameter])
-        for id, names in _FIELDS.items():
             for number in EFFECTS[id].parameters:
                 number.check(getattr(self, names[number.name]), names[number.name])
 

@@ -123,10 +123,6 @@ def check_simulated_gravity(gravity: float, **simulated: float) -> None:
             )
 
 
-def _rise(steps: NDArray[np.float64], strict: bool) -> bool:
-    return bool((steps > 0).all() if strict else (steps >= 0).all())
-
-
 def sample_times(
     duration: float, interval: float, times: ArrayLike | None, *, strict: bool = False
 ) -> NDArray[np.float64]:
@@ -140,7 +136,8 @@ def sample_times(
             every = np.append(every, duration)
         return np.minimum(every, duration)
     given = np.asarray(times, dtype=float)
-    if given.ndim != 1 or len(given) == 0 or not np.isfinite(given).all() or not _rise(np.diff(given), strict):
+    falls = np.less_equal if strict else np.less
+    if given.ndim != 1 or len(given) == 0 or not np.isfinite(given).all() or falls(np.diff(given), 0).any():
         raise ValueError("times must be a list of finite numbers that rise")
     if given[0] < 0 or given[-1] > duration:
         raise ValueError(f"times must lie within 0 to duration = {duration:g} s, not {given[0]:g} to {given[-1]:g} s")
