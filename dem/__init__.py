@@ -10,14 +10,9 @@ Imports nothing of ours outside itself.
 from __future__ import annotations
 
 import importlib
-import os
 from typing import TYPE_CHECKING, Any
 
 import hedgebed_renamed  # old names of modules
-
-# Taichi greets on stdout as it is imported; what a script prints is the script's.
-os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-os.environ.setdefault("TI_LOG_LEVEL", "error")
 
 if TYPE_CHECKING:
     from .bed import Bed

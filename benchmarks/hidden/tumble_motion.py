@@ -11,8 +11,8 @@ A trial's numbers are a row of the table `p`, in the order of COLUMNS. Every fun
 import math
 
 import numpy as np
-import taichi as ti
 
+from hedgebed_taichi import ti
 from rigid.batch.runtime import ensure
 
 __all__ = ["COLUMNS", "STEP", "move"]

@@ -19,7 +19,7 @@ by jumping into contact is left out (docs/bed.md).
 
 import math
 
-import taichi as ti
+from hedgebed_taichi import ti
 
 __all__ = ["COHESIONS", "DMT", "JKR", "jkr_contact", "jkr_force", "jkr_range", "jkr_reach", "pull_off"]
 

@@ -41,9 +41,8 @@ The dashpots of friction, rolling and twisting see the half-step velocity.
 import math
 from typing import Any
 
-import taichi as ti
-
 from dem.grains.materials import Facing, Material
+from hedgebed_taichi import ti
 
 from .cohesion import DMT, JKR, jkr_force, jkr_reach
 

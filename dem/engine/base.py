@@ -7,13 +7,13 @@ state, checkpoints, stresses and energies read them (``dem.engine.core`` is what
 import math
 
 import numpy as np
-import taichi as ti
 
 from dem.contact.cohesion import COHESIONS, jkr_range
 from dem.contact.law import effective_moduli, pair_row
 from dem.grains.materials import Material
 from dem.grains.packing import bulk_packing, surface_height
 from dem.grains.sizes import Json
+from hedgebed_taichi import ti
 
 from . import runtime
 from .engine import take_engine

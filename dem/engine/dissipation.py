@@ -17,7 +17,8 @@ A bed without a balance has ``ABSENT`` for a table, and its kernels are compiled
 import itertools
 
 import numpy as np
-import taichi as ti
+
+from hedgebed_taichi import ti
 
 from .lists import INDEX_BITS, INDEX_MASK, SAME_IMAGE
 from .rows import Rows

@@ -23,11 +23,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
 from dem.contact.law import PAIR_WIDTH
 from dem.grains.packing import curve_ranks
 from dem.shapes.basic import ROW_WIDTH
+from hedgebed_taichi import ti
 
 from . import runtime
 from .dissipation import Balance, BalanceKernels

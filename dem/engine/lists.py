@@ -3,11 +3,10 @@
 Runs every hundred steps or so. The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
-import taichi as ti
-
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range
 from dem.shapes.basic import rotate
+from hedgebed_taichi import ti
 
 from .values import EnginePart
 

@@ -3,7 +3,7 @@
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
-import taichi as ti
+from hedgebed_taichi import ti
 
 from .lists import INDEX_MASK, MOST_BODIES
 from .values import EnginePart

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import taichi as ti
-from taichi.lang.util import to_numpy_type
+
+from hedgebed_taichi import ti
 
 __all__ = ["put_rows", "read_fields", "row_numbers", "take_rows", "write_fields"]
 
@@ -22,7 +22,7 @@ def take_rows(field: Any, rows: Rows, *, part: int | None = None) -> np.ndarray:
     if isinstance(rows, slice):
         return np.asarray(field.to_numpy()[rows])
     width = () if isinstance(field, ti.ScalarField) else (field.n,)
-    values = np.zeros((len(rows), *(width or (1,))), dtype=to_numpy_type(field.dtype))
+    values = np.zeros((len(rows), *(width or (1,))), dtype=ti.lang.util.to_numpy_type(field.dtype))
     if len(rows):
         which = (0 if part is None else part, part is not None)
         _take(field, np.ascontiguousarray(rows, dtype=np.int32), values, bool(width), *which)
@@ -32,7 +32,7 @@ def take_rows(field: Any, rows: Rows, *, part: int | None = None) -> np.ndarray:
 def put_rows(field: Any, values: np.ndarray, where: Any) -> None:
     """Put values into some rows of a field; the others become zero. ``where`` is an index of its numpy array."""
     width = () if isinstance(field, ti.ScalarField) else (field.n,)
-    array = np.zeros((*field.shape, *width), dtype=to_numpy_type(field.dtype))
+    array = np.zeros((*field.shape, *width), dtype=ti.lang.util.to_numpy_type(field.dtype))
     array[where] = values
     field.from_numpy(array)
 

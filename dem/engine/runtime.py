@@ -59,7 +59,7 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
     wanted = Runtime(arch, threads, precision)
     if wanted == _current:
         return wanted
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     real = ti.f64 if precision == "float64" else ti.f32
     # Taichi's own control-flow pass triples the time to compile and LLVM does its work: steps run as fast without it.

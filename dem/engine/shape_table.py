@@ -9,11 +9,11 @@ from collections import defaultdict
 from typing import Any
 
 import numpy as np
-import taichi as ti
 
 from dem.shapes.basic import BOX, CAPSULE, FRUSTUM, MESH, PLACE_WIDTH, PLACED, TUBE, Shape, distance_to, rotate
 from dem.shapes.mesh import Feature, Mesh, Surface, mesh_tree
 from dem.shapes.solids import box_distance, capsule_distance, tube_distance
+from hedgebed_taichi import ti
 
 from .rows import put_rows
 from .values import EnginePart

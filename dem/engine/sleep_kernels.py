@@ -4,7 +4,7 @@ fields they use.
 A bed whose grains do not sleep has ``ABSENT`` for a table, and its kernels are compiled without all this.
 """
 
-import taichi as ti
+from hedgebed_taichi import ti
 
 from .lists import BUILT, INDEX_MASK
 from .values import EnginePart

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-import taichi as ti
 
 from dem.grains.materials import Material
+from hedgebed_taichi import ti
 
 from .bodies import BedBodies
 from .engine import Engine

@@ -3,10 +3,9 @@
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
-import taichi as ti
-
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range, contact_force, turning_torque
+from hedgebed_taichi import ti
 
 from .lists import CACHE_LINE, FINISHED, INDEX_BITS, INDEX_MASK, ITEMS_PER_THREAD, QUEUE, SAME_IMAGE
 from .values import EnginePart

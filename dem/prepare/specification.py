@@ -23,6 +23,7 @@ from dem.grains.materials import material as find_material
 from dem.grains.packing import RAIN_COLUMN, draw_radii, rain_column, rain_positions
 from dem.grains.sizes import Json, Sizes, describe, sizes_of
 from dem.measure.grading import measure_grading, surface_under
+from hedgebed_taichi import version
 
 from .report import B
 
@@ -203,10 +204,8 @@ class Specification:
 
 @functools.cache
 def fingerprint() -> str:
-    """A short digest of the code that computes beds and of Taichi's version: other code may give other bits."""
-    import taichi
-
-    digest = hashlib.sha256(repr(taichi.__version__).encode())
+    """A short digest of the code that computes beds and of Taichi: with another one, bits may differ."""
+    digest = hashlib.sha256(version().encode())
     for path in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

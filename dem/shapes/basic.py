@@ -11,7 +11,7 @@ which meet a grain as a plane does). Further shapes are in ``dem.shapes.solids``
 import math
 from dataclasses import astuple, dataclass
 
-import taichi as ti
+from hedgebed_taichi import ti
 
 __all__ = ["Ball", "Cone", "Cylinder", "Plane", "Primitive", "Shape", "distance_to", "rotate"]
 

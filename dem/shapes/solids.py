@@ -8,7 +8,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import taichi as ti
+
+from hedgebed_taichi import ti
 
 from .basic import BOX, CAPSULE, PLACED, TUBE, Round, Shape, refuse_length, refuse_point
 

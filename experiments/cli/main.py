@@ -33,18 +33,17 @@ from experiments.runs.streams import (
     terminate_like_ctrl_c,
 )
 from experiments.runs.version import __version__
+from hedgebed_taichi import chosen
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "build_app", "main"]
 
 
 def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line on `tokens` (``sys.argv[1:]`` by default) and return the exit status."""
-    # Taichi greets on stdout and has a new version looked for: neither belongs here.
-    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-    os.environ.setdefault("TI_LOG_LEVEL", "error")
-    os.environ.setdefault("TI_SKIP_VERSION_CHECK", "1")
     try:
         with terminate_like_ctrl_c():
+            with refusing():
+                chosen()
             tokens = sys.argv[1:] if tokens is None else list(tokens)
             return build_app()(tokens, exit_on_error=False, print_error=False) or DONE
     except (CycloptsError, ValueError) as error:

@@ -12,7 +12,7 @@ __all__ = ["try_opengl", "try_taichi"]
 
 def try_taichi(arch: str) -> dict[str, Any]:
     """Start Taichi on `arch` (cpu, cuda or vulkan), run a kernel, and say whether the sum came out."""
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     version = ".".join(map(str, ti.__version__))
     try:

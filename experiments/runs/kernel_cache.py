@@ -6,9 +6,10 @@ later process then finds the cache locked, compiles everything anew and keeps no
 stays an empty file, which would never be written again either.
 """
 
-import os
 import time
 from pathlib import Path
+
+from hedgebed_taichi import kernel_cache
 
 __all__ = ["free_kernel_cache"]
 
@@ -19,8 +20,7 @@ def free_kernel_cache(folder: Path | None = None) -> bool:
     """Remove a lock that a killed process has left in `folder` (Taichi's own by default), and the kernels it left
     empty. Says whether there was one; what cannot be removed stays, for without the cache all works, but slowly.
     """
-    given = os.environ.get("TI_OFFLINE_CACHE_FILE_PATH")
-    folder = folder or (Path(given) if given else Path.home() / ".cache" / "taichi" / "ticache")
+    folder = folder or kernel_cache()
     lock = folder / "ticache.lock"
     try:
         left_at = lock.stat().st_mtime

@@ -20,11 +20,10 @@ def ensure(*, threads: int | None = None) -> None:
 
     Raises RuntimeError: Taichi runs in single precision or not on the CPU: the batch needs double precision there.
     """
-    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # its greeting would spoil what a script prints
-    import taichi as ti
-    from taichi.lang import impl
+    from hedgebed_taichi import is_running, ti
 
-    if impl.get_runtime().prog is not None:
+    if is_running():
+        impl = ti.lang.impl
         config = impl.current_cfg()
         if impl.get_runtime().default_fp != ti.f64 or config.arch not in (ti.x64, ti.arm64):
             raise RuntimeError(

@@ -228,7 +228,7 @@ def assemble(terms: tuple[Term, ...], ground: str, *, taichi: bool = False) -> M
         functions = {name: for_taichi(function) for name, function in functions.items()}
     exec(compile(text, file, "exec"), functions)
     if taichi:
-        import taichi as ti
+        from hedgebed_taichi import ti
 
         for name in written:  # in the order in which they call each other
             functions[name] = ti.func(functions[name])
@@ -238,7 +238,7 @@ def assemble(terms: tuple[Term, ...], ground: str, *, taichi: bool = False) -> M
 
 def for_taichi(function: Callable[..., Any]) -> Any:
     """`function`, compiled by Taichi from its source, with Taichi's mathematics; functions of other modules too."""
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     code, around = function.__code__, function.__globals__
     names = {name: getattr(ti, name) for name in _MATHEMATICS if name in code.co_names}

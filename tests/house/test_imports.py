@@ -1,5 +1,6 @@
 """Imports of ours point one way: between the folders at the top, between packages, between files."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ MAY_IMPORT = {
     "experiments": {"experiments", "coupling", "dem", "rigid", "vis"},
     "vis": {"vis", "rigid"},
 }
-"""And all of them `hedgebed_renamed`, which imports nothing of ours."""
+"""And all of them `hedgebed_renamed` and `hedgebed_taichi`, which import nothing of ours."""
 MOST_FILES = 20
 """In one folder."""
 
@@ -42,6 +43,13 @@ def test_no_packages_import_one_another_in_a_circle():
         packages.setdefault(package, set()).update(folder_of(target, known) for target in targets)
         packages[package].discard(package)
     assert circle(packages) == []
+
+
+def test_one_module_alone_imports_taichi_or_its_fork():
+    files = [*modules().values(), *ROOT.glob("*.py"), *(ROOT / "tests").rglob("*.py"), *ROOT.glob("examples/*.py")]
+    importing = re.compile(r"^\s*(?:import|from) (?:taichi|quadrants)\b|import_module\(.(?:taichi|quadrants)\b", re.M)
+    found = [path.relative_to(ROOT) for path in files if importing.search(path.read_text(encoding="utf-8"))]
+    assert found == [Path("hedgebed_taichi.py")]
 
 
 def test_a_folder_has_no_more_files_than_one_can_look_through():

@@ -142,7 +142,7 @@ _Own = tuple[tuple[Term, Push | None], ...]
 
 def _compiled(lines: Mapping[str, Sequence[str]], hooks: Mapping[str, Callable[..., Any]], name: str) -> list[Any]:
     """Functions (head -> lines) that call `hooks`, written out as text and compiled by Taichi."""
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     names = {"ti": ti} | {key: for_taichi(hook) for key, hook in hooks.items()}
     text = "".join(f"def {head}:\n" + "".join(f"    {line}\n" for line in body) for head, body in lines.items())
@@ -201,7 +201,7 @@ def _changes(own: _Own) -> list[Any]:
 
 def _functions(own: _Own) -> tuple[Any, Any]:
     """The force on a spike, and the share of its bound that a friction has which takes a way to turn round."""
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
     loading_changed, unload_changed, damper_changed, force_changed, own_spring, own_force = _changes(own)
@@ -251,7 +251,7 @@ def _functions(own: _Own) -> tuple[Any, Any]:
 
 @lru_cache(maxsize=8)
 def _kernels(own: _Own) -> tuple[Any, Any]:
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     force, taken = _functions(own)
     MASS, GRAVITY, SPEED_SCALE, SETTLED = _SLOT["mass"], _SLOT["gravity"], _SLOT["speed_scale"], _SETTLED

@@ -13,7 +13,7 @@ MOST_SPLITS = 12  # Cuts of one step; beyond, modes change at its end
 
 def make_advance(parts: SimpleNamespace) -> Any:
     """The kernel `advance(numbers, poses, times, time_step, steps, end, launch, summary, series)`."""
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     start_inner, advance_inner = make_inner(parts)
     push_spikes, hold = make_contacts(parts), make_hold(parts)
@@ -200,7 +200,7 @@ def make_inner(parts: SimpleNamespace) -> Any:
     `start_inner` puts it where it rests, and the longest step for it [s] into the tally; `advance_inner` finds it at
     the step's end.
     """
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     @ti.func
     def start_inner(s: ti.template(), p: ti.template(), now: ti.template(), last: ti.template(), t: ti.template()):
@@ -243,7 +243,7 @@ def make_records(parts: SimpleNamespace) -> Any:
     launch and the largest speeds in the tally `t`, `enter` theta on the first entry into each state; `summarise` writes
     the trial's row of the summary.
     """
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     @ti.func
     def record(series: ti.template(), i, sample, u, dt, now: ti.template(), then: ti.template(), state):

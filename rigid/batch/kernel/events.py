@@ -16,7 +16,7 @@ def make_events(parts: SimpleNamespace) -> Any:
     `find_events` puts the share of the step at which friction, wheel or a term's own coordinate change first into `e`,
     where that is before what is there. `switch` changes the modes at an event.
     """
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     earlier = parts.earlier
 

@@ -15,7 +15,7 @@ def make_contacts(parts: SimpleNamespace) -> Any:
 
     It returns the trial's status: 1 where a fourth spike would touch, otherwise the one given.
     """
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     @ti.func
     def push_spikes(
@@ -97,7 +97,7 @@ def make_hold(parts: SimpleNamespace) -> Any:
 
     `hx`, `hy`, `ht` are the speeds of the step's middle.
     """
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     @ti.func
     def hold(

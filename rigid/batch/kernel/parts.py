@@ -45,7 +45,7 @@ _TALLY = (
 
 def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamespace:
     """For these effects on this ground, for platforms with `count` rows of spikes."""
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     model = assemble(terms, ground, taichi=True)
     names = parameter_names(terms)

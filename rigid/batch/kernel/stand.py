@@ -8,7 +8,7 @@ __all__ = ["make_stand"]
 
 def make_stand(parts: SimpleNamespace) -> Any:
     """The kernel `stand(numbers, poses)`: y and theta at rest; theta NaN where a platform cannot stand."""
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     @ti.kernel
     def stand(numbers: ti.types.ndarray(dtype=ti.f64, ndim=2), poses: ti.types.ndarray(dtype=ti.f64, ndim=2)):

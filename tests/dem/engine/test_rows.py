@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-import taichi as ti
 
 from dem.engine import runtime
 from dem.engine.energy import _twice
 from dem.engine.rows import take_rows
+from hedgebed_taichi import ti
 
 
 @pytest.fixture(scope="module")

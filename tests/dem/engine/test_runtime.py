@@ -44,7 +44,7 @@ put = {}
 pin = os.sched_setaffinity
 os.sched_setaffinity = lambda thread, cores: (put.update({thread: cores}), pin(thread, cores))
 runtime.start()
-import taichi as ti
+from hedgebed_taichi import ti
 total = ti.field(ti.f64, 1 << 16)
 
 @ti.kernel

@@ -6,12 +6,12 @@ import meshio
 import numpy as np
 import pytest
 import solid_shapes
-import taichi as ti
 
 from dem import Mesh, Polyhedron, mesh_from_file
 from dem.engine import runtime
 from dem.engine.shape_table import ShapeTable
 from dem.shapes.mesh import mesh_tree
+from hedgebed_taichi import ti
 
 
 @pytest.fixture(scope="module")

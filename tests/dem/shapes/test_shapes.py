@@ -5,13 +5,13 @@ import math
 
 import numpy as np
 import pytest
-import taichi as ti
 from single_grains import RADIUS, SIZE, grains_at, rotated
 
 from dem import Ball, Cone, Cylinder, Plane
 from dem.contact.law import effective_moduli
 from dem.engine import runtime
 from dem.shapes.basic import distance_to
+from hedgebed_taichi import ti
 
 BALL = Ball(center=(0.001, -0.002, 0.003), radius=0.004)
 CYLINDER = Cylinder(-0.002, 0.006, 0.003)

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 import solid_shapes
-import taichi as ti
 from single_grains import RADIUS, STUFF, grains_at, rotated
 
 from dem import Ball, Box, Capsule, Cylinder, Facing, Material, Mesh, Placed, Polyhedron, Tube
 from dem.contact.law import effective_moduli
 from dem.engine import runtime
 from dem.engine.shape_table import ShapeTable
+from hedgebed_taichi import ti
 
 TURN = (math.cos(0.35), 0.6 * math.sin(0.35), 0.0, 0.8 * math.sin(0.35))
 """A turn by 0.7 rad about (0.6, 0, 0.8)."""

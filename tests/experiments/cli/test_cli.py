@@ -13,6 +13,7 @@ import pytest
 from golden import golden
 
 import hedgebed
+import hedgebed_taichi
 from experiments.cli.main import main
 from experiments.cli.runs import _number, show_folder
 from experiments.runs.folder import RunFolder
@@ -349,6 +350,19 @@ def test_where_nothing_varies_no_spread_is_shown(dig, capsys):
 def test_python_m_hedgebed_is_the_same_command():
     done = subprocess.run([sys.executable, "-m", "hedgebed", "--version"], capture_output=True, text=True, cwd=ROOT)
     assert (done.returncode, done.stdout.strip()) == (0, hedgebed.__version__)
+
+
+@pytest.mark.parametrize(("name", "also"), [("taichy", "quadrants"), ("quadrants", "pip install quadrants")])
+def test_a_taichi_that_is_not_there_is_refused_before_anything_starts(name, also, monkeypatch, capsys):
+    monkeypatch.setenv("HEDGEBED_TAICHI", name)
+    monkeypatch.setattr(hedgebed_taichi, "find_spec", lambda name: None)
+    hedgebed_taichi.chosen.cache_clear()
+    try:
+        assert main(["penetrate"]) == 2
+    finally:
+        hedgebed_taichi.chosen.cache_clear()
+    said = capsys.readouterr().err
+    assert all(word in said for word in ("HEDGEBED_TAICHI", repr(name), also))
 
 
 def test_help_does_not_wait_for_taichi():

@@ -7,7 +7,7 @@ from pathlib import Path
 SCRIPT = """
 import hashlib, sys
 import numpy as np
-import taichi as ti
+from hedgebed_taichi import ti
 from tumble_campaigns import CONDITIONS, campaign
 from experiments.diagnose.fit import together
 from experiments.diagnose.fit.fitting import Model, Whitener

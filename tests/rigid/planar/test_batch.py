@@ -193,7 +193,7 @@ def test_bad_input_is_refused_by_name():
 
 def test_the_batch_and_a_bed_s_runtime_live_in_one_process():
     # A bed that starts Taichi anew takes nothing from the batch, which is compiled again and gives the same bits.
-    import taichi as ti
+    from hedgebed_taichi import ti
 
     trials = [in_rig(0.2), in_rig(0.3)]
     before = simulate_batch(trials, duration=0.2, sample_every=20).series
