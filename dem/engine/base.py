@@ -5,6 +5,7 @@ state, checkpoints, stresses and energies read them (``dem.engine.core`` is what
 """
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +17,11 @@ from dem.grains.sizes import Json
 from hedgebed_taichi import ti
 
 from . import runtime
+from .checking import check_lists, check_step, debug_wanted, keep_histories
 from .engine import take_engine
 from .lists import MOST_BODIES
 from .sleep import Sleep, Sleeper
-from .values import BedFailure, BedSettings
+from .values import BedFailure, BedSettings, State
 
 __all__ = ["FLOOR", "BedBase", "check_array"]
 
@@ -40,6 +42,8 @@ class BedBase:
         steps, list_count: time steps and neighbour lists so far. steps_since_lists: since the last lists.
         reaction_steps: of the last ``advance``. tallied: sums of the forces on bodies since, or None.
         sleeper: the rules of sleep at work, or None. has_floor: whether body 0 is a plane.
+        debug: whether all lists are checked against brute force, at every step (``dem.engine.checking``); as
+            HEDGEBED_DEBUG=1 in the environment says, or set it.
     """
 
     def __init__(self, settings: BedSettings, radii: np.ndarray, *, precision: str, arch: str, threads: int | None):
@@ -58,6 +62,7 @@ class BedBase:
         self.tallied: np.ndarray | None = None
         self.sleeper: Sleeper | None = None
         self.has_floor = False
+        self.debug = debug_wanted()
         self.recipe: Json = {}
         self.surface = self.packing_fraction = math.nan
         largest = float(radii.max())
@@ -80,6 +85,11 @@ class BedBase:
         )
         self.engine.grain_pair[None] = pair_row(stuff, tensile=settings.tensile)
         self.engine.write("body_turn", np.tile([1.0, 0.0, 0.0, 0.0], (MOST_BODIES, 1)))
+
+    if TYPE_CHECKING:
+
+        def state(self) -> State:
+            """``dem.engine.state`` has it."""
 
     def let_sleep(self, rules: Sleep | None = None) -> None:
         """Stop computing grains at rest far from the bodies; ``dem.engine.sleep`` has the rules.
@@ -186,7 +196,7 @@ class BedBase:
                 if forced:  # new lists in the step to come, as if a grain had moved far
                     e.moved[None] = 1
                 most = min(most, sleeper.rules.every - self.steps % sleeper.rules.every)
-            advanced, halted = e.launch(most, self.time_step, limit, self.gravity, keep)
+            advanced, halted = e.launch(1 if self.debug else most, self.time_step, limit, self.gravity, keep)
             done += advanced
             self._count(advanced)
             if halted:
@@ -197,6 +207,8 @@ class BedBase:
                 limit = 0.5 * self.skin
                 done += 1
                 self._count(1)
+            if self.debug:
+                check_step(self)
         self.tallied, overlap = self.tally()
         if not overlap <= self.overlap_limit:
             raise BedFailure(
@@ -222,6 +234,7 @@ class BedBase:
     def make_lists(self, *, all_awake: bool = False) -> None:
         """Sort the grains and list who is near whom, the contacts' history carried over. Raises BedFailure."""
         e = self.engine
+        before = keep_histories(self) if self.debug else None
         e.keep_lists(e.rest, e.balance)
         awake = self.awake_count
         if self.sleeper is not None:
@@ -234,6 +247,8 @@ class BedBase:
         if code:
             e.problem[None] = [0, 0]
             raise BedFailure(self._explain(code, value))
+        if before is not None:
+            check_lists(self, before)
 
     def _explain(self, code: int, value: int) -> str:
         e = self.engine

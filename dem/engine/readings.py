@@ -87,6 +87,20 @@ class Readings(EnginePart):
         return largest
 
     @ti.kernel
+    def body_gaps(self, gaps: ti.types.ndarray(dtype=ti.f64, ndim=3), skin: float, shapes: ti.template()):
+        """How far each grain awake is from feeling each body [m], and from where lists say that it does, less a skin.
+
+        Every grain with every body: for ``dem.engine.checking``.
+        """
+        for i in range(self.count[self.AWAKE]):
+            x = self.position[i]
+            for b in range(self.body_count[None]):
+                felt = self.body_range(b, x.w, 0.0)
+                distance, n, curvature, arm = self.nearest(b, x.xyz, x.w + felt + skin, shapes, True)
+                gaps[i, b, 0] = ti.cast(distance - x.w - self.body_range(b, x.w, curvature), ti.f64)
+                gaps[i, b, 1] = ti.cast(distance - x.w - felt, ti.f64)
+
+    @ti.kernel
     def mark_origin(self):
         """Count displacements from here."""
         for i in range(self.count[self.GRAINS]):

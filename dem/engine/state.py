@@ -152,6 +152,7 @@ class BedState(BedBodies):
         radii = values["position"][np.argsort(values["id"]), 3].astype(float)
         settings = replace(self.settings, gravity=self.gravity, **changes)
         bed = type(self)(settings, radii if keep is None else radii[keep], **asdict(self.runtime))
+        bed.debug = self.debug
         adopt(bed, values, keep=keep)
         return bed
 
