@@ -11,6 +11,8 @@ import functools
 import io
 import os
 import sys
+import textwrap
+import warnings
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -67,13 +69,38 @@ def _load() -> Any:
     """Import it in silence: what a script prints is the script's, and nobody asks for new versions."""
     for key, value in {
         "ENABLE_TAICHI_HEADER_PRINT": "0",
-        "TI_SKIP_VERSION_CHECK": "1",
+        "TI_SKIP_VERSION_CHECK": "ON",
         "TI_LOG_LEVEL": "error",
         "QD_LOG_LEVEL": "error",
     }.items():
         os.environ.setdefault(key, value)
+    # quadrants says so whenever a field of vectors is filled; kernels that steps call have no such argument.
+    warnings.filterwarnings("ignore", ".*Template mapper caching disabled")
     with contextlib.redirect_stdout(io.StringIO()):
-        return import_module(chosen())
+        taichi = import_module(chosen())
+    _read_sources_once(chosen())
+    return taichi
+
+
+def _read_sources_once(name: str) -> None:
+    """Keep what Taichi asks for again and again while it reads kernels: a fifth of the time to a script's first step.
+
+    For every node of a syntax tree it wraps the source lines around it, for the message of an error that may come, and
+    for every call of a function it looks for the function's source. The answers are the same each time.
+    """
+
+    @functools.cache
+    def wrapper(**options: Any) -> textwrap.TextWrapper:
+        made = textwrap.TextWrapper(**options)
+        made.wrap = functools.lru_cache(maxsize=10_000)(made.wrap)  # type: ignore[method-assign]
+        return made
+
+    for module in ("ast.ast_transformer_utils", "kernel_impl", "_wrap_inspect"):
+        names = vars(import_module(f"{name}.lang.{module}"))
+        if "TextWrapper" in names:
+            names["TextWrapper"] = wrapper
+        if "getsourcelines" in names:
+            names["getsourcelines"] = functools.lru_cache(maxsize=500)(names["getsourcelines"])
 
 
 def __getattr__(name: str) -> Any:

@@ -21,7 +21,7 @@ import numpy as np
 from hedgebed_taichi import ti
 
 from .lists import INDEX_BITS, INDEX_MASK, SAME_IMAGE
-from .rows import Rows
+from .rows import Rows, Zeroes
 from .values import EnginePart
 
 __all__ = ["OUTSIDE", "PARTS", "TURNED", "BalanceKernels", "Balance"]
@@ -50,11 +50,11 @@ class Balance:
         # the other bodies; and gravity.
         self.turned = F(3, ti.f64, (chunks, len(TURNED)))
         self.pull = F(3, ti.f64, ())
+        self._zeroes = Zeroes(self.last, self.near_last, self.taken, self.turned)
 
     def clear(self) -> None:
         """A new balance: no sums, nothing remembered."""
-        for field in (self.last, self.near_last, self.taken, self.turned):
-            field.fill(0)
+        self._zeroes.put()
 
     def sums(self) -> dict[str, np.ndarray]:
         """Over all chunks, in their order: work by ``PARTS`` [J], and angular impulses by ``TURNED`` [N m s], [3]."""

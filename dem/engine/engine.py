@@ -33,7 +33,7 @@ from . import runtime
 from .dissipation import Balance, BalanceKernels
 from .lists import ABSENT, CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
 from .readings import TALLY_BLOCKS, Readings
-from .rows import put_rows
+from .rows import Zeroes, put_rows
 from .shape_table import PLAIN, Shapes
 from .sleep_kernels import Rest, Sleepers
 from .steps import Steps
@@ -174,6 +174,8 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
         self.moved, self.halted, self.done = (ti.field(ti.i32, ()) for _ in range(3))
         self.problem = ti.Vector.field(2, ti.i32, ())
+        empty = ("pair_start", "pair_end", "overlap", "ticket", "near_end", *self.BODY_FIELDS)
+        self._zeroes = Zeroes(*(getattr(self, name) for name in empty))
 
     def _make_grain_fields(self, n: int, cell_capacity: int) -> None:
         """A row for each grain, and room for sorting."""
@@ -249,8 +251,7 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         for k, value in enumerate(box):
             self.box[k] = value
         self.write("rank", curve_ranks(*cells))
-        for name in ("pair_start", "pair_end", "overlap", "ticket", "near_end", *self.BODY_FIELDS):
-            getattr(self, name).fill(0)
+        self._zeroes.put()
         for counter in (self.body_count, self.moved, self.halted, self.done):
             counter[None] = 0
         self.problem[None] = [0, 0]

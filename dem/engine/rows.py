@@ -7,9 +7,28 @@ import numpy as np
 
 from hedgebed_taichi import ti
 
-__all__ = ["put_rows", "read_fields", "row_numbers", "take_rows", "write_fields"]
+__all__ = ["Zeroes", "put_rows", "read_fields", "row_numbers", "take_rows", "write_fields"]
 
 Rows = np.ndarray | slice
+
+
+@ti.data_oriented
+class Zeroes:
+    """Sets several fields to zero by one kernel: `fill` of a field compiles one for each field."""
+
+    def __init__(self, *fields: Any):
+        self.scalars = [field for field in fields if isinstance(field, ti.ScalarField)]
+        self.vectors = [field for field in fields if not isinstance(field, ti.ScalarField)]
+
+    @ti.kernel
+    def put(self):
+        # Not `ti.zero`, which is zero times what is there: not a number stays one.
+        for field in ti.static(self.scalars):
+            for row in ti.grouped(field):
+                field[row] = 0
+        for field in ti.static(self.vectors):
+            for row in ti.grouped(field):
+                field[row] = ti.Vector.zero(field.dtype, field.n)
 
 
 def row_numbers(start: np.ndarray, counts: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ A bed whose grains do not sleep has ``ABSENT`` for a table, and its kernels are 
 from hedgebed_taichi import ti
 
 from .lists import BUILT, INDEX_MASK
+from .rows import Zeroes
 from .values import EnginePart
 
 __all__ = ["FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
@@ -57,13 +58,14 @@ class Rest:
         self.begins = ti.field(ti.i32, ())  # rank of the cell whose sleepers come first in memory
         self.block = ti.field(ti.i32, ())  # its block along x
         self.near = ti.field(real, 3)
+        self._zeroes = Zeroes(
+            self.asleep, self.was, self.woken, self.leaves, self.quiet, self.start, self.end,
+            self.side, self.mass, self.news, self.held, self.begins, self.block, self.force,
+        )  # fmt: skip
 
     def clear(self) -> None:
         """All are awake."""
-        for field in (self.asleep, self.was, self.woken, self.leaves, self.quiet, self.start, self.end):
-            field.fill(0)
-        for field in (self.side, self.mass, self.news, self.held, self.begins, self.block, self.force):
-            field.fill(0)
+        self._zeroes.put()
         self.whole[None] = 1
         self.last[None] = -1
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .packing import curve_ranks
 from .sizes import Json, Uniform
@@ -234,6 +233,8 @@ def _between(places: np.ndarray, one: np.ndarray, other: np.ndarray, period: tup
 
 def _meeting(places: np.ndarray, radii: np.ndarray, period: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Pairs closer than ``_PUSHED`` sums of radii; the first is the larger one, so that its own reach finds all."""
+    from scipy.spatial import cKDTree  # here, since few scripts need it and it is slow to import
+
     tree = cKDTree(places, boxsize=(*period, 0.0))
     found = []
     for start in range(0, len(places), _BLOCK):

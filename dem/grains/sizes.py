@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -80,8 +79,8 @@ class _Cut(_About):
 
     def _normal(self, rng: np.random.Generator, count: int) -> np.ndarray:
         """Standard normal numbers between -cut and cut."""
-        low = ndtr(-self.cut)
-        return ndtri(low + (1 - 2 * low) * rng.uniform(0, 1, count))
+        low = _below(-self.cut)
+        return _quantile(low + (1 - 2 * low) * rng.uniform(0, 1, count))
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class Normal(_Cut):
     def mean_cube(self) -> float:
         """Of the diameter [m3]: 1 + 3 s^2 E z^2 for a symmetric z, E z^2 = 1 - 2 c phi(c) / (2 Phi(c) - 1)."""
         density = math.exp(-0.5 * self.cut**2) / math.sqrt(2 * math.pi)
-        square = 1 - 2 * self.cut * density / (1 - 2 * float(ndtr(-self.cut)))
+        square = 1 - 2 * self.cut * density / (1 - 2 * _below(-self.cut))
         return self.mean**3 * (1 + 3 * self.deviation**2 * square)
 
     def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
@@ -133,8 +132,8 @@ class LogNormal(_Cut):
     def _moment(self, power: int) -> float:
         """Mean of (diameter / median)^power."""
         shift = power * self.deviation
-        share = ndtr(self.cut - shift) - ndtr(-self.cut - shift)
-        return math.exp(0.5 * shift**2) * float(share) / (1 - 2 * float(ndtr(-self.cut)))
+        share = _below(self.cut - shift) - _below(-self.cut - shift)
+        return math.exp(0.5 * shift**2) * share / (1 - 2 * _below(-self.cut))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -244,3 +243,17 @@ def sizes_of(grain: float | Sizes, spread: float | None = None) -> Sizes:
 def describe(sizes: DataclassInstance) -> Json:
     """A distribution, or ``dem.Graded``, in plain values that JSON takes."""
     return {"kind": type(sizes).__name__} | asdict(sizes)
+
+
+def _below(z: float) -> float:
+    """Share of standard normal numbers below `z`."""
+    from scipy.special import ndtr  # here, since few scripts need it and it is slow to import
+
+    return float(ndtr(z))
+
+
+def _quantile(share: np.ndarray) -> np.ndarray:
+    """The numbers below which these shares of standard normal numbers are."""
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(share))

@@ -5,7 +5,7 @@ import pytest
 
 from dem.engine import runtime
 from dem.engine.energy import _twice
-from dem.engine.rows import take_rows
+from dem.engine.rows import Zeroes, take_rows
 from hedgebed_taichi import ti
 
 
@@ -28,6 +28,14 @@ def test_rows_taken_are_those_of_the_whole_field(started, width, parts, kind):
             whole = field.to_numpy() if part is None else field.to_numpy()[part]
             found = take_rows(field, chosen, part=part)
             assert found.dtype == whole.dtype and np.array_equal(found, whole[chosen])
+
+
+def test_several_fields_are_set_to_zero_at_once_numbers_that_are_none_included(started):
+    fields = ti.field(ti.f64, ()), ti.Vector.field(3, ti.f32, (4, 2)), ti.field(ti.i32, 5)
+    for field, value in zip(fields, (np.nan, np.inf, 3), strict=True):
+        field.fill(value)
+    Zeroes(*fields).put()
+    assert [field.to_numpy().any() for field in fields] == [False] * 3
 
 
 def test_contacts_kept_by_both_sleepers_are_those_met_twice():
