@@ -46,7 +46,15 @@ from hedgebed_taichi import ti
 
 from .cohesion import DMT, JKR, jkr_force, jkr_reach
 
-__all__ = ["contact_force", "damping_factor", "effective_moduli", "pair_parameters", "pair_row", "turning_torque"]
+__all__ = [
+    "contact_force",
+    "damping_factor",
+    "effective_moduli",
+    "onset_of",
+    "pair_parameters",
+    "pair_row",
+    "turning_torque",
+]
 
 Template: Any = (
     ti.template()
@@ -144,14 +152,15 @@ def adhesive_range(p: Template, radius):
 
 @ti.func
 def contact_force(
-    p: Template, n, v_n, v_t, overlap, radius, mass, dt, u: Template, tensile: Template, cohesion: Template
+    p: Template, n, v_n, v_t, overlap, radius, mass, onset, dt, u: Template, tensile: Template, cohesion: Template
 ):
     """Force on the first of a pair, without rolling.
 
     ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v_n`` the rate at which the first moves away
     and ``v_t`` the slip, across n, both half a step before [m/s]; ``overlap`` [m], ``radius``, ``mass`` the effective
-    ones, ``dt`` the time since the last force; 0 where forces are computed anew, which leaves the history alone. ``u``
-    the history, updated in place: tangential displacement [m] and ``past`` [kg m/s], 0 for a new contact.
+    ones, ``onset`` from ``onset_of``, ``dt`` the time since the last force; 0 where forces are computed anew, which
+    leaves the history alone. ``u`` the history, updated in place: tangential displacement [m] and ``past`` [kg m/s], 0
+    for a new contact.
     Returns (normal force [N], what of it is the dashpot's [N], tangential force vector [N], tangential stiffness [N/m],
     contact radius [m], sqrt(m* S_n), load that presses the surfaces together [N]).
     """
@@ -170,14 +179,9 @@ def contact_force(
             pull = 2.0 * p[_PI_W] * radius
             spring -= pull
     c_n = p[_DAMPING] * root
+    c_n *= onset
     momentum = mass * v_n
-    past = u.w
-    if past == 0.0 or dt == 0.0:
-        past = 0.5 * momentum
-        if ti.static(cohesion != JKR):
-            # Apart a step ago, but for round-off; not so where forces begin with overlaps.
-            if overlap < -1.001 * v_n * dt and u.w == 0.0:
-                c_n *= _first_touch(overlap / (-v_n * dt))
+    past = ti.select(u.w == 0.0 or dt == 0.0, 0.5 * momentum, u.w)
     f_n = (mass * spring - c_n * (1.5 * momentum - past)) / (mass + 0.5 * dt * c_n)
     if ti.static(not tensile):
         f_n = ti.max(f_n, -pull)
@@ -199,27 +203,31 @@ def contact_force(
 
 
 @ti.func
-def _first_touch(share):
-    """The mean of d^(1/4) from the touch to half a step on, over its value now; ``share`` of a step since the touch."""
-    f = ti.max(share, 1e-6)
-    return 0.8 * (f + 0.5) * ti.sqrt(ti.sqrt((f + 0.5) / f))
+def onset_of(v_n, overlap, dt, past, cohesion: Template):
+    """What the normal dashpot is multiplied by: 1, or more in the step in which a pair came to touch.
+
+    That is the mean of d^(1/4) from the touch to half a step on, over its value now. Arguments as of ``contact_force``.
+    """
+    result = overlap * 0.0 + 1.0
+    if ti.static(cohesion != JKR):
+        # Apart a step ago, but for round-off; not so where forces begin with overlaps.
+        if past == 0.0 and overlap < -1.001 * v_n * dt:
+            f = ti.max(overlap / (-v_n * dt), 1e-6)
+            result = 0.8 * (f + 0.5) * ti.sqrt(ti.sqrt((f + 0.5) / f))
+    return result
 
 
 @ti.func
 def bounded(stiffness, damping, stretch, rate, bound):
     """Force of a spring that slides at a bound, with a dashpot while it sticks; and the share of the stretch left."""
     force = -stiffness * stretch
-    share = bound * 0.0 + 1.0
+    limit = bound * bound
+    slides = force.norm_sqr() > limit
+    force -= ti.select(slides, damping * 0.0, damping) * rate
     square = force.norm_sqr()
-    if square > bound * bound:
-        share = bound / ti.sqrt(square)
-        force *= share
-    else:
-        force -= damping * rate
-        square = force.norm_sqr()
-        if square > bound * bound:
-            force *= bound / ti.sqrt(square)
-    return force, share
+    one = bound * 0.0 + 1.0
+    scale = ti.select(square > limit, bound / ti.sqrt(square), one)
+    return scale * force, ti.select(slides, scale, one)
 
 
 @ti.func
@@ -245,11 +253,10 @@ def turning_torque(p: Template, n, spin, load, k_t, a, radius, root, dt, q: Temp
     c_w = 0.7071067811865476 * p[_TURNING_DAMPING] * root * radius * a
     bound = 0.1875 * ti.math.pi * p[_FRICTION] * a * force
     m_n = -k_w * twist
-    if ti.abs(m_n) > bound:
-        m_n = ti.select(m_n > 0.0, bound, -bound)
-        twist = -m_n / k_w
-    else:
-        m_n = ti.min(bound, ti.max(-bound, m_n - c_w * spin_n))
+    slides = ti.abs(m_n) > bound
+    held = ti.select(m_n > 0.0, bound, -bound)
+    m_n = ti.select(slides, held, ti.min(bound, ti.max(-bound, m_n - c_w * spin_n)))
+    twist = ti.select(slides, -held / k_w, twist)
     if dt > 0.0:
         q = share * roll + twist * n
     return m + m_n * n

@@ -196,7 +196,8 @@ class BedBase:
                 if forced:  # new lists in the step to come, as if a grain had moved far
                     e.moved[None] = 1
                 most = min(most, sleeper.rules.every - self.steps % sleeper.rules.every)
-            advanced, halted = e.launch(1 if self.debug else most, self.time_step, limit, self.gravity, keep)
+            most = 1 if self.debug else most
+            advanced, halted = e.launch(most, self.awake_count, self.time_step, limit, self.gravity, keep)
             done += advanced
             self._count(advanced)
             if halted:

@@ -32,6 +32,7 @@ from hedgebed_taichi import ti
 from . import runtime
 from .dissipation import Balance, BalanceKernels
 from .lists import ABSENT, CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
+from .pairs import Pairs
 from .readings import TALLY_BLOCKS, Readings
 from .rows import Zeroes, put_rows
 from .shape_table import PLAIN, Shapes
@@ -40,8 +41,11 @@ from .steps import Steps
 
 __all__ = ["Engine", "MOST_BODIES", "MOST_PRIMITIVES", "STEPS_PER_LAUNCH", "take_engine"]
 
-# A launch is short enough for a thread that left to come back soon, and for Ctrl-C.
-STEPS_PER_LAUNCH = 20
+# A launch is a good part of a tenth of a second: short enough for a thread that left to come back soon and for Ctrl-C,
+# and long enough for threads that seldom wait. A virtual machine whose processors are idle for a moment a hundred times
+# a second may be given two halves of one core instead of two cores (docs/performance.md).
+STEPS_PER_LAUNCH, MOST_STEPS_PER_LAUNCH = 20, 200
+GRAIN_STEPS_PER_LAUNCH = 3_000_000
 GRAINS_PER_CHUNK = 1250
 MOST_CHUNKS = 64
 AWAKE_SHARE = 0.64
@@ -141,7 +145,7 @@ def _roomy(count: int, *, least: int) -> int:
 
 
 @ti.data_oriented
-class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
+class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
     """Grains, lists and bodies in Taichi fields, and the kernels that advance them."""
 
     # Fields of the state: with a row for each grain, and of the bodies and their shapes.
@@ -302,13 +306,15 @@ class Engine(Lists, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         put_rows(field, values, first if rows is None else rows)
 
     def launch(
-        self, most: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float
+        self, most: int, awake: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float
     ) -> tuple[int, bool]:
-        """Up to ``most`` steps, or a few where that is many: (steps done, whether new lists are needed)."""
+        """Up to ``most`` steps of the grains awake, fewer where that is many: (steps done, whether lists are due)."""
         if self.gpu:
             self.done[None] = 0
             for _ in range(min(most, STEPS_PER_LAUNCH)):
                 self.run_on_gpu(dt, limit, *gravity, keep, self.shapes, self.rest, self.balance)
         else:
-            self.run(dt, limit, *gravity, keep, min(most, STEPS_PER_LAUNCH), self.shapes, self.rest, self.balance)
+            steps = GRAIN_STEPS_PER_LAUNCH // max(1, awake)
+            steps = min(most, MOST_STEPS_PER_LAUNCH, max(STEPS_PER_LAUNCH, steps))
+            self.run(dt, limit, *gravity, keep, steps, self.shapes, self.rest, self.balance)
         return int(self.done[None]), bool(self.halted[None])

@@ -3,16 +3,14 @@
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
-from dem.contact.cohesion import JKR
-from dem.contact.law import adhesive_range, contact_force, turning_torque
+from dem.contact.law import contact_force, onset_of, turning_torque
 from hedgebed_taichi import ti
 
-from .lists import CACHE_LINE, FINISHED, INDEX_BITS, INDEX_MASK, ITEMS_PER_THREAD, QUEUE, SAME_IMAGE
+from .lists import CACHE_LINE, FINISHED, ITEMS_PER_THREAD, QUEUE
 from .values import EnginePart
 
 __all__ = ["Steps"]
 
-LANES = 16
 # Looks at a counter, per grain of a chunk, before a thread gives up waiting: some milliseconds.
 PATIENCE = 100
 
@@ -73,163 +71,21 @@ class Steps(EnginePart):
     def push(self, c, dt, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         """Forces between the grains of a chunk and all that they touch."""
         start, end = self.chunk_range(c)
+        # First find out which pairs touch, then their forces.
         base = c * self.count[self.CHUNK_ROOM]
-        rows = base
-        if end > start:  # with sleepers a chunk may be empty
-            rows = self.pair_end[end - 1]
-        last = self.sieve(c, base, rows, dt, rest, balance)
+        last = self.sieve(c, dt, rest, balance)
         if ti.static(balance.on):
             self.balance_weight(c, dt, balance)
-        largest, held = self.push_touching(c, base, last, dt, rest, balance)
+        largest, held = ti.cast(0.0, self.real), ti.Vector.zero(self.real, 3)
+        if ti.static(self.gpu):
+            largest, held = self.push_each(c, base, last, dt, rest, balance)
+        else:
+            largest, held = self.push_lanes(c, base, last, dt, rest, balance)
         for s in range(c * self.count[self.NEAR_ROOM], self.near_end[c]):
             largest = ti.max(largest, self.push_near(c, s, dt, shapes, balance))
         self.overlap[c] = ti.max(self.overlap[c], largest)
         if ti.static(rest.on):
             rest.held[c] = rest.held[c] + held
-
-    @ti.func
-    def sieve(self, c, base, rows, dt, rest: ti.template(), balance: ti.template()):
-        """Put the numbers of a chunk's rows that touch in ``touching``; the end of them.
-
-        No branch that a processor would have to guess.
-        """
-        last = base
-        for s in range(base, rows):
-            code = self.pair[s]
-            i = self.first[s]
-            bits = ti.select(code < 0, ~code, code)
-            x_i = self.position[i]
-            x_j = self.position[bits & INDEX_MASK]
-            sum_r = x_i.w + x_j.w
-            d = self.apart(x_i, x_j, bits)
-            if ti.static(self.cohesion == JKR):
-                sum_r += adhesive_range(self.grain_pair[None], x_i.w * x_j.w / sum_r)
-            touching = d.norm_sqr() < sum_r * sum_r
-            self.touching[last] = s
-            last += ti.select(touching, 1, 0)
-            if touching != (code < 0):
-                self.pair[s] = ~code
-                if code < 0:
-                    if ti.static(balance.on):
-                        self.balance_pair(c, s, i, bits & INDEX_MASK, d, balance.nothing(), dt, rest, balance)
-                    self.slide[s] = ti.Vector.zero(self.real, 4)
-                    if ti.static(self.rolling):
-                        self.roll[s] = ti.Vector.zero(self.real, 3)
-        return last
-
-    @ti.func
-    def push_touching(self, c, base, last, dt, rest: ti.template(), balance: ti.template()):
-        """Forces of the touching pairs of a chunk, LANES at a time; (largest overlap over diameter, force on sleepers).
-
-        The middle loop has plain local arrays and no branch, so that LLVM computes several pairs with one instruction.
-        """
-        start, end = self.chunk_range(c)
-        p = self.grain_pair[None]
-        largest = ti.cast(0.0, self.real)
-        held = ti.Vector.zero(self.real, 3)
-        one = ti.Vector([1.0] * LANES, dt=self.real)
-        dx, dy, dz, ri, rj, mi, mj = one, one, one, one, one, one, one
-        vx, vy, vz, wix, wiy, wiz, wjx, wjy, wjz = one, one, one, one, one, one, one, one, one
-        ux, uy, uz, uw = one, one, one, one
-        qx, qy, qz = one, one, one
-        fx, fy, fz, tx, ty, tz, hx, hy, hz, share = one, one, one, one, one, one, one, one, one, one
-        ai, aj = one, one
-        for block in range((last - base + LANES - 1) // LANES):
-            first = base + block * LANES
-            m = ti.min(LANES, last - first)
-            for l in range(m):
-                s = self.touching[first + l]
-                i = self.first[s]
-                bits = ~self.pair[s]
-                j = bits & INDEX_MASK
-                x_i, x_j = self.position[i], self.position[j]
-                d = self.apart(x_i, x_j, bits)
-                dx[l], dy[l], dz[l], ri[l], rj[l] = d.x, d.y, d.z, x_i.w, x_j.w
-                v_i, v_j = self.velocity[i], self.velocity[j]
-                v = v_i.xyz - v_j.xyz
-                vx[l], vy[l], vz[l], mi[l], mj[l] = v.x, v.y, v.z, v_i.w, v_j.w
-                w_i, w_j = self.spin[i], self.spin[j]
-                wix[l], wiy[l], wiz[l] = w_i.x, w_i.y, w_i.z
-                wjx[l], wjy[l], wjz[l] = w_j.x, w_j.y, w_j.z
-                u = self.slide[s]
-                ux[l], uy[l], uz[l], uw[l] = u.x, u.y, u.z, u.w
-                if ti.static(self.rolling):
-                    q = self.roll[s]
-                    qx[l], qy[l], qz[l] = q.x, q.y, q.z
-            for l in range(LANES):
-                d = ti.Vector([dx[l], dy[l], dz[l]])
-                length = d.norm()
-                sum_r = ri[l] + rj[l]
-                overlap = sum_r - length
-                mass = mi[l] + mj[l]
-                # One division for three reciprocals.
-                inverse = 1.0 / (length * sum_r * mass)
-                by_length = sum_r * mass * inverse
-                n = d * by_length
-                by_sum = length * mass * inverse
-                radius = ri[l] * rj[l] * by_sum
-                mass = mi[l] * mj[l] * (length * sum_r * inverse)
-                arm_i = ri[l] - 0.5 * overlap
-                arm_j = rj[l] - 0.5 * overlap
-                # The slip as ``dem.contact.law`` says it: across the normal half a step ago, n - h v_t, with the arms
-                # of then.
-                v = ti.Vector([vx[l], vy[l], vz[l]])
-                v_n = v.dot(n)
-                v_t = v - v_n * n
-                h = 0.5 * dt * by_length
-                back = 0.25 * dt * v_n
-                w_i = ti.Vector([wix[l], wiy[l], wiz[l]])
-                w_j = ti.Vector([wjx[l], wjy[l], wjz[l]])
-                turning = (arm_i - back) * w_i + (arm_j - back) * w_j
-                v_t = (1.0 + h * v_n) * v_t - turning.cross(n)
-                u = ti.Vector([ux[l], uy[l], uz[l], uw[l]])
-                f_n, damped, f_t, k_t, a, root, load = contact_force(
-                    p, n, v_n, v_t, overlap, radius, mass, dt, u, self.tensile, self.cohesion
-                )
-                ux[l], uy[l], uz[l], uw[l] = u.x, u.y, u.z, u.w
-                f = f_n * n + f_t
-                t = f_t.cross(n)
-                fx[l], fy[l], fz[l] = f.x, f.y, f.z
-                tx[l], ty[l], tz[l] = t.x, t.y, t.z
-                ai[l], aj[l] = arm_i, arm_j
-                share[l] = overlap * by_sum
-                if ti.static(self.rolling):
-                    q = ti.Vector([qx[l], qy[l], qz[l]])
-                    turn = turning_torque(p, n, w_i - w_j, load, k_t, a, radius, root, dt, q)
-                    qx[l], qy[l], qz[l] = q.x, q.y, q.z
-                    hx[l], hy[l], hz[l] = turn.x, turn.y, turn.z
-            for l in range(m):
-                s = self.touching[first + l]
-                i = self.first[s]
-                bits = ~self.pair[s]
-                j = bits & INDEX_MASK
-                self.slide[s] = ti.Vector([ux[l], uy[l], uz[l], uw[l]])
-                f = ti.Vector([fx[l], fy[l], fz[l]])
-                t = ti.Vector([tx[l], ty[l], tz[l]])
-                turn = ti.Vector.zero(self.real, 3)
-                if ti.static(self.rolling):
-                    self.roll[s] = ti.Vector([qx[l], qy[l], qz[l]])
-                    turn = ti.Vector([hx[l], hy[l], hz[l]])
-                self.force[i] = self.force[i] + f
-                self.torque[i] = self.torque[i] + (ai[l] * t + turn)
-                if j >= start and j < end:
-                    self.force[j] = self.force[j] - f
-                    self.torque[j] = self.torque[j] + (aj[l] * t - turn)
-                if ti.static(rest.on):
-                    if j >= self.count[self.AWAKE]:
-                        held -= f
-                largest = ti.max(largest, share[l])
-        return largest, held
-
-    @ti.func
-    def apart(self, x_i, x_j, bits):
-        """From the neighbour, or its image that the upper bits mean, to the grain."""
-        d = x_i.xyz - x_j.xyz
-        image = bits >> INDEX_BITS
-        if image != SAME_IMAGE:
-            d.x += ti.cast(image % 3 - 1, self.real) * self.box[self.PERIOD_X]
-            d.y += ti.cast(image // 3 - 1, self.real) * self.box[self.PERIOD_Y]
-        return d
 
     @ti.func
     def push_near(self, c, s, dt, shapes: ti.template(), balance: ti.template()):
@@ -249,8 +105,9 @@ class Steps(EnginePart):
             radius = x.w / (1.0 + x.w * curvature)
             p = self.body_pair[b]
             u = self.near_slide[s]
+            onset = onset_of(v_n, overlap, dt, u.w, self.cohesion)
             f_n, damped, f_t, k_t, a, root, load = contact_force(
-                p, n, v_n, v_t, overlap, radius, self.velocity[i].w, dt, u, self.tensile, self.cohesion
+                p, n, v_n, v_t, overlap, radius, self.velocity[i].w, onset, dt, u, self.tensile, self.cohesion
             )
             self.near_slide[s] = u
             f = f_n * n + f_t
