@@ -7,6 +7,8 @@ other work: it is said, and not counted.
 
 For quick trials, in the environment: HEDGEBED_BENCH_SIZES (as in "20000 100000"), HEDGEBED_BENCH_ROUNDS,
 HEDGEBED_BENCH_STEPS (timed ones), HEDGEBED_BENCH_SHOWN=0 (nothing that is only shown).
+
+``--limit``: a loop in plain C races as well, where there is a compiler, and shows how far the machine goes.
 """
 
 import os
@@ -17,12 +19,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from benchmarks.race import entrants, table
 from benchmarks.race.entrants import LAMMPS, LIGGGHTS, WARM_STEPS, Entrant, Heat, Ours, Peer, Theirs
 from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
 from benchmarks.race.machine import begin_timing, environment_numbers, wide_console
+from benchmarks.race.yardstick import compile_yardstick, yardsticks
 from experiments.runs.types import Json
 
 __all__ = ["Lane", "Settings", "pick_best", "run"]
@@ -37,15 +40,16 @@ _EXPECTED_SPEED, _SETTLING_STEPS = 1e7, 40_000
 
 @dataclass(frozen=True)
 class Settings:
-    """What is raced: numbers of grains, rounds, timed steps (None: by the number of grains), what is only shown."""
+    """What is raced: numbers of grains, rounds, timed steps (None: by their number), what is only shown, the C loop."""
 
     sizes: tuple[int, ...] = (20_000, 100_000)
     rounds: int = 5
     steps: int | None = None
     shown: bool = True
+    limit: bool = False
 
     @classmethod
-    def from_environment(cls) -> Self:
+    def from_environment(cls, *, limit: bool = False) -> Self:
         """The defaults, or what HEDGEBED_BENCH_SIZES, _ROUNDS, _STEPS and _SHOWN say.
 
         Raises ValueError for one that is no positive whole number (several for the sizes; 0 or 1 for the last).
@@ -56,7 +60,7 @@ class Settings:
         shown = os.environ.get("HEDGEBED_BENCH_SHOWN", "1")
         if shown not in ("0", "1"):
             raise ValueError(f"HEDGEBED_BENCH_SHOWN = {shown!r} must be 0 or 1")
-        return cls(sizes, rounds, steps[0] if steps else None, shown == "1")
+        return cls(sizes, rounds, steps[0] if steps else None, shown == "1", limit)
 
     def steps_for(self, count: int) -> int:
         """Timed steps of a bed of ``count`` grains."""
@@ -87,7 +91,7 @@ class Lane:
 
     def as_dict(self) -> Json:
         """What bench.json keeps of it."""
-        about = ("name", "ours", "counted", "rolling", "precision", "threads", "skin")
+        about = ("name", "ours", "counted", "limit", "rolling", "precision", "threads", "skin")
         heats = [{k: v for k, v in asdict(heat).items() if k not in ("version", "command")} for heat in self.heats]
         command = self.heats[-1].command if heats else ""
         return {"label": self.label} | {key: getattr(self.entrant, key) for key in about} | {
@@ -96,13 +100,13 @@ class Lane:
         }  # fmt: skip
 
 
-def run(out: Path, *, progress: Any) -> Json:
+def run(out: Path, *, progress: Any, limit: bool = False) -> Json:
     """Race, show the table on stdout, and return what goes into bench.json. Nothing is written to `out`.
 
-    `progress`: an ``experiments.runs.progress.Progress``. Raises ValueError for a wrong variable of the environment,
-    RuntimeError where our own bed failed.
+    `progress`: an ``experiments.runs.progress.Progress``. `limit`: the C loop races too. Raises ValueError for a wrong
+    variable of the environment, RuntimeError where our own bed failed.
     """
-    settings = Settings.from_environment()
+    settings = Settings.from_environment(limit=limit)
     bench, busy = begin_timing("bed")
     cores = bench["machine"]["cores"]
     peers, remarks = _find_peers()
@@ -112,7 +116,7 @@ def run(out: Path, *, progress: Any) -> Json:
     progress.plan(dict(_plan(settings, with_peers=bool(peers))))
     said = [f"{key}={value!r}" for key, value in sorted(os.environ.items()) if key.startswith("HEDGEBED_BENCH_")]
     bench |= {
-        "command": " ".join([*said, "hedgebed bench bed"]),
+        "command": " ".join([*said, "hedgebed bench bed", *(["--limit"] if limit else [])]),
         "peers": {peer.name: None for peer in (LIGGGHTS, LAMMPS)},
         "unit": "grain steps per second",
         "rounds": settings.rounds,
@@ -121,15 +125,18 @@ def run(out: Path, *, progress: Any) -> Json:
             "material": {key: value for key, value in asdict(BENCH).items() if key != "sources"},
             "gravity": entrants.GRAVITY, "time_step": entrants.TIME_STEP, "warm_steps": WARM_STEPS,
         },
-        "ratios": {}, "beds": [], "remarks": remarks,
+        "ratios": {}, "limits": {}, "beds": [], "remarks": remarks,
     }  # fmt: skip
     for count in settings.sizes:
-        bed, lanes = _race(count, settings, peers, cores, progress)
+        bed, lanes = _race(count, settings, peers, cores, progress, remarks)
         best = pick_best(lanes)
         ran = {"best_peer": best.label if best else None, "entrants": [lane.as_dict() for lane in lanes]}
         bench["beds"].append(bed | ran)
         ours, theirs = lanes[0].speed, best and best.speed
         bench["ratios"][str(count)] = ours / theirs if ours and theirs else None
+        if limit:
+            fastest = pick_best(lanes, of="limit")
+            bench["limits"][str(count)] = ours / fastest.speed if ours and fastest and fastest.speed else None
         for lane in lanes:
             if lane.heats and isinstance(lane.entrant, Theirs):
                 bench["peers"][lane.entrant.peer.name] = lane.heats[-1].version
@@ -165,8 +172,10 @@ def _plan(settings: Settings, *, with_peers: bool) -> Iterator[tuple[str, float]
             yield f"{count:,} grains: float32, one thread", 3 * heat
 
 
-def _race(count: int, settings: Settings, peers: list[Peer], cores: int, progress: Any) -> tuple[Json, list[Lane]]:
-    """Race on one bed: what is to be said of the bed, and the lanes, ours first."""
+def _race(
+    count: int, settings: Settings, peers: list[Peer], cores: int, progress: Any, remarks: list[str]
+) -> tuple[Json, list[Lane]]:
+    """Race on one bed: what is to be said of the bed, and the lanes, ours first. ``remarks``: more are added."""
     steps, of = settings.steps_for(count), f"{count:,} grains: "
     progress.stage(f"{of}bed")
     began = time.perf_counter()
@@ -185,21 +194,34 @@ def _race(count: int, settings: Settings, peers: list[Peer], cores: int, progres
         racing = [lane for lane in theirs if lane.entrant.counted]
         rolling = [Lane(Ours(grains, threads=cores, rolling=True))] if settings.shown else []
         shown = [lane for lane in theirs if not lane.entrant.counted and settings.shown]
-        staying = [ours, *racing, *rolling, *shown]
+        limits = _limits(grains, folder, cores, remarks) if settings.limit else []
+        staying = [ours, *racing, *limits, *rolling, *shown]
         for k in range(1, settings.rounds + 1):
             _heats(f"{of}round {k}", staying, steps, progress)
             if ours.failure:
                 raise RuntimeError(f"our own bed did not get through the race: {ours.failure}")
-            staying = [ours, *_leaders(racing)]
+            staying = [ours, *_leaders(racing), *_leaders(limits)]
     alone = []
     if settings.shown:
         # These start Taichi anew, which ends the beds of before.
         alone = [Lane(Ours(grains, threads=cores, precision="float32")), Lane(Ours(grains, threads=1))]
         _heats(f"{of}float32, one thread", alone, steps, progress)
-    _check_work(ours, [*alone, *racing, *(lane for lane in shown if not lane.entrant.rolling)])
+    _check_work(ours, [*alone, *racing, *limits, *(lane for lane in shown if not lane.entrant.rolling)])
     for lane in rolling:
         _check_work(lane, [lane for lane in shown if lane.entrant.rolling])
-    return bed, [ours, *alone, *rolling, *racing, *shown]
+    return bed, [ours, *alone, *rolling, *racing, *limits, *shown]
+
+
+def _limits(grains: Grains, folder: Path, threads: int, remarks: list[str]) -> list[Lane]:
+    """The C loop; none where it cannot be compiled, which is said."""
+    program, said = compile_yardstick(folder)
+    if program is None:
+        remarks += [said] if said not in remarks else []
+        return []
+    return [
+        Lane(entrant)
+        for entrant in yardsticks(grains, program=program, folder=folder, threads=threads, skins=SKINS)
+    ]  # fmt: skip
 
 
 def _heats(stage: str, lanes: list[Lane], steps: int, progress: Any) -> None:
@@ -264,9 +286,10 @@ def _check_work(ours: Lane, lanes: list[Lane]) -> None:
         lane.other_work = ", ".join(found)
 
 
-def pick_best(lanes: list[Lane]) -> Lane | None:
-    """The fastest of the peers that count and did the same work; None if there is none."""
-    fit = [lane for lane in lanes if lane.entrant.counted and lane.speed is not None and not lane.other_work]
+def pick_best(lanes: list[Lane], *, of: Literal["counted", "limit"] = "counted") -> Lane | None:
+    """The fastest of the peers that count, or of the C loop's, that did the same work; None if there is none."""
+    chosen = (lane for lane in lanes if (lane.entrant.counted if of == "counted" else lane.entrant.limit))
+    fit = [lane for lane in chosen if lane.speed is not None and not lane.other_work]
     return max(reversed(fit), key=lambda lane: lane.speed or 0.0, default=None)
 
 

@@ -115,6 +115,7 @@ class Heat:
 class Entrant(ABC):
     """What races: ``name`` for tables, ``counted`` if it can be the best peer, ``skin`` [m] where it is chosen.
 
+    ``limit``: it only shows how far the machine goes.
     ``rolling`` says that contacts resist rolling: other work, to be compared with its like.
     """
 
@@ -122,6 +123,7 @@ class Entrant(ABC):
     ours = False
     precision = "float64"
     counted = False
+    limit = False
     rolling = False
     skin: float | None = None
     threads: int

@@ -55,12 +55,16 @@ def _remark(entrant: Json, best: str | None) -> str:
         return f"other work: {entrant['other_work']}"
     if entrant["label"] == best:
         return "best peer"
+    if entrant.get("limit"):
+        return "how far the machine goes"
     return "" if entrant["counted"] or entrant["ours"] else "shown, not counted"
 
 
 def _title(bed: Json, bench: Json) -> str:
     ratio = bench["ratios"][str(bed["grain_count"])]
     verdict = "no peer to race against" if ratio is None else f"hedgebed / best peer = {ratio:.2f}"
+    limit = bench.get("limits", {}).get(str(bed["grain_count"]))
+    verdict += "" if limit is None else f", hedgebed / C loop = {limit:.2f}"
     return f"{bed['grain_count']:,} grains, {bed['steps']} timed steps: {verdict}"
 
 

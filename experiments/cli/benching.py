@@ -2,20 +2,23 @@
 
 ``benchmarks/<what>.py`` offers ``run(out: Path, *, progress: Progress) -> dict``: it may write into `out`, shows its
 table itself and returns what goes into bench.json, ``{"format": "hedgebed-bench/1", "what": <what>, ...}``. Further
-keyword arguments of `run`, each a str or an int with a default, are options of the command. A benchmark that can go on
-in a folder of its own offers ``continues(out: Path) -> bool`` as well.
+keyword arguments of `run`, each a str, an int or a bool with a default, are options of the command. A benchmark that
+can go on in a folder of its own offers ``continues(out: Path) -> bool`` as well.
 """
 
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from experiments.runs.reading import nearest
 
-__all__ = ["benchmark_options", "goes_on", "load_benchmark"]
+__all__ = ["benchmark_options", "goes_on", "load_benchmark", "spelled_out"]
+
+
+_FLAGS = ("--json", "--quiet", "--help", "--version", "--out")  # of the command itself; --out alone is refused
 
 
 def load_benchmark(what: str, root: Path | None = None) -> Callable[..., dict[str, Any]]:
@@ -35,7 +38,7 @@ def load_benchmark(what: str, root: Path | None = None) -> Callable[..., dict[st
 
 
 def benchmark_options(run: Callable[..., dict[str, Any]], given: Mapping[str, str]) -> dict[str, Any]:
-    """Options of the command as arguments of `run`. Raises ValueError for one it has not, or for no whole number."""
+    """Options of the command as arguments of `run`. Raises ValueError for one it has not, or for a wrong value."""
     known = {
         name: parameter.default
         for name, parameter in inspect.signature(run).parameters.items()
@@ -46,11 +49,28 @@ def benchmark_options(run: Callable[..., dict[str, Any]], given: Mapping[str, st
         if name not in known:
             there = nearest(name, sorted(known)) if known else "there is none"
             raise ValueError(f"--{name} is no option here; {there}")
+        if isinstance(known[name], bool):
+            if text not in ("yes", "no"):
+                raise ValueError(f"{name} = {text!r} must be yes or no; --{name} alone means yes")
+            found[name] = text == "yes"
+            continue
         whole = isinstance(known[name], int)
         if whole and not text.isdigit():
             raise ValueError(f"{name} = {text!r}: a whole number was expected")
         found[name] = int(text) if whole else text
     return found
+
+
+def spelled_out(tokens: Sequence[str]) -> list[str]:
+    """The words of a command line; after ``bench`` an option that stands alone, as ``--limit``, has the value yes."""
+    words = list(tokens)
+    if words[:1] != ["bench"]:
+        return words
+    alone = [
+        word.startswith("--") and "=" not in word and word not in _FLAGS and (not after or after.startswith("-"))
+        for word, after in zip(words, [*words[1:], ""], strict=True)
+    ]
+    return [f"{word}=yes" if lonely else word for word, lonely in zip(words, alone, strict=True)]
 
 
 def goes_on(run: Callable[..., dict[str, Any]], out: Path) -> bool:

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, get_origin
 
 from cyclopts import App, CycloptsError, Parameter
 
+from experiments.cli.benching import spelled_out
 from experiments.cli.options import as_typed, option_of, reserved_option
 from experiments.cli.runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, redraw_old_report, show_folder
 from experiments.runs import registry
@@ -44,7 +45,7 @@ def main(tokens: Sequence[str] | None = None) -> int:
         with terminate_like_ctrl_c():
             with refusing():
                 chosen()
-            tokens = sys.argv[1:] if tokens is None else list(tokens)
+            tokens = spelled_out(sys.argv[1:] if tokens is None else tokens)
             return build_app()(tokens, exit_on_error=False, print_error=False) or DONE
     except (CycloptsError, ValueError) as error:
         if not isinstance(error, CycloptsError | RefusedError):

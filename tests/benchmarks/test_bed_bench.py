@@ -14,6 +14,8 @@ from benchmarks.bed import Lane, Settings, pick_best
 from benchmarks.race import table
 from benchmarks.race.entrants import LIGGGHTS, Entrant, Heat, Ours, PeerError, read_log, run_peer
 from benchmarks.race.grains import BENCH, DIAMETER, Grains, coordination, packing, prepare_grains, wrapped, write_data
+from benchmarks.race.yardstick import Yardstick, compile_yardstick
+from experiments.cli.benching import benchmark_options, spelled_out
 from experiments.cli.main import main
 from experiments.runs.progress import Progress
 
@@ -161,6 +163,52 @@ def test_a_data_file_holds_every_grain_in_a_box_that_takes_them(tmp_path):
     assert height > (grains.positions[:, 2] + grains.radii).max()
 
 
+# The yardstick in C
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    found, said = compile_yardstick(tmp_path_factory.mktemp("yardstick"))
+    if found is None:
+        pytest.skip(said)
+    return found
+
+
+@pytest.mark.parametrize("blocks", [True, False])
+def test_the_c_loop_does_our_work_to_round_off(blocks, program, ours, tmp_path):
+    """The same law and order of a step: what differs is the order of sums, and how that has grown in 1020 steps."""
+    heat = ours.heat(20)
+    loop = Yardstick(stack(), program=program, folder=tmp_path, threads=2, blocks=blocks, skin=1e-4).heat(20)
+    assert loop.coordination == heat.coordination
+    assert loop.packing == pytest.approx(heat.packing, rel=1e-9)
+    assert loop.kinetic_energy == pytest.approx(heat.kinetic_energy, rel=1e-6)
+    there = np.fromfile(tmp_path / "yardstick.out").reshape(-1, 3)
+    period = np.array([*stack().period, np.inf])
+    apart = there - ours._bed.grains().position
+    apart[:, :2] -= period[:2] * np.round(apart[:, :2] / period[:2])
+    assert np.abs(apart).max() < 1e-6 * DIAMETER
+
+
+def test_the_c_loop_with_rolling_does_the_same_in_blocks_and_pair_by_pair(program, tmp_path):
+    options = {"program": program, "folder": tmp_path, "skin": 2e-4, "rolling": True}
+    heats = [
+        Yardstick(stack(), blocks=blocks, threads=threads, **options).heat(20)
+        for blocks in (True, False)
+        for threads in (1, 2)
+    ]
+    assert {heat.coordination for heat in heats} == {heats[0].coordination}
+    energies = [heat.kinetic_energy for heat in heats]
+    assert energies == pytest.approx(4 * [energies[0]], rel=1e-6)
+    free = Yardstick(stack(), blocks=True, threads=1, **{**options, "rolling": False}).heat(20)
+    assert free.kinetic_energy > 1.01 * energies[0]
+
+
+def test_without_a_compiler_the_c_loop_is_left_out_and_that_is_said(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    program, said = compile_yardstick(tmp_path)
+    assert program is None and "apt install" in said
+
+
 # Who counts
 
 
@@ -227,6 +275,16 @@ def test_each_peer_goes_on_with_its_fastest_skin_and_those_near_to_it():
         lane("b", skin=2e-4),
     ]
     assert race._leaders(lanes) == [lanes[0], lanes[1], lanes[3]]
+
+
+def test_an_option_that_stands_alone_means_yes():
+    assert spelled_out(["bench", "bed", "--limit", "--out", "b", "--quiet"]) == [
+        "bench", "bed", "--limit=yes", "--out", "b", "--quiet",
+    ]  # fmt: skip
+    assert spelled_out(["tumble", "--sleep"]) == ["tumble", "--sleep"]
+    assert benchmark_options(race.run, {"limit": "yes"}) == {"limit": True}
+    with pytest.raises(ValueError, match="limit = '3' must be yes or no"):
+        benchmark_options(race.run, {"limit": "3"})
 
 
 def test_the_environment_sets_sizes_rounds_and_steps(monkeypatch):
