@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from dem.contact.cohesion import jkr_range
 from dem.contact.law import effective_moduli
@@ -140,6 +139,8 @@ def _close(bed: CheckedBed, state: State, within: float) -> tuple[Array, Array, 
 
     Returns places, the image's number as the lists have it, and the gap that is left between the two [m].
     """
+    from scipy.spatial import cKDTree  # here, since it is slow to import
+
     position = state["position"].astype(float)
     x, radius = position[:, :3], position[:, 3]
     period = np.array([*bed.size[:2], 0.0])

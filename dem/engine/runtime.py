@@ -71,6 +71,12 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
             ours = {thread.native_id for thread in threading.enumerate()}  # started meanwhile by somebody else
             _keep_apart(sorted(_own_threads() - before - ours)[-threads:])
         else:
+            # Asked first, since Taichi's start ends the beds there are even where it fails.
+            if not ti.lang.misc.is_arch_supported(ti.cuda):
+                raise RuntimeError(
+                    "arch = 'cuda' is not available here: no NVIDIA GPU with its driver; use arch = 'cpu'"
+                )
+            _current, _generation = None, _generation + 1
             try:
                 ti.init(arch=ti.cuda, enable_fallback=False, **options)
             except Exception as problem:

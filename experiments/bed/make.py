@@ -6,6 +6,7 @@ from dem.prepare.prepare import check_options, fingerprint, soft_enough
 from experiments.grains.graded import grading_told
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.sizes import bond_number, in_grains_of, scaling_told, sizes_table
+from experiments.grains.where import check_where
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
@@ -21,6 +22,7 @@ __all__ = ["check", "fingerprint", "resume", "run"]
 def check(settings: BedSettings) -> None:
     """Raise ValueError, naming key, value and what is allowed, for what machine or material cannot serve."""
     check_name(settings.name)
+    check_where(arch=settings.arch, threads=settings.threads, precision=settings.precision)
     check_options(settings.size, settings.grain, settings.gravity, settings.seed, settings.max_overlap)
     graded, local = settings.graded, settings.local
     check_room(settings.size, settings.grain, local, graded)

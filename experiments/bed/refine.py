@@ -14,6 +14,7 @@ from dem.prepare.recipe import check_stages, parse_stage
 from dem.prepare.report import Prepared
 from experiments.grains.graded import grading_told
 from experiments.grains.sizes import KEPT, in_grains_of
+from experiments.grains.where import check_where
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -87,6 +88,7 @@ def check(settings: BedRefineSettings) -> None:
     """Raise ValueError, naming key, value and what is allowed, for what cannot be refined, or not on this machine."""
     check_name(settings.name)
     options, _ = refined_options(settings)
+    check_where(arch=options["arch"], threads=settings.threads, precision=options["precision"])
     sizes: Sizes | Graded = options["grain"]
     check_options(options["size"], sizes.mean, options["gravity"], options["seed"], options["max_overlap"])
     graded, local = (sizes, sizes.local) if isinstance(sizes, Graded) else (None, sizes)

@@ -73,6 +73,11 @@ def test_the_walk_sees_imports_inside_functions_for_type_checkers_and_by_name(tm
     assert set(circle(graph_of(tmp_path))) == {"vis.one", "vis.two"}
 
 
+def test_a_bed_is_there_without_scipy_which_is_slow_to_import():
+    code = "import sys\nimport dem\ndem.Bed\nassert 'scipy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
 def test_the_functions_of_an_experiment_are_there_without_what_computes():
     code = (
         "import sys\nfrom experiments import bed, hop, penetrate\nimport experiments.diagnose\n"

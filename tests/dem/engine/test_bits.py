@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import falling_bed
@@ -23,10 +24,10 @@ def chunks(monkeypatch):
     monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", falling_bed.GRAINS_PER_CHUNK)
 
 
-def elsewhere(*arguments) -> subprocess.Popen:
+def elsewhere(*arguments, **environment) -> subprocess.Popen:
     return subprocess.Popen(
         [sys.executable, falling_bed.__file__, *map(str, arguments)],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -89,6 +90,18 @@ def test_cohesive_grains_keep_their_bits_too(cohesion, tmp_path):
         loaded[step] = falling_bed.digest(again)
     assert loaded == {step: digests[step] for step in (200, 300)}
     assert finish(elsewhere_too) == digests
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not find_spec("quadrants"), reason="quadrants is not installed: pip install 'hedgebed[quadrants]'")
+@pytest.mark.parametrize("kind", [("none", "spike"), ("jkr", "spike"), ("none", "solids", "sleep")])
+def test_the_fork_of_taichi_gives_the_same_bits(kind, tmp_path):
+    both = {
+        taichi: elsewhere("fresh", tmp_path / f"{taichi}.npz", 300, 1, 100, *kind, HEDGEBED_TAICHI=taichi)
+        for taichi in ("taichi", "quadrants")
+    }
+    digests = {taichi: finish(process) for taichi, process in both.items()}
+    assert len(digests["taichi"]) == 3 and digests["quadrants"] == digests["taichi"]
 
 
 @pytest.mark.long

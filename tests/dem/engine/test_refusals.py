@@ -12,6 +12,7 @@ import pytest
 
 from dem import Ball, Bed, BedFailure, Cylinder, Material, Plane
 from dem.engine import runtime
+from hedgebed_taichi import ti
 
 STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.6)
 RADIUS = 0.002
@@ -224,6 +225,20 @@ def test_an_overlap_past_its_bound_stops_the_bed(tmp_path):
     assert bed.max_overlap > 0.01
     again = Bed.load(bed.save(tmp_path / "bed.npz"))
     assert again.max_overlap == bed.max_overlap and again.overlap_limit == 0.01
+
+
+def prepare(**options):
+    return Bed.prepare("sand", size=(0.02, 0.02, 0.02), grain=2e-3, **options)
+
+
+@pytest.mark.parametrize("start", [make, prepare])
+def test_a_gpu_that_is_not_there_is_refused_and_beds_on_the_cpu_go_on(start, monkeypatch):
+    bed = make()
+    monkeypatch.setattr(ti.lang.misc, "is_arch_supported", lambda arch: False)
+    with pytest.raises(RuntimeError, match=r"arch = 'cuda'.*no NVIDIA GPU.*arch = 'cpu'"):
+        start(arch="cuda")
+    bed.advance(2)
+    assert bed.steps == 2
 
 
 def test_a_bed_of_an_earlier_taichi_refuses_to_go_on(monkeypatch, tmp_path):

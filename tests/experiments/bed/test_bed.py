@@ -16,6 +16,7 @@ from experiments.bed.settings import BedRefineSettings, BedSettings
 from experiments.cli.main import BAD_INPUT, DONE, FAILED, STOPPED, main
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import read_series
+from hedgebed_taichi import ti
 
 MAKE = ["bed", "make", "--stages", "rain", "--size", "0.024", "0.024", "0.02", "--threads", "1", "--quiet"]
 
@@ -109,6 +110,14 @@ def test_a_bed_that_does_not_say_how_it_was_made_is_not_refined(shelf, tmp_path)
     Bed.load(shelf / "rained.npz", threads=1).save(tmp_path / "plain.npz")
     with pytest.raises(ValueError, match="does not say how it was prepared"):
         bed_refine.check(BedRefineSettings(bed=str(tmp_path / "plain.npz")))
+
+
+def test_a_gpu_that_is_not_there_is_refused_before_any_work(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(ti.lang.misc, "is_arch_supported", lambda arch: False)
+    assert main(["bed", "make", "--arch", "cuda", "--out", str(tmp_path / "run")]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "arch = 'cuda'" in said and "arch = 'cpu'" in said
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
