@@ -28,7 +28,7 @@ __all__ = ["FLOOR", "BedBase", "check_array"]
 # Skin over mean diameter: first guess and bounds. It adapts to how often lists are made.
 _SKIN, _LEAST_SKIN, _LARGEST_SKIN = 0.06, 0.02, 0.15
 # A rebuild costs about as much as this many steps, and a skin of one diameter would add about this share to a step.
-_REBUILD_STEPS, _SKIN_COST = 4.0, 1.2
+_REBUILD_STEPS, _SKIN_COST = 6.0, 0.5
 FLOOR = 0
 
 

@@ -390,7 +390,10 @@ class Lists(EnginePart):
                             if ti.static(rest.on):
                                 if part == 1:
                                     r = self.place_asleep(r, rest)
-                            for j in range(self.cell_start[r], self.cell_start[r + 1]):
+                            first, behind = self.cell_start[r], self.cell_start[r + 1]
+                            if first >= start and behind <= i:  # grains of this chunk, whose pairs with i are theirs
+                                first = behind
+                            for j in range(first, behind):
                                 own = j >= start and j < end
                                 if j != i and (j > i or not own):
                                     x_j = self.position[j]

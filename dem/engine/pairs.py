@@ -17,7 +17,7 @@ from .values import EnginePart
 
 __all__ = ["Pairs"]
 
-LANES = 16
+LANES = 64
 
 
 @ti.data_oriented
