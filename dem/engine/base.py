@@ -197,7 +197,7 @@ class BedBase:
                     e.moved[None] = 1
                 most = min(most, sleeper.rules.every - self.steps % sleeper.rules.every)
             most = 1 if self.debug else most
-            advanced, halted = e.launch(most, self.awake_count, self.time_step, limit, self.gravity, keep)
+            advanced, halted = e.launch(most, self.time_step, limit, self.gravity, keep, self.awake_count)
             done += advanced
             self._count(advanced)
             if halted:
