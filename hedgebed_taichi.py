@@ -61,7 +61,8 @@ def kernel_cache() -> Path:
         "quadrants": ("QD_OFFLINE_CACHE_FILE_PATH", "quadrants/qdcache"),
     }[chosen()]
     given = os.environ.get(variable)
-    return Path(given) if given else Path.home() / ".cache" / folder
+    cache = Path(given) if given else Path.home() / ".cache" / folder
+    return cache if chosen() == "taichi" else cache / "kernel_compilation_manager"
 
 
 @functools.cache
@@ -99,8 +100,9 @@ def _read_sources_once(name: str) -> None:
         names = vars(import_module(f"{name}.lang.{module}"))
         if "TextWrapper" in names:
             names["TextWrapper"] = wrapper
-        if "getsourcelines" in names:
-            names["getsourcelines"] = functools.lru_cache(maxsize=500)(names["getsourcelines"])
+        for reader in ("getsourcelines", "getsourcefile"):
+            if reader in names:
+                names[reader] = functools.lru_cache(maxsize=500)(names[reader])
 
 
 def __getattr__(name: str) -> Any:

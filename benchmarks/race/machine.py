@@ -5,7 +5,6 @@ import platform
 import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from rich.table import Table
 from experiments.runs.memory import cores_there
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
+from hedgebed_taichi import version
 
 __all__ = ["begin_timing", "column_table", "describe_machine", "environment_numbers", "now", "wide_console"]
 
@@ -71,5 +71,5 @@ def describe_machine(cores: int, load: float) -> Json:
         "load": load,
         "system": platform.platform(),
         "python": platform.python_version(),
-        "taichi": version("taichi"),
+        "taichi": version().removeprefix("taichi "),
     }

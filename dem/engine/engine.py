@@ -179,7 +179,8 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.moved, self.halted, self.done = (ti.field(ti.i32, ()) for _ in range(3))
         self.problem = ti.Vector.field(2, ti.i32, ())
         empty = ("pair_start", "pair_end", "overlap", "ticket", "near_end", *self.BODY_FIELDS)
-        self._zeroes = Zeroes(*(getattr(self, name) for name in empty))
+        counters = (self.body_count, self.moved, self.halted, self.done, self.problem)
+        self._zeroes = Zeroes(*(getattr(self, name) for name in empty), *counters)
 
     def _make_grain_fields(self, n: int, cell_capacity: int) -> None:
         """A row for each grain, and room for sorting."""
@@ -256,9 +257,6 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
             self.box[k] = value
         self.write("rank", curve_ranks(*cells))
         self._zeroes.put()
-        for counter in (self.body_count, self.moved, self.halted, self.done):
-            counter[None] = 0
-        self.problem[None] = [0, 0]
         self.clear_pushes()
         self.clear_shapes()
         self.held = None

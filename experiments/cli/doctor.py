@@ -48,9 +48,8 @@ def probe(*arguments: str, timeout: float = 90.0) -> dict[str, Any]:
     A crash, a hang past `timeout` [s] or an exception comes back as ``{"ok": False, "reason": ...}``.
     """
     command = [sys.executable, "-P", str(Path(probes.__file__)), *arguments]
-    environment = {**os.environ, "ENABLE_TAICHI_HEADER_PRINT": "0", "TI_SKIP_VERSION_CHECK": "1"}
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, env=environment, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
     except subprocess.TimeoutExpired:
         return {"ok": False, "reason": f"no answer within {timeout:.0f} s"}
     if done.returncode < 0:
@@ -77,7 +76,7 @@ def _taichi(arch: str, answer: dict[str, Any]) -> Finding:
         "cuda": "needs an NVIDIA card and its driver; the bed runs on the CPU without",
         "vulkan": "not needed",
     }
-    version = f"Taichi {answer['version']}" if answer.get("version") else "Taichi"
+    version = answer.get("version", "Taichi")
     detail = f"{version} runs a kernel" if answer["ok"] else f"does not run here ({answer['reason']})"
     return Finding(f"backend {arch}", answer["ok"], detail, remedies[arch], required=arch == "cpu")
 

@@ -13,8 +13,9 @@ __all__ = ["try_opengl", "try_taichi"]
 def try_taichi(arch: str) -> dict[str, Any]:
     """Start Taichi on `arch` (cpu, cuda or vulkan), run a kernel, and say whether the sum came out."""
     from hedgebed_taichi import ti
+    from hedgebed_taichi import version as taichi_version
 
-    version = ".".join(map(str, ti.__version__))
+    version = taichi_version()
     try:
         ti.init(arch=getattr(ti, arch), log_level=ti.ERROR, offline_cache=False)
     except Exception as error:

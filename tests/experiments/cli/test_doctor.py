@@ -48,7 +48,7 @@ def test_noise_before_the_answer_does_no_harm(script):
 def machine(monkeypatch, tmp_path):
     """A machine whose trials answer at once; change `answers` to take something away."""
     answers = {
-        "cpu": {"ok": True, "version": "1.7.4"},
+        "cpu": {"ok": True, "version": "taichi 1.7.4"},
         "cuda": {"ok": False, "reason": "Taichi fell back to x64"},
         "vulkan": {"ok": False, "reason": "Taichi fell back to x64"},
         "opengl": {"ok": True, "renderer": "llvmpipe"},

@@ -3,12 +3,15 @@
 import os
 import time
 
+import pytest
+
 from experiments.runs.kernel_cache import free_kernel_cache
 
 
-def test_a_lock_left_by_a_killed_process_is_removed_with_what_it_left_empty_and_one_in_use_stays(tmp_path):
+@pytest.mark.parametrize("names", ["ticache.lock T1.tic T2.tic T3.tic", "qdcache.lock T1.qdc T2.qdc T3.qdc"])
+def test_a_lock_left_by_a_killed_process_is_removed_with_what_it_left_empty_and_one_in_use_stays(names, tmp_path):
     """Taichi's lock is a file that is there; without it Taichi reads the cache again."""
-    lock, empty, new, whole = (tmp_path / name for name in ("ticache.lock", "T1.tic", "T2.tic", "T3.tic"))
+    lock, empty, new, whole = (tmp_path / name for name in names.split())
     for file in (lock, empty, new):
         file.touch()
     whole.write_bytes(b"kernel")
@@ -17,5 +20,5 @@ def test_a_lock_left_by_a_killed_process_is_removed_with_what_it_left_empty_and_
     for file in (lock, empty, whole):
         os.utime(file, (an_hour_ago, an_hour_ago))
     assert free_kernel_cache(tmp_path)
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["T2.tic", "T3.tic"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == [new.name, whole.name]
     assert not free_kernel_cache(tmp_path)
