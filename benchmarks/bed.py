@@ -9,6 +9,7 @@ For quick trials, in the environment: HEDGEBED_BENCH_SIZES (as in "20000 100000"
 HEDGEBED_BENCH_STEPS (timed ones), HEDGEBED_BENCH_SHOWN=0 (nothing that is only shown).
 
 ``--limit``: a loop in plain C races as well, where there is a compiler, and shows how far the machine goes.
+``--profile``: no race; where the time of a step goes (``benchmarks/race/profile.py``).
 """
 
 import os
@@ -25,6 +26,7 @@ from benchmarks.race import entrants, table
 from benchmarks.race.entrants import LAMMPS, LIGGGHTS, WARM_STEPS, Entrant, Heat, Ours, Peer, Theirs
 from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
 from benchmarks.race.machine import begin_timing, environment_numbers, wide_console
+from benchmarks.race.profile import profile_bed
 from benchmarks.race.yardstick import compile_yardstick, yardsticks
 from experiments.runs.types import Json
 
@@ -33,6 +35,7 @@ __all__ = ["Lane", "Settings", "pick_best", "run"]
 SKINS = (1e-4, 2e-4, 4e-4)  # of the peers' lists [m]
 _USUAL_SKIN = 2e-4  # for what is only shown [m]
 COORDINATION_BOUND, PACKING_BOUND = 0.01, 0.002  # the same work: this much off ours, at most [1]
+REPEATS = 30  # of each kernel of a profile
 _CLOSE = 0.85  # a skin this near to the fastest stays in the race
 # For the plan: grain-steps a second, and what settling takes.
 _EXPECTED_SPEED, _SETTLING_STEPS = 1e7, 40_000
@@ -100,32 +103,47 @@ class Lane:
         }  # fmt: skip
 
 
-def run(out: Path, *, progress: Any, limit: bool = False) -> Json:
+def run(out: Path, *, progress: Any, limit: bool = False, profile: bool = False) -> Json:
     """Race, show the table on stdout, and return what goes into bench.json. Nothing is written to `out`.
 
-    `progress`: an ``experiments.runs.progress.Progress``. `limit`: the C loop races too. Raises ValueError for a wrong
-    variable of the environment, RuntimeError where our own bed failed.
+    `progress`: an ``experiments.runs.progress.Progress``. `limit`: the C loop races too. `profile`: instead of the
+    race, where the time of a step goes. Raises ValueError for a wrong variable of the environment, RuntimeError where
+    our own bed failed.
     """
     settings = Settings.from_environment(limit=limit)
-    bench, busy = begin_timing("bed")
-    cores = bench["machine"]["cores"]
-    peers, remarks = _find_peers()
-    remarks += busy
-    for remark in remarks:
-        progress.message(remark)
-    progress.plan(dict(_plan(settings, with_peers=bool(peers))))
+    bench, remarks = begin_timing("bed")
     said = [f"{key}={value!r}" for key, value in sorted(os.environ.items()) if key.startswith("HEDGEBED_BENCH_")]
+    options = [f"--{name}" for name, given in (("limit", limit), ("profile", profile)) if given]
     bench |= {
-        "command": " ".join([*said, "hedgebed bench bed", *(["--limit"] if limit else [])]),
-        "peers": {peer.name: None for peer in (LIGGGHTS, LAMMPS)},
-        "unit": "grain steps per second",
-        "rounds": settings.rounds,
+        "command": " ".join([*said, "hedgebed bench bed", *options]),
         "case": {
             "diameter": DIAMETER, "spread": SPREAD,
             "material": {key: value for key, value in asdict(BENCH).items() if key != "sources"},
             "gravity": entrants.GRAVITY, "time_step": entrants.TIME_STEP, "warm_steps": WARM_STEPS,
         },
-        "ratios": {}, "limits": {}, "beds": [], "remarks": remarks,
+        "remarks": remarks,
+    }  # fmt: skip
+    cores = bench["machine"]["cores"]
+    if profile:
+        _profile(bench, settings, cores, progress)
+    else:
+        _race_all(bench, settings, cores, progress)
+    progress.close()
+    table.show(bench, wide_console())
+    return bench
+
+
+def _race_all(bench: Json, settings: Settings, cores: int, progress: Any) -> None:
+    """Race on beds of all sizes; what came out goes into `bench`."""
+    peers, missing = _find_peers()
+    remarks = bench["remarks"]
+    remarks += missing
+    for remark in remarks:
+        progress.message(remark)
+    progress.plan(dict(_plan(settings, with_peers=bool(peers))))
+    bench |= {
+        "peers": {peer.name: None for peer in (LIGGGHTS, LAMMPS)}, "unit": "grain steps per second",
+        "rounds": settings.rounds, "ratios": {}, "limits": {}, "beds": [],
     }  # fmt: skip
     for count in settings.sizes:
         bed, lanes = _race(count, settings, peers, cores, progress, remarks)
@@ -134,16 +152,28 @@ def run(out: Path, *, progress: Any, limit: bool = False) -> Json:
         bench["beds"].append(bed | ran)
         ours, theirs = lanes[0].speed, best and best.speed
         bench["ratios"][str(count)] = ours / theirs if ours and theirs else None
-        if limit:
+        if settings.limit:
             fastest = pick_best(lanes, of="limit")
             bench["limits"][str(count)] = ours / fastest.speed if ours and fastest and fastest.speed else None
         for lane in lanes:
             if lane.heats and isinstance(lane.entrant, Theirs):
                 bench["peers"][lane.entrant.peer.name] = lane.heats[-1].version
         remarks += [f"{count:,} grains: {remark}" for lane in lanes for remark in _remarks(lane)]
-    progress.close()
-    table.show(bench, wide_console())
-    return bench
+
+
+def _profile(bench: Json, settings: Settings, cores: int, progress: Any) -> None:
+    """Where the time of a step goes, in beds of all sizes; what came out goes into `bench`."""
+    bench |= {"unit": "ns of thread time per grain and step", "repeats": REPEATS, "profile": []}
+    progress.plan({f"{count:,} grains": count * _SETTLING_STEPS / _EXPECTED_SPEED for count in settings.sizes})
+    for count in settings.sizes:
+        progress.stage(f"{count:,} grains")
+        grains = prepare_grains(count, threads=cores, progress=progress)
+        with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as name:
+            bed, said = profile_bed(
+                grains, steps=settings.steps_for(count), repeats=REPEATS, threads=cores, folder=Path(name)
+            )  # fmt: skip
+        bench["profile"].append(bed)
+        bench["remarks"] += [remark for remark in said if remark not in bench["remarks"]]
 
 
 def _find_peers() -> tuple[list[Peer], list[str]]:

@@ -146,8 +146,7 @@ class Ours(Entrant):
         self._state: Json = {}
 
     def heat(self, steps: int) -> Heat:
-        bed = self._bed or self._warmed()
-        bed.restore(self._state)
+        bed = self.warmed()
         lists = bed.list_count
         began = time.perf_counter()
         bed.advance(steps)
@@ -158,8 +157,11 @@ class Ours(Entrant):
         share = packing(self._grains.solid_volume, period, float(after.positions[:, 2].mean()))
         return Heat(after.count * steps / wall, bed.list_count - lists, coordination(after), share, bed.kinetic_energy)
 
-    def _warmed(self) -> Bed:
-        """The bed after its warm-up, with everything compiled."""
+    def warmed(self) -> Bed:
+        """The bed in its state after the warm-up, with everything compiled."""
+        if self._bed is not None:
+            self._bed.restore(self._state)
+            return self._bed
         grains = self._grains
         bed = Bed.from_grains(
             self._material, positions=grains.positions, radii=grains.radii, gravity=GRAVITY, time_step=TIME_STEP,

@@ -1,11 +1,13 @@
-"""bench.json as a table: on the terminal, and in Markdown for docs/performance.md.
+"""bench.json as tables: on the terminal, and in Markdown for docs/performance.md.
 
 python -m benchmarks.race.table DIR/bench.json                      # prints the Markdown
-python -m benchmarks.race.table DIR/bench.json docs/performance.md  # puts it between the two marks in that file
+python -m benchmarks.race.table DIR/bench.json docs/performance.md  # puts it between its two marks in that file
 """
 
 import json
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich import box
@@ -14,16 +16,46 @@ from rich.table import Table
 
 from experiments.runs.types import Json
 
-__all__ = ["HEADINGS", "MARKS", "markdown", "rows", "show"]
+__all__ = ["HEADINGS", "MARKS", "PHASES", "Sheet", "insert", "markdown", "marks_of", "rows", "show"]
 
 HEADINGS = ("code", "skin, mm", "threads", "10^6/s", "runs", "ours/this", "touching", "packing", "uJ", "lists", "")
 LEGEND = (
     "10^6/s: million grain-steps a second, median of the runs; touching: grains that a grain touches, packing and uJ "
     "(kinetic energy): at the end of the timed steps; lists: neighbour lists made in them."
 )
-_LEFT = (0, len(HEADINGS) - 1)
-MARKS = ("<!-- bench bed: begin -->", "<!-- bench bed: end -->")
+PHASES = ("finding", "forces", "moving", "sorting", "listing", "waiting", "else")
+PROFILE_HEADINGS = ("code", "threads", *PHASES, "all", "lists/step")
+PROFILE_LEGEND = (
+    "ns of thread time for a grain and a step: of one thread in our bed processor time, else wall time times threads. "
+    "Of ours, sorting and listing are measured each alone; moving, finding (rows looked at) and forces as what a step "
+    "of a bed that stands still takes without and with them; all on one that moves; else is inferred. Moving holds "
+    "launches and the waiting between phases. The C loop has a clock in it."
+)
+MARKS = {
+    "beds": ("<!-- bench bed: begin -->", "<!-- bench bed: end -->"),
+    "profile": ("<!-- bench bed --profile: begin -->", "<!-- bench bed --profile: end -->"),
+}
+"""Where in a page the table goes, by what a bench.json has."""
 _NONE = "-"
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """One table: its title, headings, which columns are set to the left, and rows."""
+
+    title: str
+    headings: tuple[str, ...]
+    left: tuple[int, ...]
+    rows: list[tuple[str, ...]]
+
+    def markdown(self) -> list[str]:
+        """Its lines, the title left out."""
+
+        def line(cells: tuple[str, ...]) -> str:
+            return "| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |"
+
+        rule = "|" + "|".join("---" if k in self.left else "---:" for k in range(len(self.headings))) + "|"
+        return [line(self.headings), rule, *(line(row) for row in self.rows)]
 
 
 def rows(bed: Json) -> list[tuple[str, ...]]:
@@ -68,16 +100,49 @@ def _title(bed: Json, bench: Json) -> str:
     return f"{bed['grain_count']:,} grains, {bed['steps']} timed steps: {verdict}"
 
 
+def _profile_rows(bed: Json) -> list[tuple[str, ...]]:
+    return [
+        (
+            column["name"],
+            str(column["threads"]),
+            *(f"{column['phases'][phase]:.1f}" if phase in column["phases"] else _NONE for phase in PHASES),
+            f"{column['total']:.1f}",
+            f"{column['lists_per_step']:.4f}",
+        )
+        for column in bed["columns"]
+    ]
+
+
+def _profile_title(bed: Json) -> str:
+    counts = bed["counts"]
+    return (
+        f"{bed['grain_count']:,} grains, {bed['steps']} steps: for each grain {counts['rows']:.2f} rows, of which "
+        f"{counts['touching_rows']:.2f} touch, {counts['contacts']:.2f} contacts "
+        f"({100 * counts['computed_twice']:.0f} % computed twice, {counts['chunks']} chunks)"
+    )
+
+
+def _tables(bench: Json) -> Iterator[Sheet]:
+    for bed in bench.get("beds", ()):
+        yield Sheet(_title(bed, bench), HEADINGS, (0, len(HEADINGS) - 1), rows(bed))
+    for bed in bench.get("profile", ()):
+        yield Sheet(_profile_title(bed), PROFILE_HEADINGS, (0,), _profile_rows(bed))
+
+
+def _legend(bench: Json) -> str:
+    return PROFILE_LEGEND if "profile" in bench else LEGEND
+
+
 def show(bench: Json, console: Console) -> None:
-    """Print a table for each bed, and what was left out or went wrong."""
-    for bed in bench["beds"]:
-        table = Table(title=_title(bed, bench), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-        for k, heading in enumerate(HEADINGS):
-            table.add_column(heading, justify="left" if k in _LEFT else "right", no_wrap=k not in _LEFT)
-        for row in rows(bed):
+    """Print the tables, and what was left out or went wrong."""
+    for sheet in _tables(bench):
+        table = Table(title=sheet.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+        for k, heading in enumerate(sheet.headings):
+            table.add_column(heading, justify="left" if k in sheet.left else "right", no_wrap=k not in sheet.left)
+        for row in sheet.rows:
             table.add_row(*row)
         console.print(table, markup=False)
-    console.print(LEGEND, markup=False)
+    console.print(_legend(bench), markup=False)
     for remark in bench["remarks"]:
         console.print(f"- {remark}", markup=False, highlight=False)
 
@@ -85,25 +150,30 @@ def show(bench: Json, console: Console) -> None:
 def markdown(bench: Json) -> str:
     """The same in Markdown, with date, machine, versions and command."""
     machine = bench["machine"]
-    peers = ", ".join(f"{name} {version}" for name, version in bench["peers"].items() if version)
-    rule = "|" + "|".join("---" if k in _LEFT else "---:" for k in range(len(HEADINGS))) + "|"
-
-    def line(cells: tuple[str, ...]) -> str:
-        return "| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |"
-
+    versions = [f"hedgebed {bench['version']}, Taichi {machine['taichi']}"]
+    if "peers" in bench:
+        versions.append(", ".join(f"{name} {said}" for name, said in bench["peers"].items() if said) or "no peers")
     lines = [
-        f"{bench['date']}, {machine['processor']}, {machine['cores']} cores; hedgebed {bench['version']}, "
-        f"Taichi {machine['taichi']}; {peers or 'no peers'}; `{bench['command']}`. Medians of {bench['rounds']} rounds."
+        f"{bench['date']}, {machine['processor']}, {machine['cores']} cores; {'; '.join(versions)}; "
+        f"`{bench['command']}`." + (f" Medians of {bench['rounds']} rounds." if "rounds" in bench else "")
     ]
-    for bed in bench["beds"]:
-        lines += ["", f"**{_title(bed, bench)}**", "", line(HEADINGS), rule, *(line(row) for row in rows(bed))]
+    for sheet in _tables(bench):
+        lines += ["", f"**{sheet.title}**", "", *sheet.markdown()]
     remarks = [f"- {remark}" for remark in bench["remarks"]]
-    return "\n".join([*lines, "", LEGEND, *([""] if remarks else []), *remarks]) + "\n"
+    return "\n".join([*lines, "", _legend(bench), *([""] if remarks else []), *remarks]) + "\n"
 
 
-def insert(text: str, table: str) -> str:
-    """A page with what is between its two marks replaced by a table. Raises ValueError where a mark is missing."""
-    begin, end = MARKS
+def marks_of(bench: Json) -> tuple[str, str]:
+    """The marks between which the table of a bench.json belongs. Raises ValueError for one that has none."""
+    found = next((marks for key, marks in MARKS.items() if key in bench), None)
+    if found is None:
+        raise ValueError(f"this bench.json ({bench.get('what')}) has no table for a page")
+    return found
+
+
+def insert(text: str, table: str, marks: tuple[str, str]) -> str:
+    """A page with what is between two marks replaced by a table. Raises ValueError where a mark is missing."""
+    begin, end = marks
     head, first, rest = text.partition(begin)
     _, second, tail = rest.partition(end)
     if not first or not second:
@@ -116,12 +186,13 @@ def main(arguments: list[str]) -> int:
     if not 1 <= len(arguments) <= 2:
         print(__doc__, file=sys.stderr)
         return 2
-    table = markdown(json.loads(Path(arguments[0]).read_text(encoding="utf-8")))
+    bench = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
+    table = markdown(bench)
     if len(arguments) == 1:
         print(table, end="")
         return 0
     page = Path(arguments[1])
-    page.write_text(insert(page.read_text(encoding="utf-8"), table), encoding="utf-8")
+    page.write_text(insert(page.read_text(encoding="utf-8"), table, marks_of(bench)), encoding="utf-8")
     return 0
 
 

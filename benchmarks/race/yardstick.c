@@ -6,7 +6,8 @@
    grains (8) and of a grain on the floor (8), then x, y, z, radius and mass of each grain [SI].
    OUT: x, y, z of each grain at the end, in the order of BED. Standard output: seconds and lists made of the timed
    steps; kinetic energy; touching pairs and other rows at the end (one across two parts counts twice); rows looked at
-   a step that did not touch.
+   a step that did not touch; then the threads' seconds, summed: finding contacts, their forces, moving, sorting,
+   making lists, waiting for one another.
 
    What it does, beside sorted grains and half lists:
    - Each thread has one contiguous part of the grains; a pair across two parts is computed by both.
@@ -33,6 +34,7 @@ typedef struct { pair *rows; int count, room; } box;
 #define INLINE static inline __attribute__((always_inline))
 #define BOXES 8
 #define BITS 26
+enum { FINDING, FORCES, MOVING, SORTING, LISTING, WAITING, PHASES };
 #define MASK ((1 << BITS) - 1)
 #define MOST_THREADS 64
 #define WIDE 8 /* doubles in a vector */
@@ -47,6 +49,7 @@ typedef struct {
     quad *near_slide, *near_roll;
     int near_count, near_room;
     long checked;             /* rows looked at in the timed steps */
+    double spent[PHASES];     /* [s] */
     double far;               /* largest displacement squared since the lists were made */
     char gap[128]; /* parts of two threads share no cache line */
 } part;
@@ -202,8 +205,16 @@ static void push_floor(part *p, double dt) {
     }
 }
 
-static void push(part *p, int me, double dt, double far) {
+/* The time since `*last`, which becomes now, is of this phase. */
+static void spend(part *p, int phase, double *last) {
+    double now = omp_get_wtime();
+    p->spent[phase] += now - *last;
+    *last = now;
+}
+
+static void push(part *p, int me, double dt, double far, double *last) {
     sieve(p, far);
+    spend(p, FINDING, last);
     if (in_blocks && with_rolling)
         push_blocks(p, me, dt, 1);
     else if (in_blocks)
@@ -213,6 +224,7 @@ static void push(part *p, int me, double dt, double far) {
     else
         push_pairs(p, me, dt, 0);
     push_floor(p, dt);
+    spend(p, FORCES, last);
 }
 
 static void move(part *p, double dt) {
@@ -381,19 +393,29 @@ static int advance(int steps) {
     {
         int me = omp_get_thread_num();
         part *p = &parts[me];
+        double last = omp_get_wtime();
         for (int k = 0; k < steps; k++) {
             move(p, DT);
+            spend(p, MOVING, &last);
             meet();
             double far = farthest();
+            spend(p, WAITING, &last);
             if (2.0 * far > skin) {
                 meet();
-                if (me == 0) sort_grains(), lists++;
+                spend(p, WAITING, &last);
+                if (me == 0) {
+                    sort_grains(), lists++;
+                    spend(p, SORTING, &last);
+                }
                 meet();
+                spend(p, WAITING, &last);
                 list_pairs(p);
+                spend(p, LISTING, &last);
                 far = 0.0;
             }
-            push(p, me, DT, far);
+            push(p, me, DT, far, &last);
             meet();
+            spend(p, WAITING, &last);
         }
     }
     return lists;
@@ -439,15 +461,16 @@ int main(int words, char **word) {
         parts[k].near_slide = room(share * sizeof(quad)), parts[k].near_roll = room(share * sizeof(quad));
     }
     sort_grains();
-    for (int k = 0; k < threads; k++) list_pairs(&parts[k]), push(&parts[k], k, 0.0, 0.0);
+    double began = omp_get_wtime();
+    for (int k = 0; k < threads; k++) list_pairs(&parts[k]), push(&parts[k], k, 0.0, 0.0, &began);
     for (int i = 0; i < N; i++) { /* velocities live half a step behind positions */
         double by = -0.5 * DT / V[i].w, turn = 2.5 * by / (X[i].w * X[i].w);
         V[i].x = by * F[i].x, V[i].y = by * F[i].y, V[i].z = by * F[i].z;
         W[i].x = turn * T[i].x, W[i].y = turn * T[i].y, W[i].z = turn * T[i].z;
     }
     advance(warm);
-    for (int k = 0; k < threads; k++) parts[k].checked = 0;
-    double began = omp_get_wtime();
+    for (int k = 0; k < threads; k++) parts[k].checked = 0, memset(parts[k].spent, 0, sizeof parts[k].spent);
+    began = omp_get_wtime();
     int lists = advance(steps);
     double took = omp_get_wtime() - began, energy = 0.0;
     long touching = 0, rows = 0, checked = 0;
@@ -466,6 +489,12 @@ int main(int words, char **word) {
     }
     f = fopen(word[2], "wb");
     if (!f || fwrite(out, sizeof(double), 3 * N, f) != (size_t)(3 * N) || fclose(f)) return 5;
-    printf("%.9g %d %.9g %ld %ld %.9g\n", took, lists, energy, touching, rows, (double)checked / (steps ? steps : 1));
+    printf("%.9g %d %.9g %ld %ld %.9g", took, lists, energy, touching, rows, (double)checked / (steps ? steps : 1));
+    for (int phase = 0; phase < PHASES; phase++) {
+        double spent = 0.0;
+        for (int k = 0; k < threads; k++) spent += parts[k].spent[phase];
+        printf(" %.9g", spent);
+    }
+    printf("\n");
     return 0;
 }

@@ -22,6 +22,8 @@ __all__ = ["FLAGS", "Yardstick", "compile_yardstick", "yardsticks"]
 
 FLAGS = ("-O3", "-march=native", "-fopenmp", "-fno-math-errno", "-fno-trapping-math")
 """Without the last two a compiler makes no vector instructions of roots and divisions that not every pair needs."""
+TOLD = ("touching", "apart", "looked_at", "finding", "forces", "moving", "sorting", "listing", "waiting")
+"""Touching pairs and other rows at the end, rows looked at a step that did not touch; then the phases [s]."""
 _SOURCE = Path(__file__).resolve().parent / "yardstick.c"
 _SLOWEST = 2e5  # grain steps per second and thread, below which it is ended
 _START = 120.0  # for reading the bed, and for threads that wait for one another on a busy machine [s]
@@ -53,10 +55,15 @@ class Yardstick(Entrant):
         how = "pairs in blocks" if blocks else "pair by pair"
         self.name = f"C loop, {how}" + (" with rolling" if rolling else "")
         self.threads, self.skin, self.rolling, self.blocks = threads, skin, rolling, blocks
+        self.grain_count = grains.count
         self._grains, self._program, self._folder = grains, program, folder
         self._bed = folder / ("yardstick-rolling.bed" if rolling else "yardstick.bed")
 
     def heat(self, steps: int) -> Heat:
+        return self.timed(steps)[0]
+
+    def timed(self, steps: int) -> tuple[Heat, dict[str, float]]:
+        """The same, with what the loop says of itself: seconds of all threads by phase, and counts of rows."""
         grains, place = self._grains, self._folder / "yardstick.out"
         if not self._bed.exists():
             write_bed(self._bed, grains, rolling=self.rolling)
@@ -73,12 +80,13 @@ class Yardstick(Entrant):
             raise RuntimeError(f"{self.name} was ended after {limit:.0f} s") from None
         if done.returncode:
             raise RuntimeError(f"{self.name} failed (exit status {done.returncode}): {done.stderr.strip()}")
-        wall, lists, energy, *_ = map(float, done.stdout.split())
+        wall, lists, energy, *more = map(float, done.stdout.split())
         positions = wrapped(np.fromfile(place).reshape(grains.count, 3), grains.period)
         after = Grains(positions, grains.radii, grains.period)
         share = packing(grains.solid_volume, grains.period, float(positions[:, 2].mean()))
         said = " ".join(["yardstick", "BED", "OUT", *command[3:]])
-        return Heat(grains.count * steps / wall, int(lists), coordination(after), share, energy, "", said)
+        heat = Heat(grains.count * steps / wall, int(lists), coordination(after), share, energy, "", said)
+        return heat, dict(zip(TOLD, more, strict=True))
 
 
 def yardsticks(

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from race_stacks import stack
 
 import benchmarks.bed as race
 from benchmarks.bed import Lane, Settings, pick_best
 from benchmarks.race import table
 from benchmarks.race.entrants import LIGGGHTS, Entrant, Heat, Ours, PeerError, read_log, run_peer
-from benchmarks.race.grains import BENCH, DIAMETER, Grains, coordination, packing, prepare_grains, wrapped, write_data
+from benchmarks.race.grains import BENCH, DIAMETER, coordination, packing, prepare_grains, wrapped, write_data
 from benchmarks.race.yardstick import Yardstick, compile_yardstick
 from experiments.cli.benching import benchmark_options, spelled_out
 from experiments.cli.main import main
@@ -64,17 +65,6 @@ Neighbor list builds = 2
 Dangerous builds = 0
 Total wall time: 0:00:05
 """
-
-
-def stack(across: int = 8, layers: int = 5) -> Grains:
-    """Equal grains in square layers, each in the hollows of the one below, all touching by a little."""
-    spacing = DIAMETER * (1 - 2e-4)
-    rise = spacing * math.sqrt(0.5)
-    i, j, k = (m.ravel() for m in np.meshgrid(np.arange(across), np.arange(across), np.arange(layers), indexing="ij"))
-    shift = 0.5 * (k % 2)
-    positions = np.column_stack([(i + shift) * spacing, (j + shift) * spacing, 0.4999 * DIAMETER + k * rise])
-    period = (across * spacing, across * spacing)
-    return Grains(wrapped(positions, period), np.full(len(positions), DIAMETER / 2), period)
 
 
 # What logs say
@@ -370,7 +360,8 @@ def test_a_race_on_a_stack_finds_that_peers_do_the_same_work(tiny, tmp_path, mon
     assert "best peer" in capfd.readouterr().out
     assert list((tmp_path / "temporary").iterdir()) == []
     assert not (tmp_path / "b").exists()
-    page = table.insert(f"before\n{table.MARKS[0]}\nold\n{table.MARKS[1]}\nafter\n", table.markdown(bench))
+    marks = table.marks_of(bench)
+    page = table.insert(f"before\n{marks[0]}\nold\n{marks[1]}\nafter\n", table.markdown(bench), marks)
     assert page.startswith("before\n") and page.endswith("after\n") and "old" not in page
     rows = [line for line in page.splitlines() if line.startswith("| ")]
     assert len(rows) == 1 + 3
