@@ -10,6 +10,10 @@ Normal (Hertz; Thornton, Cummins & Cleary 2013, Powder Technology 233:30 for the
 Tangential (Mindlin 1949, no-slip stiffness; Coulomb's law bounds the spring, and the dashpot acts while it sticks):
     F_t = -S_t u,  |S_t u| set back to mu F_n where it is more;
     else F_t = -(S_t u + c_n sqrt(S_t / S_n) sqrt(m* S_n) u'), |F_t| <= mu F_n;  S_t = 8 G* a.
+    Two springs (``dem.grains.materials.TANGENTIAL``):
+    "displacement": u is what has slid, whatever a is by now (LIGGGHTS' ``history``, LAMMPS' ``mindlin``);
+    "rescaled": while a grows, S_t u stays and u falls; while a falls, u stays and S_t u falls (Thornton, Cummins &
+    Cleary 2013; LAMMPS' ``mindlin_rescale/force``). It makes no energy, see below.
 Rolling (elastic-plastic spring-dashpot, Ai et al. 2011, Powder Technology 206:269, with the stiffness S_t R*^2 of the
 tangential spring at the rolling radius):
     M = -(k_r q + c_r q'),  q' the relative rolling rate; the spring bounded by mu_r R* F_n in the same way.
@@ -23,6 +27,18 @@ Damping never makes a pair pull more than its pull-off force; without cohesion t
 friction, rolling and twisting the load that presses the surfaces together stands for F_n: F_n + 2 pi w R* with DMT, F_n
 + 2 (3/2 pi w R*) with JKR (Thornton 1991, J. Phys. D 24:1942; Marshall 2009).
 
+A spring that makes no energy. The normal force does not know of the tangential spring; so whatever that comes to hold,
+U = S_t u^2 / 2, has to be done as work along the slip. As a changes without slip there is no work. With u kept
+("displacement") U follows a up and down: slip, closing, slip back, parting makes (S_2 - S_1) u^2 / 2. With S_t u kept
+as a grows ("rescaled") U = (S_t u)^2 / 2 S_t falls then, too: every change of a takes energy, slip at one a takes none,
+and no order of the two makes any. Rolling and twisting likewise, whose stiffnesses go with a and a^3. The contact
+radius of the step before is that of the overlap less what has closed since, known to third order in the step: it needs
+no memory.
+A rescaled spring also turns with its pair, at its full length: by the least turn that brings the normal of the step
+before to n, then about n by the mean of both spins. With m the middle of both normals, the first is u - (u n) m for a
+vector across the normal, and two reflections, across m and across n, for any. The displacement spring is projected onto
+the plane of n, and does not turn about n.
+
 In time. Velocities live half a step behind positions.
 - The normal dashpot wants d' at the time of the force. A contact remembers ``past`` = (m* v + dt F) / 2 of the step
   before; with a = (v - v_before) / dt the last relative acceleration, whoever caused it, and the change of the pair's
@@ -33,8 +49,10 @@ In time. Velocities live half a step behind positions.
   end, f the share of the step for which the pair has touched.
 - The slip of a step is taken across the normal m at the step's middle, where the velocity is, with the arms of then,
   and laid into the plane of n. With m = n - h v_t, h = dt / 2 |x_i - x_j| and v_t what of v = v_i - v_j is across n, it
-  is (1 + h v n) v_t - W x n, W the spins times their arms, but for terms of second order in h and for -h (W n) v_t x n,
-  which is left out: nor is the spring turned with a pair that turns about its own normal.
+  is (1 + h v n) v_t - W x n - h (W n) v_t x n, W the spins times their arms, but for terms of second order in h. The
+  last is left out where the spring does not turn about n either ("displacement").
+- A rescaled spring is turned and rescaled with half of the step's slip in it, the other half comes after: right to
+  second order, and of no more energy than the work, as F_t changes by the mean S_t of the step while a grows.
 The dashpots of friction, rolling and twisting see the half-step velocity.
 """
 
@@ -152,8 +170,9 @@ def adhesive_range(p: Template, radius):
 
 @ti.func
 def contact_force(
-    p: Template, n, v_n, v_t, overlap, radius, mass, onset, dt, u: Template, tensile: Template, cohesion: Template
-):
+    p: Template, n, v_n, v_t, overlap, radius, mass, onset, dt, u: Template, tensile: Template, cohesion: Template,
+    rescaled: Template, closed, middle, angle,
+):  # fmt: skip
     """Force on the first of a pair, without rolling.
 
     ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v_n`` the rate at which the first moves away
@@ -161,8 +180,11 @@ def contact_force(
     ones, ``onset`` from ``onset_of``, ``dt`` the time since the last force; 0 where forces are computed anew, which
     leaves the history alone. ``u`` the history, updated in place: tangential displacement [m] and ``past`` [kg m/s], 0
     for a new contact.
+    For a ``rescaled`` spring: what the overlap has gained over the step, ``closed`` [m]; the middle of both normals,
+    ``middle``, whose part along n is 1; and how far the pair has turned about it, ``angle`` [rad].
     Returns (normal force [N], what of it is the dashpot's [N], tangential force vector [N], tangential stiffness [N/m],
-    contact radius [m], sqrt(m* S_n), load that presses the surfaces together [N]).
+    contact radius [m], sqrt(m* S_n), load that presses the surfaces together [N], contact radius of the step before
+    over that of now, at most 1).
     """
     a = ti.sqrt(radius * overlap)
     spring = a * 0.0
@@ -193,13 +215,30 @@ def contact_force(
 
     k_t = p[_EIGHT_G] * a
     c_t = p[_TANGENTIAL_DAMPING] * root
-    stretch = u.xyz + dt * v_t
-    stretch -= stretch.dot(n) * n
+    grown = a * 0.0 + 1.0
+    stretch = u.xyz
+    if ti.static(rescaled):
+        before = overlap - ti.max(closed, 0.0)
+        if ti.static(cohesion == JKR):
+            if closed > 0.0:
+                a_before, _ = jkr_force(p[_TWO_E], p[_PI_W], before, radius)
+                grown = a_before / a
+        else:
+            # sqrt(before / overlap), within x^3 / 32 of it, x the share of the overlap that is new.
+            before = ti.max(before, 0.0)
+            grown = (overlap + 3.0 * before) / (3.0 * overlap + before)
+        half = (0.5 * dt) * v_t
+        stretch += half
+        across = stretch - stretch.dot(n) * middle
+        stretch = grown * ((1.0 - 0.5 * angle * angle) * across + angle * n.cross(stretch)) + half
+    else:
+        stretch += dt * v_t
+        stretch -= stretch.dot(n) * n
     f_t, share = bounded(k_t, c_t, stretch, v_t, p[_FRICTION] * ti.abs(load))
     if dt > 0.0:
         u.xyz = share * stretch
         u.w = 0.5 * (momentum + dt * f_n)
-    return f_n, f_n - spring, f_t, k_t, a, root, load
+    return f_n, f_n - spring, f_t, k_t, a, root, load, grown
 
 
 @ti.func
@@ -231,18 +270,31 @@ def bounded(stiffness, damping, stretch, rate, bound):
 
 
 @ti.func
-def turning_torque(p: Template, n, spin, load, k_t, a, radius, root, dt, q: Template):
+def turning_torque(
+    p: Template, n, spin, load, k_t, a, radius, root, dt, q: Template, rescaled: Template, grown, middle, angle
+):
     """Rolling and twisting torque on the first of a pair [N m].
 
     ``spin`` the relative angular velocity, ``load`` what presses the surfaces together [N], ``a`` the contact radius
     [m], ``root`` sqrt(m* S_n), ``q`` the angle turned [rad], updated in place: its normal part is twisting, the rest
     rolling. The dampings are shares of the critical one for the inertia 2/5 m* R*^2; as S_t is a fixed multiple of S_n,
-    they come from ``root`` without another root.
+    they come from ``root`` without another root. The rest is as ``contact_force`` has it.
     """
-    q += spin * dt
     spin_n = spin.dot(n)
-    twist = q.dot(n)
-    roll = q - twist * n
+    twist = spin_n * 0.0
+    roll = spin
+    if ti.static(rescaled):
+        q += (0.5 * dt) * spin
+        across = (4.0 - 2.0 * middle.norm_sqr()) * q.dot(middle)
+        twist = across - q.dot(n)
+        q -= across * middle
+        roll = grown * ((1.0 - 0.5 * angle * angle) * (q + twist * n) + angle * n.cross(q))
+        roll += (0.5 * dt) * (spin - spin_n * n)
+        twist = grown * grown * grown * twist + (0.5 * dt) * spin_n
+    else:
+        q += spin * dt
+        twist = q.dot(n)
+        roll = q - twist * n
     force = ti.abs(load)
 
     k_r = k_t * radius * radius

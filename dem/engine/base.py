@@ -77,6 +77,7 @@ class BedBase:
             largest_skin=largest_skin,
             rolling=stuff.rolling_friction > 0,
             tensile=settings.tensile,
+            rescaled=stuff.tangential == "rescaled",
             cohesion=COHESIONS[stuff.cohesion],
             real=ti.f64 if precision == "float64" else ti.f32,
             gpu=arch == "cuda",

@@ -62,6 +62,7 @@ class Build:
         capacity: grains that there is room for, at most 2^26. cell_capacity, chunk_capacity: likewise.
         neighbours_per_grain: rows of the pair lists for each.
         rolling: whether contacts carry a rolling spring. tensile: whether a contact's damping may pull at its end.
+        rescaled: whether a contact's springs are (``dem.contact.law``).
         cohesion: a law of ``dem.contact.cohesion.COHESIONS``. real: ti.f64 or ti.f32.
         gpu: one grain a chunk. threads: of the CPU.
     """
@@ -72,6 +73,7 @@ class Build:
     neighbours_per_grain: int = 16
     rolling: bool
     tensile: bool
+    rescaled: bool
     cohesion: int
     real: Any
     gpu: bool
@@ -158,6 +160,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
     def __init__(self, build: Build):
         self.real = real = build.real
         self.rolling, self.tensile, self.cohesion, self.gpu = build.rolling, build.tensile, build.cohesion, build.gpu
+        self.rescaled = build.rescaled
         self.cpu_items = build.threads * ITEMS_PER_THREAD
         self.block_stride = SCAN_BLOCKS if self.gpu else build.threads
         capacity, chunk_capacity = build.capacity, build.chunk_capacity

@@ -97,13 +97,23 @@ class Pairs(EnginePart):
         h = 0.5 * dt * by_length
         back = 0.25 * dt * v_n
         turning = (arm_i - back) * w_i + (arm_j - back) * w_j
+        closed = dt * (h * v_t.norm_sqr() - v_n)
+        middle = n
+        if ti.static(self.rescaled):
+            lean = (h * (1.0 + 2.0 * h * v_n)) * v_t
+            middle = n - lean
+            turning += turning.dot(n) * lean
+        angle = (0.5 * dt) * (w_i + w_j).dot(middle)
         v_t = (1.0 + h * v_n) * v_t - turning.cross(n)
-        f_n, damped, f_t, k_t, a, root, load = contact_force(
-            p, n, v_n, v_t, overlap, radius, mass, onset, dt, u, self.tensile, self.cohesion
-        )
+        f_n, damped, f_t, k_t, a, root, load, grown = contact_force(
+            p, n, v_n, v_t, overlap, radius, mass, onset, dt, u, self.tensile, self.cohesion,
+            self.rescaled, closed, middle, angle,
+        )  # fmt: skip
         turn = d * 0.0
         if ti.static(self.rolling):
-            turn = turning_torque(p, n, w_i - w_j, load, k_t, a, radius, root, dt, q)
+            turn = turning_torque(
+                p, n, w_i - w_j, load, k_t, a, radius, root, dt, q, self.rescaled, grown, middle, angle
+            )
         return n, f_n, damped, f_t, turn, arm_i, arm_j, overlap * by_sum
 
     @ti.func

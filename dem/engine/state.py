@@ -27,9 +27,10 @@ from .values import BedSettings, State
 
 __all__ = ["BedState", "Checkpoint", "adopt", "laid_end_to_end", "read_file", "touching_pairs", "whole_file"]
 
-STATE_FORMAT = "hedgebed-bed/3"
-# Before there was cohesion, and before contacts remembered their last step; these files can still be read.
-STATE_FORMATS = ("hedgebed-bed/1", "hedgebed-bed/2", STATE_FORMAT)
+STATE_FORMAT = "hedgebed-bed/4"
+# Before there was cohesion, before contacts remembered their last step, and before springs were rescaled; these files
+# can still be read.
+STATE_FORMATS = ("hedgebed-bed/1", "hedgebed-bed/2", "hedgebed-bed/3", STATE_FORMAT)
 
 MATERIAL_NUMBERS = ("density", "young", "poisson", "friction", "restitution", "rolling_friction", "surface_energy")
 GRAIN_FIELDS = Engine.GRAIN_FIELDS
@@ -37,7 +38,7 @@ BODY_FIELDS = (*Engine.BODY_FIELDS, "overlap", "pushes")
 NEAR_FIELDS = ("near_grain", "near_body", "near_slide", "near_roll")
 LIST_NAMES = ("pair_count", "pair", "slide", "near_count", *NEAR_FIELDS)
 NAMES = (*GRAIN_FIELDS, *BODY_FIELDS, *LIST_NAMES, "numbers", "reals")
-ABOUT = ("material", "material_numbers", "cohesion", "size", "height", "tensile", "seed", "precision")
+ABOUT = ("material", "material_numbers", "cohesion", "tangential", "size", "height", "tensile", "seed", "precision")
 
 
 # What lists are made with, and what a step makes anew: nothing of it is read before it is written.
@@ -200,6 +201,7 @@ class BedState(BedBodies):
             "material": np.array(stuff.name),
             "material_numbers": np.array([getattr(stuff, key) for key in MATERIAL_NUMBERS]),
             "cohesion": np.array(stuff.cohesion),
+            "tangential": np.array(stuff.tangential),
             "size": np.array(self.size),
             "height": np.array(self.settings.height),
             "tensile": np.array(self.settings.tensile),
@@ -265,18 +267,22 @@ def read_file(path: Path) -> tuple[BedSettings, State, str]:
     if found == STATE_FORMATS[0] and "material_numbers" in stored:
         stored["material_numbers"] = np.append(stored["material_numbers"], 0.0)
         stored["cohesion"] = np.array("none")
+    if found in STATE_FORMATS[:3]:
+        stored["tangential"] = np.array("displacement")
     missing = [key for key in (*ABOUT, *(f"state.{name}" for name in NAMES)) if key not in stored]
     if missing:
         raise ValueError(f"{path} is not a whole bed saved by hedgebed: it lacks {', '.join(missing)}")
     numbers: Any = dict(zip(MATERIAL_NUMBERS, map(float, stored["material_numbers"]), strict=True))
     state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
-    if found != STATE_FORMAT:
+    if found in STATE_FORMATS[:2]:
         for key in ("slide", "near_slide"):  # 0: as of a contact that has just begun
             state[key] = np.pad(state[key], ((0, 0), (0, 1)))
     seed = int(stored["seed"])
     (x, y, z), (gx, gy, gz) = map(float, stored["size"]), map(float, state["reals"][2:5])
     settings = BedSettings(
-        material=Material(str(stored["material"]), cohesion=str(stored["cohesion"]), **numbers),
+        material=Material(
+            str(stored["material"]), cohesion=str(stored["cohesion"]), tangential=str(stored["tangential"]), **numbers
+        ),
         size=(x, y, z),
         gravity=(gx, gy, gz),
         time_step=float(state["reals"][0]),

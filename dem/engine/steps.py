@@ -101,14 +101,16 @@ class Steps(EnginePart):
         result = ti.cast(0.0, self.real)
         if overlap > -self.body_range(b, x.w, curvature):
             arm_i = x.w - overlap
-            v_n, v_t, spin, parting = self.near_rates(i, b, n, curvature, arm, arm_i, dt)
+            v_n, v_t, spin, parting, middle = self.near_rates(i, b, n, curvature, arm, arm_i, dt)
+            angle = (0.5 * dt) * (self.spin[i].xyz + self.body_spin[b]).dot(middle)
             radius = x.w / (1.0 + x.w * curvature)
             p = self.body_pair[b]
             u = self.near_slide[s]
             onset = onset_of(v_n, overlap, dt, u.w, self.cohesion)
-            f_n, damped, f_t, k_t, a, root, load = contact_force(
-                p, n, v_n, v_t, overlap, radius, self.velocity[i].w, onset, dt, u, self.tensile, self.cohesion
-            )
+            f_n, damped, f_t, k_t, a, root, load, grown = contact_force(
+                p, n, v_n, v_t, overlap, radius, self.velocity[i].w, onset, dt, u, self.tensile, self.cohesion,
+                self.rescaled, -dt * parting, middle, angle,
+            )  # fmt: skip
             self.near_slide[s] = u
             f = f_n * n + f_t
             t = arm_i * f_t.cross(n)
@@ -116,7 +118,9 @@ class Steps(EnginePart):
             turn = ti.Vector.zero(self.real, 3)
             if ti.static(self.rolling):
                 q = self.near_roll[s]
-                turn = turning_torque(p, n, spin, load, k_t, a, radius, root, dt, q)
+                turn = turning_torque(
+                    p, n, spin, load, k_t, a, radius, root, dt, q, self.rescaled, grown, middle, angle
+                )
                 self.near_roll[s] = q
                 t += turn
                 t_body -= turn
@@ -135,7 +139,7 @@ class Steps(EnginePart):
             if ti.static(balance.on):
                 before = balance.near_last[s]
                 if before.norm_sqr() > 0.0:
-                    v_n, v_t, spin, parting = self.near_rates(i, b, n, curvature, arm, x.w - overlap, dt)
+                    v_n, v_t, spin, parting, _ = self.near_rates(i, b, n, curvature, arm, x.w - overlap, dt)
                     balance.add(c, balance.took(before, balance.nothing(), parting, v_t, spin, dt))
                     balance.near_last[s] = balance.nothing()
             self.near_slide[s] = ti.Vector.zero(self.real, 4)
@@ -144,7 +148,7 @@ class Steps(EnginePart):
 
     @ti.func
     def near_rates(self, i, b, n, curvature, arm, arm_i, dt):
-        """How fast a grain parts from a body, slides on it and turns, and the first across the middle normal.
+        """How fast a grain parts from a body, slides on it and turns, the first across the middle normal, and that.
 
         As the body sees the grain; then half a step ago, where the velocities are: the normal, and the arms.
         """
@@ -153,12 +157,16 @@ class Steps(EnginePart):
         path = self.velocity[i].xyz - self.body_velocity[b]
         v = path - body_spin.cross(arm + arm_i * n)
         v_n = v.dot(n)
-        turning = body_spin.cross(n) + (curvature / (1.0 + curvature * arm_i)) * (v - v_n * n)
+        bent = curvature / (1.0 + curvature * arm_i)
+        turning = body_spin.cross(n) + bent * (v - v_n * n)
         middle = n - 0.5 * dt * turning
         v += 0.5 * dt * body_spin.cross(path)
+        # To second order, for springs that turn with the normal; the middle one is right to first.
+        turning = body_spin.cross(n) + (bent * (1.0 + dt * bent * v_n)) * (v - v.dot(n) * n)
+        lean = 0.5 * dt * (turning - 0.5 * dt * body_spin.cross(turning))
         v -= (arm_i - 0.5 * dt * v_n) * (w_i - body_spin).cross(middle)
         v_t = v - v.dot(n) * middle
-        return v_n, v_t, w_i - body_spin, v.dot(middle)
+        return v_n, v_t, w_i - body_spin, v.dot(middle), n - lean + lean.dot(n) * n
 
     @ti.kernel
     def run(

@@ -13,6 +13,7 @@ rolling_friction = 0.2      # 0 if not given
 cohesion = "dmt"            # "none" if not given
 surface_energy = 0.3        # [J/m2]; with cohesion
 grain = 0.004               # the mean diameter for which surface_energy holds [m]; for every one if not given
+tangential = "displacement" # the springs of friction and rolling; "displacement" if not given
 [sources]                   # where each number comes from, in words
 friction = "..."
 ```
@@ -43,6 +44,7 @@ MATERIAL_FORMAT = "hedgebed-material/1"
 _NAME = re.compile(r"[a-z0-9][a-z0-9._+-]*")
 
 COHESIONS = ("none", "dmt", "jkr")  # The laws of cohesion, see ``dem.contact.cohesion``
+TANGENTIAL = ("rescaled", "displacement")  # The springs of friction and rolling, see ``dem.contact.law``
 LEAST_RESTITUTION = 0.01
 LEAST_ROLLING = 1e-9
 """A rolling friction that resists nothing [1]: with none at all rolling is left out of a bed, on its bodies as well."""
@@ -57,6 +59,7 @@ class Material:
         cohesion: "none", "dmt" or "jkr" (``dem.contact.cohesion``).
         surface_energy: gamma [J/m2], half the work of adhesion of two grains; 0 without cohesion.
         grain: mean diameter of the grains for which ``surface_energy`` holds [m], see ``for_grain``; None: of all.
+        tangential: the springs of friction and rolling, "rescaled" or "displacement" (``dem.contact.law``).
 
     Raises ValueError: a number that no material can have, with the key and what is allowed.
     """
@@ -71,6 +74,7 @@ class Material:
     cohesion: str = "none"
     surface_energy: float = 0.0
     grain: float | None = field(default=None, compare=False)
+    tangential: str = "displacement"
     sources: dict[str, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self):
@@ -87,12 +91,13 @@ class Material:
         for key in ("friction", "rolling_friction"):
             if not 0 <= getattr(self, key) < math.inf:
                 refuse(key, "0 or more")
-        if self.cohesion not in COHESIONS:
-            near = difflib.get_close_matches(str(self.cohesion).lower(), COHESIONS, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ValueError(
-                f"material {self.name!r}: cohesion = {self.cohesion!r} is no law; there is {', '.join(COHESIONS)}{hint}"
-            )
+        for key, value, laws in (("cohesion", self.cohesion, COHESIONS), ("tangential", self.tangential, TANGENTIAL)):
+            if value not in laws:
+                near = difflib.get_close_matches(str(value).lower(), laws, n=1)
+                hint = f"; did you mean {near[0]!r}?" if near else ""
+                raise ValueError(
+                    f"material {self.name!r}: {key} = {value!r} is no law; there is {', '.join(laws)}{hint}"
+                )
         if self.cohesion == "none":
             if self.surface_energy != 0:
                 refuse("surface_energy", "0 without a law of cohesion; set cohesion to 'dmt' or 'jkr' [J/m2]")
@@ -231,7 +236,8 @@ def _read(path: Path) -> Material:
 def _of_its_kind(path: Path, key: str, value: Any) -> Any:
     """The value of a key of a file, a number as a float. Raises ValueError where it is of another kind."""
     texts, numbers = (str, "a text"), (int | float, "a number")
-    kinds = {"name": texts, "cohesion": texts, "sources": (dict, "a table of texts, one for each number")}
+    kinds = dict.fromkeys(("name", "cohesion", "tangential"), texts)
+    kinds["sources"] = (dict, "a table of texts, one for each number")
     kind, wanted = kinds.get(key, numbers)
     fits = isinstance(value, kind) and not isinstance(value, bool)
     if not fits or (kind is dict and not all(isinstance(text, str) for text in value.values())):

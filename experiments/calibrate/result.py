@@ -24,7 +24,7 @@ Values = Mapping[str, float]
 """Of the parameters, by name."""
 Measured = tuple[float, float | None] | None
 """Value and standard error of a figure; None where it could not be measured."""
-_UNSOURCED = ("name", "cohesion", "grain")
+_UNSOURCED = ("name", "cohesion", "grain", "tangential")
 
 
 @dataclass(frozen=True)

@@ -175,8 +175,8 @@ class CalibrateSettings(StrictSettings):
         if numbers.get("cohesion") == "none":
             numbers["surface_energy"] = 0.0
         for key, value in numbers.items():
-            if isinstance(value, str) != (key == "cohesion"):
-                raise ValueError(f"fixed.{key} = {value!r} must be a {'text' if key == 'cohesion' else 'number'}")
+            if isinstance(value, str) != (text := key in ("cohesion", "tangential")):
+                raise ValueError(f"fixed.{key} = {value!r} must be a {'text' if text else 'number'}")
         sources = {key: f"as {found.name}: {text}" for key, text in found.sources.items()}
         sources |= {key: self.sources.get(key, "given") for key in self.fixed}
         return Material(**(kept | numbers | {"name": self.name, "grain": None, "sources": sources}))

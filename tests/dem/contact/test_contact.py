@@ -195,6 +195,8 @@ def test_an_unknown_law_of_cohesion_is_refused_and_the_nearest_offered():
         Material(**GOOD, cohesion="JRK", surface_energy=0.1)
     with pytest.raises(ValueError, match=r"cohesion = 'glue' is no law; there is none, dmt, jkr$"):
         Material(**GOOD, cohesion="glue")
+    with pytest.raises(ValueError, match=r"tangential = 'rescale' is no law; .*did you mean 'rescaled'\?"):
+        Material(**GOOD, tangential="rescale")
     for value in (0.0, -0.1, math.nan, math.inf):
         with pytest.raises(ValueError, match=f"surface_energy = {value} must be positive with cohesion 'jkr'"):
             Material(**GOOD, cohesion="jkr", surface_energy=value)
