@@ -242,6 +242,18 @@ def contact_force(
 
 
 @ti.func
+def springs_hold(p: Template, n, overlap, radius, u, q, cohesion: Template):
+    """What a contact's springs hold [J]: the tangential one; the rolling and the twisting one. As ``contact_force``."""
+    a = ti.sqrt(radius * ti.max(overlap, 0.0))
+    if ti.static(cohesion == JKR):
+        a, _ = jkr_force(p[_TWO_E], p[_PI_W], overlap, radius)
+    half = 0.5 * p[_EIGHT_G] * a
+    twist = q.dot(n)
+    turned = radius * radius * (q.norm_sqr() - twist * twist) + 0.5 * a * a * twist * twist
+    return half * u.xyz.norm_sqr(), half * turned
+
+
+@ti.func
 def onset_of(v_n, overlap, dt, past, cohesion: Template):
     """What the normal dashpot is multiplied by: 1, or more in the step in which a pair came to touch.
 

@@ -15,7 +15,7 @@ from dem.grains.materials import material as find_material
 from dem.shapes.basic import Plane
 
 from .base import FLOOR, check_array
-from .dissipation import PARTS, TURNED, Balance
+from .dissipation import FRICTION, PARTS, TURNED, Balance
 from .state import BedState, laid_end_to_end
 from .stress import find_contacts
 from .values import BedSettings, Grains, State
@@ -255,6 +255,17 @@ class BedCore(BedState):
         """
         sums = self._balance().sums()
         return {part: float(sums[part]) for part in PARTS}
+
+    @property
+    def friction_work(self) -> dict[str, float]:
+        """What friction, rolling and twisting took since ``track_contact_work``, contact by contact and step by step.
+
+        Of each contact the work done against its tangential force, or its torques, over a step, less what its spring
+        came to hold [J]. tangential_lost, turning_lost: the sums of what is positive. tangential_made, turning_made:
+        of what is negative, energy that the law makes. Raises ValueError: it is not tracked.
+        """
+        sums = self._balance().sums()
+        return {part: float(sums[part]) for part in FRICTION}
 
     def _balance(self) -> Balance:
         if not self.engine.balance.on:

@@ -6,6 +6,9 @@ over it is minus the mean of the part before and after, times that velocity, tim
 before. Three parts: the normal dashpot, the tangential force (its spring included), the rolling and twisting torque
 (likewise). What the springs hold, ``dem.engine.energy`` reads off; less that, the last two are friction.
 
+Friction is kept contact by contact as well: what a contact's part took over a step, less what its spring came to hold
+over it, is *lost* where it is positive and *made* where it is negative. A law without a fault makes nothing.
+
 Beside it stands the balance of angular momentum about the bed's origin: what the bodies took, and what reaches grains
 from outside, which is weight, contacts across the periodic sides (the torques on a pair whose neighbour is an image do
 not cancel but leave the period x F), grains put back into the box at its other side, and sleepers (what those awake do
@@ -18,19 +21,23 @@ import itertools
 
 import numpy as np
 
+from dem.contact.law import springs_hold
 from hedgebed_taichi import ti
 
 from .lists import INDEX_BITS, INDEX_MASK, SAME_IMAGE
 from .rows import Rows, Zeroes
-from .values import EnginePart
+from .values import EnginePart, State
 
-__all__ = ["OUTSIDE", "PARTS", "TURNED", "BalanceKernels", "Balance"]
+__all__ = ["FRICTION", "OUTSIDE", "PARTS", "TURNED", "BalanceKernels", "Balance"]
 
 PARTS = ("damping", "tangential", "turning")
+FRICTION = ("tangential_lost", "tangential_made", "turning_lost", "turning_made")
 TURNED = ("outside", "first_body", "bodies")
 OUTSIDE, FIRST, OTHERS = range(3)
-# Of a row of ``last``: the normal dashpot's force, the tangential force, the turning torque.
-_WIDTH = 7
+# Of a row of ``last``: the normal dashpot's force, the tangential force, the turning torque, what the springs of the
+# last two hold; less than nothing where that is not known.
+_WIDTH = 9
+_HELD = 7
 
 
 @ti.data_oriented
@@ -46,25 +53,38 @@ class Balance:
         self.last, self.old_last = (F(_WIDTH, real, rows) for _ in range(2))
         self.near_last, self.old_near_last = (F(_WIDTH, real, near) for _ in range(2))
         self.taken = F(len(PARTS), ti.f64, chunks)
+        self.rubbed = F(len(FRICTION), ti.f64, chunks)
         # Angular impulses about the bed's origin: from outside, to the first body (the floor, where there is one), to
         # the other bodies; and gravity.
         self.turned = F(3, ti.f64, (chunks, len(TURNED)))
         self.pull = F(3, ti.f64, ())
-        self._zeroes = Zeroes(self.last, self.near_last, self.taken, self.turned)
+        self._zeroes = Zeroes(self.last, self.near_last, self.taken, self.rubbed, self.turned)
 
     def clear(self) -> None:
         """A new balance: no sums, nothing remembered."""
         self._zeroes.put()
 
     def sums(self) -> dict[str, np.ndarray]:
-        """Over all chunks, in their order: work by ``PARTS`` [J], and angular impulses by ``TURNED`` [N m s], [3]."""
-        found = (np.cumsum(field.to_numpy(), axis=0)[-1] for field in (self.taken, self.turned))
-        return dict(zip(PARTS + TURNED, itertools.chain(*found), strict=True))
+        """Over all chunks, in their order: work by ``PARTS`` and ``FRICTION`` [J], and angular impulses by ``TURNED``
+        [N m s], [3]."""
+        found = (np.cumsum(field.to_numpy(), axis=0)[-1] for field in (self.taken, self.rubbed, self.turned))
+        return dict(zip(PARTS + FRICTION + TURNED, itertools.chain(*found), strict=True))
 
     @staticmethod
     def rows(pairs: np.ndarray, near: np.ndarray) -> dict[str, Rows]:
         """Rows of the fields that its next step depends on; ``pairs``, ``near``: those of the lists in use."""
-        return {"last": pairs, "near_last": near, "taken": slice(None), "turned": slice(None)}
+        whole = dict.fromkeys(("taken", "rubbed", "turned"), slice(None))
+        return {"last": pairs, "near_last": near, **whole}
+
+    @staticmethod
+    def of_today(values: State, *, prefix: str) -> State:
+        """The fields of a state; of one from before friction was kept by contact, with what springs held unknown."""
+        found = dict(values)
+        for name in (f"{prefix}last", f"{prefix}near_last"):
+            missing = _WIDTH - found[name].shape[1]
+            found[name] = np.pad(found[name], ((0, 0), (0, missing)), constant_values=-1.0)
+        found.setdefault(f"{prefix}rubbed", np.zeros((len(found[f"{prefix}taken"]), len(FRICTION))))
+        return found
 
     @ti.func
     def nothing(self):
@@ -72,9 +92,17 @@ class Balance:
         return ti.Vector.zero(self.real, _WIDTH)
 
     @ti.func
-    def parts(self, damped, f_t, turn):
+    def parts(self, damped, f_t, turn, held_t, held_r):
         """A row of ``last``."""
-        return ti.Vector([damped, f_t.x, f_t.y, f_t.z, turn.x, turn.y, turn.z])
+        return ti.Vector([damped, f_t.x, f_t.y, f_t.z, turn.x, turn.y, turn.z, held_t, held_r])
+
+    @ti.func
+    def seen_from(self, sign, row):
+        """A row of ``last`` as the second grain of a pair has it, where ``sign`` is -1."""
+        other = sign * row
+        for k in ti.static((0, _HELD, _HELD + 1)):
+            other[k] = row[k]
+        return other
 
     @ti.func
     def took(self, before, now, v_n, v_t, spin, dt):
@@ -85,9 +113,15 @@ class Balance:
         )
 
     @ti.func
-    def add(self, c, took):
-        """To a chunk's sums."""
-        self.taken[c] = self.taken[c] + ti.cast(took, ti.f64)
+    def add(self, c, share, before, now, took):
+        """To a chunk's sums: ``share`` of what the parts of a row took."""
+        self.taken[c] = self.taken[c] + ti.cast(share * took, ti.f64)
+        # All zero: a contact that has just begun, which takes next to nothing, or one that has just woken.
+        if before[_HELD] >= 0.0 and before.norm_sqr() > 0.0:
+            for k in ti.static(range(2)):
+                lost = ti.cast(share * (took[1 + k] - (now[_HELD + k] - before[_HELD + k])), ti.f64)
+                self.rubbed[c][2 * k] = self.rubbed[c][2 * k] + ti.max(lost, 0.0)
+                self.rubbed[c][2 * k + 1] = self.rubbed[c][2 * k + 1] + ti.max(-lost, 0.0)
 
     @ti.func
     def turn(self, c, which: ti.template(), impulse):
@@ -112,8 +146,11 @@ class BalanceKernels(EnginePart):
         half = 0.5 * (self.position[i].w + self.position[j].w - length) + 0.25 * dt * v_n
         w_i, w_j = self.spin[i].xyz, self.spin[j].xyz
         turning = (self.position[i].w - half) * w_i + (self.position[j].w - half) * w_j
+        if ti.static(self.rescaled):
+            turning += turning.dot(n) * h * v_t
+        before = balance.last[s]
         took = balance.took(
-            balance.last[s], now, v_n - h * v_t.norm_sqr(), (1.0 + h * v_n) * v_t - turning.cross(n), w_i - w_j, dt
+            before, now, v_n - h * v_t.norm_sqr(), (1.0 + h * v_n) * v_t - turning.cross(n), w_i - w_j, dt
         )
         balance.last[s] = now
         # Across chunks both sides have a row; a sleeper has none.
@@ -123,7 +160,19 @@ class BalanceKernels(EnginePart):
         if ti.static(rest.on):
             if j >= self.count[self.AWAKE]:
                 share = ti.cast(1.0, self.real)
-        balance.add(c, share * took)
+        balance.add(c, share, before, now, took)
+
+    @ti.func
+    def pair_row(self, s, i, j, d, n, damped, f_t, turn, balance: ti.template()):
+        """A row of ``Balance.last``: of the pair in row ``s``."""
+        r_i, r_j = self.position[i].w, self.position[j].w
+        q = d * 0.0
+        if ti.static(self.rolling):
+            q = self.roll[s]
+        held_t, held_r = springs_hold(
+            self.grain_pair[None], n, r_i + r_j - d.norm(), r_i * r_j / (r_i + r_j), self.slide[s], q, self.cohesion
+        )
+        return balance.parts(damped, f_t, turn, held_t, held_r)
 
     @ti.func
     def balance_weight(self, c, dt, balance: ti.template()):

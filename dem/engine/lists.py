@@ -439,9 +439,7 @@ class Lists(EnginePart):
         if ti.static(balance.on):
             balance.last[s] = balance.nothing()
             if old >= 0:
-                last = sign * balance.old_last[old]
-                last[0] = sign * last[0]  # the normal part is the same from either side
-                balance.last[s] = last
+                balance.last[s] = balance.seen_from(sign, balance.old_last[old])
 
     @ti.func
     def list_near(self, c, start, end, skin, shapes: ti.template(), rest: ti.template(), balance: ti.template()):

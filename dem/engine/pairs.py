@@ -246,7 +246,8 @@ class Pairs(EnginePart):
                 self.torque[j] = self.torque[j] + (arm_j * t - turn)
         if ti.static(balance.on):
             d = self.apart(self.position[i], self.position[j], bits)
-            self.balance_pair(c, s, i, j, d, balance.parts(damped, f_t, turn), dt, rest, balance)
+            now = self.pair_row(s, i, j, d, n, damped, f_t, turn, balance)
+            self.balance_pair(c, s, i, j, d, now, dt, rest, balance)
             self.balance_turning(c, bits, f, f_t, turn, n, arm_j, dt, rest, balance)
         held = ti.Vector.zero(self.real, 3)
         if ti.static(rest.on):

@@ -132,7 +132,8 @@ class BedState(BedBodies):
         if "ledger_taken" in values:
             x, y, z = (float(v) for v in values["reals"][2:5])
             e.open_balance((x, y, z))
-            write_fields(e.balance, e.balance.rows(rows, near), "ledger_", values)
+            kept = e.balance.of_today(values, prefix="ledger_")
+            write_fields(e.balance, e.balance.rows(rows, near), "ledger_", kept)
         numbers = [int(v) for v in values["numbers"]]
         self.steps, bodies, self.list_count, self.steps_since_lists, self.reaction_steps, floor = numbers
         self.has_floor, self.tallied, self.sleeper = bool(floor), None, None

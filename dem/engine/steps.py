@@ -3,7 +3,7 @@
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
-from dem.contact.law import contact_force, onset_of, turning_torque
+from dem.contact.law import contact_force, onset_of, springs_hold, turning_torque
 from hedgebed_taichi import ti
 
 from .lists import CACHE_LINE, FINISHED, ITEMS_PER_THREAD, QUEUE
@@ -131,8 +131,9 @@ class Steps(EnginePart):
                 self.pushes[c, b][k + 3] = self.pushes[c, b][k + 3] + t_body[k]
             result = overlap / (2.0 * x.w)
             if ti.static(balance.on):
-                now = balance.parts(damped, f_t, turn)
-                balance.add(c, balance.took(balance.near_last[s], now, parting, v_t, spin, dt))
+                held_t, held_r = springs_hold(p, n, overlap, radius, u, self.near_roll[s], self.cohesion)
+                now, before = balance.parts(damped, f_t, turn, held_t, held_r), balance.near_last[s]
+                balance.add(c, 1.0, before, now, balance.took(before, now, parting, v_t, spin, dt))
                 balance.near_last[s] = now
                 self.balance_body(c, i, b, f, t_body, n, arm, arm_i, dt, balance)
         else:
@@ -140,8 +141,9 @@ class Steps(EnginePart):
                 before = balance.near_last[s]
                 if before.norm_sqr() > 0.0:
                     v_n, v_t, spin, parting, _ = self.near_rates(i, b, n, curvature, arm, x.w - overlap, dt)
-                    balance.add(c, balance.took(before, balance.nothing(), parting, v_t, spin, dt))
-                    balance.near_last[s] = balance.nothing()
+                    now = balance.nothing()
+                    balance.add(c, 1.0, before, now, balance.took(before, now, parting, v_t, spin, dt))
+                    balance.near_last[s] = now
             self.near_slide[s] = ti.Vector.zero(self.real, 4)
             self.near_roll[s] = ti.Vector.zero(self.real, 3)
         return result

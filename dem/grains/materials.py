@@ -236,8 +236,8 @@ def _read(path: Path) -> Material:
 def _of_its_kind(path: Path, key: str, value: Any) -> Any:
     """The value of a key of a file, a number as a float. Raises ValueError where it is of another kind."""
     texts, numbers = (str, "a text"), (int | float, "a number")
-    kinds = dict.fromkeys(("name", "cohesion", "tangential"), texts)
-    kinds["sources"] = (dict, "a table of texts, one for each number")
+    known = (dict, "a table of texts, one for each number")
+    kinds = {"name": texts, "cohesion": texts, "tangential": texts, "sources": known}
     kind, wanted = kinds.get(key, numbers)
     fits = isinstance(value, kind) and not isinstance(value, bool)
     if not fits or (kind is dict and not all(isinstance(text, str) for text in value.values())):

@@ -1,5 +1,7 @@
 """The engine's book of what contacts take, against one kept outside it and against the first law."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,3 +54,23 @@ def test_what_is_held_and_what_was_taken_is_the_first_energy_to_second_order(law
 def test_a_bed_without_a_book_says_how_to_open_one():
     with pytest.raises(ValueError, match=r"tracks no contact work.*track_contact_work\(\) starts it"):
         _ = cluster(ROUGH, time_step=4e-6).contact_work
+
+
+def made(bed):
+    """What friction, and rolling with twisting, made over what they took."""
+    work = bed.friction_work
+    return np.array([work[f"{part}_made"] / work[f"{part}_lost"] for part in ("tangential", "turning")])
+
+
+def test_rescaled_springs_make_no_energy_in_a_cluster_and_displacement_springs_do():
+    """Sixteen grains that collide, slide and roll; what is lost, less what is made, is what the book has."""
+    found = {}
+    for law in ("rescaled", "displacement"):
+        _, _, sliding, turning, held, wound = accounts(
+            bed := cluster(replace(ROUGH, tangential=law), time_step=4e-6), parts=4, every=250
+        )
+        work, found[law] = bed.friction_work, made(bed)
+        for part, own in (("tangential", sliding - held), ("turning", turning - wound)):
+            assert work[f"{part}_lost"] - work[f"{part}_made"] == pytest.approx(own[-1], rel=2e-3), part
+    assert found["rescaled"].max() < 1e-3
+    assert found["displacement"].max() > 5e-3
