@@ -18,7 +18,10 @@ __all__ = [
     "BENCH", "DIAMETER", "SPREAD", "Grains", "coordination", "packing", "prepare_grains", "wrapped", "write_data",
 ]  # fmt: skip
 
-BENCH = Material("bench", density=2600.0, young=5e7, poisson=0.3, friction=0.5, restitution=0.5)
+# The spring of friction as the peers have it in the race.
+BENCH = Material(
+    "bench", density=2600.0, young=5e7, poisson=0.3, friction=0.5, restitution=0.5, tangential="displacement"
+)
 """What the peers' decks have as well."""
 DIAMETER, SPREAD = 0.004, 0.1  # [m], [1]
 SEED = 1

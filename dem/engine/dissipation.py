@@ -116,12 +116,12 @@ class Balance:
     def add(self, c, share, before, now, took):
         """To a chunk's sums: ``share`` of what the parts of a row took."""
         self.taken[c] = self.taken[c] + ti.cast(share * took, ti.f64)
-        # All zero: a contact that has just begun, which takes next to nothing, or one that has just woken.
-        if before[_HELD] >= 0.0 and before.norm_sqr() > 0.0:
-            for k in ti.static(range(2)):
-                lost = ti.cast(share * (took[1 + k] - (now[_HELD + k] - before[_HELD + k])), ti.f64)
-                self.rubbed[c][2 * k] = self.rubbed[c][2 * k] + ti.max(lost, 0.0)
-                self.rubbed[c][2 * k + 1] = self.rubbed[c][2 * k + 1] + ti.max(-lost, 0.0)
+        # All zero: a contact that has just begun, or woken; of the second what it held before is not known.
+        known = before[_HELD] >= 0.0 and before.norm_sqr() > 0.0
+        for k in ti.static(range(2)):
+            lost = ti.cast(share * (took[1 + k] - (now[_HELD + k] - before[_HELD + k])), ti.f64)
+            self.rubbed[c][2 * k] = self.rubbed[c][2 * k] + ti.max(lost, 0.0)
+            self.rubbed[c][2 * k + 1] = self.rubbed[c][2 * k + 1] + ti.select(known, ti.max(-lost, 0.0), 0.0)
 
     @ti.func
     def turn(self, c, which: ti.template(), impulse):

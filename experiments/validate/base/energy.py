@@ -6,6 +6,7 @@ against 2/5 k delta^2.5, which it meets to second order in the step; what dashpo
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +70,11 @@ class _Springs:
     def stored(self) -> float:
         return 0.5 * float(self.stiffness @ (self.stretch**2).sum(axis=1))
 
+    def turn(self, grown: Array, turned: Callable[[Array], Array], rate: Array, dt: float) -> None:
+        """Rescaled and turned over a step, with half of what is added to it by ``load`` in it."""
+        half = 0.5 * dt * rate
+        self.stretch = grown[:, None] * turned(self.stretch + half) - half
+
     def load(self, stiffness: Array, damping: Array, rate: Array, bound: Array, dt: float) -> Array:
         """A step on: the force of each, shape [pair, 3]."""
         self.stiffness = stiffness
@@ -79,6 +85,36 @@ class _Springs:
         self.stretch[stiffness == 0] = 0.0
         force = -stiffness[:, None] * self.stretch
         return within(force - np.where(slides, 0.0, damping)[:, None] * rate, bound)
+
+
+@dataclass(frozen=True)
+class _Turn:
+    """How pairs turn over a step, to second order: their normals by twice ``lean``, and about them by the mean of both
+    spins; ``turned``: the sum of the spins times the step, shape [pair, 3] as all."""
+
+    normals: Array
+    lean: Array
+    turned: Array
+
+    @property
+    def angle(self) -> Array:
+        """About the normals, shape [pair, 1]."""
+        return 0.5 * np.asarray((self.turned * (self.normals - self.lean)).sum(axis=1))[:, None]
+
+    def about(self, u: Array) -> Array:
+        """Vectors across the normals, turned about them."""
+        return (1 - 0.5 * self.angle**2) * u + self.angle * np.cross(self.normals, u)
+
+    def whole(self, u: Array) -> Array:
+        """Turned with the normals: by reflections across the middle ones and the present ones."""
+        middle = self.normals - self.lean
+        u = u - 2 * (u * middle).sum(axis=1)[:, None] / (middle**2).sum(axis=1)[:, None] * middle
+        return u - 2 * (u * self.normals).sum(axis=1)[:, None] * self.normals
+
+    def across(self, u: Array) -> Array:
+        """Vectors across the normals, turned with and about them."""
+        with_them = u - (u * self.normals).sum(axis=1)[:, None] * (self.normals - self.lean)
+        return (1 - 0.5 * self.angle**2) * with_them + self.angle * np.cross(self.normals, u)
 
 
 class _Dashpot:
@@ -116,6 +152,7 @@ class _Contacts:
         self.star, self.shear = effective_moduli(stuff.young, stuff.poisson, stuff.young, stuff.poisson)
         self.factor = damping_factor(stuff.restitution, tensile=tensile)
         self.mu, self.mu_r = stuff.friction, stuff.rolling_friction
+        self.rescaled = stuff.tangential == "rescaled"
         self.period = np.array(bed.size[:2])
         self.i, self.j = np.triu_indices(bed.grain_count, 1)
         self.slide, self.roll, self.twist = (_Springs(len(self.i)) for _ in range(3))
@@ -139,23 +176,37 @@ class _Contacts:
         self.arm, self.normal, self.damped = arm, f_n, f_n - elastic
         self.f_t, self.torque = np.zeros((2, *normals.shape))
         # Half a step ago, where the velocities are, the normal was this and the arm longer by what it has lost since.
-        middle = normals - 0.5 * took * (path - v_n[:, None] * normals) / length[:, None]
+        lean = 0.5 * took * (path - v_n[:, None] * normals) / length[:, None]
+        middle, turn = normals - lean, _Turn(normals, lean * (1 + took * v_n / length)[:, None], took * (w[i] + w[j]))
+        # What the overlap was a step ago, where it has grown; the share is that of contact radii.
+        closed = 2 * length * (lean**2).sum(axis=1) - took * v_n
+        before = np.maximum(0.0, overlap - np.maximum(0.0, closed))
+        grown = (overlap + 3 * before) / np.where(touching, 3 * overlap + before, 1.0)
         if mu > 0:
             back = arm - 0.25 * took * v_n
-            v_t = path - v_n[:, None] * middle - np.cross(back[:, None] * (w[i] + w[j]), normals)
-            v_t = np.where(touching[:, None], v_t, 0.0)
+            slid = path - v_n[:, None] * middle
+            v_t = slid - np.cross(back[:, None] * (w[i] + w[j]), normals - turn.lean if self.rescaled else normals)
+            v_t = np.where(touching[:, None], flat(v_t, normals) if self.rescaled else v_t, 0.0)
             damping = factor * math.sqrt(4 * self.shear / self.star) * root
-            self.slide.stretch = flat(self.slide.stretch, normals)
+            if self.rescaled:
+                self.slide.turn(grown, turn.across, v_t, took)
+            else:
+                self.slide.stretch = flat(self.slide.stretch, normals)
             self.f_t = self.slide.load(k_t, damping, v_t, mu * np.abs(f_n), took)
         if self.mu_r > 0:
             spin = np.where(touching[:, None], w[i] - w[j], 0.0)
             along = (spin * normals).sum(axis=1)[:, None] * normals
             share = 2 * TURNING_DAMPING_RATIO * math.sqrt(0.4 * self.mass) * self.radius
             k_r, k_w = k_t * self.radius**2, 0.5 * k_t * a * a
-            # One angle is kept for both, so that what the normal turns into changes hands.
-            angle = self.roll.stretch + self.twist.stretch
-            self.twist.stretch = (angle * normals).sum(axis=1)[:, None] * normals
-            self.roll.stretch = angle - self.twist.stretch
+            if self.rescaled:
+                whole = turn.whole(self.roll.stretch + self.twist.stretch + 0.5 * took * spin)
+                twisted = (whole * normals).sum(axis=1)[:, None] * normals
+                self.roll.stretch = grown[:, None] * turn.about(whole - twisted) - 0.5 * took * (spin - along)
+                self.twist.stretch = grown[:, None] ** 3 * twisted - 0.5 * took * along
+            else:  # one angle is kept for both, so that what the normal turns into changes hands
+                angle = self.roll.stretch + self.twist.stretch
+                self.twist.stretch = (angle * normals).sum(axis=1)[:, None] * normals
+                self.roll.stretch = angle - self.twist.stretch
             bound = self.mu_r * self.radius * np.abs(f_n)
             self.torque = self.roll.load(k_r, share * np.sqrt(k_r), spin - along, bound, took)
             bound = 3 * math.pi / 16 * mu * a * np.abs(f_n)

@@ -23,7 +23,7 @@ from . import say
 __all__ = ["CASES", "Setup", "grains"]
 
 DATA = Path(__file__).parents[1] / "dosta_data" / "25KParticles.txt.gz"
-STUFF = Material("dosta", 2500.0, 1e9, 0.2, 0.3, 0.5)
+STUFF = Material("dosta", 2500.0, 1e9, 0.2, 0.3, 0.5, tangential="displacement")  # as the codes of the paper
 BALL_DENSITY, BALL_YOUNG, BALL_POISSON, BALL_FRICTION, BALL_RESTITUTION = 7200.0, 210e9, 0.2, 0.2, 0.4
 BALL_RADIUS, GRAVITY = 0.01, 9.8
 SPEED, THROWN_FROM = 5.0, 0.06

@@ -44,7 +44,7 @@ __all__ = ["CASES", "Assembly", "dense", "pairs"]
 Array = np.ndarray
 _SMOOTH, _UNDAMPED = "e = 0.5, no friction", "e = 1, friction 0.5"
 _STICKING, _SLIDING = "e = 0.5, friction 50", "e = 0.5, friction 0.5"
-_GRAIN = partial(Material, "peers", 2600.0, 5e7, 0.3)
+_GRAIN = partial(Material, "peers", 2600.0, 5e7, 0.3, tangential="displacement")  # as `history` and `mindlin` are
 LAWS = {
     _SMOOTH: _GRAIN(friction=0.0, restitution=0.5),
     _UNDAMPED: _GRAIN(friction=0.5, restitution=1.0),
