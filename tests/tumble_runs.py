@@ -25,13 +25,13 @@ def prepare_small(on_bed, *_):
     return small_bed(on_bed.settings)
 
 
-def small_bed(settings, material=SAND):
+def small_bed(settings, stuff=SAND):
     """Two layers of large grains, almost at rest."""
     d, rows, columns = 6e-3, 32 // settings.bed_repeats, 6
     low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(columns)]
     high = [((i + 1.0) * d, (j + 1.0) * d, 0.5 * d + d * math.sqrt(0.5)) for i in range(rows) for j in range(columns)]
     bed = Bed.from_grains(
-        material, positions=np.array(low + high), radii=np.full(2 * rows * columns, 0.5 * d), young=1e7, max_overlap=0.1,
+        stuff, positions=np.array(low + high), radii=np.full(2 * rows * columns, 0.5 * d), young=1e7, max_overlap=0.1,
         size=(rows * d, columns * d, 0.03), height=0.3, threads=1, gravity=9.80665,
     )  # fmt: skip
     bed.advance(1000)
