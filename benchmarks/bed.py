@@ -1,12 +1,13 @@
-"""``hedgebed bench bed``: the bed of grains against LIGGGHTS and LAMMPS, on the same grains, doing the same work.
+"""``hedgebed bench bed``: the bed of grains against LIGGGHTS, LAMMPS and YADE, on the same grains, with the same work.
 
 The entrants run in turn, several rounds, in one go, because a machine drifts; medians are quoted. The first round has
-every skin of the peers' neighbour lists; a peer goes on with its fastest, and with any that is nearly as fast. What is
-only shown (other laws, rolling, one thread, float32) runs once. A peer whose bed ends up in another state than ours did
+every skin of the peers' neighbour lists; a peer goes on with its fastest, and with any that is nearly as fast, and not
+at all where it is slower than half the fastest. There are two races in one: without rolling resistance and with it.
+What is only shown (other laws, one thread, float32) runs once. A peer whose bed ends up in another state than ours did
 other work: it is said, and not counted.
 
 For quick trials, in the environment: HEDGEBED_BENCH_SIZES (as in "20000 100000"), HEDGEBED_BENCH_ROUNDS,
-HEDGEBED_BENCH_STEPS (timed ones), HEDGEBED_BENCH_SHOWN=0 (nothing that is only shown).
+HEDGEBED_BENCH_STEPS (timed ones), HEDGEBED_BENCH_SHOWN=0 (nothing that is only shown, and no rolling).
 
 ``--limit``: a loop in plain C races as well, where there is a compiler, and shows how far the machine goes.
 ``--profile``: no race; where the time of a step goes (``benchmarks/race/profile.py``).
@@ -23,7 +24,7 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 from benchmarks.race import entrants, table
-from benchmarks.race.entrants import LAMMPS, LIGGGHTS, WARM_STEPS, Entrant, Heat, Ours, Peer, Theirs
+from benchmarks.race.entrants import LAMMPS, LIGGGHTS, WARM_STEPS, YADE, Entrant, Heat, Ours, Peer, Theirs, Yade
 from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
 from benchmarks.race.machine import begin_timing, environment_numbers, wide_console
 from benchmarks.race.profile import profile_bed
@@ -37,6 +38,7 @@ _USUAL_SKIN = 2e-4  # for what is only shown [m]
 COORDINATION_BOUND, PACKING_BOUND = 0.01, 0.002  # the same work: this much off ours, at most [1]
 REPEATS = 30  # of each kernel of a profile
 _CLOSE = 0.85  # a skin this near to the fastest stays in the race
+_HOPELESS = 0.5  # a peer slower than this share of the fastest leaves it
 # For the plan: grain-steps a second, and what settling takes.
 _EXPECTED_SPEED, _SETTLING_STEPS = 1e7, 40_000
 
@@ -142,19 +144,21 @@ def _race_all(bench: Json, settings: Settings, cores: int, progress: Any) -> Non
         progress.message(remark)
     progress.plan(dict(_plan(settings, with_peers=bool(peers))))
     bench |= {
-        "peers": {peer.name: None for peer in (LIGGGHTS, LAMMPS)}, "unit": "grain steps per second",
-        "rounds": settings.rounds, "ratios": {}, "limits": {}, "beds": [],
+        "peers": {peer.name: None for peer in PEERS}, "unit": "grain steps per second", "rounds": settings.rounds,
+        "ratios": {}, "rolling_ratios": {}, "limits": {}, "beds": [],
     }  # fmt: skip
     for count in settings.sizes:
         bed, lanes = _race(count, settings, peers, cores, progress, remarks)
-        best = pick_best(lanes)
-        ran = {"best_peer": best.label if best else None, "entrants": [lane.as_dict() for lane in lanes]}
+        best = {rolling: pick_best(lanes, rolling=rolling) for rolling in (False, True)}
+        labels = [lane.label if lane else None for lane in best.values()]
+        ran = {"best_peer": labels[0], "best_rolling_peer": labels[1], "entrants": [lane.as_dict() for lane in lanes]}
         bench["beds"].append(bed | ran)
-        ours, theirs = lanes[0].speed, best and best.speed
-        bench["ratios"][str(count)] = ours / theirs if ours and theirs else None
+        bench["ratios"][str(count)] = _ratio(lanes[0], best[False])
+        rolling = [lane for lane in lanes if lane.entrant.ours and lane.entrant.rolling]
+        if rolling:
+            bench["rolling_ratios"][str(count)] = _ratio(rolling[0], best[True])
         if settings.limit:
-            fastest = pick_best(lanes, of="limit")
-            bench["limits"][str(count)] = ours / fastest.speed if ours and fastest and fastest.speed else None
+            bench["limits"][str(count)] = _ratio(lanes[0], pick_best(lanes, of="limit"))
         for lane in lanes:
             if lane.heats and isinstance(lane.entrant, Theirs):
                 bench["peers"][lane.entrant.peer.name] = lane.heats[-1].version
@@ -176,17 +180,23 @@ def _profile(bench: Json, settings: Settings, cores: int, progress: Any) -> None
         bench["remarks"] += [remark for remark in said if remark not in bench["remarks"]]
 
 
+def _ratio(ours: Lane, other: Lane | None) -> float | None:
+    """Our speed over another's; None where one has none."""
+    return ours.speed / other.speed if other and ours.speed and other.speed else None
+
+
 def _find_peers() -> tuple[list[Peer], list[str]]:
     """The peers that can race, and what is to be said of the others."""
-    peers = [peer for peer in (LIGGGHTS, LAMMPS) if peer.find()]
+    peers = [peer for peer in PEERS if peer.find()]
     remarks = [
         f"{peer.name} is not installed and is left out (apt install {peer.package})"
-        for peer in (LIGGGHTS, LAMMPS) if peer not in peers
+        for peer in PEERS if peer not in peers
     ]  # fmt: skip
-    if peers and not shutil.which("mpirun"):
-        names = " and ".join(peer.name for peer in peers)
+    by_mpi = [peer for peer in peers if peer is not YADE]
+    if by_mpi and not shutil.which("mpirun"):
+        names = " and ".join(peer.name for peer in by_mpi)
         remarks.append(f"mpirun is not installed, so {names} cannot use all cores: left out (apt install openmpi-bin)")
-        peers = []
+        peers = [peer for peer in peers if peer is YADE]
     return peers, remarks
 
 
@@ -196,7 +206,7 @@ def _plan(settings: Settings, *, with_peers: bool) -> Iterator[tuple[str, float]
         heat = count * (WARM_STEPS + settings.steps_for(count)) / _EXPECTED_SPEED
         yield f"{count:,} grains: bed", count * _SETTLING_STEPS / _EXPECTED_SPEED
         for k in range(1, settings.rounds + 1):
-            lanes = 6 + 4 * settings.shown if k == 1 else 3
+            lanes = 6 + 8 * settings.shown if k == 1 else 3 + 3 * settings.shown
             yield f"{count:,} grains: round {k}", heat * (1 + with_peers * lanes)
         if settings.shown:
             yield f"{count:,} grains: float32, one thread", 3 * heat
@@ -217,29 +227,30 @@ def _race(
         "coordination_before": coordination(grains),
     }  # fmt: skip
     ours = Lane(Ours(grains, threads=cores))
+    rolling = [Lane(Ours(grains, threads=cores, rolling=True))] if settings.shown else []
     with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as name:
         folder = Path(name)
         write_data(folder / "bed.data", grains)
         theirs = [Lane(entrant) for peer in peers for entrant in _theirs(peer, grains, folder, cores)]
-        racing = [lane for lane in theirs if lane.entrant.counted]
-        rolling = [Lane(Ours(grains, threads=cores, rolling=True))] if settings.shown else []
+        racing = [lane for lane in theirs if lane.entrant.counted and not lane.entrant.rolling]
+        against = [lane for lane in theirs if lane.entrant.counted and lane.entrant.rolling and rolling]
         shown = [lane for lane in theirs if not lane.entrant.counted and settings.shown]
         limits = _limits(grains, folder, cores, remarks) if settings.limit else []
-        staying = [ours, *racing, *limits, *rolling, *shown]
+        staying = [ours, *racing, *limits, *rolling, *against, *shown]
         for k in range(1, settings.rounds + 1):
             _heats(f"{of}round {k}", staying, steps, progress)
             if ours.failure:
                 raise RuntimeError(f"our own bed did not get through the race: {ours.failure}")
-            staying = [ours, *_leaders(racing), *_leaders(limits)]
+            staying = [ours, *_leaders(racing), *_leaders(limits), *rolling, *_leaders(against)]
     alone = []
     if settings.shown:
         # These start Taichi anew, which ends the beds of before.
         alone = [Lane(Ours(grains, threads=cores, precision="float32")), Lane(Ours(grains, threads=1))]
         _heats(f"{of}float32, one thread", alone, steps, progress)
-    _check_work(ours, [*alone, *racing, *limits, *(lane for lane in shown if not lane.entrant.rolling)])
+    _check_work(ours, [*alone, *racing, *limits, *shown])
     for lane in rolling:
-        _check_work(lane, [lane for lane in shown if lane.entrant.rolling])
-    return bed, [ours, *alone, *rolling, *racing, *limits, *shown]
+        _check_work(lane, against)
+    return bed, [ours, *alone, *racing, *shown, *limits, *rolling, *against]
 
 
 def _limits(grains: Grains, folder: Path, threads: int, remarks: list[str]) -> list[Lane]:
@@ -268,36 +279,43 @@ def _heats(stage: str, lanes: list[Lane], steps: int, progress: Any) -> None:
         progress.message(f"{lane.label}: {went}")
 
 
+PEERS = (LIGGGHTS, LAMMPS, YADE)
 _LAWS = {
     LIGGGHTS: (
-        ("hertz/history", False, {"roll": ""}),
-        ("hertz/history with rolling (epsd2)", True, {"roll": "rolling_friction epsd2"}),
+        ("hertz/history", True, False, {"roll": ""}),
+        ("hertz/history with rolling (epsd2)", True, True, {"roll": "rolling_friction epsd2"}),
     ),
     LAMMPS: (
-        ("granular hertz/material", False, {"law": "material"}),
-        ("gran/hertz/history", False, {"law": "history"}),
-        ("granular hertz/material with rolling (sds)", True, {"law": "rolling"}),
+        ("granular hertz/material", True, False, {"law": "material"}),
+        ("gran/hertz/history", False, False, {"law": "history"}),
+        ("granular hertz/material with rolling (sds)", True, True, {"law": "rolling"}),
     ),
+    YADE: (("Hertz-Mindlin", True, False, {}),),
 }
-"""Each peer's laws, whether they resist rolling, and variables of its deck; the first can be the best."""
+"""Each peer's laws, whether they can be the best, whether they resist rolling, and variables of its deck."""
 
 
 def _theirs(peer: Peer, grains: Grains, folder: Path, ranks: int) -> Iterator[Theirs]:
-    """A peer's entrants: those that can be the best, then those that are shown beside."""
-    for k, (law, rolling, variables) in enumerate(_LAWS[peer]):
-        for skin in (_USUAL_SKIN,) if k else SKINS:
-            yield Theirs(
+    """A peer's entrants: those that can be the best with every skin, but for YADE, which is slow."""
+    kind = Yade if peer is YADE else Theirs
+    for law, counted, rolling, variables in _LAWS[peer]:
+        for skin in SKINS if counted and peer is not YADE else (_USUAL_SKIN,):
+            yield kind(
                 peer, f"{peer.name} {law}", grains, folder=folder, data="bed.data", ranks=ranks, skin=skin,
-                counted=k == 0, rolling=rolling, variables=variables,
+                counted=counted, rolling=rolling, variables=variables,
             )  # fmt: skip
 
 
 def _leaders(racing: list[Lane]) -> list[Lane]:
-    """Of each peer the fastest skin, and those close to it."""
+    """Of each peer the fastest skin, and those close to it; of one that has no chance none."""
     fastest: dict[str, float] = {}
     for lane in racing:
         fastest[lane.entrant.name] = max(fastest.get(lane.entrant.name, 0.0), lane.speed or 0.0)
-    return [lane for lane in racing if lane.speed is not None and lane.speed >= _CLOSE * fastest[lane.entrant.name]]
+    least = _HOPELESS * max(fastest.values(), default=0.0)
+    return [
+        lane for lane in racing
+        if lane.speed is not None and lane.speed >= max(least, _CLOSE * fastest[lane.entrant.name])
+    ]  # fmt: skip
 
 
 def _check_work(ours: Lane, lanes: list[Lane]) -> None:
@@ -316,15 +334,19 @@ def _check_work(ours: Lane, lanes: list[Lane]) -> None:
         lane.other_work = ", ".join(found)
 
 
-def pick_best(lanes: list[Lane], *, of: Literal["counted", "limit"] = "counted") -> Lane | None:
+def pick_best(
+    lanes: list[Lane], *, of: Literal["counted", "limit"] = "counted", rolling: bool = False
+) -> Lane | None:  # fmt: skip
     """The fastest of the peers that count, or of the C loop's, that did the same work; None if there is none."""
     chosen = (lane for lane in lanes if (lane.entrant.counted if of == "counted" else lane.entrant.limit))
-    fit = [lane for lane in chosen if lane.speed is not None and not lane.other_work]
-    return max(reversed(fit), key=lambda lane: lane.speed or 0.0, default=None)
+    fit = [lane for lane in chosen if lane.entrant.rolling == rolling and lane.speed is not None]
+    return max(
+        reversed([lane for lane in fit if not lane.other_work]), key=lambda lane: lane.speed or 0.0, default=None
+    )
 
 
 def _remarks(lane: Lane) -> Iterator[str]:
     if lane.failure:
         yield f"{lane.label}: {lane.failure}"
-    elif lane.other_work and not lane.entrant.rolling:
+    elif lane.other_work:
         yield f"{lane.label} did other work than ours ({lane.other_work}) and is not counted"

@@ -4,9 +4,12 @@ An entrant does the same thing however often it is asked: the same grains, at re
 that are not timed, then the timed ones.
 """
 
+import json
+import math
 import os
 import re
 import shutil
+import subprocess
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -18,8 +21,8 @@ from experiments.runs.types import Json
 from experiments.validate.base.peers import PEERS, Peer, PeerError, run_deck
 
 __all__ = [
-    "LAMMPS", "LIGGGHTS", "TIME_STEP", "WARM_STEPS", "Entrant", "Heat", "Ours", "Peer", "PeerError", "Theirs",
-    "read_log", "run_peer",
+    "LAMMPS", "LIGGGHTS", "TIME_STEP", "WARM_STEPS", "YADE", "Entrant", "Heat", "Ours", "Peer", "PeerError", "Theirs",
+    "Yade", "read_log", "read_yade", "run_peer",
 ]  # fmt: skip
 
 TIME_STEP = 1e-5  # [s]
@@ -32,6 +35,7 @@ _SLOWEST = 1e5
 _START = 60.0  # for a peer to read its bed [s]
 _HERE = Path(__file__).resolve().parent
 LIGGGHTS, LAMMPS = PEERS["liggghts"], PEERS["lammps"]
+YADE = Peer("YADE", ("yade",), "yade")
 
 
 @dataclass(frozen=True)
@@ -185,20 +189,61 @@ class Theirs(Entrant):
     ):  # fmt: skip
         self.peer, self.name, self.counted, self.rolling = peer, name, counted, rolling
         self.skin, self.threads, self._grains, self._folder = skin, ranks, grains, folder
-        self._variables = {"in": data, "skin": f"{skin:g}", **variables}
+        self._data, self._variables = data, variables
 
     def heat(self, steps: int) -> Heat:
-        work = self._grains.count * (WARM_STEPS + steps)
-        variables = {**self._variables, "warm": str(WARM_STEPS), "steps": str(steps)}
-        limit = _START + work / (_SLOWEST * self.threads)
-        outcome, command = run_peer(self.peer, self._folder, ranks=self.threads, variables=variables, limit=limit)
-        if outcome.grain_count != self._grains.count or outcome.steps != steps:
+        grains = self._grains
+        limit = _START + grains.count * (WARM_STEPS + steps) / (_SLOWEST * self.threads)
+        outcome, command = self._run(steps, limit)
+        if outcome.grain_count != grains.count or outcome.steps != steps:
             raise RuntimeError(
                 f"{self.name} ran {outcome.steps} steps of {outcome.grain_count} grains; "
-                f"{steps} of {self._grains.count} were wanted"
+                f"{steps} of {grains.count} were wanted"
             )
-        share = packing(self._grains.solid_volume, outcome.period, outcome.mean_height)
+        share = packing(grains.solid_volume, outcome.period, outcome.mean_height)
         return Heat(
             outcome.grain_count * outcome.steps / outcome.time, outcome.list_count, outcome.coordination, share,
             outcome.kinetic_energy, outcome.version, " ".join(word or "''" for word in command), outcome.missed,
         )  # fmt: skip
+
+    def _run(self, steps: int, limit: float) -> tuple[Outcome, list[str]]:
+        variables = {"in": self._data, "skin": f"{self.skin:g}", **self._variables}
+        variables |= {"warm": str(WARM_STEPS), "steps": str(steps)}
+        return run_peer(self.peer, self._folder, ranks=self.threads, variables=variables, limit=limit)
+
+
+class Yade(Theirs):
+    """YADE: one process with threads, and a script of its Python."""
+
+    def _run(self, steps: int, limit: float) -> tuple[Outcome, list[str]]:
+        out, program = self._folder / "yade.json", self.peer.find()
+        if program is None:
+            raise PeerError(self.peer.missing)
+        out.unlink(missing_ok=True)
+        shutil.copyfile(_HERE / "bench_yade.py", self._folder / "bench_yade.py")
+        numbers = (f"{self.skin:g}", str(WARM_STEPS), str(steps))
+        command = [program, f"-j{self.threads}", "-x", "-n", "bench_yade.py", self._data, out.name, *numbers]
+        try:
+            done = subprocess.run(
+                command, cwd=self._folder, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
+                timeout=limit, check=False,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise PeerError(f"{self.name} was ended after {limit:.0f} s") from None
+        if done.returncode or not out.is_file():
+            last = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()[-1]
+            raise PeerError(f"{self.name} failed (exit status {done.returncode}): {last}")
+        return read_yade(out.read_text(encoding="utf-8")), command
+
+
+def read_yade(text: str) -> Outcome:
+    """What YADE's script wrote of its timed run. Raises PeerError where a number is missing or is not a number."""
+    try:
+        found = json.loads(text)
+        lx, ly = map(float, found.pop("period"))
+        outcome = Outcome(**found, period=(lx, ly))
+        if not (outcome.time > 0 and all(map(math.isfinite, (outcome.coordination, outcome.mean_height, lx, ly)))):
+            raise ValueError("a time or a length is no number")
+    except (ValueError, TypeError, KeyError) as problem:
+        raise PeerError(f"what YADE wrote cannot be read: {problem}") from None
+    return outcome

@@ -60,10 +60,12 @@ class Sheet:
 
 def rows(bed: Json) -> list[tuple[str, ...]]:
     """The rows of one bed of bench.json, one for each entrant, in the order of HEADINGS."""
-    return [_row(entrant, bed["entrants"][0]["speed"], bed["best_peer"]) for entrant in bed["entrants"]]
+    ours = {entrant["rolling"]: entrant["speed"] for entrant in reversed(bed["entrants"]) if entrant["ours"]}
+    best = (bed["best_peer"], bed.get("best_rolling_peer"))
+    return [_row(entrant, ours.get(entrant["rolling"]), best) for entrant in bed["entrants"]]
 
 
-def _row(entrant: Json, ours: float | None, best: str | None) -> tuple[str, ...]:
+def _row(entrant: Json, ours: float | None, best: tuple[str | None, ...]) -> tuple[str, ...]:
     speed, last = entrant["speed"], entrant["heats"][-1] if entrant["heats"] else {}
     return (
         entrant["name"] + ("" if entrant["precision"] == "float64" else f" {entrant['precision']}"),
@@ -80,13 +82,13 @@ def _row(entrant: Json, ours: float | None, best: str | None) -> tuple[str, ...]
     )
 
 
-def _remark(entrant: Json, best: str | None) -> str:
+def _remark(entrant: Json, best: tuple[str | None, ...]) -> str:
     if entrant["failure"]:
         return "failed"
     if entrant["other_work"]:
         return f"other work: {entrant['other_work']}"
-    if entrant["label"] == best:
-        return "best peer"
+    if entrant["label"] in best:
+        return "best peer with rolling" if entrant["rolling"] else "best peer"
     if entrant.get("limit"):
         return "how far the machine goes"
     return "" if entrant["counted"] or entrant["ours"] else "shown, not counted"
@@ -95,6 +97,8 @@ def _remark(entrant: Json, best: str | None) -> str:
 def _title(bed: Json, bench: Json) -> str:
     ratio = bench["ratios"][str(bed["grain_count"])]
     verdict = "no peer to race against" if ratio is None else f"hedgebed / best peer = {ratio:.2f}"
+    rolling = bench.get("rolling_ratios", {}).get(str(bed["grain_count"]))
+    verdict += "" if rolling is None else f", with rolling {rolling:.2f}"
     limit = bench.get("limits", {}).get(str(bed["grain_count"]))
     verdict += "" if limit is None else f", hedgebed / C loop = {limit:.2f}"
     return f"{bed['grain_count']:,} grains, {bed['steps']} timed steps: {verdict}"

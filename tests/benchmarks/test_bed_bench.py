@@ -13,14 +13,19 @@ from race_stacks import stack
 import benchmarks.bed as race
 from benchmarks.bed import Lane, Settings, pick_best
 from benchmarks.race import table
-from benchmarks.race.entrants import LIGGGHTS, Entrant, Heat, Ours, PeerError, read_log, run_peer
+from benchmarks.race.entrants import LIGGGHTS, Entrant, Heat, Ours, PeerError, read_log, read_yade, run_peer
 from benchmarks.race.grains import BENCH, DIAMETER, coordination, packing, prepare_grains, wrapped, write_data
 from benchmarks.race.yardstick import Yardstick, compile_yardstick
 from experiments.cli.benching import benchmark_options, spelled_out
 from experiments.cli.main import main
 from experiments.runs.progress import Progress
 
-PROGRAMS = {"liggghts": ("liggghts",), "lammps": ("lmp", "lammps"), "openmpi-bin": ("mpirun",)}
+PROGRAMS = {
+    "liggghts": ("liggghts",),
+    "lammps": ("lmp", "lammps"),
+    "openmpi-bin": ("mpirun",),
+    "yade": ("yade",),
+}
 MISSING = [package for package, names in PROGRAMS.items() if not any(map(shutil.which, names))]
 
 LIGGGHTS_LOG = """LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, compiled 2022-01-26 by someone, git commit unknown)
@@ -102,6 +107,30 @@ def test_the_timed_run_is_read_from_a_log_of_lammps():
 def test_a_log_that_lacks_something_is_refused(log, said):
     with pytest.raises(PeerError, match=said):
         read_log(log)
+
+
+def test_what_yade_wrote_is_read_and_refused_where_it_lacks_something():
+    told = {
+        "version": "2023.02a", "time": 0.5, "steps": 200, "grain_count": 1000, "list_count": 3, "missed": 0,
+        "kinetic_energy": 2.5e-5, "coordination": 4.036, "mean_height": 6.5e-3, "period": [0.044, 0.046],
+    }  # fmt: skip
+    outcome = read_yade(json.dumps(told))
+    assert (outcome.steps, outcome.coordination, outcome.period) == (200, 4.036, (0.044, 0.046))
+    for wrong in ({"time": 0.0}, {"coordination": math.nan}, {"period": [1]}, {"more": 1}):
+        with pytest.raises(PeerError, match="cannot be read"):
+            read_yade(json.dumps(told | wrong))
+    with pytest.raises(PeerError, match="cannot be read"):
+        read_yade(json.dumps({key: value for key, value in told.items() if key != "steps"}))
+
+
+def test_with_and_without_rolling_each_has_a_best_peer():
+    lanes = [lane("free", 6.0), lane("rolls", 9.0), lane("rolls too", 8.0)]
+    for one in lanes[1:]:
+        one.entrant.rolling = True
+    assert pick_best(lanes) is lanes[0]
+    assert pick_best(lanes, rolling=True) is lanes[1]
+    lanes[1].other_work = "coordination -1.4 %"
+    assert pick_best(lanes, rolling=True) is lanes[2]
 
 
 def test_a_peer_that_fails_is_quoted(tmp_path, monkeypatch):
@@ -263,8 +292,9 @@ def test_each_peer_goes_on_with_its_fastest_skin_and_those_near_to_it():
         lane("a", 8.0, skin=4e-4),
         lane("b", 1.0, skin=1e-4),
         lane("b", skin=2e-4),
+        lane("c", 6.0, skin=1e-4),
     ]
-    assert race._leaders(lanes) == [lanes[0], lanes[1], lanes[3]]
+    assert race._leaders(lanes) == [lanes[0], lanes[1], lanes[5]]  # b has no chance
 
 
 def test_an_option_that_stands_alone_means_yes():
@@ -329,8 +359,8 @@ def test_a_race_without_peers_has_null_ratios_and_says_who_was_missing(tiny, mon
     bench = json.loads(Path("b/bench.json").read_text())
     assert json.loads(shown.out) == bench
     assert (bench["format"], bench["what"], bench["ratios"]) == ("hedgebed-bench/1", "bed", {"320": None})
-    assert bench["peers"] == {"LIGGGHTS": None, "LAMMPS": None}
-    for name in ("LIGGGHTS", "LAMMPS"):
+    assert bench["peers"] == {"LIGGGHTS": None, "LAMMPS": None, "YADE": None}
+    for name in bench["peers"]:
         assert any(name in remark and "apt install" in remark for remark in bench["remarks"])
         assert name in shown.err
     (bed,) = bench["beds"]
@@ -353,8 +383,8 @@ def test_a_race_on_a_stack_finds_that_peers_do_the_same_work(tiny, tmp_path, mon
         monkeypatch.setattr("benchmarks.race.machine.cores_there", lambda: 2)
     bench = race.run(tmp_path / "b", progress=Progress())
     (bed,) = bench["beds"]
-    assert [entrant["failure"] for entrant in bed["entrants"]] == ["", "", ""]
-    assert [entrant["other_work"] for entrant in bed["entrants"]] == ["", "", ""]
+    assert {entrant["failure"] for entrant in bed["entrants"]} == {""}
+    assert {entrant["other_work"] for entrant in bed["entrants"]} == {""}
     assert bench["ratios"]["320"] > 0
     assert all(bench["peers"].values())
     assert "best peer" in capfd.readouterr().out
@@ -364,7 +394,7 @@ def test_a_race_on_a_stack_finds_that_peers_do_the_same_work(tiny, tmp_path, mon
     page = table.insert(f"before\n{marks[0]}\nold\n{marks[1]}\nafter\n", table.markdown(bench), marks)
     assert page.startswith("before\n") and page.endswith("after\n") and "old" not in page
     rows = [line for line in page.splitlines() if line.startswith("| ")]
-    assert len(rows) == 1 + 3
+    assert len(rows) == 1 + 4
     assert len({row.count("|") for row in rows}) == 1
 
 
@@ -381,4 +411,4 @@ def test_a_race_on_a_prepared_bed_finds_that_peers_do_the_same_work(tmp_path, mo
     for name, value in {"SIZES": "2000", "ROUNDS": "1", "STEPS": "200", "SHOWN": "0"}.items():
         monkeypatch.setenv(f"HEDGEBED_BENCH_{name}", value)
     bench = race.run(tmp_path / "b", progress=Progress())
-    assert [entrant["other_work"] for entrant in bench["beds"][0]["entrants"]] == [""] * 7
+    assert [entrant["other_work"] for entrant in bench["beds"][0]["entrants"]] == [""] * 8
