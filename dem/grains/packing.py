@@ -82,8 +82,8 @@ def curve_ranks(nx: int, ny: int, nz: int) -> np.ndarray:
             result |= ((a >> bit) & 1) << (3 * bit)
         return result
 
-    k, j, i = np.meshgrid(np.arange(nz), np.arange(ny), np.arange(nx), indexing="ij")
-    code = spread(i.ravel()) | spread(j.ravel()) << 1 | spread(k.ravel()) << 2
+    code = spread(np.arange(nz))[:, None, None] << 2 | spread(np.arange(ny))[:, None] << 1 | spread(np.arange(nx))
+    code = code.ravel()
     rank = np.empty(code.size, dtype=np.int32)
     rank[np.argsort(code, kind="stable")] = np.arange(code.size, dtype=np.int32)
     return rank
@@ -98,12 +98,14 @@ def packing_profile(heights: np.ndarray, radii: np.ndarray, area: float, edges: 
 
     Returns the packing fraction of each slab [1], shape [slab_count].
     """
-    below = np.empty(len(edges))
-    for k, z in enumerate(edges):
-        t = np.clip(z - heights, -radii, radii)
-        # Volume of a sphere below a plane at height t from its centre.
-        below[k] = (math.pi * (radii**2 * (t + radii) - (t**3 + radii**3) / 3)).sum()
+    below = np.array([_volumes_below(z, heights, radii).sum() for z in edges])
     return np.diff(below) / (area * np.diff(edges))
+
+
+def _volumes_below(z: float, heights: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Volume of each sphere below a plane [m3]."""
+    t = np.clip(z - heights, -radii, radii)
+    return math.pi * (radii**2 * (t + radii) - (t**3 + radii**3) / 3)
 
 
 def bulk_packing(heights: np.ndarray, radii: np.ndarray, area: float) -> float:
@@ -127,11 +129,20 @@ def surface_height(heights: np.ndarray, radii: np.ndarray, area: float, *, bulk:
     top = float((heights + radii).max())
     count = max(2, math.ceil(top / (0.05 * d)))
     edges = np.linspace(0.0, top, count + 1)
-    profile = packing_profile(heights, radii, area, edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    reached = np.flatnonzero(profile >= 0.5 * bulk)
-    k = int(reached[-1]) if len(reached) else len(profile) - 1
-    if k + 1 == len(profile):
+    # Slab by slab from the top; going down, only spheres that reach above the plane have another volume below it.
+    volumes = _volumes_below(top, heights, radii)
+    upper, above = volumes.sum(), math.nan
+    for k in range(count - 1, -1, -1):
+        cut = np.flatnonzero(edges[k] - heights < radii)
+        volumes[cut] = _volumes_below(edges[k], heights[cut], radii[cut])
+        lower = volumes.sum()
+        here = (upper - lower) / (area * (edges[k + 1] - edges[k]))
+        if here >= 0.5 * bulk:
+            break
+        upper, above = lower, here
+    else:
+        k = count - 1
+    if k + 1 == count:
         return top
-    above, below = profile[k + 1], profile[k]
-    return float(middle[k] + (below - 0.5 * bulk) / (below - above) * (middle[k + 1] - middle[k]))
+    return float(middle[k] + (here - 0.5 * bulk) / (here - above) * (middle[k + 1] - middle[k]))
