@@ -9,7 +9,7 @@ WORKERS ?= 2
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test fast long slow tiers cover validate experiments bench doctor format clean distclean
+.PHONY: help run test fast long slow tiers cover validate experiments bench gpu doctor format clean distclean
 
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
@@ -49,6 +49,9 @@ experiments: $(VENV)/.installed  ## the platform's experiments on grains that ha
 
 bench: $(VENV)/.installed  ## race the bed against LIGGGHTS and LAMMPS, as far as they are installed (WHAT=bed)
 	$(BIN)/hedgebed bench $(WHAT) $(ARGS)
+
+gpu: $(VENV)/.installed-test  ## on a machine with an NVIDIA GPU: the tests of beds there, and grain-steps per second; 10 minutes at most
+	$(BIN)/python -m benchmarks.gpu $(ARGS)
 
 doctor: $(VENV)/.installed  ## what this machine has, and what to install where something lacks
 	$(BIN)/hedgebed doctor

@@ -5,6 +5,7 @@ import tomllib
 from collections import Counter
 from pathlib import Path
 
+import engine_pool
 import golden
 import pytest
 from hypothesis import settings
@@ -56,6 +57,8 @@ def pytest_configure(config):
 def pytest_collection_modifyitems(items):
     heavy = heavy_files(tomllib.loads(DURATIONS.read_text(encoding="utf-8")))
     for item in items:
+        if engine_pool.ARCH != "cpu" and (mark := item.get_closest_marker("cpu_only")):
+            item.add_marker(pytest.mark.skip(reason=f"{mark.args[0]}: on a CPU only"))
         if item.path.relative_to(ROOT).as_posix() in heavy:
             item.add_marker("heavy")
 

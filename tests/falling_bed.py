@@ -13,7 +13,9 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import engine_pool
 import numpy as np
+import pytest
 import solid_shapes
 
 import dem.engine.engine
@@ -85,6 +87,7 @@ def main() -> None:
     what, path, steps, threads = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     every = int(sys.argv[5]) if len(sys.argv) > 5 else steps
     dem.engine.engine.GRAINS_PER_CHUNK = GRAINS_PER_CHUNK
+    engine_pool.go_there(pytest.MonkeyPatch())
     cohesion = sys.argv[6] if len(sys.argv) > 6 else "none"
     body = sys.argv[7] if len(sys.argv) > 7 else "spike"
     sleep = len(sys.argv) > 8

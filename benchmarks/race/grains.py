@@ -52,7 +52,7 @@ class Grains:
         return 4 / 3 * math.pi * float((self.radii**3).sum())
 
 
-def prepare_grains(count: int, *, threads: int | None = None, progress: Any = None) -> Grains:
+def prepare_grains(count: int, *, threads: int | None = None, arch: str = "cpu", progress: Any = None) -> Grains:
     """Exactly ``count`` grains of a bed that ``Bed.prepare`` made or had in its cache: the lowest of slightly more.
 
     Raises ValueError for fewer than 250 grains, RuntimeError where the bed that was rained in had too few.
@@ -68,6 +68,7 @@ def prepare_grains(count: int, *, threads: int | None = None, progress: Any = No
         size = tuple(round(DIAMETER * length, 6) for length in (width, width, height))
         bed = Bed.prepare(
             BENCH, size=size, grain=DIAMETER, spread=SPREAD, young=BENCH.young, seed=SEED, threads=threads,
+            arch=arch,
             progress=progress,
         )  # fmt: skip
         if bed.grain_count >= count:

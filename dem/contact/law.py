@@ -186,7 +186,8 @@ def contact_force(
     contact radius [m], sqrt(m* S_n), load that presses the surfaces together [N], contact radius of the step before
     over that of now, at most 1).
     """
-    a = ti.sqrt(radius * overlap)
+    # Single precision on a GPU has a root that is no better than its last digit, and an overlap that may be below 0.
+    a = ti.sqrt(radius * ti.max(overlap, 0.0))
     spring = a * 0.0
     if ti.static(cohesion == JKR):
         a, spring = jkr_force(p[_TWO_E], p[_PI_W], overlap, radius)

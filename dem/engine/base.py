@@ -18,7 +18,7 @@ from hedgebed_taichi import ti
 
 from . import runtime
 from .checking import check_lists, check_step, debug_wanted, keep_histories
-from .engine import take_engine
+from .engine import Engine, take_engine
 from .lists import MOST_BODIES
 from .sleep import Sleep, Sleeper
 from .values import BedFailure, BedSettings, State
@@ -45,6 +45,9 @@ class BedBase:
         debug: whether all lists are checked against brute force, at every step (``dem.engine.checking``); as
             HEDGEBED_DEBUG=1 in the environment says, or set it.
     """
+
+    gpu_engine: type[Engine] = Engine
+    """The class of its engine on a GPU: ``dem.Bed`` has ``dem.gpu.engine.GpuEngine``."""
 
     def __init__(self, settings: BedSettings, radii: np.ndarray, *, precision: str, arch: str, threads: int | None):
         """Fields without grains in them; ``from_grains`` and the like check what they pass, and fill them."""
@@ -80,9 +83,9 @@ class BedBase:
             rescaled=stuff.tangential == "rescaled",
             cohesion=COHESIONS[stuff.cohesion],
             real=ti.f64 if precision == "float64" else ti.f32,
-            gpu=arch == "cuda",
+            gpu=self.runtime.arch == "cuda",
             threads=self.runtime.threads,
-            neighbours_per_grain=_rows_per_grain(radii, largest_skin, gpu=arch == "cuda"),
+            neighbours_per_grain=_rows_per_grain(radii, largest_skin, gpu=self.runtime.arch == "cuda"),
         )
         self.engine.grain_pair[None] = pair_row(stuff, tensile=settings.tensile)
         self.engine.write("body_turn", np.tile([1.0, 0.0, 0.0, 0.0], (MOST_BODIES, 1)))
@@ -267,7 +270,8 @@ class BedBase:
                 f"({x:.4g}, {y:.4g}, {z:.4g}) m, the box reaches from {e.bottom:.4g} to {self.height:.4g} m"
             )
         room, what = (e.chunk_room, "pairs") if code == 2 else (e.near_room, "grains near bodies")
-        return f"the lists have room for {room} {what} a chunk and {value} are needed; the grains overlap too much"
+        where = "" if e.gpu else " a chunk"
+        return f"the lists have room for {room} {what}{where} and {value} are needed; the grains overlap too much"
 
     def compute_forces(self, elapsed: float = 0.0) -> None:
         """Compute the forces where the grains are; ``elapsed``: the time by which contacts have slid since then."""
@@ -303,7 +307,7 @@ class BedBase:
         e.write("spin", np.column_stack([spins, np.zeros(self.grain_count)]))
         e.write("origin", positions)
         e.write("id", np.arange(self.grain_count))
-        e.write("near_end", np.arange(e.chunk_count) * e.near_room)
+        e.lay_near(np.zeros(0, dtype=np.int64), self.grain_count, e.chunk_count)
 
     def check_valid(self) -> None:
         """Raise RuntimeError where Taichi was started anew since the bed was made."""
@@ -336,9 +340,9 @@ def _reach(material: Material, radius: float) -> float:
 
 
 def _rows_per_grain(radii: np.ndarray, skin: float, *, gpu: bool) -> int:
-    """Rows of the pair lists for a grain: the most that fit around it (on a GPU) or around a mean one, with spare."""
+    """Rows of the pair lists for a mean grain, with spare; on a GPU both grains of a pair have one."""
     small, large = float(radii.min()), float(radii.max())
     # Caps of neighbours on a sphere: each takes a cone of half angle asin(r_s / (r_l + r_s + skin)).
     half = math.asin(small / (large + small + skin))
     most = math.ceil(2 / (1 - math.cos(half)))
-    return most + 4 if gpu else min(most + 4, 20)
+    return min(most * 9 // 16, 24) if gpu else min(most + 4, 20)

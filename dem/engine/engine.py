@@ -33,8 +33,8 @@ from . import runtime
 from .dissipation import Balance, BalanceKernels
 from .lists import ABSENT, CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
 from .pairs import Pairs
-from .readings import TALLY_BLOCKS, Readings
-from .rows import Zeroes, put_rows
+from .readings import Readings
+from .rows import Zeroes, put_rows, row_numbers
 from .shape_table import PLAIN, Shapes
 from .sleep_kernels import Rest, Sleepers
 from .steps import Steps
@@ -50,6 +50,7 @@ GRAINS_PER_CHUNK = 1250
 MOST_CHUNKS = 64
 AWAKE_SHARE = 0.64
 MOST_PRIMITIVES = 64
+LARGE = 1 << 18
 
 _free: dict[tuple, list] = {}
 
@@ -95,6 +96,7 @@ def take_engine(
     """An engine set up for ``owner``: one that an earlier owner has left, where there is one of the same build.
 
     Args:
+        owner: a bed; its ``gpu_engine`` is the class of an engine on a GPU.
         grain_count: number of grains. period: lateral period (x, y) [m].
         bottom, height: z of the box's bottom and top [m].
         largest_diameter: of the grains [m]. largest_skin: of the lists [m].
@@ -120,7 +122,7 @@ def take_engine(
     for old in [k for k in _free if k[0] != key[0]]:
         del _free[old]
     idle = _free.setdefault(key, [])
-    engine = idle.pop() if idle else Engine(shape)
+    engine = idle.pop() if idle else (owner.gpu_engine if gpu else Engine)(shape)
     box = (*period, bottom, height, period[0] / nx, period[1] / ny, cell)
     engine.set_up(grain_count=grain_count, chunk_count=chunk_count, cells=cells, box=box)
     weakref.finalize(owner, idle.append, engine).atexit = False
@@ -128,22 +130,29 @@ def take_engine(
 
 
 def capacities(grain_count: int, cell_count: int, chunk_count: int, *, gpu: bool) -> dict[str, int]:
-    """How many grains, cells and chunks an engine is compiled for that has to hold these."""
+    """How many grains, cells and chunks an engine is compiled for that has to hold these; a GPU's has no chunks."""
     return {
         "capacity": _roomy(grain_count, least=64),
         "cell_capacity": _roomy(cell_count, least=1024),
-        "chunk_capacity": _roomy(chunk_count, least=MOST_CHUNKS),
+        "chunk_capacity": 1 if gpu else _roomy(chunk_count, least=MOST_CHUNKS),
     }
 
 
 def _roomy(count: int, *, least: int) -> int:
-    """The next of 1 and 1.5 times a power of two: few shapes to compile, and little room wasted."""
+    """The next of 1 and 1.5 times a power of two: few shapes to compile, and little room wasted.
+
+    Of large beds a sixteenth of a power of two more at most, as memory is what they are short of.
+    """
     power = least
     while power < count:
         if power * 3 // 2 >= count:
-            return power * 3 // 2
+            power = power * 3 // 2
+            break
         power *= 2
-    return power
+    if power <= LARGE:
+        return power
+    part = 1 << (count.bit_length() - 5)
+    return -(-count // part) * part
 
 
 @ti.data_oriented
@@ -156,6 +165,8 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         *(f"body_{name}" for name in ("position", "velocity", "spin", "turn", "listed", "listed_turn", "extent")),
         *("body_primitives", "body_pair", "primitive_kind", "primitive_row"),
     )
+    # Zero where nothing is listed.
+    EMPTY: tuple[str, ...] = ("pair_start", "pair_end", "overlap", "near_end")
 
     def __init__(self, build: Build):
         self.real = real = build.real
@@ -166,9 +177,11 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         capacity, chunk_capacity = build.capacity, build.chunk_capacity
         self.count = ti.field(ti.i32, 12)
         self.box = ti.field(real, 7)
-        self._make_grain_fields(capacity, build.cell_capacity)
+        self._make_grain_fields(capacity)
+        self._make_sort_fields(capacity, build.cell_capacity)
         self._make_list_fields(capacity, chunk_capacity, capacity * build.neighbours_per_grain + 8 * chunk_capacity)
-        self._make_body_fields(chunk_capacity)
+        self._make_sums(chunk_capacity)
+        self._make_body_fields()
         # Who computes which chunk, each counter in a cache line of its own.
         self.ticket = ti.field(ti.i32, 2 * CACHE_LINE)
         self.claim = ti.field(ti.i32, chunk_capacity * CACHE_LINE if not self.gpu else 1)
@@ -181,17 +194,21 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
         self.moved, self.halted, self.done = (ti.field(ti.i32, ()) for _ in range(3))
         self.problem = ti.Vector.field(2, ti.i32, ())
-        empty = ("pair_start", "pair_end", "overlap", "ticket", "near_end", *self.BODY_FIELDS)
         counters = (self.body_count, self.moved, self.halted, self.done, self.problem)
-        self._zeroes = Zeroes(*(getattr(self, name) for name in empty), *counters)
+        empty = (getattr(self, name) for name in ("ticket", *self.EMPTY, *self.BODY_FIELDS))
+        self._zeroes = Zeroes(*empty, *counters)
 
-    def _make_grain_fields(self, n: int, cell_capacity: int) -> None:
-        """A row for each grain, and room for sorting."""
+    def _make_grain_fields(self, n: int) -> None:
+        """A row for each grain."""
         F, real = ti.Vector.field, self.real
         # position: x y z radius; velocity: x y z mass (half a step behind); spin: x y z and nothing.
         self.position, self.velocity, self.spin = (F(4, real, n) for _ in range(3))
         self.force, self.torque, self.origin, self.listed = (F(3, real, n) for _ in range(4))
         self.id = ti.field(ti.i32, n)
+
+    def _make_sort_fields(self, n: int, cell_capacity: int) -> None:
+        """Room for sorting."""
+        F, real = ti.Vector.field, self.real
         self.buffer4 = [F(4, real, n) for _ in range(3)]
         self.buffer3 = F(3, real, n)
         self.buffer_id, self.came_from, self.key = (ti.field(ti.i32, n) for _ in range(3))
@@ -222,14 +239,14 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.near_roll, self.old_near_roll = F(3, real, near), F(3, real, near)
         self.near_first = ti.field(ti.i32, n)
 
-    def _make_body_fields(self, chunk_capacity: int) -> None:
-        """Bodies, whose velocities the host sets, their shapes, and the forces of each chunk on them."""
+    def _make_sums(self, chunk_capacity: int) -> None:
+        """What chunks add up: the largest overlap, the forces on bodies."""
+        self.overlap = ti.field(self.real, chunk_capacity)
+        self.pushes = ti.Vector.field(6, self.real, (chunk_capacity, MOST_BODIES))
+
+    def _make_body_fields(self) -> None:
+        """Bodies, whose velocities the host sets, and their shapes."""
         F, real = ti.Vector.field, self.real
-        self.overlap = ti.field(real, chunk_capacity)
-        self.pushes = F(6, real, (chunk_capacity, MOST_BODIES))
-        if self.gpu:  # sums over blocks of chunks, so that nothing of the bed's size is summed by one thread or read
-            self.block_pushes = F(6, ti.f64, (TALLY_BLOCKS, MOST_BODIES))
-            self.block_overlap = ti.field(ti.f64, TALLY_BLOCKS)
         self.body_count = ti.field(ti.i32, ())
         self.body_position, self.body_velocity, self.body_spin, self.body_listed = (
             F(3, real, MOST_BODIES) for _ in range(4)
@@ -250,8 +267,9 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.chunk_count = chunk_count
         self.nx, self.ny, self.nz = cells
         self.bottom = box[self.BOTTOM]
-        self.chunk_room = self.pair.shape[0] // chunk_count
-        self.near_room = self.near_grain.shape[0] // chunk_count
+        chunks = 1 if self.gpu else chunk_count
+        self.chunk_room = self.pair.shape[0] // chunks
+        self.near_room = self.near_grain.shape[0] // chunks
         # Fewer awake have smaller chunks, so that all threads have some.
         self.awake_per_chunk = max(1, round(AWAKE_SHARE * GRAINS_PER_CHUNK))
         sizes = (grain_count, chunk_count, self.chunk_room, self.near_room, *cells, math.prod(cells))
@@ -265,6 +283,47 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.held = None
         self.rest = ABSENT
         self.balance = ABSENT
+
+    # What the host reads and writes of lists, in the order of grains, or of chunks near bodies.
+
+    def listed_pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs listed for each grain, and their rows."""
+        start, end = self.read("pair_start"), self.read("pair_end")
+        return end - start, row_numbers(start, end - start)
+
+    def lay_pairs(self, counts: np.ndarray, awake: int, chunks: int) -> np.ndarray:
+        """Make room for so many pairs of each grain, in the chunks of those awake; their rows."""
+        chunk = chunk_starts(awake, chunks)
+        before = np.concatenate(([0], np.cumsum(counts)))
+        which = np.repeat(np.arange(chunks), np.diff(chunk))
+        start = np.zeros(self.grain_count, dtype=np.int32)
+        start[:awake] = before[:awake] - before[chunk[which]] + which * self.chunk_room
+        self.write("pair_start", start)
+        self.write("pair_end", start + counts)
+        rows = row_numbers(start, counts)
+        self.write("first", np.repeat(np.arange(self.grain_count), counts), rows)
+        return rows
+
+    def lay_history(self, counts: np.ndarray) -> np.ndarray:
+        """Make room for so many pairs of each grain, one behind the other, which ``make_lists`` takes for history."""
+        start = np.cumsum(counts) - counts
+        self.write("pair_start", start)
+        self.write("pair_end", start + counts)
+        return row_numbers(start, counts)
+
+    def listed_near(self) -> tuple[np.ndarray, np.ndarray]:
+        """Grains near bodies in each chunk, and their rows."""
+        start = np.arange(self.chunk_count) * self.near_room
+        counts = self.read("near_end") - start
+        return counts, row_numbers(start, counts)
+
+    def lay_near(self, grains: np.ndarray, awake: int, chunks: int) -> np.ndarray:
+        """Make room for these grains near bodies, in the order of memory, in the chunks of those awake; their rows."""
+        chunk = np.searchsorted(chunk_starts(awake, chunks), grains, side="right") - 1
+        counts = np.bincount(chunk, minlength=self.chunk_count)
+        start = np.arange(self.chunk_count) * self.near_room
+        self.write("near_end", (start + counts).astype(np.int32))
+        return row_numbers(start, counts)
 
     def let_sleep(self) -> None:
         """From here on kernels know of sleep; all are awake still."""
@@ -310,12 +369,14 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self, most: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float, awake: int
     ) -> tuple[int, bool]:
         """Up to ``most`` steps of the grains awake, fewer where that is many: (steps done, whether lists are due)."""
-        if self.gpu:
-            self.done[None] = 0
-            for _ in range(min(most, STEPS_PER_LAUNCH)):
-                self.run_on_gpu(dt, limit, *gravity, keep, self.shapes, self.rest, self.balance)
-        else:
-            steps = GRAIN_STEPS_PER_LAUNCH // max(1, awake)
-            steps = min(most, MOST_STEPS_PER_LAUNCH, max(STEPS_PER_LAUNCH, steps))
-            self.run(dt, limit, *gravity, keep, steps, self.shapes, self.rest, self.balance)
+        steps = GRAIN_STEPS_PER_LAUNCH // max(1, awake)
+        steps = min(most, MOST_STEPS_PER_LAUNCH, max(STEPS_PER_LAUNCH, steps))
+        self.run(dt, limit, *gravity, keep, steps, self.shapes, self.rest, self.balance)
         return int(self.done[None]), bool(self.halted[None])
+
+
+def chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:
+    """First grain of each chunk and the end, shape [chunk_count + 1]; as ``Engine.chunk_range`` has it."""
+    base, rest = divmod(grain_count, chunk_count)
+    c = np.arange(chunk_count + 1)
+    return c * base + np.minimum(c, rest)

@@ -8,9 +8,7 @@ from hedgebed_taichi import ti
 from .lists import INDEX_MASK, MOST_BODIES
 from .values import EnginePart
 
-__all__ = ["TALLY_BLOCKS", "Readings"]
-
-TALLY_BLOCKS = 256
+__all__ = ["Readings"]
 
 
 @ti.data_oriented
@@ -41,25 +39,10 @@ class Readings(EnginePart):
     def tally(self, rows: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         """Sums over the chunks, in their order: of what grains do to each body; and the largest overlap, or NaN.
 
-        A row of six for each body, and one more whose first number is the overlap. On a GPU, where a chunk is a grain,
-        over blocks of chunks first: what the host gets is as small as from a CPU.
+        A row of six for each body, and one more whose first number is the overlap.
         """
-        if ti.static(self.gpu):
-            for block, b in ti.ndrange(TALLY_BLOCKS, MOST_BODIES + 1):
-                size = (self.count[self.ALL_CHUNKS] + TALLY_BLOCKS - 1) // TALLY_BLOCKS
-                first = block * size
-                end = ti.min(first + size, self.count[self.ALL_CHUNKS])
-                if b == MOST_BODIES:
-                    self.block_overlap[block] = self.largest_overlap(self.overlap, first, end)
-                elif b < self.body_count[None]:
-                    self.block_pushes[block, b] = self.sum_of_pushes(self.pushes, b, first, end)
-                else:
-                    self.block_pushes[block, b] = ti.Vector.zero(ti.f64, 6)
-            for b in range(MOST_BODIES + 1):
-                self.put_tally(rows, b, self.block_pushes, self.block_overlap, TALLY_BLOCKS)
-        else:
-            for b in range(MOST_BODIES + 1):
-                self.put_tally(rows, b, self.pushes, self.overlap, self.count[self.ALL_CHUNKS])
+        for b in range(MOST_BODIES + 1):
+            self.put_tally(rows, b, self.pushes, self.overlap, self.count[self.ALL_CHUNKS])
 
     @ti.func
     def put_tally(self, rows: ti.template(), b, pushes: ti.template(), overlaps: ti.template(), parts):

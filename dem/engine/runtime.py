@@ -41,7 +41,7 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
 
     Args:
         arch: "cpu" or "cuda".
-        threads: CPU threads; all that the machine has when None.
+        threads: CPU threads; all that the machine has when None. With a GPU it makes no difference.
         precision: "float64" or "float32".
 
     Raises ValueError: an unknown architecture or precision, or a number of threads below one. RuntimeError: the
@@ -56,7 +56,7 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
         threads = len(_cores())
     if threads < 1:
         raise ValueError(f"threads = {threads} must be at least 1")
-    wanted = Runtime(arch, threads, precision)
+    wanted = Runtime(arch, threads if arch == "cpu" else 1, precision)
     if wanted == _current:
         return wanted
     from hedgebed_taichi import ti

@@ -21,7 +21,7 @@ from hedgebed_taichi import ti
 from .bodies import BedBodies
 from .engine import Engine
 from .lists import ABSENT, INDEX_BITS, INDEX_MASK
-from .rows import read_fields, row_numbers, take_rows, write_fields
+from .rows import read_fields, take_rows, write_fields
 from .sleep import Sleep, Sleeper
 from .values import BedSettings, State
 
@@ -42,8 +42,8 @@ ABOUT = ("material", "material_numbers", "cohesion", "tangential", "size", "heig
 
 
 # What lists are made with, and what a step makes anew: nothing of it is read before it is written.
-_SCRATCH = ("old_", "cell_", "block_", "came_from", "key", "near_first", "touching", "rank", "ticket", "claim",
-            "problem")  # fmt: skip
+_SCRATCH = ("old_", "cell_", "block_", "buffer", "came_from", "key", "near_first", "touching", "rank", "ticket",
+            "claim", "problem")  # fmt: skip
 _BED_NUMBERS = ("steps", "list_count", "grain_steps", "steps_since_lists", "reaction_steps", "skin", "tallied")
 _SLEEP_NUMBERS = ("awake", "mass", "slept", "leaving")
 
@@ -71,15 +71,14 @@ class BedState(BedBodies):
         self.check_valid()
         e = self.engine
         state = {name: e.read(name) for name in (*GRAIN_FIELDS, *BODY_FIELDS)}
-        start, end = e.read("pair_start"), e.read("pair_end")
-        counts = end - start
-        rows = row_numbers(start, counts)
+        counts, rows = e.listed_pairs()
         pair = take_rows(e.pair, rows)
         touching = rows[pair < 0]
         state |= {"pair_count": counts, "pair": pair, "slide": take_rows(e.slide, touching)}
-        near_count = e.read("near_end") - _near_starts(e)
-        near = row_numbers(_near_starts(e), near_count)
+        near_count, near = e.listed_near()
         state |= {"near_count": near_count, **read_fields(e, dict.fromkeys(NEAR_FIELDS, near), "")}
+        if e.gpu:  # not yet added to the sums of the bodies
+            state["near_push"] = take_rows(e.near_push, near)
         if e.rolling:
             state["roll"] = take_rows(e.roll, touching)
         state |= e.shape_state()
@@ -113,21 +112,14 @@ class BedState(BedBodies):
         for name in (*GRAIN_FIELDS, *BODY_FIELDS):
             e.write(name, values[name])
         e.restore_shapes(values)
-        counts = values["pair_count"]
         awake, chunks = values.get("sleep_numbers", (self.grain_count, e.chunk_count))[:2]
-        chunk = _chunk_starts(awake, chunks)
-        before = np.concatenate(([0], np.cumsum(counts)))
-        which = np.repeat(np.arange(chunks), np.diff(chunk))
-        start = np.zeros(self.grain_count, dtype=np.int32)
-        start[:awake] = before[:awake] - before[chunk[which]] + which * e.chunk_room
-        rows = row_numbers(start, counts)
+        rows = e.lay_pairs(values["pair_count"], awake, chunks)
         touching = rows[values["pair"] < 0]
-        e.write("pair_start", start)
-        e.write("pair_end", start + counts)
-        e.write("first", np.repeat(np.arange(self.grain_count), counts), rows)
         for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
             e.write(name, values[name], at)
-        near = _write_near(e, values["near_count"], values)
+        near = _write_near(e, values, awake, chunks)
+        if e.gpu:
+            e.write("near_push", values["near_push"], near)
         e.balance = ABSENT
         if "ledger_taken" in values:
             x, y, z = (float(v) for v in values["reals"][2:5])
@@ -313,17 +305,14 @@ def adopt(bed: BedBodies, state: State, *, keep: np.ndarray | None = None) -> No
     chosen = stay[first] & stay[second]
     a, b = place[first[chosen]], place[second[chosen]]
     counts = np.bincount(a, minlength=bed.grain_count)
-    start = np.cumsum(counts) - counts
-    for name, rows in (("pair_start", start), ("pair_end", start + counts), ("pair", ~b)):
-        e.write(name, rows)
+    rows = e.lay_history(counts)
+    e.write("pair", ~b, rows)
     for name in ("slide", "roll") if e.rolling else ("slide",):
-        e.write(name, state[name][chosen])
+        e.write(name, state[name][chosen], rows)
     near = stay[state["near_grain"]]
-    grain = place[state["near_grain"][near]]
-    starts = _chunk_starts(bed.grain_count, e.chunk_count)
-    chunk = np.searchsorted(starts, grain, side="right") - 1
-    near_count = np.bincount(chunk, minlength=e.chunk_count)
-    _write_near(e, near_count, {name: state[name][near] for name in NEAR_FIELDS} | {"near_grain": grain})
+    values = {name: state[name][near] for name in NEAR_FIELDS}
+    values["near_grain"] = place[values["near_grain"]]
+    _write_near(e, values, bed.grain_count, e.chunk_count)
     for name in Engine.BODY_FIELDS:
         e.write(name, state[name])
     e.restore_shapes(state)
@@ -365,13 +354,6 @@ def laid_end_to_end(state: State, times: int, *, period: float) -> State:
     return found
 
 
-def _chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:
-    """First grain of each chunk and the end, shape [chunk_count + 1]; as ``Engine.chunk_range`` has it."""
-    base, rest = divmod(grain_count, chunk_count)
-    c = np.arange(chunk_count + 1)
-    return c * base + np.minimum(c, rest)
-
-
 def touching_pairs(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The touching rows of the pair lists: grain, neighbour, and periods (x, y) from the neighbour's image back to it.
 
@@ -384,14 +366,8 @@ def touching_pairs(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return first, bits & INDEX_MASK, np.column_stack([image % 3 - 1, image // 3 - 1])
 
 
-def _near_starts(e: Engine) -> np.ndarray:
-    """First row of each chunk in the lists of grains near bodies."""
-    return np.arange(e.chunk_count) * e.near_room
-
-
-def _write_near(e: Engine, counts: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Put the lists of grains near bodies into the engine, ``counts`` of them in each chunk; their rows."""
-    rows = row_numbers(_near_starts(e), counts)
-    e.write("near_end", (counts + _near_starts(e)).astype(np.int32))
+def _write_near(e: Engine, values: Mapping[str, np.ndarray], awake: int, chunks: int) -> np.ndarray:
+    """Put the lists of grains near bodies into the engine; their rows."""
+    rows = e.lay_near(values["near_grain"], awake, chunks)
     write_fields(e, dict.fromkeys(NEAR_FIELDS, rows), "", values)
     return rows

@@ -126,9 +126,7 @@ class Steps(EnginePart):
                 t_body -= turn
             self.force[i] = self.force[i] + (f)
             self.torque[i] = self.torque[i] + (t)
-            for k in ti.static(range(3)):
-                self.pushes[c, b][k] = self.pushes[c, b][k] - f[k]
-                self.pushes[c, b][k + 3] = self.pushes[c, b][k + 3] + t_body[k]
+            self.push_body(c, s, b, f, t_body)
             result = overlap / (2.0 * x.w)
             if ti.static(balance.on):
                 held_t, held_r = springs_hold(p, n, overlap, radius, u, self.near_roll[s], self.cohesion)
@@ -147,6 +145,13 @@ class Steps(EnginePart):
             self.near_slide[s] = ti.Vector.zero(self.real, 4)
             self.near_roll[s] = ti.Vector.zero(self.real, 3)
         return result
+
+    @ti.func
+    def push_body(self, c, s, b, f, t_body):
+        """Sum what row s does to body b, chunk by chunk: force and torque."""
+        for k in ti.static(range(3)):
+            self.pushes[c, b][k] = self.pushes[c, b][k] - f[k]
+            self.pushes[c, b][k + 3] = self.pushes[c, b][k + 3] + t_body[k]
 
     @ti.func
     def near_rates(self, i, b, n, curvature, arm, arm_i, dt):
@@ -232,31 +237,6 @@ class Steps(EnginePart):
                             looks += 1
                         if looks == patience:
                             phase = 2 * steps
-
-    @ti.kernel
-    def run_on_gpu(
-        self,
-        dt: float,
-        limit: float,
-        gx: float,
-        gy: float,
-        gz: float,
-        keep: float,
-        shapes: ti.template(),
-        rest: ti.template(),
-        balance: ti.template(),
-    ):
-        """One step on a GPU, where every grain is a chunk; nothing where new lists are needed, as in ``run``."""
-        for c in range(self.count[self.CHUNKS]):
-            if self.halted[None] == 0:
-                self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
-        for c in range(self.count[self.CHUNKS]):
-            if self.moved[None] == 0:
-                self.push(c, dt, shapes, rest, balance)
-                if c == 0:
-                    self.done[None] = self.done[None] + 1
-            elif c == 0:
-                self.halted[None] = 1
 
     @ti.kernel
     def push_all(self, dt: float, shapes: ti.template(), rest: ti.template(), balance: ti.template()):

@@ -12,8 +12,12 @@ import dem.engine.engine
 from dem import BedFailure
 from dem.engine.lists import INDEX_BITS, INDEX_MASK
 
+CHUNKS = pytest.mark.cpu_only("chunks")
 
-@pytest.fixture(params=["one chunk", "seven chunks", "grain chunks"])
+
+@pytest.fixture(
+    params=[pytest.param("one chunk", marks=CHUNKS), pytest.param("seven chunks", marks=CHUNKS), "grain chunks"]
+)
 def layout(request, engines, monkeypatch):
     if request.param == "seven chunks":
         monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 9)
@@ -29,12 +33,17 @@ def checked(layout, monkeypatch):
     return cloud.make(ball=True)
 
 
+def listed(bed):
+    """Grain, row and neighbour's code of every pair listed."""
+    counts, rows = bed.engine.listed_pairs()
+    return np.repeat(np.arange(bed.grain_count), counts), rows, bed.engine.read("pair")[rows]
+
+
 def touching_row(bed):
-    """A row of the pair lists in contact."""
-    e = bed.engine
-    start, end, pair = e.read("pair_start"), e.read("pair_end"), e.read("pair")
-    rows = np.concatenate([np.arange(*ends) for ends in zip(start, end, strict=True)])
-    return int(rows[pair[rows] < 0][0])
+    """Grain and row of a pair in contact."""
+    grain, rows, pair = listed(bed)
+    k = np.flatnonzero(pair < 0)[0]
+    return int(grain[k]), int(rows[k])
 
 
 def test_right_lists_pass_and_a_check_changes_no_bit(checked):
@@ -58,6 +67,7 @@ def test_right_lists_of_grains_that_feel_one_another_before_they_touch_pass(monk
 
 
 @pytest.mark.long
+@pytest.mark.cpu_only("sleep")
 def test_right_lists_of_a_bed_whose_grains_sleep_and_wake_pass(monkeypatch):
     """Contacts that a sleeper keeps count as its history."""
     monkeypatch.setenv("HEDGEBED_DEBUG", "1")
@@ -96,8 +106,8 @@ def test_a_pair_that_no_list_has_is_found_when_it_touches(checked, monkeypatch):
 
 def test_a_dropped_pair_is_found(checked):
     e = checked.engine
-    row = touching_row(checked)
-    i, j = int(e.first[row]), ~e.pair[row] & INDEX_MASK
+    i, row = touching_row(checked)
+    j = ~e.pair[row] & INDEX_MASK
     e.pair[row] = i | (e.pair[row] & ~INDEX_MASK & 0x7FFFFFFF)  # itself, where its neighbour was
     ids = e.read("id")
     with pytest.raises(BedFailure, match=rf"step 1: .*grains {ids[i]} and {ids[j]}\D.*not listed"):
@@ -107,19 +117,16 @@ def test_a_dropped_pair_is_found(checked):
 def test_a_pair_listed_twice_is_found(checked):
     """A row overwritten by another of the same grain: one pair too few, one twice."""
     e = checked.engine
-    start, end = e.read("pair_start"), e.read("pair_end")
-    rows = np.concatenate([np.arange(*ends) for ends in zip(start, end, strict=True) if ends[1] > ends[0] + 1])
-    row = next(
-        int(s) for s in rows if e.pair[int(s)] < 0 and int(s) + 1 in rows and e.first[int(s) + 1] == e.first[int(s)]
-    )
-    e.pair[row + 1] = e.pair[row]
+    grain, rows, pair = listed(checked)
+    k = next(k for k in np.flatnonzero(pair < 0) if grain[k] == grain[k + 1])
+    e.pair[rows[k + 1]] = e.pair[rows[k]]
     with pytest.raises(BedFailure, match=r"step 1: .*are listed 2 times"):
         checked.advance(1)
 
 
 def test_a_pair_through_the_wrong_image_is_found(checked):
     e = checked.engine
-    row = touching_row(checked)
+    _, row = touching_row(checked)
     e.pair[row] = ~(~e.pair[row] & INDEX_MASK)  # image (-1, -1)
     assert ~e.pair[row] >> INDEX_BITS == 0
     with pytest.raises(BedFailure, match=r"step 1: .* and are not listed"):
@@ -129,8 +136,7 @@ def test_a_pair_through_the_wrong_image_is_found(checked):
 def test_a_dropped_grain_at_a_body_is_found(checked):
     """Its row is given to another body."""
     e = checked.engine
-    starts = np.arange(e.chunk_count) * e.near_room
-    rows = np.concatenate([np.arange(*ends) for ends in zip(starts, e.read("near_end"), strict=True)])
+    _, rows = e.listed_near()
     height, ids = e.read("position")[:, 2:], e.read("id")
     row = next(int(s) for s in rows if e.near_body[s] == 0 and height[e.near_grain[s], 0] < height[e.near_grain[s], 1])
     e.near_body[row] = 1

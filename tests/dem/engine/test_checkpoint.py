@@ -39,6 +39,7 @@ def test_a_bed_goes_on_from_what_it_held_to_the_same_bits_as_often_as_one_likes(
         assert bits(bed) == after and (bed.reactions() == push).all()
 
 
+@pytest.mark.cpu_only("sleep")
 def test_only_the_last_state_held_is_taken_back_and_none_across_a_change_of_sleep_or_book(engines):
     bed = made("chunks", engines)
     first, second = bed.checkpoint(), bed.checkpoint()
@@ -50,7 +51,7 @@ def test_only_the_last_state_held_is_taken_back_and_none_across_a_change_of_slee
         bed.rollback(second)
 
 
-@pytest.mark.parametrize("changed", ["gravity", "rules"])
+@pytest.mark.parametrize("changed", ["gravity", pytest.param("rules", marks=pytest.mark.cpu_only("sleep"))])
 def test_a_state_held_under_another_gravity_or_other_rules_of_sleep_is_not_taken_back(changed, engines):
     bed = made("chunks", engines)
     if changed == "rules":

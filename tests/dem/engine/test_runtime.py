@@ -9,7 +9,10 @@ import pytest
 
 from dem.engine import runtime
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system pins no threads")
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system pins no threads"),
+    pytest.mark.cpu_only("threads"),
+]
 
 
 def test_workers_get_a_core_each_only_where_there_are_as_many_cores(monkeypatch):

@@ -15,6 +15,8 @@ from dem import Ball, Bed, Material, Sleep
 from dem.engine.lists import Lists
 from dem.engine.sleep import Sleeper
 
+pytestmark = pytest.mark.cpu_only("sleep")
+
 STUFF = Material("grain", 2600, 1e7, 0.25, 0.5, 0.3, 0.1)
 D = 4e-3
 COLUMNS, ROWS = 90, 4

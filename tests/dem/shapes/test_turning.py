@@ -51,7 +51,7 @@ def layers():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("sleeps", [False, True])
+@pytest.mark.parametrize("sleeps", [False, pytest.param(True, marks=pytest.mark.cpu_only("sleep"))])
 def test_grains_on_a_floor_under_bodies_turn_by_weight_floor_sides_sleepers_and_bodies(sleeps):
     """A ball that goes through the end of the periodic cell and a capsule that turns, both dug in; with sleep and
     without. Kept and restored on the way, to the same bits."""
