@@ -331,9 +331,7 @@ class GpuLists(Lists):
             if ti.static(self.rolling):
                 self.roll[s] = sign * self.old_roll[old]
             if ti.static(balance.on):
-                last = sign * balance.old_last[old]
-                last[0] = sign * last[0]  # the normal part is the same from either side
-                balance.last[s] = last
+                balance.last[s] = balance.seen_from(sign, balance.old_last[old])
         else:
             self.pair[s] = code
             self.slide[s] = ti.Vector.zero(self.real, 4)

@@ -155,7 +155,8 @@ class GpuSteps(Pairs, Steps):
             self.roll[s] = q
         f = f_n * n + f_t
         if ti.static(balance.on):
-            self.balance_pair(i, s, i, j, d, balance.parts(damped, f_t, turn), dt, ABSENT, balance)
+            now = self.pair_row(s, i, j, d, n, damped, f_t, turn, balance)
+            self.balance_pair(i, s, i, j, d, now, dt, ABSENT, balance)
             self.balance_turning(i, bits, f, f_t, turn, n, arm_j, dt, ABSENT, balance)
         return f, arm_i * f_t.cross(n) + turn, share
 

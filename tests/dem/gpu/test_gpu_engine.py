@@ -8,6 +8,7 @@ import falling_bed
 import numpy as np
 import pytest
 
+import dem.engine.engine
 import dem.gpu.steps
 from dem import Bed
 
@@ -59,8 +60,9 @@ def test_several_steps_in_a_kernel_give_the_bits_of_single_ones(engines, monkeyp
 
 
 @pytest.mark.parametrize("first", ["cpu", "gpu"])
-def test_a_file_of_the_one_goes_on_with_the_other(first, engines, tmp_path):
+def test_a_file_of_the_one_goes_on_with_the_other(first, engines, tmp_path, monkeypatch):
     """Histories and forces come over: sixty steps later both are the same to round-off."""
+    monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", falling_bed.GRAINS_PER_CHUNK)  # put back at the end
     layouts = {"cpu": {}, "gpu": GPU}
     engines.overrides = layouts.pop(first)
     bed = falling_bed.make(1)
