@@ -11,6 +11,8 @@ HEDGEBED_BENCH_STEPS (timed ones), HEDGEBED_BENCH_SHOWN=0 (nothing that is only 
 
 ``--limit``: a loop in plain C races as well, where there is a compiler, and shows how far the machine goes.
 ``--profile``: no race; where the time of a step goes (``benchmarks/race/profile.py``).
+``--scale``: no race; speed and memory of 20,000 to 1,000,000 grains (``benchmarks/race/scale.py``), or of those in
+HEDGEBED_BENCH_SIZES, each a multiple of the first.
 """
 
 import os
@@ -28,6 +30,7 @@ from benchmarks.race.entrants import LAMMPS, LIGGGHTS, WARM_STEPS, YADE, Entrant
 from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination, prepare_grains, write_data
 from benchmarks.race.machine import begin_timing, environment_numbers, wide_console
 from benchmarks.race.profile import profile_bed
+from benchmarks.race.scale import keep_bed, scale_of
 from benchmarks.race.yardstick import compile_yardstick, yardsticks
 from experiments.runs.types import Json
 
@@ -36,6 +39,7 @@ __all__ = ["Lane", "Settings", "pick_best", "run"]
 SKINS = (1e-4, 2e-4, 4e-4)  # of the peers' lists [m]
 _USUAL_SKIN = 2e-4  # for what is only shown [m]
 COORDINATION_BOUND, PACKING_BOUND = 0.01, 0.002  # the same work: this much off ours, at most [1]
+SCALE_SIZES = (20_000, 100_000, 300_000, 1_000_000)
 REPEATS = 30  # of each kernel of a profile
 _CLOSE = 0.85  # a skin this near to the fastest stays in the race
 _HOPELESS = 0.5  # a peer slower than this share of the fastest leaves it
@@ -105,17 +109,21 @@ class Lane:
         }  # fmt: skip
 
 
-def run(out: Path, *, progress: Any, limit: bool = False, profile: bool = False) -> Json:
+def run(
+    out: Path, *, progress: Any, limit: bool = False, profile: bool = False, scale: bool = False
+) -> Json:  # fmt: skip
     """Race, show the table on stdout, and return what goes into bench.json. Nothing is written to `out`.
 
-    `progress`: an ``experiments.runs.progress.Progress``. `limit`: the C loop races too. `profile`: instead of the
-    race, where the time of a step goes. Raises ValueError for a wrong variable of the environment, RuntimeError where
-    our own bed failed.
+    `progress`: an ``experiments.runs.progress.Progress``. `limit`: the C loop races too. Instead of the race:
+    `profile`, where the time of a step goes; `scale`, speed and memory of large beds. Raises ValueError for a wrong
+    variable of the environment, or both of them; RuntimeError where our own bed failed.
     """
+    if profile and scale:
+        raise ValueError("profile and scale are two benchmarks: give one of them")
     settings = Settings.from_environment(limit=limit)
     bench, remarks = begin_timing("bed")
     said = [f"{key}={value!r}" for key, value in sorted(os.environ.items()) if key.startswith("HEDGEBED_BENCH_")]
-    options = [f"--{name}" for name, given in (("limit", limit), ("profile", profile)) if given]
+    options = [f"--{name}" for name, given in (("limit", limit), ("profile", profile), ("scale", scale)) if given]
     bench |= {
         "command": " ".join([*said, "hedgebed bench bed", *options]),
         "case": {
@@ -128,6 +136,8 @@ def run(out: Path, *, progress: Any, limit: bool = False, profile: bool = False)
     cores = bench["machine"]["cores"]
     if profile:
         _profile(bench, settings, cores, progress)
+    elif scale:
+        _scale(bench, settings, cores, progress)
     else:
         _race_all(bench, settings, cores, progress)
     progress.close()
@@ -178,6 +188,39 @@ def _profile(bench: Json, settings: Settings, cores: int, progress: Any) -> None
             )  # fmt: skip
         bench["profile"].append(bed)
         bench["remarks"] += [remark for remark in said if remark not in bench["remarks"]]
+
+
+def _scale(bench: Json, settings: Settings, cores: int, progress: Any) -> None:
+    """Speed and memory of the smallest bed laid end to end; what came out goes into `bench`."""
+    sizes = environment_numbers("SIZES", SCALE_SIZES, most=100)
+    first = sizes[0]
+    if any(count % first for count in sizes):
+        raise ValueError(
+            f"HEDGEBED_BENCH_SIZES = {sizes}: each must be a multiple of the first, which is laid end to end"
+        )
+    bench |= {"unit": "grain steps per second; bytes", "scale": []}
+    work = {count: 2 * _scale_steps(count, settings) * count / _EXPECTED_SPEED for count in sizes}
+    progress.plan(
+        {"bed": first * _SETTLING_STEPS / _EXPECTED_SPEED} | {f"{n:,} grains": 20 + t for n, t in work.items()}
+    )
+    progress.stage("bed")
+    with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as name:
+        path = Path(name) / "bed.npz"
+        keep_bed(path, prepare_grains(first, threads=cores, progress=progress), cores)
+        for count in sizes:
+            progress.stage(f"{count:,} grains")
+            steps = _scale_steps(count, settings)
+            found = scale_of(path, count // first, count=first, threads=cores, steps=steps)
+            least = bench["scale"][0] if bench["scale"] else None
+            for kind in ("held", "most"):
+                grown = None if least is None else (found[kind] - least[kind]) / (count - first)
+                found[f"{kind}_per_grain"] = grown
+            bench["scale"].append(found)
+
+
+def _scale_steps(count: int, settings: Settings) -> int:
+    """Timed steps of a bed of that size, for some ten seconds, but no fewer than a list lasts."""
+    return settings.steps or max(200, min(2000, int(10 * _EXPECTED_SPEED / count)))
 
 
 def _ratio(ours: Lane, other: Lane | None) -> float | None:

@@ -94,12 +94,12 @@ def wrapped(positions: np.ndarray, period: tuple[float, float]) -> np.ndarray:
     return inside
 
 
-def write_data(path: Path, grains: Grains) -> None:
+def write_data(path: Path, grains: Grains, *, above: float = 2 * DIAMETER) -> None:
     """Write the data file that LIGGGHTS (atom style granular) and LAMMPS (sphere) read.
 
-    A row is id, type, diameter [m], density [kg/m3], x, y, z [m].
+    A row is id, type, diameter [m], density [kg/m3], x, y, z [m]. ``above``: room above the highest grain [m].
     """
-    top = float((grains.positions[:, 2] + grains.radii).max()) + 2 * DIAMETER
+    top = float((grains.positions[:, 2] + grains.radii).max()) + above
     box = box_of(*grains.period, top, figures=12)
     text = data_file(box, spheres(grains.radii, grains.positions, BENCH.density, figures=12))
     path.write_text(text, encoding="ascii")

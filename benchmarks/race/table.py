@@ -31,8 +31,24 @@ PROFILE_LEGEND = (
     "of a bed that stands still takes without and with them; all on one that moves; else is inferred. Moving holds "
     "launches and the waiting between phases. The C loop has a clock in it."
 )
+SCALE_HEADINGS = (
+    "grains",
+    "steps",
+    "10^6/s",
+    "lists",
+    "GB held",
+    "kB/grain held",
+    "kB/grain at most",
+    "kB/grain fields",
+)
+SCALE_LEGEND = (
+    "10^6/s: million grain-steps a second; held: memory of the process at the end, at most: while the bed was laid end "
+    "to end too; kB a grain of both: growth from the first row; fields: what the engine has allocated, its room to "
+    "spare included."
+)
 MARKS = {
     "beds": ("<!-- bench bed: begin -->", "<!-- bench bed: end -->"),
+    "scale": ("<!-- bench bed --scale: begin -->", "<!-- bench bed --scale: end -->"),
     "profile": ("<!-- bench bed --profile: begin -->", "<!-- bench bed --profile: end -->"),
 }
 """Where in a page the table goes, by what a bench.json has."""
@@ -126,15 +142,33 @@ def _profile_title(bed: Json) -> str:
     )
 
 
+def _scale_row(size: Json) -> tuple[str, ...]:
+    grown = [size["held_per_grain"], size["most_per_grain"], size["fields"] / size["grain_count"]]
+    return (
+        f"{size['grain_count']:,}", str(size["steps"]), f"{1e-6 * size['speed']:.2f}", str(size["list_count"]),
+        f"{1e-9 * size['held']:.2f}", *(_NONE if value is None else f"{1e-3 * value:.2f}" for value in grown),
+    )  # fmt: skip
+
+
+def _scale_title(sizes: list[Json]) -> str:
+    last = sizes[-1]
+    largest = ", ".join(
+        f"{name} {size / last['grain_count']:.0f}" for name, size in last["largest_fields"].items()
+    )  # fmt: skip
+    return f"Flat cost; bytes a grain of the largest fields at {last['grain_count']:,} grains: {largest}"
+
+
 def _tables(bench: Json) -> Iterator[Sheet]:
     for bed in bench.get("beds", ()):
         yield Sheet(_title(bed, bench), HEADINGS, (0, len(HEADINGS) - 1), rows(bed))
     for bed in bench.get("profile", ()):
         yield Sheet(_profile_title(bed), PROFILE_HEADINGS, (0,), _profile_rows(bed))
+    if "scale" in bench:
+        yield Sheet(_scale_title(bench["scale"]), SCALE_HEADINGS, (), [_scale_row(size) for size in bench["scale"]])
 
 
 def _legend(bench: Json) -> str:
-    return PROFILE_LEGEND if "profile" in bench else LEGEND
+    return {"profile": PROFILE_LEGEND, "scale": SCALE_LEGEND}.get(next((k for k in MARKS if k in bench), ""), LEGEND)
 
 
 def show(bench: Json, console: Console) -> None:
