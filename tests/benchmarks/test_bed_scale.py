@@ -36,7 +36,8 @@ def test_a_scale_says_speed_and_growth_of_memory(tmp_path, monkeypatch, capfd):
     assert [size["held_per_grain"] for size in bench["scale"]] == [None, 1000.0]
     assert bench["scale"][1]["most_per_grain"] == 2000.0
     assert json.dumps(bench)
-    assert "| 640 | 20 | 10.00 | 1 | 0.10 | 1.00 | 2.00 | 3.12 |" in table.markdown(bench)
+    last = table.markdown(bench).splitlines()[5 + len(bench["scale"])]
+    assert [cell.strip() for cell in last.split("|")][6:9] == ["1.00", "2.00", "3.12"]
     assert "1.00" in capfd.readouterr().out
     monkeypatch.setenv("HEDGEBED_BENCH_SIZES", "320 500")
     with pytest.raises(ValueError, match="multiple of the first"):
