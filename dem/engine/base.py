@@ -29,6 +29,8 @@ __all__ = ["FLOOR", "BedBase", "check_array"]
 _SKIN, _LEAST_SKIN, _LARGEST_SKIN = 0.06, 0.02, 0.15
 # A rebuild costs about as much as this many steps, and a skin of one diameter would add about this share to a step.
 _REBUILD_STEPS, _SKIN_COST = 6.0, 0.5
+# Rows of the pair lists and the near lists a grain, to begin with; on a GPU both grains of a pair have one.
+PAIR_ROWS, NEAR_ROWS, NEAR_ROWS_ON_GPU = 5.0, 0.25, 1.0
 FLOOR = 0
 
 
@@ -70,6 +72,7 @@ class BedBase:
         self.surface = self.packing_fraction = math.nan
         largest = float(radii.max())
         largest_skin = _LARGEST_SKIN * self.mean_diameter + _reach(stuff, largest / 2)
+        pair_rows, near_rows = _rows_per_grain(radii, largest_skin, gpu=self.runtime.arch == "cuda")
         self.engine = take_engine(
             self,
             grain_count=self.grain_count,
@@ -85,7 +88,8 @@ class BedBase:
             real=ti.f64 if precision == "float64" else ti.f32,
             gpu=self.runtime.arch == "cuda",
             threads=self.runtime.threads,
-            neighbours_per_grain=_rows_per_grain(radii, largest_skin, gpu=self.runtime.arch == "cuda"),
+            neighbours_per_grain=pair_rows,
+            near_per_grain=near_rows,
         )
         self.engine.grain_pair[None] = pair_row(stuff, tensile=settings.tensile)
         self.engine.write("body_turn", np.tile([1.0, 0.0, 0.0, 0.0], (MOST_BODIES, 1)))
@@ -208,6 +212,7 @@ class BedBase:
                 if not forced:
                     self.adapt_skin()
                 self.make_lists()
+                e = self.engine
                 self.compute_forces(self.time_step)
                 limit = 0.5 * self.skin
                 done += 1
@@ -246,32 +251,47 @@ class BedBase:
             self.sleeper.rearrange(all_awake=all_awake)
         e.sort(*self.gravity, awake, e.rest, e.balance)
         e.make_lists(self.skin, e.shapes, e.rest, e.balance)
+        lost, pairs, near = (int(e.problem[k]) for k in range(3))
+        if lost or pairs or near:
+            e.problem.fill(0)
+        if lost:
+            raise BedFailure(self._explain(lost - 1))
+        if pairs or near:  # as many as are needed are known by now, so that once more is enough
+            self.make_room(pairs, near)
+            self.engine.make_lists(self.skin, self.engine.shapes, self.engine.rest, self.engine.balance)
         self.list_count += 1
         self.steps_since_lists = 0
-        code, value = (int(v) for v in e.problem[None])
-        if code:
-            e.problem[None] = [0, 0]
-            raise BedFailure(self._explain(code, value))
         if before is not None:
             check_lists(self, before)
 
-    def _explain(self, code: int, value: int) -> str:
+    def make_room(self, pairs: int, near: int) -> None:
+        """See that lists have room for so many rows of pairs, and of grains near bodies, in each chunk.
+
+        ``engine`` may be another one then. Raises BedFailure: there is no memory for such lists.
+        """
+        try:
+            self.engine = self.engine.with_room(self, pairs, near)
+        except MemoryError as problem:
+            e = self.engine
+            raise BedFailure(
+                f"the lists have room for {e.chunk_room} pairs and {e.near_room} grains near bodies a chunk, {pairs} "
+                f"and {near} are needed, and to go on with that {problem}; take fewer grains, or larger ones"
+            ) from None
+
+    def _explain(self, some: int) -> str:
+        """Why there are no lists; ``some``: the id of a grain that has left the box."""
         e = self.engine
-        if code == 1:
-            position, ids = e.read("position"), e.read("id")
-            bad = ~np.isfinite(position).all(axis=1)
-            if bad.any():
-                return f"the position of grain {int(ids[bad].min())} is not a number at t = {self.time:.6g} s"
-            lost = (position[:, 2] > self.height) | (position[:, 2] < e.bottom)
-            first = int(ids[lost].min()) if lost.any() else value
-            x, y, z = position[ids == first][0, :3]
-            return (
-                f"grain {first} left the box ({int(lost.sum())} in all) at t = {self.time:.6g} s: it is at "
-                f"({x:.4g}, {y:.4g}, {z:.4g}) m, the box reaches from {e.bottom:.4g} to {self.height:.4g} m"
-            )
-        room, what = (e.chunk_room, "pairs") if code == 2 else (e.near_room, "grains near bodies")
-        where = "" if e.gpu else " a chunk"
-        return f"the lists have room for {room} {what}{where} and {value} are needed; the grains overlap too much"
+        position, ids = e.read("position"), e.read("id")
+        bad = ~np.isfinite(position).all(axis=1)
+        if bad.any():
+            return f"the position of grain {int(ids[bad].min())} is not a number at t = {self.time:.6g} s"
+        lost = (position[:, 2] > self.height) | (position[:, 2] < e.bottom)
+        first = int(ids[lost].min()) if lost.any() else some
+        x, y, z = position[ids == first][0, :3]
+        return (
+            f"grain {first} left the box ({int(lost.sum())} in all) at t = {self.time:.6g} s: it is at "
+            f"({x:.4g}, {y:.4g}, {z:.4g}) m, the box reaches from {e.bottom:.4g} to {self.height:.4g} m"
+        )
 
     def compute_forces(self, elapsed: float = 0.0) -> None:
         """Compute the forces where the grains are; ``elapsed``: the time by which contacts have slid since then."""
@@ -339,10 +359,14 @@ def _reach(material: Material, radius: float) -> float:
     return jkr_range(surface_energy=material.surface_energy, radius=radius, effective_young=young)
 
 
-def _rows_per_grain(radii: np.ndarray, skin: float, *, gpu: bool) -> int:
-    """Rows of the pair lists for a mean grain, with spare; on a GPU both grains of a pair have one."""
+def _rows_per_grain(radii: np.ndarray, skin: float, *, gpu: bool) -> tuple[float, float]:
+    """Rows of the pair lists and near lists for a mean grain, to begin with; on a GPU a pair has two.
+
+    Settled beds of sand have up to 3.8 in their fullest chunk, 4.7 with the largest skin; lists grow where it is more.
+    """
+    if not gpu:
+        return PAIR_ROWS, NEAR_ROWS
     small, large = float(radii.min()), float(radii.max())
     # Caps of neighbours on a sphere: each takes a cone of half angle asin(r_s / (r_l + r_s + skin)).
     half = math.asin(small / (large + small + skin))
-    most = math.ceil(2 / (1 - math.cos(half)))
-    return min(most * 9 // 16, 24) if gpu else min(most + 4, 20)
+    return float(min(math.ceil(2 / (1 - math.cos(half))) * 9 // 16, 24)), NEAR_ROWS_ON_GPU

@@ -13,12 +13,13 @@ Layout (measured reasons in docs/performance.md):
 * Sums into a field are written as x = x + y, because Taichi's x += y is an atomic operation.
 
 An engine is compiled for a capacity, not for a number of grains, and is used again by the next bed that fits:
-``take_engine`` keeps those that no bed holds any more.
+``take_engine`` keeps those that no bed holds any more. Lists begin with room for the rows that a settled bed needs;
+where more are needed the bed goes on in another engine, with more room (``Engine.with_room``), to the same bits.
 """
 
 import math
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -34,7 +35,7 @@ from .dissipation import Balance, BalanceKernels
 from .lists import ABSENT, CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
 from .pairs import Pairs
 from .readings import Readings
-from .rows import Zeroes, put_rows, row_numbers
+from .rows import FieldStore, Zeroes, copy_fields, put_rows, row_numbers, twins_of
 from .shape_table import PLAIN, Shapes
 from .sleep_kernels import Rest, Sleepers
 from .steps import Steps
@@ -52,7 +53,12 @@ AWAKE_SHARE = 0.64
 MOST_PRIMITIVES = 64
 LARGE = 1 << 18
 
+# Lists that have to grow get more than they need now, by this factor: what grows once may grow on.
+_SPARE = 1.25
+_MOST_ROWS = 2**31 - 1  # rows are counted with 32 bits
+
 _free: dict[tuple, list] = {}
+_grown: dict["Build", "Build"] = {}  # builds whose lists were too small for a bed, and what such a bed went on with
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +67,7 @@ class Build:
 
     Attributes:
         capacity: grains that there is room for, at most 2^26. cell_capacity, chunk_capacity: likewise.
-        neighbours_per_grain: rows of the pair lists for each.
+        neighbours_per_grain: rows of the pair lists for each. near_per_grain: of the lists of grains near bodies.
         rolling: whether contacts carry a rolling spring. tensile: whether a contact's damping may pull at its end.
         rescaled: whether a contact's springs are (``dem.contact.law``).
         cohesion: a law of ``dem.contact.cohesion.COHESIONS``. real: ti.f64 or ti.f32.
@@ -71,7 +77,8 @@ class Build:
     capacity: int
     cell_capacity: int
     chunk_capacity: int
-    neighbours_per_grain: int = 16
+    neighbours_per_grain: float = 16.0
+    near_per_grain: float = 2.0
     rolling: bool
     tensile: bool
     rescaled: bool
@@ -79,6 +86,17 @@ class Build:
     real: Any
     gpu: bool
     threads: int
+
+    @property
+    def spare(self) -> int:
+        """Rows that lists have beside those of the grains."""
+        return 4096 if self.gpu else 8 * self.chunk_capacity
+
+    @property
+    def rows(self) -> tuple[int, int]:
+        """Rows of the pair lists, and of the lists of grains near bodies."""
+        pairs, near = (int(self.capacity * share) for share in (self.neighbours_per_grain, self.near_per_grain))
+        return pairs + self.spare, near + self.spare
 
 
 def take_engine(
@@ -102,7 +120,7 @@ def take_engine(
         largest_diameter: of the grains [m]. largest_skin: of the lists [m].
         chunk_count: chosen when None. build: the attributes of ``Build``, but for its capacities.
 
-    Raises ValueError: a bed less than three grains wide.
+    Raises ValueError: a bed less than three grains wide, or with more grains than there is memory for.
     """
     cell = largest_diameter + largest_skin
     nx, ny = (max(1, int(length / cell)) for length in period)
@@ -118,14 +136,26 @@ def take_engine(
         chunk_count = grain_count if gpu else max(1, min(MOST_CHUNKS, round(grain_count / GRAINS_PER_CHUNK)))
     build |= capacities(grain_count, math.prod(cells), chunk_count, gpu=gpu)
     shape = Build(**build)
+    while shape in _grown:
+        shape = _grown[shape]
+    try:
+        engine = _engine(shape, owner)
+    except MemoryError as problem:
+        raise ValueError(f"a bed of {grain_count} grains {problem}; take fewer grains, or larger ones") from None
+    box = (*period, bottom, height, period[0] / nx, period[1] / ny, cell)
+    engine.set_up(grain_count=grain_count, chunk_count=chunk_count, cells=cells, box=box)
+    return engine
+
+
+def _engine(shape: Build, owner: Any) -> "Engine":
+    """An engine of this build for ``owner``, who gives it back in the end. Raises MemoryError."""
     key = (runtime.generation(), shape)
     for old in [k for k in _free if k[0] != key[0]]:
         del _free[old]
     idle = _free.setdefault(key, [])
-    engine = idle.pop() if idle else (owner.gpu_engine if gpu else Engine)(shape)
-    box = (*period, bottom, height, period[0] / nx, period[1] / ny, cell)
-    engine.set_up(grain_count=grain_count, chunk_count=chunk_count, cells=cells, box=box)
-    weakref.finalize(owner, idle.append, engine).atexit = False
+    engine: Engine = idle.pop() if idle else (owner.gpu_engine if shape.gpu else Engine)(shape)
+    engine.owner = weakref.finalize(owner, idle.append, engine)
+    engine.owner.atexit = False
     return engine
 
 
@@ -165,97 +195,106 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         *(f"body_{name}" for name in ("position", "velocity", "spin", "turn", "listed", "listed_turn", "extent")),
         *("body_primitives", "body_pair", "primitive_kind", "primitive_row"),
     )
+    # What is in no field.
+    _OWN = ("grain_count", "chunk_count", "nx", "ny", "nz", "bottom", "awake_per_chunk", "shapes", "_kept", "_meshes")
     # Zero where nothing is listed.
     EMPTY: tuple[str, ...] = ("pair_start", "pair_end", "overlap", "near_end")
 
     def __init__(self, build: Build):
-        self.real = real = build.real
+        self.build = build
+        self.owner: Any = None  # the bed's end, which gives the engine back
+        self.real = build.real
         self.rolling, self.tensile, self.cohesion, self.gpu = build.rolling, build.tensile, build.cohesion, build.gpu
         self.rescaled = build.rescaled
         self.cpu_items = build.threads * ITEMS_PER_THREAD
         self.block_stride = SCAN_BLOCKS if self.gpu else build.threads
-        capacity, chunk_capacity = build.capacity, build.chunk_capacity
-        self.count = ti.field(ti.i32, 12)
-        self.box = ti.field(real, 7)
-        self._make_grain_fields(capacity)
-        self._make_sort_fields(capacity, build.cell_capacity)
-        self._make_list_fields(capacity, chunk_capacity, capacity * build.neighbours_per_grain + 8 * chunk_capacity)
-        self._make_sums(chunk_capacity)
-        self._make_body_fields()
-        # Who computes which chunk, each counter in a cache line of its own.
-        self.ticket = ti.field(ti.i32, 2 * CACHE_LINE)
-        self.claim = ti.field(ti.i32, chunk_capacity * CACHE_LINE if not self.gpu else 1)
+        self.store = FieldStore(planned=True)  # fields that are made cannot be left unused: count their memory first
+        self._make_fields(build)
+        if not self.gpu:
+            runtime.refuse_memory(self.store.bytes)
+        self.store = FieldStore()
+        self._make_fields(build)
+        self.store.lay_out()
         self.shapes = PLAIN  # the table of the shapes that need one; kernels are compiled anew for another
         self._kept = None
         self._meshes = []
         self.rest: Any = ABSENT  # the table of those that sleep, likewise
         self.held: Any = None  # the last checkpoint
         self.balance: Any = ABSENT  # the table of the energy balance, likewise
-        # Step control: moved is written by move and read by push; halted is written by push and read by move.
-        self.moved, self.halted, self.done = (ti.field(ti.i32, ()) for _ in range(3))
-        self.problem = ti.Vector.field(2, ti.i32, ())
         counters = (self.body_count, self.moved, self.halted, self.done, self.problem)
         empty = (getattr(self, name) for name in ("ticket", *self.EMPTY, *self.BODY_FIELDS))
         self._zeroes = Zeroes(*empty, *counters)
 
+    def _make_fields(self, build: Build) -> None:
+        capacity, chunk_capacity = build.capacity, build.chunk_capacity
+        self.count = self.store.scalar(ti.i32, 12)
+        self.box = self.store.scalar(build.real, 7)
+        self._make_grain_fields(capacity)
+        self._make_sort_fields(capacity, build.cell_capacity)
+        self._make_list_fields(capacity, chunk_capacity, *build.rows)
+        self._make_sums(chunk_capacity)
+        self._make_body_fields()
+        # Who computes which chunk, each counter in a cache line of its own.
+        self.ticket = self.store.scalar(ti.i32, 2 * CACHE_LINE)
+        self.claim = self.store.scalar(ti.i32, chunk_capacity * CACHE_LINE if not self.gpu else 1)
+        # Step control: moved is written by move and read by push; halted is written by push and read by move.
+        self.moved, self.halted, self.done = (self.store.scalar(ti.i32, ()) for _ in range(3))
+        self.problem = self.store.scalar(ti.i32, 3)
+
     def _make_grain_fields(self, n: int) -> None:
         """A row for each grain."""
-        F, real = ti.Vector.field, self.real
+        F, real = self.store.vector, self.real
         # position: x y z radius; velocity: x y z mass (half a step behind); spin: x y z and nothing.
         self.position, self.velocity, self.spin = (F(4, real, n) for _ in range(3))
         self.force, self.torque, self.origin, self.listed = (F(3, real, n) for _ in range(4))
-        self.id = ti.field(ti.i32, n)
+        self.id = self.store.scalar(ti.i32, n)
 
     def _make_sort_fields(self, n: int, cell_capacity: int) -> None:
         """Room for sorting."""
-        F, real = ti.Vector.field, self.real
-        self.buffer4 = [F(4, real, n) for _ in range(3)]
-        self.buffer3 = F(3, real, n)
-        self.buffer_id, self.came_from, self.key = (ti.field(ti.i32, n) for _ in range(3))
-        self.rank = ti.field(ti.i32, cell_capacity)
-        self.cell_start = ti.field(ti.i32, 2 * cell_capacity + 1)
-        self.cell_fill = ti.field(ti.i32, 2 * cell_capacity)
-        self.block_sum = ti.field(ti.i32, SCAN_BLOCKS)
+        self.buffer_id, self.came_from, self.key = (self.store.scalar(ti.i32, n) for _ in range(3))
+        self.rank = self.store.scalar(ti.i32, cell_capacity)
+        self.cell_start = self.store.scalar(ti.i32, 2 * cell_capacity + 1)
+        self.cell_fill = self.store.scalar(ti.i32, 2 * cell_capacity)
+        self.block_sum = self.store.scalar(ti.i32, SCAN_BLOCKS)
 
-    def _make_list_fields(self, n: int, chunk_capacity: int, rows: int) -> None:
+    def _make_list_fields(self, n: int, chunk_capacity: int, rows: int, near: int) -> None:
         """Pair lists and lists of grains near bodies.
 
         Chunk c owns the rows from c times its room, those of a grain lie together. ``first`` is the grain a row belongs
         to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step, ``slide`` the contact's
         history: x y z of the tangential spring, and what the normal dashpot remembers.
         """
-        F, real = ti.Vector.field, self.real
-        self.pair_start, self.pair_end, self.old_start, self.old_end = (ti.field(ti.i32, n) for _ in range(4))
-        self.pair, self.first, self.touching, self.old_pair = (ti.field(ti.i32, rows) for _ in range(4))
-        self.slide, self.old_slide = F(4, real, rows), F(4, real, rows)
+        F, real = self.store.vector, self.real
+        self.pair_start, self.pair_end, self.old_start, self.old_end = (self.store.scalar(ti.i32, n) for _ in range(4))
+        self.pair, self.first, self.touching, self.old_pair = (self.store.scalar(ti.i32, rows) for _ in range(4))
+        self.slide, self.old_slide = F(4, real, max(rows, 4 * n)), F(4, real, rows)  # ``sort`` has four rows a grain
         if self.rolling:
             self.roll, self.old_roll = F(3, real, rows), F(3, real, rows)
-        near = 2 * n + 8 * chunk_capacity
-        self.near_end, self.old_near_end = (ti.field(ti.i32, chunk_capacity) for _ in range(2))
+        self.near_end, self.old_near_end = (self.store.scalar(ti.i32, chunk_capacity) for _ in range(2))
         self.near_grain, self.near_body, self.old_near_grain, self.old_near_body = (
-            ti.field(ti.i32, near) for _ in range(4)
+            self.store.scalar(ti.i32, near) for _ in range(4)
         )
         self.near_slide, self.old_near_slide = F(4, real, near), F(4, real, near)
         self.near_roll, self.old_near_roll = F(3, real, near), F(3, real, near)
-        self.near_first = ti.field(ti.i32, n)
+        self.near_first, self.old_near_room = self.store.scalar(ti.i32, n), self.store.scalar(ti.i32, ())
 
     def _make_sums(self, chunk_capacity: int) -> None:
         """What chunks add up: the largest overlap, the forces on bodies."""
-        self.overlap = ti.field(self.real, chunk_capacity)
-        self.pushes = ti.Vector.field(6, self.real, (chunk_capacity, MOST_BODIES))
+        self.overlap = self.store.scalar(self.real, chunk_capacity)
+        self.pushes = self.store.vector(6, self.real, (chunk_capacity, MOST_BODIES))
 
     def _make_body_fields(self) -> None:
         """Bodies, whose velocities the host sets, and their shapes."""
-        F, real = ti.Vector.field, self.real
-        self.body_count = ti.field(ti.i32, ())
+        F, real = self.store.vector, self.real
+        self.body_count = self.store.scalar(ti.i32, ())
         self.body_position, self.body_velocity, self.body_spin, self.body_listed = (
             F(3, real, MOST_BODIES) for _ in range(4)
         )
         self.body_turn, self.body_listed_turn = (F(4, real, MOST_BODIES) for _ in range(2))  # quaternions, scalar first
-        self.body_extent = ti.field(real, MOST_BODIES)
+        self.body_extent = self.store.scalar(real, MOST_BODIES)
         self.body_primitives = F(2, ti.i32, MOST_BODIES)
         self.body_pair = F(PAIR_WIDTH, real, MOST_BODIES)
-        self.primitive_kind = ti.field(ti.i32, MOST_PRIMITIVES)
+        self.primitive_kind = self.store.scalar(ti.i32, MOST_PRIMITIVES)
         self.primitive_row = F(ROW_WIDTH, real, MOST_PRIMITIVES)
         self.grain_pair = F(PAIR_WIDTH, real, ())
 
@@ -267,12 +306,9 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.chunk_count = chunk_count
         self.nx, self.ny, self.nz = cells
         self.bottom = box[self.BOTTOM]
-        chunks = 1 if self.gpu else chunk_count
-        self.chunk_room = self.pair.shape[0] // chunks
-        self.near_room = self.near_grain.shape[0] // chunks
         # Fewer awake have smaller chunks, so that all threads have some.
         self.awake_per_chunk = max(1, round(AWAKE_SHARE * GRAINS_PER_CHUNK))
-        sizes = (grain_count, chunk_count, self.chunk_room, self.near_room, *cells, math.prod(cells))
+        sizes = (grain_count, chunk_count, *self._most_rooms(), *cells, math.prod(cells))
         self.count.from_numpy(np.array([*sizes, grain_count, chunk_count, grain_count, sizes[-1]], dtype=np.int32))
         for k, value in enumerate(box):
             self.box[k] = value
@@ -283,6 +319,72 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.held = None
         self.rest = ABSENT
         self.balance = ABSENT
+
+    @property
+    def chunk_room(self) -> int:
+        """Rows of the pair lists that a chunk has."""
+        return int(self.count[self.CHUNK_ROOM])
+
+    @property
+    def near_room(self) -> int:
+        """Rows of the list of grains near bodies that a chunk has."""
+        return int(self.count[self.NEAR_ROOM])
+
+    def _most_rooms(self) -> tuple[int, int]:
+        """The most rows that a chunk can have, of both lists."""
+        return self.pair.shape[0] // self._shares, self.near_grain.shape[0] // self._shares
+
+    @property
+    def _shares(self) -> int:
+        """Among so many the rows of lists are shared out: a GPU's are packed."""
+        return 1 if self.gpu else self.chunk_count
+
+    def with_room(self, owner: Any, pairs: int, near: int) -> "Engine":
+        """An engine in the same state whose lists have room for so many rows a chunk: this one, or one to go on with.
+
+        Then this one is empty, and its memory is given back. Lists put aside stay valid, new ones are to be made.
+        Raises MemoryError: there is no room for such lists.
+        """
+        rooms = self._most_rooms()
+        if pairs <= rooms[0] and near <= rooms[1]:
+            self.count[self.CHUNK_ROOM], self.count[self.NEAR_ROOM] = rooms
+            return self
+        shares = (self.build.neighbours_per_grain, self.build.near_per_grain)
+        pair_share, near_share = (
+            share if need <= room else self._share_for(need)
+            for share, need, room in zip(shares, (pairs, near), rooms, strict=True)
+        )
+        larger = replace(self.build, neighbours_per_grain=pair_share, near_per_grain=near_share)
+        if max(larger.rows) > _MOST_ROWS:
+            raise MemoryError(f"needs {max(larger.rows)} rows of lists, of {_MOST_ROWS} that can be counted")
+        new = _engine(larger, owner)
+        for name in self._OWN:
+            setattr(new, name, getattr(self, name))
+        tables: list[tuple[Any, Any]] = [(self, new)]
+        new.rest, new.balance = (ABSENT, ABSENT)
+        if self.rest.on:
+            new.rest = new._own_rest
+            tables.append((self.rest, new.rest))
+        if self.balance.on:
+            new.balance = new._own_balance
+            tables.append((self.balance, new.balance))
+        for old_table, table in tables:
+            copy_fields(vars(old_table), vars(table))
+            if "twins" in vars(old_table):
+                copy_fields(old_table.twins, twins_of(table))
+        new.held = self.held
+        if new.held is not None:
+            new.held.tables = tuple(dict(tables).get(table, table) for table in new.held.tables)
+        new.count[self.CHUNK_ROOM], new.count[self.NEAR_ROOM] = new._most_rooms()
+        _grown[self.build] = larger
+        self.owner.detach()
+        self.store.free()
+        return new
+
+    def _share_for(self, room: int) -> float:
+        """Rows for a grain with which each chunk has room for so many, and some more."""
+        needed = (_SPARE * room + 1) * self._shares - self.build.spare
+        return math.ceil(4 * needed / self.build.capacity) / 4
 
     # What the host reads and writes of lists, in the order of grains, or of chunks near bodies.
 
@@ -303,6 +405,13 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         rows = row_numbers(start, counts)
         self.write("first", np.repeat(np.arange(self.grain_count), counts), rows)
         return rows
+
+    def rooms_for(self, pairs: np.ndarray, near: np.ndarray, awake: int, chunks: int) -> tuple[int, int]:
+        """Rows a chunk that so many pairs of each grain, and these grains near bodies, need; for ``with_room``."""
+        starts = np.array([0, self.grain_count]) if self.gpu else chunk_starts(awake, chunks)
+        counts = (pairs, np.bincount(near, minlength=self.grain_count))
+        most = [int(np.diff(np.concatenate(([0], np.cumsum(each)))[starts]).max()) for each in counts]
+        return most[0], most[1]
 
     def lay_history(self, counts: np.ndarray) -> np.ndarray:
         """Make room for so many pairs of each grain, one behind the other, which ``make_lists`` takes for history."""

@@ -17,6 +17,9 @@ ITEMS_PER_THREAD = 512
 CACHE_LINE = 16
 QUEUE, FINISHED = 0, CACHE_LINE
 BUILT = 2  # place of a number of ``dem.engine.sleep.Rest.news``: the other store of frozen contacts is filled
+# Places in Engine.problem: 1 + the id of a grain that has left the box; rows that a chunk's lists need, where they have
+# fewer.
+LOST, PAIRS_NEEDED, NEAR_NEEDED = range(3)
 SCAN_BLOCKS = 64  # in which cells are added up
 MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
 
@@ -205,23 +208,24 @@ class Lists(EnginePart):
                     self.came_from[b + 1] = self.came_from[b]
                     b -= 1
                 self.came_from[b + 1] = moving
+        # On the way they are in the histories, which are free: those of the old lists have been put aside.
         for i in range(self.count[self.SORTED]):
             o = self.came_from[i]
             if not self.lies_on(i, awake, rest):
-                self.buffer4[0][i] = self.position[o]
-                self.buffer4[1][i] = self.velocity[o]
-                self.buffer4[2][i] = self.spin[o]
-                self.buffer3[i] = self.origin[o]
+                self.slide[4 * i] = self.position[o]
+                self.slide[4 * i + 1] = self.velocity[o]
+                self.slide[4 * i + 2] = self.spin[o]
+                self.slide[4 * i + 3].xyz = self.origin[o]
                 self.buffer_id[i] = self.id[o]
         for i in range(self.count[self.SORTED]):
             if not self.lies_on(i, awake, rest):
-                self.position[i] = self.buffer4[0][i]
-                self.velocity[i] = self.buffer4[1][i]
-                self.spin[i] = self.buffer4[2][i]
-                self.origin[i] = self.buffer3[i]
+                self.position[i] = self.slide[4 * i]
+                self.velocity[i] = self.slide[4 * i + 1]
+                self.spin[i] = self.slide[4 * i + 2]
+                self.origin[i] = self.slide[4 * i + 3].xyz
                 self.id[i] = self.buffer_id[i]
-                self.listed[i] = self.buffer4[0][i].xyz
-                self.force[i] = self.buffer4[1][i].w * ti.Vector([gx, gy, gz])
+                self.listed[i] = self.slide[4 * i].xyz
+                self.force[i] = self.slide[4 * i + 1].w * ti.Vector([gx, gy, gz])
                 if ti.static(rest.on):
                     if i >= self.count[self.AWAKE]:
                         self.force[i] = ti.Vector.zero(self.real, 3)
@@ -235,7 +239,7 @@ class Lists(EnginePart):
         inside = inside and ti.abs(x.x) < 1e6 * self.box[self.PERIOD_X] and ti.abs(x.y) < 1e6 * self.box[self.PERIOD_Y]
         if not inside:
             # Any of the lost ones will do; the host looks for the first id.
-            self.problem[None] = ti.Vector([1, self.id[i]])
+            self.problem[LOST] = 1 + self.id[i]
         else:
             a = -ti.floor(x.x / self.box[self.PERIOD_X]) * self.box[self.PERIOD_X]
             b = -ti.floor(x.y / self.box[self.PERIOD_Y]) * self.box[self.PERIOD_Y]
@@ -283,6 +287,7 @@ class Lists(EnginePart):
         """Put the lists aside, so that the new ones can take the history over."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
+            self.old_near_room[None] = self.count[self.NEAR_ROOM]  # lists that grow have more by the time it is used
         for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[self.CHUNKS]):
             c = self.next_chunk(w, True)
             while c < self.count[self.CHUNKS]:
@@ -357,7 +362,8 @@ class Lists(EnginePart):
             for c in range(self.count[self.CHUNKS], self.count[self.ALL_CHUNKS]):
                 self.near_end[c] = c * self.count[self.NEAR_ROOM]
             for _ in range(1):
-                if rest.news[BUILT] == 1:
+                # Lists without room enough are made once more.
+                if rest.news[BUILT] == 1 and self.problem[PAIRS_NEEDED] + self.problem[NEAR_NEEDED] == 0:
                     rest.side[None] = 1 - rest.side[None]
                     rest.news[BUILT] = 0
                 rest.made[None] = self.count[self.AWAKE]
@@ -410,7 +416,7 @@ class Lists(EnginePart):
                                         s += 1
             self.pair_end[i] = ti.min(s, base + self.count[self.CHUNK_ROOM])
         if s > base + self.count[self.CHUNK_ROOM]:
-            self.problem[None] = ti.Vector([2, s - base])
+            ti.atomic_max(self.problem[PAIRS_NEEDED], s - base)
         self.list_near(c, start, end, skin, shapes, rest, balance)
 
     @ti.func
@@ -477,13 +483,13 @@ class Lists(EnginePart):
                     s += 1
         self.near_end[c] = ti.min(s, base + self.count[self.NEAR_ROOM])
         if s > base + self.count[self.NEAR_ROOM]:
-            self.problem[None] = ti.Vector([3, s - base])
+            ti.atomic_max(self.problem[NEAR_NEEDED], s - base)
 
     @ti.func
     def next_near(self, o, i):
         """The row of the old near list behind row o if it is of the same grain (i, its old index), or -1."""
         result = o + 1
-        room = self.count[self.NEAR_ROOM]
+        room = self.old_near_room[None]
         if result % room == 0 or result >= self.old_near_end[result // room]:
             result = -1
         elif self.old_near_grain[result] != i:

@@ -1,5 +1,6 @@
 """Some rows of a field as a numpy array: fields have room for many times the rows in use, and copying room costs."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,7 +8,17 @@ import numpy as np
 
 from hedgebed_taichi import ti
 
-__all__ = ["Zeroes", "put_rows", "read_fields", "row_numbers", "take_rows", "write_fields"]
+__all__ = [
+    "FieldStore",
+    "Zeroes",
+    "copy_fields",
+    "put_rows",
+    "read_fields",
+    "row_numbers",
+    "take_rows",
+    "twins_of",
+    "write_fields",
+]
 
 Rows = np.ndarray | slice
 
@@ -29,6 +40,76 @@ class Zeroes:
         for field in ti.static(self.vectors):
             for row in ti.grouped(field):
                 field[row] = ti.Vector.zero(field.dtype, field.n)
+
+
+# What lists are made with, and what a step makes anew: nothing of it is read before it is written.
+_SCRATCH = ("old_", "cell_", "block_", "buffer", "came_from", "key", "near_first", "touching", "rank", "ticket",
+            "claim", "problem")  # fmt: skip
+
+
+class FieldStore:
+    """Makes fields that lie in memory together, and are given back together; ``planned``: counts their memory only.
+
+    Attributes:
+        bytes: that they take.
+    """
+
+    def __init__(self, *, planned: bool = False) -> None:
+        self.bytes = 0
+        self._builder: Any = None if planned else ti.FieldsBuilder()
+        self._tree: Any = None
+
+    def scalar(self, kind: Any, shape: int | tuple[int, ...]) -> Any:
+        """As ``ti.field``, but it can be used after ``lay_out`` only."""
+        return self._placed(kind, 1, shape)
+
+    def vector(self, width: int, kind: Any, shape: int | tuple[int, ...]) -> Any:
+        """As ``ti.Vector.field``, likewise."""
+        return self._placed(kind, width, shape)
+
+    def _placed(self, kind: Any, width: int, shape: int | tuple[int, ...]) -> Any:
+        sizes = (shape,) if isinstance(shape, int) else shape
+        self.bytes += math.prod(sizes) * width * np.dtype(ti.lang.util.to_numpy_type(kind)).itemsize
+        if self._builder is None:
+            return None
+        field = ti.field(kind) if width == 1 else ti.Vector.field(width, kind)
+        at = self._builder.dense((ti.i, ti.ij)[len(sizes) - 1], sizes) if sizes else self._builder
+        at.place(field)
+        return field
+
+    def lay_out(self) -> None:
+        """Take the memory."""
+        self._tree = self._builder.finalize()
+
+    def free(self) -> None:
+        """Give the memory back: the fields, and kernels that use them, must not be used any more."""
+        self._tree.destroy()
+
+
+def twins_of(table: Any) -> dict[str, Any]:
+    """A field beside each of a table's, of its shape, but for scratch; as many as there are by now."""
+    twins: dict[str, Any] = table.__dict__.setdefault("twins", {})
+    for name, field in list(vars(table).items()):
+        if isinstance(field, ti.Field) and not name.startswith(_SCRATCH) and name not in twins:
+            kind = ti.Vector.field(field.n, field.dtype, field.shape) if isinstance(field, ti.MatrixField) else None
+            twins[name] = kind if kind is not None else ti.field(field.dtype, field.shape)
+    return twins
+
+
+def copy_fields(old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
+    """Copy fields by name into others that have as many rows, or more, of which the first are written then."""
+    for name, field in old.items():
+        if isinstance(field, ti.Field):
+            if field.shape == new[name].shape:
+                new[name].copy_from(field)
+            else:
+                _copy_head(field, new[name])
+
+
+@ti.kernel
+def _copy_head(old: ti.template(), new: ti.template()):
+    for i in old:
+        new[i] = old[i]
 
 
 def row_numbers(start: np.ndarray, counts: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Runtime", "generation", "start"]
+__all__ = ["Runtime", "free_memory", "generation", "refuse_memory", "start"]
 
 ARCHITECTURES = ("cpu", "cuda")
 PRECISIONS = ("float64", "float32")
@@ -34,6 +34,30 @@ _generation = 0
 def generation() -> int:
     """The number of times that Taichi was started; a bed of an earlier generation is no longer valid."""
     return _generation
+
+
+def free_memory() -> int | None:
+    """Bytes that this process may still take: what the system has to give, or its control group; None if unknown."""
+    found = []
+    try:
+        rows = dict(line.split(":") for line in Path("/proc/meminfo").read_text().splitlines())
+        found.append(1024 * int(rows["MemAvailable"].split()[0]))
+    except (OSError, ValueError, KeyError):
+        pass
+    try:
+        most, used, kept = (Path("/sys/fs/cgroup/memory." + name).read_text() for name in ("max", "current", "stat"))
+        cached = dict(line.split() for line in kept.splitlines())["inactive_file"]  # given back when it is needed
+        found.append(int(most) - int(used) + int(cached))
+    except (OSError, ValueError, KeyError):
+        pass
+    return min(found, default=None)
+
+
+def refuse_memory(needed: int) -> None:
+    """Raise MemoryError, with numbers, where so many bytes cannot be had."""
+    free = free_memory()
+    if free is not None and needed > free:
+        raise MemoryError(f"needs {needed / 2**30:.3g} GiB of memory, {free / 2**30:.3g} GiB are free")
 
 
 def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "float64") -> Runtime:

@@ -16,12 +16,11 @@ from typing import Any, Self
 import numpy as np
 
 from dem.grains.materials import Material
-from hedgebed_taichi import ti
 
 from .bodies import BedBodies
 from .engine import Engine
 from .lists import ABSENT, INDEX_BITS, INDEX_MASK
-from .rows import read_fields, take_rows, write_fields
+from .rows import read_fields, take_rows, twins_of, write_fields
 from .sleep import Sleep, Sleeper
 from .values import BedSettings, State
 
@@ -41,19 +40,16 @@ NAMES = (*GRAIN_FIELDS, *BODY_FIELDS, *LIST_NAMES, "numbers", "reals")
 ABOUT = ("material", "material_numbers", "cohesion", "tangential", "size", "height", "tensile", "seed", "precision")
 
 
-# What lists are made with, and what a step makes anew: nothing of it is read before it is written.
-_SCRATCH = ("old_", "cell_", "block_", "buffer", "came_from", "key", "near_first", "touching", "rank", "ticket",
-            "claim", "problem")  # fmt: skip
 _BED_NUMBERS = ("steps", "list_count", "grain_steps", "steps_since_lists", "reaction_steps", "skin", "tallied")
 _SLEEP_NUMBERS = ("awake", "mass", "slept", "leaving")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Checkpoint:
     """What ``Bed.checkpoint`` returned; a bed has room for one, so the next one ends it.
 
     Attributes:
-        tables: whose fields were copied: the engine, the sleepers, the balance.
+        tables: whose fields were copied: the engine, the sleepers, the balance. Others where lists have grown since.
         numbers: (owner, attribute, value) of what no field holds.
         conditions: gravity, and the rules of sleep at work, which must be the same at a rollback.
     """
@@ -109,10 +105,12 @@ class BedState(BedBodies):
             )
         if values["position"].dtype != self.runtime.precision:
             raise ValueError(f"this state is in {values['position'].dtype}, the bed in {self.runtime.precision}")
+        awake, chunks = values.get("sleep_numbers", (self.grain_count, e.chunk_count))[:2]
+        self.make_room(*e.rooms_for(values["pair_count"], values["near_grain"], awake, chunks))
+        e = self.engine
         for name in (*GRAIN_FIELDS, *BODY_FIELDS):
             e.write(name, values[name])
         e.restore_shapes(values)
-        awake, chunks = values.get("sleep_numbers", (self.grain_count, e.chunk_count))[:2]
         rows = e.lay_pairs(values["pair_count"], awake, chunks)
         touching = rows[values["pair"] < 0]
         for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
@@ -162,7 +160,7 @@ class BedState(BedBodies):
         numbers = [(owner, name, getattr(owner, name)) for owner, names in owners for name in names]
         kept = Checkpoint(_tables(self.engine), numbers, (*map(float, self.gravity), self.sleeper))
         for table in kept.tables:
-            for name, twin in _twins(table).items():
+            for name, twin in twins_of(table).items():
                 twin.copy_from(getattr(table, name))
         self.engine.held = kept
         return kept
@@ -179,7 +177,7 @@ class BedState(BedBodies):
         if kept.conditions != (*map(float, self.gravity), self.sleeper):
             raise ValueError("gravity or the rules of sleep are others by now than when this bed was held")
         for table in kept.tables:
-            for name, twin in _twins(table).items():
+            for name, twin in twins_of(table).items():
                 getattr(table, name).copy_from(twin)
         if e.rest.on:
             e.rest.whole[None] = 1  # of what lists were made with nothing is kept
@@ -224,16 +222,6 @@ class BedState(BedBodies):
 def _tables(e: Engine) -> tuple[Any, ...]:
     """The tables of fields at work: the engine, the sleepers, the balance."""
     return (e, *(table for table in (e.rest, e.balance) if table.on))
-
-
-def _twins(table: Any) -> dict[str, ti.Field]:
-    """A field beside each of a table's, of its shape; as many as there are by now."""
-    twins: dict[str, ti.Field] = table.__dict__.setdefault("twins", {})
-    for name, field in list(vars(table).items()):
-        if isinstance(field, ti.Field) and not name.startswith(_SCRATCH) and name not in twins:
-            kind = ti.Vector.field(field.n, field.dtype, field.shape) if isinstance(field, ti.MatrixField) else None
-            twins[name] = kind if kind is not None else ti.field(field.dtype, field.shape)
-    return twins
 
 
 @contextmanager
@@ -305,13 +293,15 @@ def adopt(bed: BedBodies, state: State, *, keep: np.ndarray | None = None) -> No
     chosen = stay[first] & stay[second]
     a, b = place[first[chosen]], place[second[chosen]]
     counts = np.bincount(a, minlength=bed.grain_count)
+    near = stay[state["near_grain"]]
+    values = {name: state[name][near] for name in NEAR_FIELDS}
+    values["near_grain"] = place[values["near_grain"]]
+    bed.make_room(*e.rooms_for(counts, values["near_grain"], bed.grain_count, e.chunk_count))
+    e = bed.engine
     rows = e.lay_history(counts)
     e.write("pair", ~b, rows)
     for name in ("slide", "roll") if e.rolling else ("slide",):
         e.write(name, state[name][chosen], rows)
-    near = stay[state["near_grain"]]
-    values = {name: state[name][near] for name in NEAR_FIELDS}
-    values["near_grain"] = place[values["near_grain"]]
     _write_near(e, values, bed.grain_count, e.chunk_count)
     for name in Engine.BODY_FIELDS:
         e.write(name, state[name])
@@ -320,6 +310,7 @@ def adopt(bed: BedBodies, state: State, *, keep: np.ndarray | None = None) -> No
     bed.has_floor = bool(state["numbers"][5])
     bed.steps = int(state["numbers"][0])
     bed.make_lists()
+    e = bed.engine
     bed.compute_forces()
     # Computed anew they are without what dashpots know of the step before: only where a contact has gone.
     lost, apart = np.zeros(len(ids), dtype=bool), stay[first] != stay[second]

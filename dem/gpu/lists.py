@@ -14,7 +14,7 @@ import numpy as np
 
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range
-from dem.engine.lists import INDEX_BITS, INDEX_MASK, MOST_BODIES, Lists
+from dem.engine.lists import INDEX_BITS, INDEX_MASK, MOST_BODIES, NEAR_NEEDED, PAIRS_NEEDED, Lists
 from hedgebed_taichi import ti
 
 __all__ = ["NEAR", "TALLY_BLOCKS", "GpuLists"]
@@ -33,35 +33,34 @@ class GpuLists(Lists):
         """Room for sorting; one grain field after the other goes through the buffers."""
         real = self.real
         self.capacity, self.cell_capacity = n, cell_capacity
-        self.buffer4, self.buffer3 = ti.Vector.field(4, real, n), ti.Vector.field(3, real, n)
-        self.came_from, self.key = (ti.field(ti.i32, n) for _ in range(2))
-        self.rank = ti.field(ti.i32, cell_capacity)
-        self.cell_start, self.cell_fill = (ti.field(ti.i32, cell_capacity + 1) for _ in range(2))
-        self.block_sum, self.block_near = (ti.field(ti.i32, SCANNED) for _ in range(2))
+        self.buffer4, self.buffer3 = self.store.vector(4, real, n), self.store.vector(3, real, n)
+        self.came_from, self.key = (self.store.scalar(ti.i32, n) for _ in range(2))
+        self.rank = self.store.scalar(ti.i32, cell_capacity)
+        self.cell_start, self.cell_fill = (self.store.scalar(ti.i32, cell_capacity + 1) for _ in range(2))
+        self.block_sum, self.block_near = (self.store.scalar(ti.i32, SCANNED) for _ in range(2))
 
-    def _make_list_fields(self, n: int, chunk_capacity: int, rows: int) -> None:
+    def _make_list_fields(self, n: int, chunk_capacity: int, rows: int, near: int) -> None:
         """Pair lists and lists of grains near bodies, and those of before."""
-        F, real = ti.Vector.field, self.real
-        self.row_capacity, self.near_capacity = rows, n + 4096
-        self.pair_start, self.old_start = (ti.field(ti.i32, n + 1) for _ in range(2))
-        self.pair, self.old_pair = (ti.field(ti.i32, rows) for _ in range(2))
+        F, real = self.store.vector, self.real
+        self.row_capacity, self.near_capacity = rows, near
+        self.pair_start, self.old_start = (self.store.scalar(ti.i32, n + 1) for _ in range(2))
+        self.pair, self.old_pair = (self.store.scalar(ti.i32, rows) for _ in range(2))
         self.slide, self.old_slide = (F(4, real, rows) for _ in range(2))
         if self.rolling:
             self.roll, self.old_roll = (F(3, real, rows) for _ in range(2))
-        near = self.near_capacity
-        self.near_start, self.old_near_start = (ti.field(ti.i32, n + 1) for _ in range(2))
-        self.near_grain, self.near_body, self.old_near_body = (ti.field(ti.i32, near) for _ in range(3))
+        self.near_start, self.old_near_start = (self.store.scalar(ti.i32, n + 1) for _ in range(2))
+        self.near_grain, self.near_body, self.old_near_body = (self.store.scalar(ti.i32, near) for _ in range(3))
         self.near_slide, self.old_near_slide = (F(4, real, near) for _ in range(2))
         self.near_roll, self.old_near_roll = (F(3, real, near) for _ in range(2))
         # Force and torque of a row on its body, summed since they were last added to ``pushes``.
         self.near_push = F(6, ti.f64, near)
-        self.total = ti.field(ti.i32, 2)
+        self.total = self.store.scalar(ti.i32, 2)
 
     def _make_sums(self, chunk_capacity: int) -> None:
         """Forces on bodies are summed by row, then by block of rows: nothing as large as the bed is read."""
-        self.overlap = ti.field(self.real, self.capacity)
-        self.pushes = ti.Vector.field(6, ti.f64, (TALLY_BLOCKS, MOST_BODIES))
-        self.block_overlap = ti.field(ti.f64, TALLY_BLOCKS)
+        self.overlap = self.store.scalar(self.real, self.capacity)
+        self.pushes = self.store.vector(6, ti.f64, (TALLY_BLOCKS, MOST_BODIES))
+        self.block_overlap = self.store.scalar(ti.f64, TALLY_BLOCKS)
 
     # What the host reads and writes of lists, in the order of grains.
 
@@ -255,9 +254,9 @@ class GpuLists(Lists):
                 self.near_start[self.count[self.GRAINS]] = near
                 self.total[PAIRS], self.total[NEAR] = rows, near
                 if rows > self.row_capacity:
-                    self.problem[None] = ti.Vector([2, rows])
+                    self.problem[PAIRS_NEEDED] = rows
                 if near > self.near_capacity:
-                    self.problem[None] = ti.Vector([3, near])
+                    self.problem[NEAR_NEEDED] = near
         for i in range(self.capacity):
             if i < self.count[self.GRAINS] and self.fits():
                 self.list_pairs(i, ti.cast(skin, self.real), self.pair_start[i], balance)

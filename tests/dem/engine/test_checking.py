@@ -22,7 +22,7 @@ def layout(request, engines, monkeypatch):
     if request.param == "seven chunks":
         monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 9)
     elif request.param == "grain chunks":
-        engines.overrides = {"gpu": True, "neighbours_per_grain": 30}
+        engines.overrides = {"gpu": True, "neighbours_per_grain": 30.0, "near_per_grain": 2.0}
     return request.param
 
 

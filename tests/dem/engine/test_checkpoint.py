@@ -12,7 +12,7 @@ from dem import Sleep
 def made(layout, engines):
     """The cloud and its ball after fifty steps."""
     if layout == "grain chunks":
-        engines.overrides = {"gpu": True, "neighbours_per_grain": 30}
+        engines.overrides = {"gpu": True, "neighbours_per_grain": 30.0, "near_per_grain": 2.0}
     bed = cloud.make(ball=True)
     bed.track_contact_work()
     bed.advance(50)

@@ -3,12 +3,13 @@
 from dataclasses import replace
 
 import cloud
+import falling_bed
 import numpy as np
 import pytest
 from naive_bed import NaiveBed
 
 import dem.engine.engine
-from dem import Bed
+from dem import Bed, BedFailure
 from dem.contact.law import damping_factor
 
 STEPS = 30
@@ -142,7 +143,72 @@ def test_a_shift_of_the_origin_changes_nothing():
     assert (b["position"][:, :2] >= 0).all() and (b["position"][:, :2] <= cloud.PERIOD[0]).all()
 
 
-def test_lists_that_are_too_small_are_no_secret(engines):
-    engines.overrides = {"gpu": True, "neighbours_per_grain": 0}
-    with pytest.raises(dem.BedFailure, match=r"room for \d+ pairs and \d+ are needed"):
+@pytest.fixture
+def little_room(engines, monkeypatch):
+    """Beds begin with room for a few rows a chunk, and no bed has grown before."""
+    monkeypatch.setattr(dem.engine.engine, "_grown", {})
+    engines.overrides = {"neighbours_per_grain": -0.45, "near_per_grain": -0.48}  # of what all chunks have
+
+
+@pytest.mark.parametrize("layout", [{}, {"gpu": True, "neighbours_per_grain": -3.9, "near_per_grain": -3.99}])
+def test_lists_that_are_too_small_grow_to_the_same_bits(little_room, engines, layout):
+    """In chunks and packed, as on a GPU; and the next bed begins with the room that this one needed."""
+    engines.overrides |= layout
+    small = cloud.make(ball=True)
+    room = small.engine.chunk_room
+    small.advance(120)
+    found = small.state()
+    del small
+    assert cloud.make().engine.chunk_room == room
+    engines.overrides = {"gpu": True} if layout else {}
+    large = cloud.make(ball=True)
+    assert room < large.engine.chunk_room
+    large.advance(120)
+    wanted = large.state()
+    assert all(np.array_equal(found[name], wanted[name]) for name in wanted)
+
+
+def test_a_machine_without_memory_for_larger_lists_says_how_much_they_need(little_room, monkeypatch):
+    monkeypatch.setattr(dem.engine.engine, "_free", {})
+    answers = iter([None])  # what is free is unknown for the first engine; then it is a kilobyte
+    monkeypatch.setattr("dem.engine.runtime.free_memory", lambda: next(answers, 1024))
+    with pytest.raises(BedFailure, match=r"room for \d+ pairs.* \d+ and \d+ are needed.* GiB of memory"):
         cloud.make()
+
+
+def test_more_grains_than_there_is_memory_for_are_refused(engines, monkeypatch):
+    engines.overrides = {"neighbours_per_grain": 77.0}  # an engine that nobody has
+    monkeypatch.setattr("dem.engine.runtime.free_memory", lambda: 1024)
+    with pytest.raises(ValueError, match=r"bed of 64 grains needs \S+ GiB of memory, \S+ GiB are free"):
+        cloud.make()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("options", [{}, {"sleep": True}, {"body": "solids"}])
+def test_lists_that_grow_in_mid_run_carry_histories_checkpoints_and_files(options, engines, monkeypatch, tmp_path):
+    """Eight chunks; with sleepers, and a mesh. Back to before they grew, on from a file into a bed with little room."""
+    monkeypatch.setattr(dem.engine.engine, "_grown", {})
+    monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", falling_bed.GRAINS_PER_CHUNK)
+    large = falling_bed.make(**options)
+    large.advance(300)
+    wanted = large.state()
+    engines.overrides = {"neighbours_per_grain": -0.25, "near_per_grain": -0.46}
+    small = falling_bed.make(**options)
+    engine = small.engine
+    small.debug = True
+    small.advance(20)
+    kept = small.checkpoint()
+    for _ in range(2):
+        small.advance(280)
+        assert small.engine is not engine
+        found = small.state()
+        assert all(np.array_equal(found[name], wanted[name]) for name in wanted)
+        small.rollback(kept)
+    small.advance(280)
+    path = small.save(tmp_path / "bed.npz")
+    dem.engine.engine._grown.clear()
+    again = Bed.load(path)
+    small.advance(40)
+    again.advance(40)
+    found, wanted = again.state(), small.state()
+    assert all(np.array_equal(found[name], wanted[name]) for name in wanted)
