@@ -3,9 +3,10 @@
 The mean diameter is a field over the bed's length x and height z, the same across y: ``fine`` under the footprints,
 down to a depth, and from there on ``growth`` metres more for each metre away, up to ``coarse``. Small grains fall
 through large ones where they fit between them. Three spheres of diameter D that touch leave a throat of
-2 / sqrt(3) - 1 = 0.155 D, below which a grain falls through a dense packing by its own weight (Savage & Lun 1988,
-J. Fluid Mech. 189:311); four in a square leave sqrt(2) - 1 = 0.414 D. So that no grain passes even those, the field
-rises no faster than ``steepest``. Rings of five and more leave wider ones; docs/bed.md has how much goes through.
+2 / sqrt(3) - 1 = 0.155 D, which is D / 6.46, below which a grain falls through a dense packing by its own weight
+(Savage & Lun 1988, J. Fluid Mech. 189:311); four in a square leave sqrt(2) - 1 = 0.414 D. So that no grain passes even
+those, the field rises no faster than ``steepest``. Rings of five and more leave wider ones; docs/bed.md has how much
+goes through.
 """
 
 import math
@@ -18,9 +19,10 @@ import numpy as np
 from .packing import curve_ranks
 from .sizes import Json, Uniform
 
-__all__ = ["THROAT", "Graded", "middles", "steepest"]
+__all__ = ["NARROWEST", "THROAT", "Graded", "middles", "steepest"]
 
 THROAT = math.sqrt(2) - 1  # The throat of four like spheres in a square, over their diameter [1]
+NARROWEST = 2 / math.sqrt(3) - 1  # that of three which touch: 1 / 6.46 [1]
 DRIFT = 2.0
 """So many diameters of the larger one may grains of the field have come closer to one another than they belong [1]."""
 _WIDTHS, _DEPTHS = 6, 4  # a bed is at least so many of its coarsest grains wide and deep, as of its mean ones elsewhere

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dem.engine.core import BedCore
+from dem.engine.stress import find_contacts
 from dem.grains.graded import THROAT, Graded, middles
 from dem.grains.packing import bulk_packing, surface_height
 
@@ -62,6 +63,8 @@ class Grading:
             the largest grains of the place where they lie [1].
         strayed_share: in grains farther out than any of their size belongs, by more than a mean diameter there [1].
         farthest: the farthest of these, in such diameters [1]; 0: none is beyond where it belongs.
+        touching_ratio: the largest ratio of the diameters of two grains that touch [1]; a grain falls through three
+            that touch where they are 6.46 times as large (``dem.grains.graded``).
         fine_count: grains of a bed of the same size that is fine throughout, at the same packing fraction.
     """
 
@@ -70,6 +73,7 @@ class Grading:
     drained_share: float
     strayed_share: float
     farthest: float
+    touching_ratio: float
     grain_count: int
     fine_count: int
 
@@ -98,9 +102,17 @@ def measure_grading(bed: BedCore, graded: Graded) -> Grading:
         drained_share=float(solid[falls].sum()) / total,
         strayed_share=float(solid[beyond > _SCATTER].sum()) / total,
         farthest=float(beyond.max()),
+        touching_ratio=_touching_ratio(bed, d),
         grain_count=len(d),
         fine_count=round(total / (math.pi / 6 * graded.fine**3 * (1 + graded.spread**2))),
     )
+
+
+def _touching_ratio(bed: BedCore, d: Array) -> float:
+    contacts = find_contacts(bed)
+    both = contacts.second >= 0
+    one, other = d[contacts.first[both]], d[contacts.second[both]]
+    return float((np.maximum(one, other) / np.minimum(one, other)).max(initial=1.0))
 
 
 def surface_under(bed: BedCore, graded: Graded) -> float:

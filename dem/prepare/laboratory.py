@@ -20,7 +20,7 @@ from dem.measure.grading import measure_grading
 from dem.measure.lid import Lid
 
 from .recipe import FLUFF, Stage
-from .report import ENERGY_RATIO, B, StageReport, measure_stage
+from .report import ENERGY_RATIO, B, ShowsBed, StageReport, measure_stage
 from .specification import BEARING
 from .stages import DRAG, PAST, SHORT, Preparation
 
@@ -104,6 +104,8 @@ class Laboratory(Preparation[B]):
     def _pause(self, done: float) -> None:
         try:
             if self._progress is not None:
+                if isinstance(self._progress, ShowsBed):
+                    self._progress.show_bed(self.bed)
                 self._progress.update(done)
         except KeyboardInterrupt:
             self.keep()

@@ -54,8 +54,9 @@ def prepare_as(
         keep: a file (.npz; a .json comes beside it) where unfinished work is kept every minute and after every stage;
             the next call with it continues from there, bitwise reproducibly.
         cache: whether to look in the cache of ``prepare_bed``, and to leave the bed there, finished or not.
-        progress: anything with ``stage(name, total)`` and ``update(done)``, or None. A KeyboardInterrupt out of
-            ``update`` stops the preparation where it can be continued.
+        progress: anything with ``stage(name, total)`` and ``update(done)``, or None; where it has ``show_bed(bed)``
+            that is called before each ``update``. A KeyboardInterrupt out of ``update`` stops the preparation where it
+            can be continued.
         options: see ``dem.prepare.specification.BedOptions``.
 
     The rain is more than is wanted, so that a bed that is levelled last has its depth up to a packing fraction of 0.64.

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -11,13 +11,21 @@ from dem.engine.stress import find_contacts, stress_profile
 from dem.grains.packing import packing_profile
 from dem.grains.sizes import Json
 
-__all__ = ["ENERGY_RATIO", "FLOOR_RATIO", "Prepared", "StageReport", "measure_stage"]
+__all__ = ["ENERGY_RATIO", "FLOOR_RATIO", "Prepared", "ShowsBed", "StageReport", "measure_stage"]
 
 # Settled: mean kinetic energy of a grain over m g d, and floor force over weight.
 ENERGY_RATIO, FLOOR_RATIO = 1e-5, 0.01
 # Layers of the profiles, in mean diameters.
 _LAYER = 1.5
 B = TypeVar("B", bound=BedCore)
+
+
+@runtime_checkable
+class ShowsBed(Protocol):
+    """What may be told a bed in preparation, before each ``update`` of the share done."""
+
+    def show_bed(self, bed: BedCore) -> None:
+        """The bed as it is."""
 
 
 @dataclass(frozen=True)

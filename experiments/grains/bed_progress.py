@@ -2,14 +2,20 @@
 
 from collections.abc import Callable
 
+from dem import Bed
 from experiments.runs.progress import Progress, as_expected
 
-__all__ = ["BedProgress", "Stages"]
+__all__ = ["BedProgress", "Stages", "show_bed"]
 
 _SHARES = {"rain": 0.30, "calm": 0.12, "settle": 0.32, "rest": 0.26}  # Of the time, on 20,000 grains
 _TAPPED = 0.1  # What all of that is where the bed is tapped to a packing fraction: 15 taps took ten times as long [1]
 _DOWN = 0.82  # Share of the fall at which the grains are down: what lies is 1 / 2.5 as high as what fell [1]
 _CALM, _REST = 4, 14  # Updates of a bed until it is cut level, and while it rests without drag: 2 to 30 were seen
+
+
+def show_bed(progress: Progress, bed: Bed) -> None:
+    """Tell how many grains the bed has, how many of them are awake, and how many grain-steps it has done."""
+    progress.show_bed(grain_count=bed.grain_count, awake_count=bed.awake_count, grain_steps=bed.grain_steps)
 
 
 class Stages:
@@ -21,6 +27,10 @@ class Stages:
     def stage(self, name: str, total: float | None = None) -> None:
         """The next stage begins."""
         self.progress.stage(name, total=total)
+
+    def show_bed(self, bed: Bed) -> None:
+        """The bed as it is; `dem.prepare` tells it before each `update`."""
+        show_bed(self.progress, bed)
 
     def update(self, done: float) -> None:
         """`done` of it, 0 to 1. Raises KeyboardInterrupt if asked to stop."""

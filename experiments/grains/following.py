@@ -16,6 +16,7 @@ from experiments.runs.stopping import held_back
 from experiments.runs.whole_runs import publish
 
 from . import say
+from .bed_progress import show_bed
 
 __all__ = ["CHECKPOINT", "Followed", "Frames"]
 
@@ -72,6 +73,8 @@ class Followed(ABC, Generic[Run]):
 
         def on_step(run: Any) -> None:
             nonlocal saved, placing, late
+            if isinstance(run.ground, BedGround):
+                show_bed(progress, run.ground.bed)
             progress.update(run.fraction)
             if run.placement_is_long and not late:
                 late = True

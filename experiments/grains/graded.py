@@ -1,13 +1,14 @@
 """What a graded bed adds to results of `bed make` and `bed refine`; where a tumble wants fine grains, which it met."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from statistics import fmean
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupling import CoupledTumble
-from dem.grains.graded import THROAT, Graded
+from dem.grains.graded import NARROWEST, THROAT, Graded
 from dem.measure.grading import MOST_DRAINED, MOST_STRAYED
 from dem.prepare.report import Prepared
 from experiments.platform.numbers import tip_angles, tip_depth
@@ -18,7 +19,10 @@ from rigid.planar.trajectory import Trajectory
 from . import say
 from .spells import spells
 
-__all__ = ["coarsest_touched", "grading_told", "graded_under", "places_touched", "tips_in_ground"]
+__all__ = [
+    "coarsest_touched", "graded_quantities", "graded_under", "grading_told", "grading_warning", "places_touched",
+    "tips_in_ground",
+]  # fmt: skip
 
 
 def grading_told(prepared: Prepared) -> Json:
@@ -46,12 +50,8 @@ def grading_told(prepared: Prepared) -> Json:
         "strayed_share": (found["strayed_share"], "1", "solid in grains too small for where they lie, by a diameter"),
         "drained_share": (found["drained_share"], "1", "solid in grains that fit through the gaps where they lie"),
     }
-    warnings = []
-    if not (found["strayed_share"] <= MOST_STRAYED and found["drained_share"] <= MOST_DRAINED):
-        warnings.append(
-            f"the grading did not hold: after {last!r} {100 * found['strayed_share']:.2g} % of the grains' volume lies "
-            f"farther out than it belongs, {100 * found['drained_share']:.2g} % could fall through"
-        )
+    warning = grading_warning(found, after=f" after {last!r}")
+    warnings = [] if warning is None else [warning]
     zone_head = ["zone", "grains", "solid [%]", "wanted [mm]", "mean [mm]", "smallest [mm]", "largest [mm]", "packing"]
     layer_head = ["height [mm]", "under footprints [mm]", "elsewhere [mm]"]
     stage_head = ["after", "strayed [% of solid]", "could drain [% of solid]", "farthest [diameters]"]
@@ -66,6 +66,32 @@ def grading_told(prepared: Prepared) -> Json:
         "quantities": quantities_of(quantities, std=None),
         "warnings": warnings,
     }
+
+
+def grading_warning(found: Mapping[str, Any], *, after: str = "") -> str | None:
+    """That small grains lie where they do not belong, or could drain, in words; `found`: a `dem.Grading` as a dict."""
+    if found["strayed_share"] <= MOST_STRAYED and found["drained_share"] <= MOST_DRAINED:
+        return None
+    return (
+        f"the grading did not hold:{after} {100 * found['strayed_share']:.2g} % of the grains' volume lies farther out "
+        f"than it belongs, {100 * found['drained_share']:.2g} % could fall through"
+    )
+
+
+def graded_quantities(found: Sequence[Mapping[str, Any]]) -> dict[str, Json]:
+    """Of the graded beds of a run: how they lie, the worst of them, and how many grains are saved."""
+    saved = [1 - bed["grain_count"] / bed["fine_count"] for bed in found]
+    drains = f"four in a square let grains through from {1 / THROAT:.2f} on, three from {1 / NARROWEST:.2f}"
+    notes = {
+        "strayed_share": "solid in grains too small for where they lie, by a diameter",
+        "drained_share": "solid in grains that fit through the gaps where they lie",
+        "touching_ratio": f"largest ratio of the diameters of two grains that touch; {drains}",
+    }
+    numbers = {
+        "grains_saved": (fmean(saved), "1", "of the grains, and grain-steps, of a bed that is as fine throughout")
+    }
+    numbers |= {key: (max(bed[key] for bed in found), "1", note) for key, note in notes.items()}
+    return quantities_of(numbers, std=None)
 
 
 def _or_none(value: float | None, form: str) -> str:

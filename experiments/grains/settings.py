@@ -87,6 +87,12 @@ class TumbleBedSettings(GrainsSettings):
     coarse: Positive | None = None
     """On a bed: graded: `grain` is the mean diameter under the expected footprints, this the largest away from them
     [m]; one size throughout if not given."""
+    fine_radius: Positive | None = None
+    """Of a graded bed: how far beside where the axis of a tip is expected grains are fine [m]; 1.5 spike diameters if
+    not given."""
+    fine_depth: Positive | None = None
+    """Of a graded bed: how far down from the surface grains are fine [m]; two spike diameters below the deepest tip
+    expected, or to the floor, if not given."""
     bed_stages: tuple[str, ...] | None = None
     """On a bed: how it is prepared, as `hedgebed bed make --stages` has it (rain:dry compact:0.57 stick level, for
     grains that stick); rained and levelled if not given."""

@@ -43,9 +43,11 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
     """The bed of one seed: the one that is given, or prepared, or from the cache."""
     if settings.bed is not None:
         return Bed.load(find_bed(settings.bed), arch=settings.arch, threads=settings.threads)
+    graded = settings.graded
     with held_back() as asked_to_stop:
         return Bed.prepare(
-            find_material(settings), size=settings.bed_size, grain=settings.grain, spread=settings.spread,
+            find_material(settings), size=settings.bed_size, grain=settings.grain if graded is None else graded,
+            spread=settings.spread if graded is None else None,
             packing=settings.packing, gravity=settings.gravity, seed=seed, young=young,
             max_overlap=settings.max_overlap, time_step=settings.time_step, precision=settings.precision,
             arch=settings.arch, threads=settings.threads, cache=settings.cache,

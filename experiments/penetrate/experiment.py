@@ -16,6 +16,7 @@ import numpy as np
 
 from coupling import BedGround, Run
 from experiments.campaign.files import keep_model, place_campaign
+from experiments.grains.bed_progress import show_bed
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
@@ -97,7 +98,7 @@ class _Work:
         except RuntimeError as error:
             raise RuntimeError(f"the bed of seed {seed} could not be prepared: {error}; {_remedy(error)}") from error
         self.plan.bed_is_there()
-        facts = BedFacts.of(bed, seed, self.softening)
+        facts = BedFacts.of(bed, seed, self.softening, self.settings.graded)
         ground = BedGround(bed, make_spike(self.settings))
         start = ground.state()
         self.folder.mark_done(f"bed-{seed}", asdict(facts))
@@ -128,6 +129,7 @@ class _Work:
             nonlocal saved, expected, sure
             if unit.kind == "drop" and stepper.at_bottom:  # from its first stop on the end is known
                 expected, sure = stepper.time + settings.after_stop, True
+            show_bed(self.progress, bed)
             self.progress.update(share_done(stepper, expected, sure=sure))
             stop = asked_to_stop()
             if not stepper.done and (stop or time.monotonic() - saved >= settings.checkpoint_interval):

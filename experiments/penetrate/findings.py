@@ -15,6 +15,8 @@ from typing import Any, Self
 import numpy as np
 
 from coupling import Penetration
+from dem.measure.grading import measure_grading
+from experiments.grains.graded import graded_quantities
 from experiments.grains.softening import Softening
 from experiments.runs.types import Json
 from rigid import SpringDamper
@@ -39,14 +41,17 @@ class BedFacts:
     surface: float
     young: float
     time_step: float
+    grading: Json | None = None
+    """Of a graded bed: what `dem.measure_grading` found."""
 
     @classmethod
-    def of(cls, bed: Any, seed: int, softening: Softening) -> Self:
-        """The facts of `bed`, whose grains are softened to `softening`."""
+    def of(cls, bed: Any, seed: int, softening: Softening, graded: Any = None) -> Self:
+        """The facts of `bed`, whose grains are softened to `softening`; `graded`: the sizes by place, if any."""
         return cls(
             seed=seed, grain_count=int(bed.grain_count), packing_fraction=float(bed.packing_fraction),
             coordination_number=float(bed.coordination_number), surface=float(bed.surface),
             young=float(softening.young), time_step=float(bed.time_step),
+            grading=None if graded is None else asdict(measure_grading(bed, graded)),
         )  # fmt: skip
 
 
@@ -215,6 +220,7 @@ def bed_entry(facts: Sequence[BedFacts], settings: PenetrateSettings, softening:
         "size": list(settings.bed_size),
         **{name: getattr(settings, name) for name in ("grain", "spread", "gravity", "max_overlap")},
         "softening": asdict(softening) | {"factor": softening.factor},
+        **({} if settings.graded is None else {"graded": asdict(settings.graded)}),
         "seeds": [asdict(entry) for entry in facts],
     }
 
@@ -235,6 +241,8 @@ def bed_quantities(facts: Sequence[BedFacts], overlap: float | None) -> dict[str
         mean = values[0] if alike else float(np.mean(values))
         # Young's modulus is set, and so exact; of the rest one bed does not show how much beds differ.
         found[name] = _quantity(mean, 0.0 if alike and name == "young" else spread(values), unit, note)
+    if gradings := [entry.grading for entry in facts if entry.grading is not None]:
+        found |= graded_quantities(gradings)
     if overlap is not None:
         found["max_overlap"] = _quantity(overlap, None, "1", "largest overlap of grains in any run, of a diameter")
     return found

@@ -3,7 +3,6 @@
 import math
 
 from experiments.campaign.files import check_target
-from experiments.grains.sizes import expected_grain_count
 from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.where import check_memory, check_where
 
@@ -33,7 +32,7 @@ def check(settings: PenetrateSettings) -> None:
     for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
         if seeds and not speeds:
             raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
-    count = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+    count = settings.grain_count
     check_memory(count, settings.grain, "bed_size")
     if count > MOST_GRAINS:
         least = settings.grain * (count / MOST_GRAINS) ** (1 / 3)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from coupling import Penetration, overdamped_below
 from dem.grains.materials import caveat
+from experiments.grains.graded import grading_warning
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -49,6 +50,7 @@ def conclude(
     }  # fmt: skip
     found = [
         overlap_warning(overlap, settings, softening),
+        *(grading_warning(entry.grading) for entry in facts if entry.grading is not None),
         caveat(material),
         *(text for text in doubts if doubts[text]),
     ]

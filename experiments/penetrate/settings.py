@@ -5,12 +5,15 @@ the machine or the grains' material is refused by the experiment's `check`.
 """
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from experiments.runs.strict import NotNegative, Positive, SeedNumber, StrictSettings, Threads
 from vis.page.sentences import Sentences
+
+if TYPE_CHECKING:
+    from dem.grains.graded import Graded
 
 __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
 
@@ -47,6 +50,15 @@ class PenetrateSettings(StrictSettings):
     bed_size: BedSize = (0.072, 0.072, 0.0508)
     grain: Grain = 0.0024
     spread: Spread = 0.15
+    coarse: Positive | None = None
+    """Graded: `grain` is the mean diameter around the spike, this the largest away from it [m]; one size throughout if
+    not given."""
+    fine_radius: Positive | None = None
+    """Of a graded bed: how far to both sides of the spike's axis, along x, grains are fine [m]; 1.5 tips if not
+    given."""
+    fine_depth: Positive | None = None
+    """Of a graded bed: how far down from the surface grains are fine [m]; two tips below `depth`, or to the floor, if
+    not given."""
     packing: float | None = Field(None, gt=0.5, le=0.64)
     """Packing fraction to prepare the bed to [1]; as it settles if not given."""
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2]; 1 g even in the rig.")
@@ -189,7 +201,52 @@ class PenetrateSettings(StrictSettings):
             return say("bed_shallow", size=_plain(self.bed_size), s=self, deep=deep)
         if min(self.bed_size) < 5 * self.grain:
             return say("bed_of_few_grains", size=_plain(self.bed_size), s=self, least=5 * self.grain)
+        return self._grading()
+
+    def _grading(self) -> str | None:
+        for key in ("fine_radius", "fine_depth"):
+            if self.coarse is None and getattr(self, key) is not None:
+                return say("of_graded", key=key, value=getattr(self, key))
+        if self.coarse is None:
+            return None
+        if self.bed is not None:
+            return say("graded_and_bed", s=self)
+        radius, size = self.fine_radius, self.bed_size
+        if radius is not None and not 0.5 * self.tip_diameter <= radius <= 0.5 * size[0]:
+            return say("fine_radius", s=self, least=0.5 * self.tip_diameter, most=0.5 * size[0])
+        if self.fine_depth is not None and not self.depth <= self.fine_depth <= size[2]:
+            return say("fine_depth", s=self, most=size[2])
+        try:
+            self.graded.check(size)  # type: ignore[union-attr]
+        except ValueError as fault:
+            return str(fault)
         return None
+
+    @property
+    def graded(self) -> "Graded | None":
+        """Sizes by place: fine around the spike, which stands in the bed's middle; None: one size throughout.
+
+        Raises ValueError: sizes that a bed cannot be graded by.
+        """
+        from dem.grains.graded import Graded
+
+        if self.coarse is None:
+            return None
+        beside = self.fine_radius or min(1.5 * self.tip_diameter, 0.5 * self.bed_size[0])
+        down = self.fine_depth or min(self.depth + 2 * self.tip_diameter, self.bed_size[2])
+        middle = 0.5 * self.bed_size[0]
+        return Graded(
+            fine=self.grain, coarse=self.coarse, spread=self.spread, depth=down,
+            footprints=((middle - beside, middle + beside),),
+        )  # fmt: skip
+
+    @property
+    def grain_count(self) -> float:
+        """About how many grains a bed will have."""
+        from experiments.grains.sizes import expected_grain_count
+
+        count = expected_grain_count(self.bed_size, self.grain, self.spread)
+        return count if self.graded is None else count * self.graded.share(self.bed_size)
 
     def _runs(self) -> str | None:
         for key in ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "seeds"):

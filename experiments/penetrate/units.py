@@ -11,7 +11,6 @@ from statistics import fmean
 from typing import Any, Literal
 
 from coupling import Drive, Drop, Run, SetDown
-from experiments.grains.sizes import expected_grain_count
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress, as_expected
 from experiments.runs.types import Json
@@ -173,7 +172,7 @@ class PenetratePlan:
             if todo:
                 costs[_bed(seed)] = self._bed_cost()
             costs |= {unit.title: self._cost(unit) for unit in todo}
-        grains = expected_grain_count(settings.bed_size, settings.grain, settings.spread)
+        grains = settings.grain_count
         count = settings.frame_count + 3  # with those of the deepest point and the end
         frames = {unit.id: count for unit in units if unit.id in self._shown} if settings.frame_count else {}
         report = PictureCosts(frames, grains).seconds

@@ -16,6 +16,7 @@ Everything is written to stderr; stdout belongs to results.
 import math
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ _LEAST_SHARE = 0.03  # Share of a stage from which on its pace so far is taken f
 _QUICK_START = 1.0  # A stage that reports its first share sooner has gone on from an earlier one's [s]
 _GUESSED = 15.0  # A first guess of the rate weighs as much as so much work done [s]
 _MOST_SLOWER = 3.0  # Most by which the machine's pace scales times that are known in seconds [1]
+_RECENT = 10.0  # A bed's rate is that of so long before now [s]
 _LATE = 0.15  # What a stage that is late is said to take yet, over how late it is [1]
 
 
@@ -116,6 +118,8 @@ class Progress(AbstractContextManager["Progress"]):
         self.stage_name = ""
         self._total: float | None = None
         self._done = 0.0
+        self._bed: tuple[int, int] | None = None  # grains, those awake
+        self._worked: deque[tuple[float, float]] = deque()  # when [s], and grain-steps until then
         self._start_reckoning({}, {}, None)
         self._pace = self._opened
 
@@ -155,6 +159,8 @@ class Progress(AbstractContextManager["Progress"]):
         A stage of the plan ends when the next one of the plan begins; others may come and go within it.
         """
         self._pace = _Pace(self._clock())
+        self._bed = None
+        self._worked.clear()
         if name in self._costs or name in self._seconds:
             self._end_stage()
             self._open, self._opened = name, self._pace
@@ -169,6 +175,31 @@ class Progress(AbstractContextManager["Progress"]):
         self._pace.report(now, share or 0.0)
         if self._opened is not self._pace and self._opened.first is None:
             self._opened.report(now, 0.0)  # something is done within it
+
+    def show_bed(self, *, grain_count: int, awake_count: int, grain_steps: int) -> None:
+        """Say of the stage's bed how many grains it has, how many are awake, how many grain-steps it has done in all.
+
+        Before `update`, which shows it; the end of the stage ends it.
+        """
+        now = self._clock()
+        if self._worked and grain_steps < self._worked[-1][1]:  # another bed
+            self._worked.clear()
+        while len(self._worked) > 1 and now - self._worked[1][0] >= _RECENT:
+            self._worked.popleft()
+        self._bed = (grain_count, awake_count)
+        self._worked.append((now, float(grain_steps)))
+
+    @property
+    def bed_words(self) -> list[str]:
+        """The bed of the stage as it is shown: grains, the share awake, grain-steps a second; empty without one."""
+        if self._bed is None:
+            return []
+        grains, awake = self._bed
+        words = [f"{grains:,} grains", f"{_percent(awake / max(1, grains))} awake"]
+        (began, first), (now, last) = self._worked[0], self._worked[-1]
+        if now > began:
+            words.append(f"{(last - first) / (now - began) / 1e6:.3g} million grain-steps/s")
+        return words
 
     def message(self, text: str) -> None:
         """Tell the person something: a warning, a finding."""
@@ -307,6 +338,7 @@ class LineProgress(Progress):
             share, rest = self.stage_fraction, self.stage_remaining()
             where = [] if share is None else [_percent(share)]
             where += [] if rest is None else [_to_go(rest)]
+            where += self.bed_words
             self.message(f"{self.stage_name}: {', '.join([*where, *self._of_all()]) or f'{done:g}'}")
             self._last = self._clock()
 
@@ -340,6 +372,7 @@ class LiveProgress(Progress):
             BarColumn(bar_width=30),
             TextColumn("{task.fields[percent]:>5}", markup=False),
             _ToGo(clock),
+            TextColumn("{task.fields[bed]}", markup=False),
             console=console or Console(stderr=True),
             transient=True,
             refresh_per_second=4,
@@ -355,6 +388,7 @@ class LiveProgress(Progress):
             completed=fraction or 0.0,
             percent="" if fraction is None else _percent(fraction),
             rest=rest,
+            bed=", ".join(self.bed_words) if task == self._stage else "",
             reported=self._clock() if self._counts_down() else math.inf,
         )
 
@@ -370,7 +404,7 @@ class LiveProgress(Progress):
     ) -> None:
         super().plan(costs, seconds=seconds, unit=unit)
         if self._whole is None:
-            self._whole = self._bars.add_task("all", total=1.0, percent="", rest=None, reported=0.0)
+            self._whole = self._bars.add_task("all", total=1.0, percent="", rest=None, bed="", reported=0.0)
         self._refresh()
 
     def stage(self, name: str, total: float | None = None) -> None:
@@ -383,7 +417,7 @@ class LiveProgress(Progress):
             )
         if self._stage is not None:
             self._bars.remove_task(self._stage)
-        self._stage = self._bars.add_task(name, total=None, percent="", rest=None, reported=0.0)
+        self._stage = self._bars.add_task(name, total=None, percent="", rest=None, bed="", reported=0.0)
         self._refresh()
 
     def update(self, done: float) -> None:

@@ -189,7 +189,8 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         return graded_under(
             self.forecast.trajectory, length=settings.bed_size[0], origin=self.origin, spike_diameter=spike,
             grain=settings.grain, spread=settings.spread, coarse=settings.coarse,
-            depth=min(settings.bed_size[2], self.forecast.deepest + 2 * spike),
+            margin=(settings.fine_radius or 1.5 * spike) / spike,
+            depth=settings.fine_depth or min(settings.bed_size[2], self.forecast.deepest + 2 * spike),
         )  # fmt: skip
 
     def grain_count(self) -> float:
@@ -235,6 +236,13 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
             raise ValueError(say("off_the_bed", s=s, half=0.5 * s.bed_length))
         if s.place and s.coarse is not None:
             raise ValueError(say("place_on_graded", s=s))
+        for key in ("fine_radius", "fine_depth"):
+            if s.coarse is None and getattr(s, key) is not None:
+                raise ValueError(say("of_graded", key=key, value=getattr(s, key)))
+        if s.fine_radius is not None and s.fine_radius < 0.5 * self.spike_diameter:
+            raise ValueError(say("fine_radius", s=s, least=0.5 * self.spike_diameter))
+        if s.fine_depth is not None and not self.forecast.deepest <= s.fine_depth <= s.bed_size[2]:
+            raise ValueError(say("fine_depth", s=s, f=self.forecast, most=s.bed_size[2]))
         if s.bed_repeats > 1 and s.coarse is not None:
             raise ValueError(say("graded_repeated", s=s))
         if s.bed_stages is not None:

@@ -1,6 +1,7 @@
 """What a tumble on grains leaves: its frames, its series, and the result that stands beside the spring-damper's."""
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import cast
 
@@ -10,9 +11,10 @@ from numpy.typing import NDArray
 from coupling import MOST_REVERSAL, BedGround, CoupledTumble
 from coupling.members import HULL
 from dem import Graded
+from dem.measure.grading import measure_grading
 from dem.prepare.prepare import fingerprint
 from experiments.grains import bed_result as grains
-from experiments.grains.graded import coarsest_touched, tips_in_ground
+from experiments.grains.graded import coarsest_touched, graded_quantities, grading_warning, tips_in_ground
 from experiments.grains.softening import Softening
 from experiments.grains.tracked_frames import PlatformFrames, member_mesh
 from experiments.platform.surfaces import find_surface
@@ -111,8 +113,11 @@ def conclude(
     result["grains"] = _grains(settings, plan, run, softening) | {
         "beside": next_to, "beside_transitions": passages(beside)
     }  # fmt: skip
-    coarsest, coarser = settings.grain, None
+    coarsest, coarser, lies = settings.grain, None, None
     if graded is not None:
+        found = asdict(measure_grading(bed, graded))
+        result["quantities"] |= graded_quantities([found])
+        lies = grading_warning(found, after=" at the end")
         coarsest = coarsest_touched(run, graded, size=settings.bed_size)
         result["grains"]["graded"] = {
             "fine": graded.fine, "coarse": graded.coarse, "footprints": [list(strip) for strip in graded.footprints],
@@ -125,7 +130,7 @@ def conclude(
         grains.residual_warning(run.energy_residual), grains.reversal_warning(run.dissipation_reversal),
         grains.unsettled_warning(run.master), own_warning(run),
         grains.overlap_warning(bed, softening, settings.max_overlap),
-        _same_sand_again(settings, run, spikes.diameter), coarser,
+        _same_sand_again(settings, run, spikes.diameter), coarser, lies,
         *grains.bed_warnings(bed, plan.surface, across=spikes.diameter / coarsest),
         say("law_in_flight", plan=plan) if surface.granular and plan.trial.counterweight == 0 else None,
         say("one_bed") if surface.granular else None,

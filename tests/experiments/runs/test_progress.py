@@ -275,6 +275,36 @@ def test_bars_show_the_stage_and_how_long_to_go(clock):
         assert expected in text
 
 
+def test_a_bed_is_shown_by_its_grains_the_share_awake_and_its_rate(clock):
+    progress = Progress(clock=clock)
+    progress.stage("drive", total=100)
+    assert progress.bed_words == []
+    for second in range(31):  # twice as fast in the last ten seconds
+        steps = 2_000_000 * second + 2_000_000 * max(0, second - 20)
+        progress.show_bed(grain_count=20_789, awake_count=7_000, grain_steps=steps)
+        clock.now += 1
+    assert progress.bed_words == ["20,789 grains", "33 % awake", "4 million grain-steps/s"]
+    progress.show_bed(grain_count=10, awake_count=10, grain_steps=0)  # another bed has no rate yet
+    assert progress.bed_words == ["10 grains", "100 % awake"]
+    progress.stage("report")
+    assert progress.bed_words == []
+
+
+def test_lines_and_bars_show_the_bed(clock):
+    stream = io.StringIO()
+    console = Console(file=io.StringIO(), force_terminal=True, width=140, color_system=None)
+    for progress in (LineProgress(stream, every=10, clock=clock), LiveProgress(console, clock=clock)):
+        with progress:
+            progress.stage("drive", total=100)
+            for done in (10, 20):
+                clock.now += 10
+                progress.show_bed(grain_count=20_789, awake_count=7_000, grain_steps=3_000_000 * done)
+                progress.update(done)
+    last = stream.getvalue().splitlines()[-1]
+    assert last.endswith("drive: 20 %, 1:20 to go, 20,789 grains, 33 % awake, 3 million grain-steps/s")
+    assert "1:20 to go 20,789 grains, 33 % awake, 3 million grain-steps/s" in console.file.getvalue()
+
+
 def test_the_kind_suits_the_stream():
     class Terminal(io.StringIO):
         def isatty(self):
