@@ -23,6 +23,7 @@ class FakeBed:
         self.proud = proud  # how far above the surface the bed is felt [m]
         self.time, self.max_overlap = 0.0, 0.0
         self.grain_count, self.packing_fraction, self.coordination_number = 200, 0.6, 5.0
+        self.awake_count = self.grain_count
         self.kinetic_energy, self.floor_force = 0.0, 1.0
         self.young, self.poisson, self.precision, self.arch = 1e7, 0.25, "float64", "cpu"
         rng = np.random.default_rng(seed)

@@ -72,6 +72,15 @@ def on_bed(**more):
             {"bed_repeats": 2, "coarse": 0.006, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
             r"bed_repeats = 2 with coarse = 0.006 m: .* one of them would do",
         ),
+        ({"fine_radius": 0.02}, r"fine_radius = 0.02 m is of a graded bed, and coarse"),
+        (
+            {"coarse": 0.006, "grain": 0.0024, "fine_radius": 0.005, "bed_size": (0.4, 0.036, 0.046)},
+            r"fine_radius = 0.005 m is less than half of a spike, 0.006 m",
+        ),
+        (
+            {"coarse": 0.006, "grain": 0.0024, "fine_depth": 0.06, "bed_size": (0.4, 0.036, 0.046)},
+            r"fine_depth = 0.06 m must be between .* and 0.046 m",
+        ),
         ({"bed_repeats": 99, "grain": 0.002}, r"makes about .* or a smaller bed would do"),
         ({"bed_stages": ("rain", "tilt:5")}, r"bed_stages has 'tilt:5': a platform needs a level bed"),
         ({"young": 1.0, "bed_size": (0.5, 0.06, 0.046)}, r"young = 1 Pa is so soft .* max_overlap = 0.05: .* would do"),
