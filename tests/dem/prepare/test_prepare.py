@@ -78,7 +78,10 @@ class Progress:
     """Keeps what it is told."""
 
     def __init__(self):
-        self.stages, self.shares = [], []
+        self.stages, self.shares, self.grain_steps = [], [], []
+
+    def show_bed(self, bed):
+        self.grain_steps.append(bed.grain_steps)
 
     def stage(self, name, total):
         self.stages.append(name)
@@ -101,6 +104,7 @@ def test_the_same_seed_gives_the_same_bits_and_progress_is_told(made):
     assert same(again.state(), made[1])
     assert progress.stages == ["rain", "settle"]
     assert len(progress.shares) > 4 and all(0 <= share <= 1 for share in progress.shares)
+    assert len(progress.grain_steps) == len(progress.shares) and max(progress.grain_steps) > 0
 
 
 def test_another_seed_rains_other_grains(monkeypatch):

@@ -398,6 +398,30 @@ def test_a_containers_limit_counts(tmp_path, monkeypatch):
     assert there.limit == 2_000_000_000 and there.free <= 1_000_000_000
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"fine_radius": 0.01}, r"fine_radius = 0.01 m is of a graded bed, and coarse"),
+        ({"fine_depth": 0.01}, r"fine_depth = 0.01 m is of a graded bed, and coarse"),
+        ({"coarse": 0.001}, r"coarse = 0.001 m is below fine = 0.0024 m"),
+        ({"coarse": 0.006, "fine_radius": 0.004}, r"fine_radius = 0.004 m must be between 0.006 m.* and 0.036 m"),
+        ({"coarse": 0.006, "fine_depth": 0.006}, r"fine_depth = 0.006 m must be between depth = 0.012 m"),
+        ({"coarse": 0.006, "spread": 0.45}, r"spread = 0.45 must be 0 or more and below 0.41"),
+        ({"coarse": 0.02, "bed_size": (0.3, 0.06, 0.05)}, r"coarse = 0.02 m makes grains of .* would do"),
+    ],
+)
+def test_gradings_that_cannot_be_are_refused(given, words):
+    with pytest.raises(ValueError, match=words):
+        PenetrateSettings(**given)
+
+
+def test_a_graded_bed_is_fine_around_the_spike_and_has_fewer_grains():
+    settings = PenetrateSettings(coarse=0.006, fine_radius=0.018, fine_depth=0.03)
+    assert settings.graded.footprints == (pytest.approx((0.018, 0.054)),)
+    assert (settings.graded.fine, settings.graded.depth) == (0.0024, 0.03)
+    assert 0.4 < settings.grain_count / PenetrateSettings().grain_count < 0.8
+
+
 def test_coarse_tips_can_be_asked_for():
     assert PenetrateSettings(tip_diameter=0.006, allow_coarse=True).tip_diameter == 0.006
 

@@ -300,9 +300,9 @@ def test_lines_and_bars_show_the_bed(clock):
                 clock.now += 10
                 progress.show_bed(grain_count=20_789, awake_count=7_000, grain_steps=3_000_000 * done)
                 progress.update(done)
-    last = stream.getvalue().splitlines()[-1]
-    assert last.endswith("drive: 20 %, 1:20 to go, 20,789 grains, 33 % awake, 3 million grain-steps/s")
-    assert "1:20 to go 20,789 grains, 33 % awake, 3 million grain-steps/s" in console.file.getvalue()
+    line, bars = stream.getvalue().splitlines()[-1], console.file.getvalue()
+    for piece in ("20 %", "1:20 to go", "20,789 grains", "33 % awake", "3 million grain-steps/s"):
+        assert piece in line and piece in bars, piece
 
 
 def test_the_kind_suits_the_stream():
