@@ -46,9 +46,15 @@ SCALE_LEGEND = (
     "to end too; kB a grain of both: growth from the first row; fields: what the engine has allocated, its room to "
     "spare included."
 )
+ANSWER_HEADINGS = ("", "time of the push, s", "times sooner", "grain-steps", "mean force, N", "force, part by part")
+ANSWER_LEGEND = (
+    "Time: of the whole push, wall. Mean force: over the part that all have run, with the difference to the peer's; "
+    "part by part: root mean square of the difference over that mean."
+)
 MARKS = {
     "beds": ("<!-- bench bed: begin -->", "<!-- bench bed: end -->"),
     "scale": ("<!-- bench bed --scale: begin -->", "<!-- bench bed --scale: end -->"),
+    "answer": ("<!-- bench answer: begin -->", "<!-- bench answer: end -->"),
     "profile": ("<!-- bench bed --profile: begin -->", "<!-- bench bed --profile: end -->"),
 }
 """Where in a page the table goes, by what a bench.json has."""
@@ -158,17 +164,67 @@ def _scale_title(sizes: list[Json]) -> str:
     return f"Flat cost; bytes a grain of the largest fields at {last['grain_count']:,} grains: {largest}"
 
 
+def _answer_rows(answer: Json) -> list[tuple[str, ...]]:
+    few = len(answer["curve"]["awake"])
+    whole, peer = answer["peer_s"], answer["curve"]["peer"]
+
+    def row(
+        name: str, seconds: float, steps: float, force: list[float], gap: float | None, apart: float | None = None
+    ) -> tuple[str, ...]:
+        mean = f"{sum(force[:few]) / few:.4g}" + ("" if gap is None else f" ({100 * gap:+.1f} %)")
+        sooner = _NONE if whole is None else f"{whole / seconds:.2f}"
+        return (
+            name,
+            f"{seconds:.0f}",
+            sooner,
+            f"{steps:.3g}",
+            mean,
+            _NONE if apart is None else f"{100 * apart:.0f} %",
+        )
+
+    lines = [
+        row("hedgebed, grains sleep", answer["ours_s"], answer["grain_steps"], answer["curve"]["ours"],
+            answer["force_difference"], answer["force_scatter"]),
+        row("hedgebed, all awake", answer["awake_s"], answer["all_awake"], answer["curve"]["awake"],
+            answer["awake_force_difference"]),
+    ]  # fmt: skip
+    if peer is not None:
+        lines.append(row(answer["peer"], whole, answer["all_awake"], peer, None))
+    return lines
+
+
+def _answer_title(answer: Json) -> str:
+    part = ""
+    if answer["extrapolated"]:
+        share = f"{100 * answer['part']:.0f} %"
+        part = f"; all but the first row ran the first {share}, their time is that of the part times the steps"
+    return (
+        f"A spike {2e3 * answer['radius']:g} mm across, {1e3 * answer['depth']:g} mm into {answer['grain_count']:,} "
+        f"grains at {answer['speed']:g} m/s, {answer['steps']:,} steps{part}"
+    )
+
+
 def _tables(bench: Json) -> Iterator[Sheet]:
     for bed in bench.get("beds", ()):
         yield Sheet(_title(bed, bench), HEADINGS, (0, len(HEADINGS) - 1), rows(bed))
     for bed in bench.get("profile", ()):
         yield Sheet(_profile_title(bed), PROFILE_HEADINGS, (0,), _profile_rows(bed))
+    if "answer" in bench:
+        yield Sheet(_answer_title(bench["answer"]), ANSWER_HEADINGS, (0,), _answer_rows(bench["answer"]))
+        tumbles = [
+            (kept["case"], f"{kept['grain_steps']:.3g}", f"{kept['all_awake']:.3g}", f"{kept['times_fewer']:.1f}")
+            for kept in bench["tumbles"]
+        ]
+        if tumbles:
+            headings = ("docs/results/", "grain-steps", "all awake", "times fewer")
+            yield Sheet("Tumbles at 0.22 N m and 0.0085 g, as they are kept", headings, (0,), tumbles)
     if "scale" in bench:
         yield Sheet(_scale_title(bench["scale"]), SCALE_HEADINGS, (), [_scale_row(size) for size in bench["scale"]])
 
 
 def _legend(bench: Json) -> str:
-    return {"profile": PROFILE_LEGEND, "scale": SCALE_LEGEND}.get(next((k for k in MARKS if k in bench), ""), LEGEND)
+    legends = {"profile": PROFILE_LEGEND, "scale": SCALE_LEGEND, "answer": ANSWER_LEGEND}
+    return next((legends[kind] for kind in legends if kind in bench), LEGEND)
 
 
 def show(bench: Json, console: Console) -> None:
