@@ -9,7 +9,6 @@ from hedgebed_renamed import renamed
 
 from .engine.core import BedCore
 from .engine.values import BedFailure
-from .gpu.engine import GpuEngine
 from .grains.materials import Material
 from .prepare.bedfile import load_prepared
 from .prepare.prepare import prepare_as, prepare_bed
@@ -32,8 +31,6 @@ class Bed(BedCore):
         grain_steps: grains computed, summed over the steps since the bed was made in this process.
         recipe: what ``prepare`` was asked for; empty where the bed was made otherwise.
     """
-
-    gpu_engine = GpuEngine
 
     @classmethod
     def prepare(cls, material: str | Material, **options: Any) -> Self:

@@ -41,7 +41,7 @@ def markdown(bench: Json) -> str:
     gpu, machine = bench["gpu"], bench["machine"]
     lines = [
         f"{bench['date']}, {gpu['name']}, driver {gpu['driver']}, {machine['cores']} cores; hedgebed "
-        f"{bench['version']} (commit {bench['commit']}), {machine['taichi']}; `{bench['command']}`.",
+        f"{bench['version']} (commit {bench['commit']}), Taichi {machine['taichi']}; `{bench['command']}`.",
         "",
     ]
     if tests := bench.get("tests"):

@@ -18,7 +18,7 @@ from hedgebed_taichi import ti
 
 from . import runtime
 from .checking import check_lists, check_step, debug_wanted, keep_histories
-from .engine import Engine, take_engine
+from .engine import take_engine
 from .lists import MOST_BODIES
 from .sleep import Sleep, Sleeper
 from .values import BedFailure, BedSettings, State
@@ -47,9 +47,6 @@ class BedBase:
         debug: whether all lists are checked against brute force, at every step (``dem.engine.checking``); as
             HEDGEBED_DEBUG=1 in the environment says, or set it.
     """
-
-    gpu_engine: type[Engine] = Engine
-    """The class of its engine on a GPU: ``dem.Bed`` has ``dem.gpu.engine.GpuEngine``."""
 
     def __init__(self, settings: BedSettings, radii: np.ndarray, *, precision: str, arch: str, threads: int | None):
         """Fields without grains in them; ``from_grains`` and the like check what they pass, and fill them."""

@@ -26,6 +26,8 @@ from typing import Any
 import numpy as np
 
 from dem.contact.law import PAIR_WIDTH
+from dem.gpu.lists import GpuLists
+from dem.gpu.steps import GpuSteps
 from dem.grains.packing import curve_ranks
 from dem.shapes.basic import ROW_WIDTH
 from hedgebed_taichi import ti
@@ -114,7 +116,6 @@ def take_engine(
     """An engine set up for ``owner``: one that an earlier owner has left, where there is one of the same build.
 
     Args:
-        owner: a bed; its ``gpu_engine`` is the class of an engine on a GPU.
         grain_count: number of grains. period: lateral period (x, y) [m].
         bottom, height: z of the box's bottom and top [m].
         largest_diameter: of the grains [m]. largest_skin: of the lists [m].
@@ -153,7 +154,7 @@ def _engine(shape: Build, owner: Any) -> "Engine":
     for old in [k for k in _free if k[0] != key[0]]:
         del _free[old]
     idle = _free.setdefault(key, [])
-    engine: Engine = idle.pop() if idle else (owner.gpu_engine if shape.gpu else Engine)(shape)
+    engine: Engine = idle.pop() if idle else (GpuEngine if shape.gpu else Engine)(shape)
     engine.owner = weakref.finalize(owner, idle.append, engine)
     engine.owner.atexit = False
     return engine
@@ -482,6 +483,17 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         steps = min(most, MOST_STEPS_PER_LAUNCH, max(STEPS_PER_LAUNCH, steps))
         self.run(dt, limit, *gravity, keep, steps, self.shapes, self.rest, self.balance)
         return int(self.done[None]), bool(self.halted[None])
+
+
+@ti.data_oriented
+class GpuEngine(GpuLists, GpuSteps, Engine):
+    """An engine whose every grain is a chunk, with the lists, loops and sums of a GPU."""
+
+    EMPTY = ("pair_start", "near_start", "near_push", "total", "overlap")
+
+    def read(self, name: str) -> np.ndarray:
+        """As ``Engine.read``; the forces on bodies are summed by blocks of rows, of which there are always as many."""
+        return np.asarray(self.pushes.to_numpy()) if name == "pushes" else super().read(name)
 
 
 def chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:

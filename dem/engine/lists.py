@@ -49,6 +49,9 @@ class Lists(EnginePart):
     # SORTED_CELLS cells: all, but for sleepers that stay where they are.
     GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS, AWAKE, ALL_CHUNKS, SORTED, SORTED_CELLS = range(12)
     PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
+    # For ``dem.gpu``, which knows of no module here.
+    INDEX_BITS, INDEX_MASK, MOST_BODIES = INDEX_BITS, INDEX_MASK, MOST_BODIES
+    PAIRS_NEEDED, NEAR_NEEDED = PAIRS_NEEDED, NEAR_NEEDED
 
     @ti.func
     def next_chunk(self, w, first: ti.template()):

@@ -1,4 +1,4 @@
-"""The engine on a GPU: its lists, loops and sums, a thread for each grain.
+"""What an engine does otherwise on a GPU: lists, loops and sums, a thread for each grain.
 
-Imports `dem.contact`, `dem.engine`.
+Imports `dem.contact`.
 """

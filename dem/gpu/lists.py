@@ -14,8 +14,9 @@ import numpy as np
 
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range
-from dem.engine.lists import INDEX_BITS, INDEX_MASK, MOST_BODIES, NEAR_NEEDED, PAIRS_NEEDED, Lists
 from hedgebed_taichi import ti
+
+from .part import Part
 
 __all__ = ["NEAR", "TALLY_BLOCKS", "GpuLists"]
 
@@ -26,7 +27,7 @@ TALLY_BLOCKS = 256
 
 
 @ti.data_oriented
-class GpuLists(Lists):
+class GpuLists(Part):
     """The part of the engine that finds neighbours, on a GPU."""
 
     def _make_sort_fields(self, n: int, cell_capacity: int) -> None:
@@ -59,7 +60,7 @@ class GpuLists(Lists):
     def _make_sums(self, chunk_capacity: int) -> None:
         """Forces on bodies are summed by row, then by block of rows: nothing as large as the bed is read."""
         self.overlap = self.store.scalar(self.real, self.capacity)
-        self.pushes = self.store.vector(6, ti.f64, (TALLY_BLOCKS, MOST_BODIES))
+        self.pushes = self.store.vector(6, ti.f64, (TALLY_BLOCKS, self.MOST_BODIES))
         self.block_overlap = self.store.scalar(ti.f64, TALLY_BLOCKS)
 
     # What the host reads and writes of lists, in the order of grains.
@@ -226,7 +227,7 @@ class GpuLists(Lists):
     @ti.kernel
     def make_lists(self, skin: float, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         """New pair and near lists for the sorted grains; history comes over from the lists put aside."""
-        for b in range(MOST_BODIES):
+        for b in range(self.MOST_BODIES):
             self.body_listed[b] = self.body_position[b]
             self.body_listed_turn[b] = self.body_turn[b]
         for i in range(self.capacity):
@@ -254,9 +255,9 @@ class GpuLists(Lists):
                 self.near_start[self.count[self.GRAINS]] = near
                 self.total[PAIRS], self.total[NEAR] = rows, near
                 if rows > self.row_capacity:
-                    self.problem[PAIRS_NEEDED] = rows
+                    self.problem[self.PAIRS_NEEDED] = rows
                 if near > self.near_capacity:
-                    self.problem[NEAR_NEEDED] = near
+                    self.problem[self.NEAR_NEEDED] = near
         for i in range(self.capacity):
             if i < self.count[self.GRAINS] and self.fits():
                 self.list_pairs(i, ti.cast(skin, self.real), self.pair_start[i], balance)
@@ -299,7 +300,7 @@ class GpuLists(Lists):
                         if j != i and d.norm_sqr() < reach * reach:
                             found += 1
                             if row >= 0:
-                                self.put_pair(s, i, j, j | ((mi + 1 + 3 * (mj + 1)) << INDEX_BITS), balance)
+                                self.put_pair(s, i, j, j | ((mi + 1 + 3 * (mj + 1)) << self.INDEX_BITS), balance)
                                 s += 1
         return found
 
@@ -309,7 +310,7 @@ class GpuLists(Lists):
         found = -1
         for s in range(self.old_start[i], self.old_start[i + 1]):
             code = self.old_pair[s]
-            if code < 0 and ((~code) & INDEX_MASK) == j:
+            if code < 0 and ((~code) & self.INDEX_MASK) == j:
                 found = s
         return found
 

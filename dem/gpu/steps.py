@@ -6,18 +6,14 @@ side by side. No sum is made by atomic operations: on one kind of card a bed has
 code runs on a CPU, for tests.
 """
 
-from typing import Any
-
 import numpy as np
 
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range
-from dem.engine.lists import ABSENT, INDEX_MASK, MOST_BODIES
-from dem.engine.pairs import Pairs
-from dem.engine.steps import Steps
 from hedgebed_taichi import ti
 
 from .lists import NEAR, TALLY_BLOCKS
+from .part import Part
 
 __all__ = ["GpuSteps"]
 
@@ -30,7 +26,7 @@ BLOCK = 64
 
 
 @ti.data_oriented
-class GpuSteps(Pairs, Steps):
+class GpuSteps(Part):
     """The part of the engine that moves grains and bodies and computes forces, on a GPU."""
 
     def launch(
@@ -40,7 +36,7 @@ class GpuSteps(Pairs, Steps):
         self.done[None] = 0
         at_once = STEPS_PER_KERNEL if most >= MANY else 1
         for _ in range(min(most, STEPS_PER_LOOK) // at_once):
-            self.run_on_gpu(dt, limit, *gravity, keep, at_once, self.shapes, self.balance)
+            self.run_on_gpu(dt, limit, *gravity, keep, at_once, self.shapes, self.rest, self.balance)
         done, halted = self.progress_so_far()
         return int(done), bool(halted)
 
@@ -59,6 +55,7 @@ class GpuSteps(Pairs, Steps):
         keep: float,
         steps: ti.template(),
         shapes: ti.template(),
+        rest: ti.template(),
         balance: ti.template(),
     ):
         """Some steps; nothing from where new lists are needed on, as in ``Engine.run``."""
@@ -69,7 +66,7 @@ class GpuSteps(Pairs, Steps):
             ti.loop_config(block_dim=BLOCK)
             for i in range(self.capacity):
                 if i < self.count[self.GRAINS] and self.moved[None] == 0:
-                    self.push_pairs(i, dt, balance)
+                    self.push_pairs(i, dt, rest, balance)
             for s in range(self.near_capacity):
                 if self.moved[None] == 0:
                     self.push_bodies(s, dt, shapes, balance)
@@ -78,20 +75,17 @@ class GpuSteps(Pairs, Steps):
                 elif s == 0:
                     self.halted[None] = 1
 
-    def push_all(self, dt: float, shapes: Any, rest: Any, balance: Any) -> None:
-        """The forces of the step that was interrupted by new lists."""
-        self.push_once(dt, shapes, balance)
-
     @ti.kernel
-    def push_once(self, dt: float, shapes: ti.template(), balance: ti.template()):
+    def push_all(self, dt: float, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
+        """The forces of the step that was interrupted by new lists."""
         for i in range(self.capacity):
             if i < self.count[self.GRAINS]:
-                self.push_pairs(i, dt, balance)
+                self.push_pairs(i, dt, rest, balance)
         for s in range(self.near_capacity):
             self.push_bodies(s, dt, shapes, balance)
 
     @ti.func
-    def push_pairs(self, i, dt, balance: ti.template()):
+    def push_pairs(self, i, dt, rest: ti.template(), balance: ti.template()):
         """Forces on grain i of all grains that it touches; its weight stands in the field already."""
         x_i, v_i, w_i = self.position[i], self.velocity[i], self.spin[i]
         p = self.grain_pair[None]
@@ -105,7 +99,7 @@ class GpuSteps(Pairs, Steps):
             for s in range(first, ti.min(first + BITS, end)):
                 code = self.pair[s]
                 bits = ti.select(code < 0, ~code, code)
-                x_j = self.position[bits & INDEX_MASK]
+                x_j = self.position[bits & self.INDEX_MASK]
                 sum_r = x_i.w + x_j.w
                 d = self.apart(x_i, x_j, bits)
                 if ti.static(self.cohesion == JKR):
@@ -117,7 +111,7 @@ class GpuSteps(Pairs, Steps):
                     self.pair[s] = ~code
                     if code < 0:
                         if ti.static(balance.on):
-                            self.balance_pair(i, s, i, bits & INDEX_MASK, d, balance.nothing(), dt, ABSENT, balance)
+                            self.balance_pair(i, s, i, bits & self.INDEX_MASK, d, balance.nothing(), dt, rest, balance)
                         self.slide[s] = ti.Vector.zero(self.real, 4)
                         if ti.static(self.rolling):
                             self.roll[s] = ti.Vector.zero(self.real, 3)
@@ -127,7 +121,7 @@ class GpuSteps(Pairs, Steps):
                 s = first + ti.cast(ti.math.popcnt(lowest - ti.cast(1, ti.u32)), ti.i32)
                 touching = touching & (touching - ti.cast(1, ti.u32))
                 bits = ~self.pair[s]
-                f, t, share = self.push_pair(i, s, bits, x_i, v_i, w_i, p, dt, balance)
+                f, t, share = self.push_pair(i, s, bits, x_i, v_i, w_i, p, dt, rest, balance)
                 force += f
                 torque += t
                 largest = ti.max(largest, share)
@@ -138,9 +132,9 @@ class GpuSteps(Pairs, Steps):
             self.overlap[i] = largest
 
     @ti.func
-    def push_pair(self, i, s, bits, x_i, v_i, w_i, p, dt, balance: ti.template()):
+    def push_pair(self, i, s, bits, x_i, v_i, w_i, p, dt, rest: ti.template(), balance: ti.template()):
         """Force and torque on grain i of the neighbour in row s, and their overlap over the mean diameter."""
-        j = bits & INDEX_MASK
+        j = bits & self.INDEX_MASK
         x_j, v_j, w_j = self.position[j], self.velocity[j], self.spin[j]
         d, v = self.apart(x_i, x_j, bits), v_i.xyz - v_j.xyz
         u, q = self.slide[s], ti.Vector.zero(self.real, 3)
@@ -156,8 +150,8 @@ class GpuSteps(Pairs, Steps):
         f = f_n * n + f_t
         if ti.static(balance.on):
             now = self.pair_row(s, i, j, d, n, damped, f_t, turn, balance)
-            self.balance_pair(i, s, i, j, d, now, dt, ABSENT, balance)
-            self.balance_turning(i, bits, f, f_t, turn, n, arm_j, dt, ABSENT, balance)
+            self.balance_pair(i, s, i, j, d, now, dt, rest, balance)
+            self.balance_turning(i, bits, f, f_t, turn, n, arm_j, dt, rest, balance)
         return f, arm_i * f_t.cross(n) + turn, share
 
     @ti.func
@@ -182,7 +176,7 @@ class GpuSteps(Pairs, Steps):
 
     @ti.kernel
     def clear_pushes(self):
-        for block, b in ti.ndrange(TALLY_BLOCKS, MOST_BODIES):
+        for block, b in ti.ndrange(TALLY_BLOCKS, self.MOST_BODIES):
             self.pushes[block, b] = ti.Vector.zero(ti.f64, 6)
         for s in range(self.near_capacity):
             if s < self.total[NEAR]:
@@ -199,7 +193,7 @@ class GpuSteps(Pairs, Steps):
             size = (self.count[self.GRAINS] + TALLY_BLOCKS - 1) // TALLY_BLOCKS
             end = ti.min((block + 1) * size, self.count[self.GRAINS])
             self.block_overlap[block] = self.largest_overlap(self.overlap, block * size, end)
-        for b in range(MOST_BODIES + 1):
+        for b in range(self.MOST_BODIES + 1):
             self.put_tally(rows, b, self.pushes, self.block_overlap, TALLY_BLOCKS)
 
     @ti.kernel

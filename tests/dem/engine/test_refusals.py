@@ -231,6 +231,7 @@ def prepare(**options):
     return Bed.prepare("sand", size=(0.02, 0.02, 0.02), grain=2e-3, **options)
 
 
+@pytest.mark.cpu_only("a machine without a GPU")
 @pytest.mark.parametrize("start", [make, prepare])
 def test_a_gpu_that_is_not_there_is_refused_and_beds_on_the_cpu_go_on(start, monkeypatch):
     bed = make()
