@@ -5,6 +5,7 @@ keeps its force as S grows and its stretch as S falls (Thornton, Cummins & Clear
 either; the displacement spring keeps its stretch.
 """
 
+import engine_pool
 import numpy as np
 import pytest
 from driven_pair import POISSON, RADIUS, STEP, STILL, YOUNG, DrivenPair, GrainOnBody
@@ -152,4 +153,6 @@ def test_a_pair_that_stands_still_keeps_its_springs():
     force, springs = pair.force, np.array(pair.springs())
     for _ in range(3):
         pair.step(STILL, STILL)
-    assert np.array_equal(pair.force, force) and np.array_equal(np.array(pair.springs()), springs)
+    within = 0.0 if engine_pool.ARCH == "cpu" else 1e-12  # a GPU multiplies and adds with one rounding
+    for found, wanted in ((pair.force, force), (np.array(pair.springs()), springs)):
+        assert np.abs(found - wanted).max() <= within * np.abs(wanted).max()
