@@ -5,8 +5,8 @@ Layout (measured reasons in docs/performance.md):
 * Grains lie in memory in the order of a space-filling curve through the cells, so that neighbours are near.
 * They are cut into a fixed number of contiguous chunks, whatever the number of threads. A pair inside a chunk is
   computed once, by the chunk's own serial loop, and added to both; a pair across chunks is computed by both sides. So
-  no two threads write to one grain, and every sum has one order: the same bits on any number of threads. On a GPU a
-  chunk is one grain, and the same code is a full list.
+  no two threads write to one grain, and every sum has one order: the same bits on any number of threads. On a GPU every
+  grain has a thread and a full list of its own (``dem.gpu``).
 * A step has two phases. ``move`` kicks and drifts (leapfrog: velocities live half a step behind positions); ``push``
   computes forces. Moving also finds out whether a grain has come further than half the skin; if so the launch ends
   there, and the host makes new lists and goes on. On a CPU all steps of a launch are one parallel loop (``run``).
@@ -208,7 +208,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.rolling, self.tensile, self.cohesion, self.gpu = build.rolling, build.tensile, build.cohesion, build.gpu
         self.rescaled = build.rescaled
         self.cpu_items = build.threads * ITEMS_PER_THREAD
-        self.block_stride = SCAN_BLOCKS if self.gpu else build.threads
+        self.block_stride = build.threads
         self.store = FieldStore(planned=True)  # fields that are made cannot be left unused: count their memory first
         self._make_fields(build)
         if not self.gpu:
@@ -237,7 +237,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self._make_body_fields()
         # Who computes which chunk, each counter in a cache line of its own.
         self.ticket = self.store.scalar(ti.i32, 2 * CACHE_LINE)
-        self.claim = self.store.scalar(ti.i32, chunk_capacity * CACHE_LINE if not self.gpu else 1)
+        self.claim = self.store.scalar(ti.i32, chunk_capacity * CACHE_LINE)
         # Step control: moved is written by move and read by push; halted is written by push and read by move.
         self.moved, self.halted, self.done = (self.store.scalar(ti.i32, ()) for _ in range(3))
         self.problem = self.store.scalar(ti.i32, 3)

@@ -54,17 +54,14 @@ class Lists(EnginePart):
     PAIRS_NEEDED, NEAR_NEEDED = PAIRS_NEEDED, NEAR_NEEDED
 
     @ti.func
-    def next_chunk(self, w, first: ti.template()):
+    def next_chunk(self, w):
         """The next chunk for work item w, or chunk_count where nothing is left.
 
         Taichi gives a CPU thread at least 512 items of a loop, so each thread has that many and one of them works.
         Which thread takes a chunk does not matter to the result.
         """
         c = self.count[self.CHUNKS]
-        if ti.static(self.gpu):
-            if ti.static(first):
-                c = w
-        elif w % ITEMS_PER_THREAD == 0:
+        if w % ITEMS_PER_THREAD == 0:
             c = ti.atomic_add(self.ticket[QUEUE], 1)
         return c
 
@@ -72,8 +69,6 @@ class Lists(EnginePart):
     def chunk_range(self, c):
         n = self.count[self.AWAKE]
         m = self.count[self.CHUNKS]
-        if ti.static(self.gpu):
-            return c, c + 1
         base = n // m
         rest = n - base * m
         start = c * base + ti.min(c, rest)
@@ -81,14 +76,11 @@ class Lists(EnginePart):
 
     @ti.func
     def chunk_of(self, i):
-        result = i
-        if ti.static(not self.gpu):
-            m = self.count[self.CHUNKS]
-            base = self.count[self.AWAKE] // m
-            rest = self.count[self.AWAKE] - base * m
-            wide = rest * (base + 1)
-            result = ti.select(i < wide, i // (base + 1), rest + (i - wide) // ti.max(base, 1))
-        return result
+        m = self.count[self.CHUNKS]
+        base = self.count[self.AWAKE] // m
+        rest = self.count[self.AWAKE] - base * m
+        wide = rest * (base + 1)
+        return ti.select(i < wide, i // (base + 1), rest + (i - wide) // ti.max(base, 1))
 
     @ti.func
     def from_body(self, b, x):
@@ -179,7 +171,7 @@ class Lists(EnginePart):
                     r = self.place_asleep(r, rest)
             self.key[i] = r
             ti.atomic_add(self.cell_fill[r], 1)
-        for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
+        for w in range(self.cpu_items):
             b = self.first_block(w)
             while b < SCAN_BLOCKS:
                 self.block_sum[b] = self.scan(b, 0, self.count[self.SORTED_CELLS], False)
@@ -191,7 +183,7 @@ class Lists(EnginePart):
                 self.block_sum[b] = total
                 total += kept
             self.cell_start[self.count[self.SORTED_CELLS]] = total
-        for w in range(self.cpu_items if ti.static(not self.gpu) else SCAN_BLOCKS):
+        for w in range(self.cpu_items):
             b = self.first_block(w)
             while b < SCAN_BLOCKS:
                 self.scan(b, self.block_sum[b], self.count[self.SORTED_CELLS], True)
@@ -268,10 +260,7 @@ class Lists(EnginePart):
     @ti.func
     def first_block(self, w):
         """Of what item w of a loop scans, SCAN_BLOCKS where that is nothing; ``next_chunk`` says why."""
-        b = w
-        if ti.static(not self.gpu):
-            b = ti.select(w % ITEMS_PER_THREAD == 0, w // ITEMS_PER_THREAD, SCAN_BLOCKS)
-        return b
+        return ti.select(w % ITEMS_PER_THREAD == 0, w // ITEMS_PER_THREAD, SCAN_BLOCKS)
 
     @ti.func
     def scan(self, b, total, n, write: ti.template()):
@@ -291,11 +280,11 @@ class Lists(EnginePart):
         for _ in range(1):
             self.ticket[QUEUE] = 0
             self.old_near_room[None] = self.count[self.NEAR_ROOM]  # lists that grow have more by the time it is used
-        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[self.CHUNKS]):
-            c = self.next_chunk(w, True)
+        for w in range(self.cpu_items):
+            c = self.next_chunk(w)
             while c < self.count[self.CHUNKS]:
                 self.keep_chunk(c, rest, balance)
-                c = self.next_chunk(w, False)
+                c = self.next_chunk(w)
         if ti.static(rest.on):
             for i in range(self.count[self.AWAKE], rest.before(rest.kept, self.count[self.GRAINS])):
                 self.old_start[i] = 0
@@ -353,11 +342,11 @@ class Lists(EnginePart):
             self.body_listed_turn[b] = self.body_turn[b]
         for _ in range(1):
             self.ticket[QUEUE] = 0
-        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[self.CHUNKS]):
-            c = self.next_chunk(w, True)
+        for w in range(self.cpu_items):
+            c = self.next_chunk(w)
             while c < self.count[self.CHUNKS]:
                 self.list_chunk(c, ti.cast(skin, self.real), shapes, rest, balance)
-                c = self.next_chunk(w, False)
+                c = self.next_chunk(w)
         if ti.static(rest.on):
             for i in range(self.count[self.AWAKE], rest.before(rest.made, self.count[self.GRAINS])):
                 self.pair_start[i] = 0

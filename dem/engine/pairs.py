@@ -201,34 +201,6 @@ class Pairs(EnginePart):
         return result, held
 
     @ti.func
-    def push_each(self, c, base, last, dt, rest: ti.template(), balance: ti.template()):
-        """``push_lanes`` pair by pair, on a GPU."""
-        start, end = self.chunk_range(c)
-        p = self.grain_pair[None]
-        held = ti.Vector.zero(self.real, 3)
-        largest = ti.cast(0.0, self.real)
-        for row in range(base, last):
-            s = self.touching[row]
-            i = self.first[s]
-            bits = ~self.pair[s]
-            j = bits & INDEX_MASK
-            x_i, x_j, v_i, v_j = self.position[i], self.position[j], self.velocity[i], self.velocity[j]
-            d, v = self.apart(x_i, x_j, bits), v_i.xyz - v_j.xyz
-            u, q = self.slide[s], ti.Vector.zero(self.real, 3)
-            if ti.static(self.rolling):
-                q = self.roll[s]
-            onset = self.first_onset(d, x_i.w, x_j.w, v_i.w, v_j.w, v, u.w, dt)
-            n, f_n, damped, f_t, turn, arm_i, arm_j, share = self.pair_force(
-                p, d, x_i.w, x_j.w, v_i.w, v_j.w, v, self.spin[i].xyz, self.spin[j].xyz, onset, dt, u, q
-            )
-            self.slide[s] = u
-            if ti.static(self.rolling):
-                self.roll[s] = q
-            held += self.add_pair(c, s, start, end, n, f_n, damped, f_t, turn, arm_i, arm_j, dt, rest, balance)
-            largest = ti.max(largest, share)
-        return largest, held
-
-    @ti.func
     def add_pair(
         self, c, s, start, end, n, f_n, damped, f_t, turn, arm_i, arm_j, dt, rest: ti.template(), balance: ti.template()
     ):
@@ -240,10 +212,9 @@ class Pairs(EnginePart):
         t = f_t.cross(n)
         self.force[i] = self.force[i] + f
         self.torque[i] = self.torque[i] + (arm_i * t + turn)
-        if ti.static(not self.gpu):
-            if j >= start and j < end:
-                self.force[j] = self.force[j] - f
-                self.torque[j] = self.torque[j] + (arm_j * t - turn)
+        if j >= start and j < end:
+            self.force[j] = self.force[j] - f
+            self.torque[j] = self.torque[j] + (arm_j * t - turn)
         if ti.static(balance.on):
             d = self.apart(self.position[i], self.position[j], bits)
             now = self.pair_row(s, i, j, d, n, damped, f_t, turn, balance)

@@ -76,11 +76,7 @@ class Steps(EnginePart):
         last = self.sieve(c, dt, rest, balance)
         if ti.static(balance.on):
             self.balance_weight(c, dt, balance)
-        largest, held = ti.cast(0.0, self.real), ti.Vector.zero(self.real, 3)
-        if ti.static(self.gpu):
-            largest, held = self.push_each(c, base, last, dt, rest, balance)
-        else:
-            largest, held = self.push_lanes(c, base, last, dt, rest, balance)
+        largest, held = self.push_lanes(c, base, last, dt, rest, balance)
         for s in range(c * self.count[self.NEAR_ROOM], self.near_end[c]):
             largest = ti.max(largest, self.push_near(c, s, dt, shapes, balance))
         self.overlap[c] = ti.max(self.overlap[c], largest)
@@ -243,8 +239,8 @@ class Steps(EnginePart):
         """The forces of the step that was interrupted by new lists."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
-        for w in range(self.cpu_items if ti.static(not self.gpu) else self.count[self.CHUNKS]):
-            c = self.next_chunk(w, True)
+        for w in range(self.cpu_items):
+            c = self.next_chunk(w)
             while c < self.count[self.CHUNKS]:
                 self.push(c, dt, shapes, rest, balance)
-                c = self.next_chunk(w, False)
+                c = self.next_chunk(w)
