@@ -200,6 +200,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
     _OWN = ("grain_count", "chunk_count", "nx", "ny", "nz", "bottom", "awake_per_chunk", "shapes", "_kept", "_meshes")
     # Zero where nothing is listed.
     EMPTY: tuple[str, ...] = ("pair_start", "pair_end", "overlap", "near_end")
+    BY_CHUNK: tuple[str, ...] = ("overlap", "pushes", "near_end")
 
     def __init__(self, build: Build):
         self.build = build
@@ -467,7 +468,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         array = getattr(self, name).to_numpy()
         if name in (*self.GRAIN_FIELDS, "pair_start", "pair_end"):
             return array[: self.grain_count]
-        return array[: self.chunk_count] if name in ("overlap", "pushes", "near_end") else array
+        return array[: self.chunk_count] if name in self.BY_CHUNK else array
 
     def write(self, name: str, values: np.ndarray, rows: np.ndarray | None = None) -> None:
         """Put values into the first rows of a field, or into the rows given; the others become zero."""
@@ -488,12 +489,6 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
 @ti.data_oriented
 class GpuEngine(GpuLists, GpuSteps, Engine):
     """An engine whose every grain is a chunk, with the lists, loops and sums of a GPU."""
-
-    EMPTY = ("pair_start", "near_start", "near_push", "total", "overlap")
-
-    def read(self, name: str) -> np.ndarray:
-        """As ``Engine.read``; the forces on bodies are summed by blocks of rows, of which there are always as many."""
-        return np.asarray(self.pushes.to_numpy()) if name == "pushes" else super().read(name)
 
 
 def chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:

@@ -30,6 +30,9 @@ TALLY_BLOCKS = 256
 class GpuLists(Part):
     """The part of the engine that finds neighbours, on a GPU."""
 
+    EMPTY = ("pair_start", "near_start", "near_push", "total", "overlap")
+    BY_CHUNK = ("overlap",)
+
     def _make_sort_fields(self, n: int, cell_capacity: int) -> None:
         """Room for sorting; one grain field after the other goes through the buffers."""
         real = self.real
