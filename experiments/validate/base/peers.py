@@ -20,10 +20,12 @@ from scipy.optimize import brentq
 from .case import Outcome
 
 __all__ = [
-    "PEERS", "Peer", "PeerError", "box_of", "data_file", "deck_of", "digits", "lammps_restitution", "run_deck",
-    "run_peer", "spheres",
+    "LAMMPS_TANGENTIAL", "PEERS", "Peer", "PeerError", "box_of", "data_file", "deck_of", "digits",
+    "lammps_restitution", "run_deck", "run_peer", "spheres",
 ]  # fmt: skip
 
+LAMMPS_TANGENTIAL = {"displacement": "mindlin", "rescaled": "mindlin_rescale/force"}
+"""LAMMPS' names of our springs (`Material.tangential`)."""
 _LAMMPS_TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
 _LAST_LINES = 6
 _GRACE = 10.0  # for mpirun to end its ranks [s]

@@ -35,7 +35,16 @@ from dem.grains.sizes import Uniform
 from dem.measure.element import ElementShear, shear_element
 from experiments.calibrate.tests import mohr_circle, summary_of, triaxial_angle
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, within
-from experiments.validate.base.peers import PEERS, box_of, data_file, deck_of, lammps_restitution, run_peer, spheres
+from experiments.validate.base.peers import (
+    LAMMPS_TANGENTIAL,
+    PEERS,
+    box_of,
+    data_file,
+    deck_of,
+    lammps_restitution,
+    run_peer,
+    spheres,
+)
 
 from . import say
 
@@ -77,9 +86,10 @@ def lammps_law(stuff: Material, young: float, grain: float, *, friction: float |
     stiff = 0.1 * young * grain
     mass = stuff.density * math.pi / 6 * grain**3
     damping = 0.3 * 2 * math.sqrt(0.5 * stiff * mass)
+    mu, spring = stuff.friction if friction is None else friction, LAMMPS_TANGENTIAL[stuff.tangential]
     return (
         f"hertz/material {young:g} {lammps_restitution(stuff.restitution):.16g} {stuff.poisson:g} "
-        f"tangential mindlin NULL 1.0 {stuff.friction if friction is None else friction:g} "
+        f"tangential {spring} NULL 1.0 {mu:g} "
         f"rolling sds {stiff:g} {damping:g} {stuff.rolling_friction if friction is None else friction:g} "
         "twisting marshall damping tsuji"
     )

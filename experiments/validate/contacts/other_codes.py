@@ -162,7 +162,8 @@ def _deck(peer: str, assembly: Assembly, stuff: Material) -> str:
         exact = 'id format "%d' + 12 * " %.17g" + '"'
     else:
         asked = f"{peers.lammps_restitution(restitution):.16g}"
-        law = f"hertz/material {young:g} {asked} {poisson:g} tangential mindlin NULL 1.0 {friction:g} damping tsuji"
+        spring = peers.LAMMPS_TANGENTIAL[stuff.tangential]
+        law = f"hertz/material {young:g} {asked} {poisson:g} tangential {spring} NULL 1.0 {friction:g} damping tsuji"
         contact = ["pair_style granular", f"pair_coeff * * {law}"]
         exact = "id format float %.17g"
     weight = [f"fix weight all gravity {assembly.gravity:g} vector 0.0 0.0 -1.0"] if assembly.gravity else []
