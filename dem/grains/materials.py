@@ -13,7 +13,7 @@ rolling_friction = 0.2      # 0 if not given
 cohesion = "dmt"            # "none" if not given
 surface_energy = 0.3        # [J/m2]; with cohesion
 grain = 0.004               # the mean diameter for which surface_energy holds [m]; for every one if not given
-tangential = "displacement" # the springs of friction and rolling; "displacement" if not given
+tangential = "displacement" # the springs of friction and rolling; "rescaled" if not given
 [sources]                   # where each number comes from, in words
 friction = "..."
 ```
@@ -74,7 +74,7 @@ class Material:
     cohesion: str = "none"
     surface_energy: float = 0.0
     grain: float | None = field(default=None, compare=False)
-    tangential: str = "displacement"
+    tangential: str = "rescaled"
     sources: dict[str, str] = field(default_factory=dict, compare=False)
 
     def __post_init__(self):

@@ -21,6 +21,7 @@ __all__ = ["ANGLES", "CASES", "E_N", "MU", "STEP", "oblique", "spin_impact"]
 
 MU, E_N, SPEED = 0.092, 0.98, 3.9
 _LIKE = {"friction": MU, "restitution": E_N, "poisson": ALUMINA["poisson"]}
+T4_SPRING = "displacement"  # the spring that the figures of T4 are of
 ANGLES = np.array([5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 70, 80, 85])
 # The figures of T4 for alumina: points read from them, angle of impact [deg] and e_t [1] or spin [rad/s].
 TANGENTIAL = np.array(
@@ -43,7 +44,12 @@ def oblique(step: float = STEP, angles: np.ndarray = ANGLES) -> Grains:
     """T4: alumina spheres that meet the floor at 3.9 m/s, at angles from its normal [deg]."""
     angle = np.radians(angles)
     velocities = SPEED * np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
-    return meet_floor(Material("t4", friction=MU, restitution=E_N, **ALUMINA), velocities, step=step, time=1.5e-5)
+    return meet_floor(
+        Material("t4", friction=MU, restitution=E_N, tangential=T4_SPRING, **ALUMINA),
+        velocities,
+        step=step,
+        time=1.5e-5,
+    )
 
 
 def _sliding_spin(angles: np.ndarray) -> np.ndarray:
@@ -88,7 +94,7 @@ def _t4_spin(tell: Tell) -> Outcome:
         Curve("bed", angles, found),
     ]
     first = np.tan(np.radians(angles))
-    like = Material("t4", friction=MU, restitution=E_N, **ALUMINA)
+    like = Material("t4", friction=MU, restitution=E_N, tangential=T4_SPRING, **ALUMINA)
     overlap = np.array([contact_of(like, RADIUS, SPEED * math.cos(angle))[0] for angle in np.radians(angles)])
     unit, laws = overlap / LARGEST / RADIUS, ("undamped", "bed")
     after = (one_spring(first, law=law, unit=unit, steps=8000, **_LIKE)[0] for law in laws)
