@@ -17,7 +17,7 @@ from . import say
 __all__ = ["CASES", "errors_of_pair", "oblique_pair"]
 
 COUNTS = (50, 100, 200, 400)  # steps in seven tenths of a contact
-PAIR = Material("pair", 2600.0, 1e8, 0.25, 50.0, 1.0)
+PAIR = Material("pair", 2600.0, 1e8, 0.25, 50.0, 1.0, tangential="displacement")
 MASS, INERTIA = mass_of(PAIR.density, RADIUS), 0.4 * mass_of(PAIR.density, RADIUS) * RADIUS * RADIUS
 STAR, SHEAR = effective_moduli(PAIR.young, PAIR.poisson, PAIR.young, PAIR.poisson)
 CONTACT = contact_of(PAIR, RADIUS, 1.0, pair=True)[2]
@@ -34,8 +34,11 @@ def _push(d: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return f, (RADIUS - overlap / 2) * np.cross(f, n)
 
 
-def _reference(y0: np.ndarray) -> np.ndarray:
-    """The two grains at ``END``: (x, v, w of both, u), shape [7, 3]; independent of the engine."""
+def _reference(y0: np.ndarray, *, rescaled: bool = False) -> np.ndarray:
+    """The two grains at ``END``: (x, v, w of both, u), shape [7, 3]; independent of the engine.
+
+    ``rescaled``: the spring turns about the normal as well, and as the overlap d grows a u stays, a ~ sqrt(d).
+    """
 
     def rates(_, y):
         x1, v1, w1, x2, v2, w2, u = y.reshape(7, 3)
@@ -46,7 +49,12 @@ def _reference(y0: np.ndarray) -> np.ndarray:
         v_t = v - (v @ n) * n
         turn = ((v1 - v2) - ((v1 - v2) @ n) * n) / length
         f, t = _push(d, u)
-        return np.concatenate([v1, f / MASS, t / INERTIA, v2, -f / MASS, t / INERTIA, v_t - (u @ turn) * n])
+        slip = v_t - (u @ turn) * n
+        if rescaled:
+            slip += 0.5 * ((w1 + w2) @ n) * np.cross(n, u)
+            overlap, closing = 2 * RADIUS - length, -(v1 - v2) @ n
+            slip -= 0.5 * closing / overlap * u if overlap > 0 and closing > 0 else 0.0
+        return np.concatenate([v1, f / MASS, t / INERTIA, v2, -f / MASS, t / INERTIA, slip])
 
     found = solve_ivp(rates, (0, END), y0, t_eval=[END], method="DOP853", rtol=1e-11, atol=1e-14)
     return found.y[:, -1].reshape(7, 3)
@@ -93,7 +101,7 @@ def _orders_of_the_scheme() -> tuple[float, float]:
     return float(end), float(middle)
 
 
-def oblique_pair(step: float, *, steps: int, along: bool = False) -> tuple[Grains, Grains, int]:
+def oblique_pair(step: float, *, steps: int, along: bool = False, rescaled: bool = False) -> tuple[Grains, Grains, int]:
     """Two grains meet obliquely, spinning, among others that are far away; before, after, and how many lists were made.
 
     ``step``: [s]. ``along``: without spins and slip.
@@ -107,8 +115,9 @@ def oblique_pair(step: float, *, steps: int, along: bool = False) -> tuple[Grain
     if not along:
         velocities[5] += 0.4 * np.array([-0.6, 0.48, 0.64])
         spins[0], spins[5] = (40.0, -30.0, 25.0), (-10.0, 60.0, 5.0)
+    pair = replace(PAIR, tangential="rescaled") if rescaled else PAIR
     bed = Bed.from_grains(
-        PAIR, positions=positions, radii=radii, velocities=velocities, spins=spins, time_step=step, **options,
+        pair, positions=positions, radii=radii, velocities=velocities, spins=spins, time_step=step, **options,
     )  # fmt: skip
     start = bed.grains()
     bed.advance(steps)
@@ -121,13 +130,13 @@ def _unknowns(grains: Grains) -> np.ndarray:
     return np.concatenate([array[i] for i in (0, 5) for array in arrays] + [np.zeros(3)])
 
 
-def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
+def errors_of_pair(along: bool, *, rescaled: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Errors of velocity, position over contact time, spin times radius [m/s] at each of ``COUNTS``; their orders."""
     errors = []
     for count in COUNTS:
-        start, after, _ = oblique_pair(END / count, steps=count, along=along)
+        start, after, _ = oblique_pair(END / count, steps=count, along=along, rescaled=rescaled)
         if count == COUNTS[0]:
-            y = _reference(_unknowns(start))
+            y = _reference(_unknowns(start), rescaled=rescaled)
         off = after.velocity[[0, 5]] - y[[1, 4]], after.position[[0, 5]] - y[[0, 3]], after.spin[[0, 5]] - y[[2, 5]]
         velocity, position, spin = (np.abs(one).max() for one in off)
         errors.append([velocity, position / CONTACT, spin * RADIUS])
@@ -135,8 +144,8 @@ def errors_of_pair(along: bool) -> tuple[np.ndarray, np.ndarray]:
     return found, -np.polyfit(np.log(COUNTS), np.log(found), 1)[0]
 
 
-def _order(along: bool, tell: Tell) -> Outcome:
-    errors, slopes = errors_of_pair(along)
+def _order(along: bool, tell: Tell, *, rescaled: bool = False) -> Outcome:
+    errors, slopes = errors_of_pair(along, rescaled=rescaled)
     band = 0.1 if along else 0.25
     rows = [
         Comparison(f"order of the {name}'s error", "1", 2.0, slope, band, False)
@@ -149,7 +158,7 @@ def _order(along: bool, tell: Tell) -> Outcome:
     curves = [Curve("order 2", counts, errors[0].max() * (counts[0] / counts) ** 2.0, False)]
     curves += [Curve(name, counts, column) for name, column in zip(QUANTITIES, errors.T, strict=False)]
     remarks = []
-    if not along:
+    if not (along or rescaled):
         end, middle = _orders_of_the_scheme()
         remarks.append(say("scheme_order", middle=middle, end=end))
     plot = Plot("Error at seven tenths of a contact", "steps", "error [m/s]", curves, log="xy")
@@ -185,4 +194,9 @@ def _bouncing(tell: Tell) -> Outcome:
     return Outcome(rows, [Plot("Error of an elastic rebound", "steps in a contact", "error [1]", curves, log="xy")])
 
 
-CASES = {"order-head-on": partial(_order, True), "order-oblique": partial(_order, False), "order-rebound": _bouncing}
+CASES = {
+    "order-head-on": partial(_order, True),
+    "order-oblique": partial(_order, False),
+    "order-rescaled": partial(_order, False, rescaled=True),
+    "order-rebound": _bouncing,
+}
