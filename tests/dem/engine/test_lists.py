@@ -29,10 +29,11 @@ def layout(request, engines, monkeypatch):
     return request.param
 
 
+STUFF = replace(cloud.STUFF, tangential="displacement")  # the springs of ``NaiveBed``
 COHESIVE = {
-    "none": cloud.STUFF,
-    "dmt": replace(cloud.STUFF, cohesion="dmt", surface_energy=5.0),
-    "jkr": replace(cloud.STUFF, cohesion="jkr", surface_energy=5.0),
+    "none": STUFF,
+    "dmt": replace(STUFF, cohesion="dmt", surface_energy=5.0),
+    "jkr": replace(STUFF, cohesion="jkr", surface_energy=5.0),
 }
 """Laws of cohesion; at this surface energy JKR's range is 0.6 % of a diameter."""
 
@@ -60,12 +61,12 @@ def computed(material):
 
 @pytest.fixture(scope="module")
 def reference():
-    return computed(cloud.STUFF)
+    return computed(STUFF)
 
 
 def test_forces_and_motion_are_those_of_a_plain_double_loop(layout, reference):
     """Forces of the first instant, and everything after thirty steps, to round-off; the reaction on the ball too."""
-    bed = cloud.make(ball=True)
+    bed = cloud.make(ball=True, material=STUFF)
     assert bed.engine.chunk_count == {"one chunk": 1, "seven chunks": 7, "grain chunks": 64}[layout]
     assert bed.engine.nx == 3
     assert bed.coordination_number > 3
@@ -131,7 +132,7 @@ def test_a_shift_of_the_origin_changes_nothing():
     """Periodic: grains and ball moved by a part of a period, so that they lie across other boundaries."""
 
     def motion(shift):
-        bed = cloud.make(ball=True, shift=shift)
+        bed = cloud.make(ball=True, shift=shift, material=STUFF)
         bed.advance(100)
         return bed.grains().as_dict(), bed.reaction(1)
 
