@@ -132,7 +132,7 @@ def test_a_shift_of_the_origin_changes_nothing():
     """Periodic: grains and ball moved by a part of a period, so that they lie across other boundaries."""
 
     def motion(shift):
-        bed = cloud.make(ball=True, shift=shift, material=STUFF)
+        bed = cloud.make(ball=True, shift=shift)
         bed.advance(100)
         return bed.grains().as_dict(), bed.reaction(1)
 

@@ -71,8 +71,10 @@ def test_what_reaches_a_bed_is_the_same_with_grains_asleep(layer):
     assert plain[:, 2].min() == 2 * ROWS * COLUMNS and found[:, 2].min() < ROWS * COLUMNS
     assert np.abs(found[:, 0] - plain[:, 0]).max() < 1e-3 * plain[:, 0].max()
     assert np.abs(found[:, 1] - plain[:, 1]).max() < 1e-3 * plain[:, 1].max()
-    for name in ("kinetic", "potential", "normal", "tangential"):
+    for name in ("potential", "normal", "tangential"):
         assert asleep_energies[name] == pytest.approx(energies[name], rel=5e-3), name
+    # The creep of those far off, 0.5 % of it, is not there while they sleep.
+    assert asleep_energies["kinetic"] == pytest.approx(energies["kinetic"], rel=1e-2)
     # Gravity, floor and ball alone change the momentum of all grains, those that fall asleep or wake included.
     assert drift < 1e-15
 
