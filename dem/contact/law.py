@@ -297,11 +297,11 @@ def turning_torque(
     twist = spin_n * 0.0
     roll = spin
     if ti.static(rescaled):
-        q += (0.5 * dt) * spin
-        across = (4.0 - 2.0 * middle.norm_sqr()) * q.dot(middle)
-        twist = across - q.dot(n)
-        q -= across * middle
-        roll = grown * ((1.0 - 0.5 * angle * angle) * (q + twist * n) + angle * n.cross(q))
+        turned = q + (0.5 * dt) * spin
+        across = (4.0 - 2.0 * middle.norm_sqr()) * turned.dot(middle)
+        twist = across - turned.dot(n)
+        turned -= across * middle
+        roll = grown * ((1.0 - 0.5 * angle * angle) * (turned + twist * n) + angle * n.cross(turned))
         roll += (0.5 * dt) * (spin - spin_n * n)
         twist = grown * grown * grown * twist + (0.5 * dt) * spin_n
     else:
