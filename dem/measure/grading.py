@@ -2,12 +2,12 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from dem.engine.core import BedCore
-from dem.engine.stress import find_contacts
 from dem.grains.graded import THROAT, Graded, middles
 from dem.grains.packing import bulk_packing, surface_height
 
@@ -102,17 +102,26 @@ def measure_grading(bed: BedCore, graded: Graded) -> Grading:
         drained_share=float(solid[falls].sum()) / total,
         strayed_share=float(solid[beyond > _SCATTER].sum()) / total,
         farthest=float(beyond.max()),
-        touching_ratio=_touching_ratio(bed, d),
+        touching_ratio=_touching_ratio(position, d, size[:2]),
         grain_count=len(d),
         fine_count=round(total / (math.pi / 6 * graded.fine**3 * (1 + graded.spread**2))),
     )
 
 
-def _touching_ratio(bed: BedCore, d: Array) -> float:
-    contacts = find_contacts(bed)
-    both = contacts.second >= 0
-    one, other = d[contacts.first[both]], d[contacts.second[both]]
-    return float((np.maximum(one, other) / np.minimum(one, other)).max(initial=1.0))
+def _touching_ratio(position: Array, d: Array, period: Sequence[float]) -> float:
+    """Largest ratio of the diameters of two grains that touch, from their centres [m] and diameters ``d`` [m]."""
+    from scipy.spatial import cKDTree  # here, since it is slow to import
+
+    inside = position.copy()
+    inside[:, :2] %= period
+    inside[:, :2][inside[:, :2] >= period] = 0.0  # what rounds to the period itself
+    inside[:, 2] -= inside[:, 2].min()
+    pairs = cKDTree(inside, boxsize=(*period, 0.0)).query_pairs(float(d.max()), output_type="ndarray")
+    apart = inside[pairs[:, 0]] - inside[pairs[:, 1]]
+    apart[:, :2] -= period * np.round(apart[:, :2] / period)
+    one, other = d[pairs[:, 0]], d[pairs[:, 1]]
+    touch = np.linalg.norm(apart, axis=1) < 0.5 * (one + other)
+    return float((np.maximum(one, other) / np.minimum(one, other))[touch].max(initial=1.0))
 
 
 def surface_under(bed: BedCore, graded: Graded) -> float:

@@ -81,9 +81,11 @@ def test_small_grains_that_have_drained_are_found():
     graded = Graded(fine=0.002, coarse=0.0044, footprints=((0.004, 0.010),))
     held = measure_grading(lying([(0.007, 0.01, 0.01), (0.036, 0.01, 0.01)], [0.002, 0.0044]), graded)
     assert held.held and held.drained_share == held.strayed_share == held.farthest == 0
+    assert held.touching_ratio == 1  # the two lie apart
     out = measure_grading(lying([(0.036, 0.01, 0.012), (0.036, 0.01, 0.01)], [0.002, 0.0044]), graded)
     share = 0.002**3 / (0.002**3 + 0.0044**3)
     assert not out.held
+    assert out.touching_ratio == pytest.approx(4.4 / 2)
     assert out.drained_share == pytest.approx(share) and out.strayed_share == pytest.approx(share)
     # the largest 2 mm grain's home: 2 mm / (1 - 0.15) belongs 2.4 mm out; this one lies 26 mm out, among 4.4 mm
     home = (0.002 / 0.85 - 0.002) / 0.15
