@@ -27,6 +27,8 @@ def beds():
     )  # fmt: skip
     piece.advance(3000, drag_time=5e-3)
     piece.advance(1000)
+    piece.make_lists()  # puts grains that have gone over the sides back, as `repeated` does
+    piece.compute_forces()
     piece.measure_surface()
     piece.recipe = {"seed": 3}
     long = piece.repeated(TIMES)

@@ -206,7 +206,8 @@ def test_a_report_of_a_bed_can_be_had_at_any_time(bed):
 def test_taps_leave_grains_that_stick_as_they_were_densest(tmp_path, monkeypatch):
     """Full taps throw such a bed up, and lumps come down; then softer ones go on from the best. Stopped in between."""
     monkeypatch.setattr("dem.prepare.stages._TELLING_TAPS", 2)
-    stuff = replace(SAND, cohesion="dmt", surface_energy=0.6)
+    # With rescaled springs no tap packs this small bed denser than the rain did, and nothing goes back to the densest.
+    stuff = replace(SAND, cohesion="dmt", surface_energy=0.6, tangential="displacement")
     made = {"stages": ["rain", "compact:densest"], "size": (0.024, 0.024, 0.016), "grain": GRAIN, "threads": 1}
     whole = Bed.prepare_as(stuff, **made)
     rain, tapped = whole.reports
