@@ -15,7 +15,7 @@ _CALM, _REST = 4, 14  # Updates of a bed until it is cut level, and while it res
 
 def show_bed(progress: Progress, bed: Bed) -> None:
     """Tell how many grains the bed has, how many of them are awake, and how many grain-steps it has done."""
-    progress.show_bed(grain_count=bed.grain_count, awake_count=bed.awake_count, grain_steps=bed.grain_steps)
+    progress.show_grains(grain_count=bed.grain_count, awake_count=bed.awake_count, grain_steps=bed.grain_steps)
 
 
 class Stages:

@@ -176,7 +176,7 @@ class Progress(AbstractContextManager["Progress"]):
         if self._opened is not self._pace and self._opened.first is None:
             self._opened.report(now, 0.0)  # something is done within it
 
-    def show_bed(self, *, grain_count: int, awake_count: int, grain_steps: int) -> None:
+    def show_grains(self, *, grain_count: int, awake_count: int, grain_steps: int) -> None:
         """Say of the stage's bed how many grains it has, how many are awake, how many grain-steps it has done in all.
 
         Before `update`, which shows it; the end of the stage ends it.

@@ -5,7 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from experiments.grains.bed_progress import BedProgress
+from dem.prepare.report import ShowsBed
+from experiments.grains.bed_progress import BedProgress, Stages
 from experiments.runs.progress import LineProgress, LiveProgress, Progress, as_expected, duration, make_progress
 
 
@@ -281,10 +282,10 @@ def test_a_bed_is_shown_by_its_grains_the_share_awake_and_its_rate(clock):
     assert progress.bed_words == []
     for second in range(31):  # twice as fast in the last ten seconds
         steps = 2_000_000 * second + 2_000_000 * max(0, second - 20)
-        progress.show_bed(grain_count=20_789, awake_count=7_000, grain_steps=steps)
+        progress.show_grains(grain_count=20_789, awake_count=7_000, grain_steps=steps)
         clock.now += 1
     assert progress.bed_words == ["20,789 grains", "33 % awake", "4 million grain-steps/s"]
-    progress.show_bed(grain_count=10, awake_count=10, grain_steps=0)  # another bed has no rate yet
+    progress.show_grains(grain_count=10, awake_count=10, grain_steps=0)  # another bed has no rate yet
     assert progress.bed_words == ["10 grains", "100 % awake"]
     progress.stage("report")
     assert progress.bed_words == []
@@ -298,7 +299,7 @@ def test_lines_and_bars_show_the_bed(clock):
             progress.stage("drive", total=100)
             for done in (10, 20):
                 clock.now += 10
-                progress.show_bed(grain_count=20_789, awake_count=7_000, grain_steps=3_000_000 * done)
+                progress.show_grains(grain_count=20_789, awake_count=7_000, grain_steps=3_000_000 * done)
                 progress.update(done)
     line, bars = stream.getvalue().splitlines()[-1], console.file.getvalue()
     for piece in ("20 %", "1:20 to go", "20,789 grains", "33 % awake", "3 million grain-steps/s"):
@@ -313,3 +314,9 @@ def test_the_kind_suits_the_stream():
     assert type(make_progress(io.StringIO())) is LineProgress
     assert type(make_progress(Terminal())) is LiveProgress
     assert type(make_progress(Terminal(), quiet=True)) is Progress
+
+
+def test_the_preparation_of_a_bed_takes_a_progress_for_one_without_beds():
+    """Benchmarks pass it as it is: its words on grains are not the protocol's."""
+    assert not isinstance(Progress(), ShowsBed)
+    assert isinstance(Stages(Progress(), bool), ShowsBed)
