@@ -6,7 +6,7 @@ python -m benchmarks.race.table DIR/bench.json docs/performance.md  # puts it be
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from rich.table import Table
 
 from experiments.runs.types import Json
 
-__all__ = ["HEADINGS", "MARKS", "PHASES", "Sheet", "insert", "markdown", "marks_of", "rows", "show"]
+__all__ = ["HEADINGS", "MARKS", "PHASES", "Sheet", "insert", "markdown", "marks_of", "print_or_insert", "rows", "show"]
 
 HEADINGS = ("code", "skin, mm", "threads", "10^6/s", "runs", "ours/this", "touching", "packing", "uJ", "lists", "")
 LEGEND = (
@@ -275,10 +275,18 @@ def insert(text: str, table: str, marks: tuple[str, str]) -> str:
     return f"{head}{begin}\n{table}{end}{tail}"
 
 
-def main(arguments: list[str]) -> int:
-    """Print the table of a bench.json, or put it into a page."""
+def print_or_insert(
+    arguments: list[str],
+    usage: str | None,
+    markdown: Callable[[Json], str],
+    marks_of: Callable[[Json], tuple[str, str]],
+) -> int:
+    """Print the table of the bench.json named first, or put it between its marks in the page named second.
+
+    Returns the exit status: 2, with ``usage`` printed, for no name or more than two. Raises ValueError: ``insert``.
+    """
     if not 1 <= len(arguments) <= 2:
-        print(__doc__, file=sys.stderr)
+        print(usage, file=sys.stderr)
         return 2
     bench = json.loads(Path(arguments[0]).read_text(encoding="utf-8"))
     table = markdown(bench)
@@ -288,6 +296,11 @@ def main(arguments: list[str]) -> int:
     page = Path(arguments[1])
     page.write_text(insert(page.read_text(encoding="utf-8"), table, marks_of(bench)), encoding="utf-8")
     return 0
+
+
+def main(arguments: list[str]) -> int:
+    """Print the table of a bench.json, or put it into a page."""
+    return print_or_insert(arguments, __doc__, markdown, marks_of)
 
 
 if __name__ == "__main__":

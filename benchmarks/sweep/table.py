@@ -4,10 +4,9 @@ python -m benchmarks.sweep.table DIR/bench.json                      # prints th
 python -m benchmarks.sweep.table DIR/bench.json docs/performance.md  # puts it between the two marks in that file
 """
 
-import json
 import sys
-from pathlib import Path
 
+from benchmarks.race.table import print_or_insert
 from experiments.runs.types import Json
 
 __all__ = ["MARKS", "PUBLISHED", "main", "markdown"]
@@ -75,28 +74,9 @@ def _cells(row: Json) -> tuple[str, ...]:
     )
 
 
-def insert(text: str, table: str) -> str:
-    """A page with what is between its two marks replaced by a table. Raises ValueError where a mark is missing."""
-    begin, end = MARKS
-    head, first, rest = text.partition(begin)
-    _, second, tail = rest.partition(end)
-    if not first or not second:
-        raise ValueError(f"the page lacks the marks {begin} and {end}")
-    return f"{head}{begin}\n{table}{end}{tail}"
-
-
 def main(arguments: list[str]) -> int:
     """Print the table of a bench.json, or put it into a page."""
-    if not 1 <= len(arguments) <= 2:
-        print(__doc__, file=sys.stderr)
-        return 2
-    table = markdown(json.loads(Path(arguments[0]).read_text(encoding="utf-8")))
-    if len(arguments) == 1:
-        print(table, end="")
-        return 0
-    page = Path(arguments[1])
-    page.write_text(insert(page.read_text(encoding="utf-8"), table), encoding="utf-8")
-    return 0
+    return print_or_insert(arguments, __doc__, markdown, lambda bench: MARKS)
 
 
 if __name__ == "__main__":
