@@ -80,15 +80,15 @@ def tracked(bed, chance, folder):
 @pytest.mark.long
 def test_orders_drawn_by_chance_have_the_bits_of_sorting_all_grains_every_time(tmp_path, monkeypatch):
     monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 20)
-    sorted_ones, rearrange, all_of_them = [], Sleeper.rearrange, False
+    sorted_ones, recount, all_of_them = [], Sleeper.recount, False
 
-    def counted(self, **more):
+    def counted(self):
         if all_of_them:
             self.bed.engine.rest.whole[None] = 1
-        rearrange(self, **more)
+        recount(self)
         sorted_ones.append(int(self.bed.engine.count[Lists.SORTED]) / self.bed.grain_count)
 
-    monkeypatch.setattr(Sleeper, "rearrange", counted)
+    monkeypatch.setattr(Sleeper, "recount", counted)
     found = tracked(two_layers(), np.random.default_rng(SEED), tmp_path)
     assert min(sorted_ones) < 0.5 and np.mean(np.array(sorted_ones) < 1) > 0.3
     assert min(awake for _, awake, _ in found) < 0.3 * 2 * COLUMNS * ROWS
