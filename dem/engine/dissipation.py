@@ -124,6 +124,11 @@ class Balance:
             self.rubbed[c][2 * k + 1] = self.rubbed[c][2 * k + 1] + ti.select(known, ti.max(-lost, 0.0), 0.0)
 
     @ti.func
+    def lose(self, c, energy):
+        """To a chunk's sums: kinetic energy [J] that is lost as in a dashpot, of grains that change their pace."""
+        self.taken[c][0] = self.taken[c][0] + ti.cast(energy, ti.f64)
+
+    @ti.func
     def turn(self, c, which: ti.template(), impulse):
         """To a chunk's angular impulses."""
         self.turned[c, which] = self.turned[c, which] + ti.cast(impulse, ti.f64)

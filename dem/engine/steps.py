@@ -147,7 +147,7 @@ class Steps(EnginePart):
         rest.held[c] = rest.held[c] + (p - after) / step
         if ti.static(balance.on):
             balance.turn(c, balance.outside, turning_after - turning)
-            balance.add(c, ti.Vector([energy - energy_after, 0.0, 0.0]))
+            balance.lose(c, energy - energy_after)
 
     @ti.func
     def turn_body(self, b, dt):

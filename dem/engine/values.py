@@ -101,7 +101,7 @@ class Sleep:
     still: float = 3e-4  # A slow grain below this may fall asleep [sqrt(g d)]
     change: float = 0.03  # A sleeper wakes when the force on it has changed by this [its contacts' mean force, or m g],
     waking_speed: float = 5e-2  # or a neighbour has this speed [sqrt(g d)]
-    every: int = 48
+    every: int = 96
     """Steps between two checks: what changes makes new lists, and those cost as much as four steps of all grains."""
 
     def __post_init__(self):

@@ -64,7 +64,7 @@ def test_what_reaches_a_bed_is_the_same_with_grains_asleep(layer):
     1e-4 off as measured: what the layer beyond those awake gives way by, and they do not.
     """
     plain, energies, _ = pressed(layer)
-    found, asleep_energies, drift = pressed(layer, Sleep(calm=0.3))
+    found, asleep_energies, drift = pressed(layer, Sleep(every=48, calm=0.3))
     assert plain[:, 2].min() == 2 * ROWS * COLUMNS and found[:, 2].min() < ROWS * COLUMNS
     assert np.abs(found[:, 0] - plain[:, 0]).max() < 1e-3 * plain[:, 0].max()
     assert np.abs(found[:, 1] - plain[:, 1]).max() < 1e-3 * plain[:, 1].max()
@@ -79,7 +79,7 @@ def test_woken_at_once_they_go_on_as_if_they_had_not_slept(layer):
     bed, state = layer
     bed.restore(state)
     bed.move_body(1, position=(0.02, 0.012, 0.05), velocity=(0.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(calm=0.1))
+    bed.let_sleep(Sleep(every=48, calm=0.1))
     bed.advance(600)
     assert bed.awake_count == 0 and bed.asleep.all()
     before = bed.grains()
@@ -128,7 +128,7 @@ def test_a_held_state_is_taken_back_with_its_sleepers_to_the_same_bits(layer):
 
     bed, state = layer
     bed.restore(state)
-    bed.let_sleep(Sleep(calm=0.3))
+    bed.let_sleep(Sleep(every=48, calm=0.3))
     bed.advance(200)
     fast = bed.sleeper.fast
     held, then = bed.checkpoint(), bits()
@@ -162,7 +162,7 @@ def test_one_that_is_woken_wakes_its_cell_and_the_26_around_it_across_the_period
     bed, state = layer
     bed.restore(state)
     bed.move_body(1, position=(0.06, 0.012, 0.5), velocity=(0.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(calm=0.3))
+    bed.let_sleep(Sleep(every=48, calm=0.3))
     bed.advance(1500)
     asleep = bed.asleep
     position = bed.grains(contacts=False).position
@@ -206,7 +206,7 @@ def skimmed(steps, *, wide=0.05, cut=None):
     bed.move_body(ball, velocity=(10.0, 0.0, 0.0))
     above = bed.add_body(Ball(radius=wide), position=(0.05, 0.006, 3.0))
     bed.move_body(above, velocity=(10.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(calm=0.05))
+    bed.let_sleep(Sleep(every=48, calm=0.05))
     begins, done, state = set(), 0, None
     while done < steps:
         bed.advance(100)
@@ -269,7 +269,7 @@ def test_lists_that_were_interrupted_leave_nobody_behind_who_was_woken(layer, mo
     """Ctrl-C between the waking and the sorting: the next lists sort those who were woken before it too."""
     bed, state = layer
     bed.restore(state)
-    bed.let_sleep(Sleep(calm=0.1))
+    bed.let_sleep(Sleep(every=48, calm=0.1))
     bed.advance(1200)
     assert 0 < bed.awake_count < 0.5 * bed.grain_count and bed.engine.rest.whole[None] == 0
 
