@@ -16,8 +16,7 @@ import hedgebed_renamed  # old names of modules
 
 if TYPE_CHECKING:
     from .bed import Bed
-    from .engine.sleep import Sleep
-    from .engine.values import BedFailure, Grains
+    from .engine.values import BedFailure, Grains, Sleep
     from .grains.graded import Graded
     from .grains.materials import MATERIALS, SAND, Facing, Material, material
     from .grains.sizes import LogNormal, Normal, Sieve, Uniform
@@ -29,8 +28,7 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "bed": ("Bed",),
-    "engine.sleep": ("Sleep",),
-    "engine.values": ("BedFailure", "Grains"),
+    "engine.values": ("BedFailure", "Grains", "Sleep"),
     "grains.graded": ("Graded",),
     "grains.materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
     "grains.sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),

@@ -19,9 +19,9 @@ from hedgebed_taichi import ti
 from . import runtime
 from .checking import check_lists, check_step, debug_wanted, keep_histories
 from .engine import take_engine
-from .lists import MOST_BODIES
-from .sleep import Sleep, Sleeper
-from .values import BedFailure, BedSettings, State
+from .lists import FLOOR, MOST_BODIES
+from .sleep import Sleeper
+from .values import BedFailure, BedSettings, Sleep, State, refuse_sleep
 
 __all__ = ["FLOOR", "BedBase", "check_array"]
 
@@ -31,7 +31,6 @@ _SKIN, _LEAST_SKIN, _LARGEST_SKIN = 0.06, 0.02, 0.15
 _REBUILD_STEPS, _SKIN_COST = 6.0, 0.5
 # Rows of the pair lists and the near lists a grain, to begin with; on a GPU both grains of a pair have one.
 PAIR_ROWS, NEAR_ROWS, NEAR_ROWS_ON_GPU = 5.0, 0.25, 1.0
-FLOOR = 0
 
 
 class BedBase:
@@ -97,19 +96,17 @@ class BedBase:
             """``dem.engine.state`` has it."""
 
     def let_sleep(self, rules: Sleep | None = None) -> None:
-        """Stop computing grains at rest far from the bodies; ``dem.engine.sleep`` has the rules.
+        """Compute quiet grains every so many steps only, and those at rest not at all, by ``dem.engine.sleep``'s rules.
 
         What is read of the bed counts sleepers in, with no speed and no force. The floor's reaction has what they would
         have passed on to it. Raises ValueError: a bed on a GPU, without floor or gravity, or whose grains cohere by
         JKR.
         """
         self.check_valid()
-        if self.engine.gpu:
-            raise ValueError("arch = 'cuda': grains sleep on a CPU only so far")
-        if not self.has_floor or not any(self.gravity):
-            raise ValueError("grains sleep in a bed with a floor and gravity only: they must lie on something")
-        if self.material.cohesion == "jkr":
-            raise ValueError("cohesion = 'jkr': the force that wakes such grains is not measured; dmt or none would do")
+        refuse_sleep(
+            arch="cuda" if self.engine.gpu else "cpu", cohesion=self.material.cohesion, floor=self.has_floor,
+            gravity=math.hypot(*self.gravity),
+        )  # fmt: skip
         self.wake()
         self.engine.let_sleep()
         self.sleeper = Sleeper(self, rules or Sleep())
@@ -118,14 +115,14 @@ class BedBase:
         """Wake all grains, which then stay awake."""
         self.check_valid()
         if self.sleeper is not None:
-            self.make_lists(all_awake=True)
+            self.make_lists()
             self.sleeper = None
             self.engine.wake_all()
             self.compute_forces()
 
     @property
     def awake_count(self) -> int:
-        """Number of grains that are computed: all that do not sleep."""
+        """Number of grains that are computed, be it every so many steps: all that do not sleep."""
         return self.grain_count if self.sleeper is None else self.sleeper.awake
 
     @property
@@ -147,11 +144,21 @@ class BedBase:
         awake = slice(0, self.awake_count)
         return [self.engine.read(name)[awake].astype(float) for name in names]
 
+    def paces(self) -> np.ndarray:
+        """Steps of the bed for one of each grain awake, in the order of memory: 1, but of the slow; shape [awake].
+
+        A slow grain moves as if it had the square of it times its mass.
+        """
+        return np.ones(self.grain_count, dtype=int) if self.sleeper is None else self.sleeper.paces()
+
     def rates_now(
         self, position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, force: np.ndarray, torque: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Velocity [m/s] and spin [rad/s] at the time of the positions, half a step after the engine's, of its rows."""
-        half = 0.5 * self.time_step
+        """Velocity [m/s] and spin [rad/s] at the time of the positions, half a step after the engine's, of its rows:
+        of all grains, or of those awake."""
+        half = np.ones(len(position))
+        half[: self.awake_count] = self.paces()[: len(half)]
+        half = 0.5 * self.time_step / half[:, None]
         radius, mass = position[:, 3], velocity[:, 3]
         now = velocity[:, :3] + half * force / mass[:, None]
         return now, spin[:, :3] + half * torque * (2.5 / (mass * radius**2))[:, None]
@@ -188,27 +195,27 @@ class BedBase:
         keep = 1 - self.time_step / drag_time
         e.clear_pushes()
         self.reaction_steps, self.tallied = steps, None
-        sleeper, forced = self.sleeper, False
+        sleeper = self.sleeper
         if sleeper is not None:
             e.rest.held.fill(0)
-            sleeper.slept = 0.0
+            sleeper.slept, sleeper.begun_ahead = 0.0, sleeper.floor_ahead()
         limit = 0.5 * self.skin
         done = 0
         while done < steps:
             most = steps - done
             if sleeper is not None:
-                forced = sleeper.check()
-                if forced:  # new lists in the step to come, as if a grain had moved far
-                    e.moved[None] = 1
+                if sleeper.check():
+                    self.make_lists(anew=False, stirred=True)
+                    e = self.engine
+                    limit = 0.5 * self.skin
                 most = min(most, sleeper.rules.every - self.steps % sleeper.rules.every)
             most = 1 if self.debug else most
-            advanced, halted = e.launch(most, self.time_step, limit, self.gravity, keep, self.awake_count)
+            advanced, halted = e.launch(most, self.steps, self.time_step, limit, self.gravity, keep, self.awake_count)
             done += advanced
             self._count(advanced)
             if halted:
-                if not forced:
-                    self.adapt_skin()
-                self.make_lists()
+                self.adapt_skin()
+                self.make_lists(anew=False)
                 e = self.engine
                 self.compute_forces(self.time_step)
                 limit = 0.5 * self.skin
@@ -225,11 +232,11 @@ class BedBase:
             )
 
     def _count(self, steps: int) -> None:
-        self.steps += steps
-        self.steps_since_lists += steps
-        self.grain_steps += steps * self.awake_count
+        self.grain_steps += steps * self.grain_count if self.sleeper is None else self.sleeper.computed(steps)
         if self.sleeper is not None:
             self.sleeper.slept += steps * self.sleeper.mass
+        self.steps += steps
+        self.steps_since_lists += steps
 
     def adapt_skin(self) -> None:
         """Move the skin towards that at which lists cost as much to make as their extra pairs cost to check."""
@@ -238,15 +245,23 @@ class BedBase:
         skin = self.skin * min(1.4, max(0.7, ratio))
         self.skin = min(_LARGEST_SKIN * self.mean_diameter, max(_LEAST_SKIN * self.mean_diameter, skin))
 
-    def make_lists(self, *, all_awake: bool = False) -> None:
-        """Sort the grains and list who is near whom, the contacts' history carried over. Raises BedFailure."""
-        e = self.engine
+    def make_lists(self, *, anew: bool = True, stirred: bool = False) -> None:
+        """Sort the grains and list who is near whom, the contacts' history carried over. Raises BedFailure.
+
+        ``anew``: wake all, for forces that are computed anew; else those to come stay what they are. ``stirred``: let
+        grains become slow, fast, fall asleep and wake.
+        """
+        e, sleeper = self.engine, self.sleeper
+        stirred = stirred or anew
         before = keep_histories(self) if self.debug else None
         e.keep_lists(e.rest, e.balance)
         awake = self.awake_count
-        if self.sleeper is not None:
-            self.sleeper.rearrange(all_awake=all_awake)
-        e.sort(*self.gravity, awake, e.rest, e.balance)
+        if sleeper is not None:
+            if stirred:
+                sleeper.rearrange(all_awake=anew)
+            sleeper.recount()
+        times = (0.0, 0.0) if sleeper is None else sleeper.times_ahead(between=stirred)
+        e.sort(*self.gravity, awake, int(anew), *times, e.rest, e.balance)
         e.make_lists(self.skin, e.shapes, e.rest, e.balance)
         lost, pairs, near = (int(e.problem[k]) for k in range(3))
         if lost or pairs or near:
@@ -260,6 +275,8 @@ class BedBase:
         self.steps_since_lists = 0
         if before is not None:
             check_lists(self, before)
+        if sleeper is not None and stirred and not anew:
+            sleeper.settle()
 
     def make_room(self, pairs: int, near: int) -> None:
         """See that lists have room for so many rows of pairs, and of grains near bodies, in each chunk.
@@ -294,7 +311,7 @@ class BedBase:
         """Compute the forces where the grains are; ``elapsed``: the time by which contacts have slid since then."""
         self.tallied = None
         e = self.engine
-        e.push_all(elapsed, e.shapes, e.rest, e.balance)
+        e.push_all(elapsed, self.steps, e.shapes, e.rest, e.balance)
 
     def shift_velocities(self, part: float) -> None:
         """Kick all grains by the present forces for this part of a time step, of either sign."""

@@ -160,7 +160,7 @@ class BedBodies(BedBase):
         total = self.tallied
         if self.sleeper is not None:
             total = total.copy()
-            total[FLOOR, :3] += self.sleeper.on_floor()
+            total[FLOOR] += self.sleeper.on_floor()
         return total / max(1, self.reaction_steps)
 
 

@@ -20,6 +20,7 @@ from dem.grains.materials import Material
 
 from .engine import Engine
 from .lists import INDEX_BITS, INDEX_MASK, SAME_IMAGE
+from .rows import chunk_starts, layout_of
 from .values import BedFailure, State
 
 __all__ = ["Histories", "check_lists", "check_step", "debug_wanted", "keep_histories"]
@@ -66,7 +67,7 @@ def check_step(bed: CheckedBed) -> None:
     """
     state = bed.state()
     _check_age(bed, state)
-    rows, wanted, possible = _pairs(bed, state, skin=0.0)
+    rows, wanted, possible = _pairs(bed, state, skin=0.0, touch=True)
     _compare(bed, state, rows[state["pair"] < 0], wanted, possible, "touch")
     listed, apart, slack = _near(bed, state, plane=0)
     _compare_near(bed, state, listed, apart < -slack, "touch", possible=None)
@@ -112,10 +113,11 @@ def _slack(bed: CheckedBed, state: State) -> float:
     return float(_ROUNDINGS * np.finfo(state["position"].dtype).eps * largest)
 
 
-def _pairs(bed: CheckedBed, state: State, *, skin: float) -> tuple[Array, Array, Array]:
+def _pairs(bed: CheckedBed, state: State, *, skin: float, touch: bool = False) -> tuple[Array, Array, Array]:
     """Pairs as sorted numbers (``_number``): those listed, row by row; those that must be; those that may be.
 
-    ``skin``: within how far of touching [m].
+    ``skin``: within how far of touching [m]. ``touch``: as they are in a step, where a slow grain's row with a fast one
+    never touches: that is the fast one's.
     """
     count, slack = bed.grain_count, _slack(bed, state)
     first = np.repeat(np.arange(count), state["pair_count"])
@@ -126,6 +128,9 @@ def _pairs(bed: CheckedBed, state: State, *, skin: float) -> tuple[Array, Array,
     # A pair of one chunk has one row, one across chunks two, one of a sleeper that of the grain awake.
     i, j, image, gap = (np.concatenate(both) for both in ((i, j), (j, i), (image, _IMAGES - 1 - image), (gap, gap)))
     mine = (i < awake) & ((j >= awake) | (chunk[i] != chunk[j]) | (i < j))
+    if touch and "sleep_numbers" in state:
+        fast = int(state["sleep_numbers"][3])
+        mine &= (i < fast) | (j >= fast)
     numbers = _number(count, i, j, image)[mine]
     return listed, np.sort(numbers[gap[mine] < skin - slack]), np.sort(numbers)
 
@@ -174,10 +179,8 @@ def _felt(bed: CheckedBed, radius: Array) -> Array:
 
 def _chunks(bed: CheckedBed, state: State) -> Array:
     """The chunk of every grain, by place; of sleepers the last."""
-    chunks = int(state["sleep_numbers"][1]) if "sleep_numbers" in state else len(state["near_count"])
-    base, rest = divmod(bed.awake_count, chunks)
-    ends = np.cumsum(base + (np.arange(chunks) < rest))
-    return np.minimum(np.searchsorted(ends, np.arange(bed.grain_count), side="right"), chunks - 1)
+    ends = chunk_starts(*layout_of(state))[1:]
+    return np.minimum(np.searchsorted(ends, np.arange(bed.grain_count), side="right"), len(ends) - 1)
 
 
 def _compare(bed: CheckedBed, state: State, listed: Array, wanted: Array, possible: Array, what: str) -> None:

@@ -122,8 +122,9 @@ class BedCore(BedState):
         e = self.engine
         order = np.argsort(e.read("id"))
         names = ("position", "velocity", "spin", "force", "torque", "origin")
-        x, v, w, force, torque, origin = (e.read(name)[order].astype(float) for name in names)
-        velocity, spin = self.rates_now(x, v, w, force, torque)
+        x, v, w, force, torque, origin = (e.read(name).astype(float) for name in names)
+        velocity, spin = (rates[order] for rates in self.rates_now(x, v, w, force, torque))
+        x, v, force, origin = (values[order] for values in (x, v, force, origin))
         counts = self.contact_counts() if contacts else np.zeros(0, dtype=np.int32)
         ids = np.arange(self.grain_count)
         return Grains(ids, x[:, :3], x[:, 3], v[:, 3], velocity, spin, force, x[:, :3] - origin, counts)
@@ -273,9 +274,17 @@ class BedCore(BedState):
         return self.engine.balance
 
     def momentum(self) -> np.ndarray:
-        """Momentum of the grains [N s], shape [3], with the velocities half a step ahead, as the forces bring them."""
+        """Momentum of the grains [N s], shape [3], with the velocities half a step ahead, as the forces bring them.
+
+        Of slow grains (``dem.engine.sleep``) with the mass that they move with, with what the fast ones have done to
+        them, and without the impulse of gravity, floor and sleepers that they have had before its time.
+        """
         v, f = self.awake_rows("velocity", "force")
-        return np.asarray((v[:, 3:] * v[:, :3] + self.time_step * f).sum(axis=0))
+        many = self.paces()[:, None]
+        found = (many**2 * v[:, 3:] * v[:, :3] + self.time_step * many * f).sum(axis=0)
+        if self.sleeper is not None:
+            found += self.time_step * (self.sleeper.pushes()[0] - self.sleeper.impulse_ahead())
+        return np.asarray(found)
 
     def angular_momentum(self) -> State:
         """Angular momentum about the bed's origin, and changes since ``track_contact_work`` [N m s], shape [3] each.
@@ -292,9 +301,12 @@ class BedCore(BedState):
         sums = self._balance().sums()
         x, v, w, f, t = self.awake_rows("position", "velocity", "spin", "force", "torque")
         radius, mass = x[:, 3], v[:, 3]
-        momentum = mass[:, None] * v[:, :3] + self.time_step * f
-        own = (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * t
+        many = self.paces()[:, None]
+        momentum = many**2 * mass[:, None] * v[:, :3] + self.time_step * many * f
+        own = many**2 * (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * many * t
         total = np.cross(x[:, :3], momentum).sum(axis=0) + own.sum(axis=0)
+        if self.sleeper is not None:
+            total += self.time_step * self.sleeper.pushes()[1]
         return {"grains": total, **{part: sums[part] for part in TURNED}}
 
 

@@ -124,6 +124,11 @@ class Balance:
             self.rubbed[c][2 * k + 1] = self.rubbed[c][2 * k + 1] + ti.select(known, ti.max(-lost, 0.0), 0.0)
 
     @ti.func
+    def lose(self, c, energy):
+        """To a chunk's sums: kinetic energy [J] that is lost as in a dashpot, of grains that change their pace."""
+        self.taken[c][0] = self.taken[c][0] + ti.cast(energy, ti.f64)
+
+    @ti.func
     def turn(self, c, which: ti.template(), impulse):
         """To a chunk's angular impulses."""
         self.turned[c, which] = self.turned[c, which] + ti.cast(impulse, ti.f64)
@@ -136,7 +141,6 @@ class BalanceKernels(EnginePart):
     @ti.func
     def balance_pair(self, c, s, i, j, d, now, dt, rest: ti.template(), balance: ti.template()):
         """What a pair's row took over the step; ``now`` the parts of its force."""
-        start, end = self.chunk_range(c)
         length = d.norm()
         n = d / length
         v = self.velocity[i].xyz - self.velocity[j].xyz
@@ -153,14 +157,19 @@ class BalanceKernels(EnginePart):
             before, now, v_n - h * v_t.norm_sqr(), (1.0 + h * v_n) * v_t - turning.cross(n), w_i - w_j, dt
         )
         balance.last[s] = now
-        # Across chunks both sides have a row; a sleeper has none.
+        balance.add(c, self.share_of_row(c, j, rest), before, now, took)
+
+    @ti.func
+    def share_of_row(self, c, j, rest: ti.template()):
+        """Of a pair, what chunk c counts: half of it where the other side has a row too."""
+        start, end = self.chunk_range(c)
         share = ti.cast(0.5, self.real)
         if j >= start and j < end:
             share = ti.cast(1.0, self.real)
         if ti.static(rest.on):
-            if j >= self.count[self.AWAKE]:
+            if j >= self.alone_from(c):
                 share = ti.cast(1.0, self.real)
-        balance.add(c, share, before, now, took)
+        return share
 
     @ti.func
     def pair_row(self, s, i, j, d, n, damped, f_t, turn, balance: ti.template()):
@@ -186,7 +195,6 @@ class BalanceKernels(EnginePart):
     @ti.func
     def balance_turning(self, c, bits, f, f_t, turn, n, arm_j, dt, rest: ti.template(), balance: ti.template()):
         """Of a touching pair's force: what crosses the periodic sides, and what a sleeper takes."""
-        start, end = self.chunk_range(c)
         j = bits & INDEX_MASK
         image = bits >> INDEX_BITS
         sleeps = False
@@ -196,11 +204,7 @@ class BalanceKernels(EnginePart):
             shift = ti.Vector.zero(self.real, 3)
             shift.x = ti.cast(image % 3 - 1, self.real) * self.box[self.PERIOD_X]
             shift.y = ti.cast(image // 3 - 1, self.real) * self.box[self.PERIOD_Y]
-            # Across chunks both sides have a row; a sleeper has none.
-            share = ti.cast(0.5, self.real)
-            if sleeps or (j >= start and j < end):
-                share = ti.cast(1.0, self.real)
-            out = -share * shift.cross(f)
+            out = -self.share_of_row(c, j, rest) * shift.cross(f)
             if sleeps:
                 out -= arm_j * f_t.cross(n) - turn - self.position[j].xyz.cross(f)
             balance.turn(c, OUTSIDE, dt * out)
@@ -220,10 +224,3 @@ class BalanceKernels(EnginePart):
             balance.turn(c, FIRST, taken)
         else:
             balance.turn(c, OTHERS, taken)
-
-    @ti.func
-    def balance_leaving(self, c, i, balance: ti.template()):
-        """A grain that falls asleep: what its motion had is gone."""
-        x, v, w = self.position[i], self.velocity[i], self.spin[i]
-        own = (ti.cast(0.4, self.real) * v.w * x.w * x.w) * w.xyz
-        balance.turn(c, OUTSIDE, -(v.w * x.xyz.cross(v.xyz) + own))

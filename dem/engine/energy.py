@@ -14,6 +14,7 @@ import numpy as np
 
 from dem.contact.cohesion import COHESIONS, DMT, JKR
 
+from .rows import chunk_starts, layout_of
 from .state import BedState, touching_pairs
 from .values import State
 
@@ -38,7 +39,7 @@ def bed_energies(bed: BedState, *, bodies: Mapping[int, Gap]) -> dict[str, float
     """
     position, kept = (bed.engine.read(name).astype(float) for name in ("position", "velocity"))
     awake = slice(0, bed.awake_count)
-    radius, mass = position[awake, 3], kept[awake, 3]
+    radius, mass = position[awake, 3], bed.paces() ** 2 * kept[awake, 3]
     velocity, rates = bed.rates_now(position[awake], kept[awake], *bed.awake_rows("spin", "force", "torque"))
     moving = 0.5 * mass @ (velocity**2).sum(axis=1)
     turning = 0.2 * (mass * radius**2) @ (rates**2).sum(axis=1)
@@ -122,11 +123,10 @@ def _pairs(bed: BedState, state: State, law: int) -> Array:
     d[:, :2] += back * bed.size[:2]
     slide = state["slide"].astype(float)
     turned = state["roll"].astype(float) if "roll" in state else np.zeros_like(d)
-    awake, chunks = state.get("sleep_numbers", (count, len(state["near_count"])))[:2]
-    base, rest = divmod(awake, chunks)
-    ends = np.cumsum(base + (np.arange(chunks) < rest))
+    ends = chunk_starts(*layout_of(state))[1:]
     own = np.searchsorted(ends, i, side="right") == np.searchsorted(ends, j, side="right")
-    share = np.where(own | (j >= awake), 1.0, 0.5)
+    awake, _, _, fast, _ = state.get("sleep_numbers", (count, 0, 0, count, 0))
+    share = np.where(own | (j >= np.where(i < fast, fast, awake)), 1.0, 0.5)
     if "sleep_numbers" in state:
         parts = zip((i, j, d, slide, turned, share), _asleep(bed, state), strict=True)
         i, j, d, slide, turned, share = (np.concatenate(pair) for pair in parts)

@@ -37,7 +37,7 @@ from .dissipation import Balance, BalanceKernels
 from .lists import ABSENT, CACHE_LINE, ITEMS_PER_THREAD, MOST_BODIES, SCAN_BLOCKS, Lists
 from .pairs import Pairs
 from .readings import Readings
-from .rows import FieldStore, Zeroes, copy_fields, put_rows, row_numbers, twins_of
+from .rows import FieldStore, Zeroes, chunk_starts, copy_fields, put_rows, row_numbers, twins_of
 from .shape_table import PLAIN, Shapes
 from .sleep_kernels import Rest, Sleepers
 from .steps import Steps
@@ -229,7 +229,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
 
     def _make_fields(self, build: Build) -> None:
         capacity, chunk_capacity = build.capacity, build.chunk_capacity
-        self.count = self.store.scalar(ti.i32, 12)
+        self.count = self.store.scalar(ti.i32, self.NUMBERS)
         self.box = self.store.scalar(build.real, 7)
         self._make_grain_fields(capacity)
         self._make_sort_fields(capacity, build.cell_capacity)
@@ -255,8 +255,8 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         """Room for sorting."""
         self.buffer_id, self.came_from, self.key = (self.store.scalar(ti.i32, n) for _ in range(3))
         self.rank = self.store.scalar(ti.i32, cell_capacity)
-        self.cell_start = self.store.scalar(ti.i32, 2 * cell_capacity + 1)
-        self.cell_fill = self.store.scalar(ti.i32, 2 * cell_capacity)
+        self.cell_start = self.store.scalar(ti.i32, 3 * cell_capacity + 1)
+        self.cell_fill = self.store.scalar(ti.i32, 3 * cell_capacity)
         self.block_sum = self.store.scalar(ti.i32, SCAN_BLOCKS)
 
     def _make_list_fields(self, n: int, chunk_capacity: int, rows: int, near: int) -> None:
@@ -311,7 +311,8 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         # Fewer awake have smaller chunks, so that all threads have some.
         self.awake_per_chunk = max(1, round(AWAKE_SHARE * GRAINS_PER_CHUNK))
         sizes = (grain_count, chunk_count, *self._most_rooms(), *cells, math.prod(cells))
-        self.count.from_numpy(np.array([*sizes, grain_count, chunk_count, grain_count, sizes[-1]], dtype=np.int32))
+        sizes += (grain_count, chunk_count, grain_count, sizes[-1], grain_count, chunk_count)
+        self.count.from_numpy(np.array(sizes, dtype=np.int32))
         for k, value in enumerate(box):
             self.box[k] = value
         self.write("rank", curve_ranks(*cells))
@@ -395,9 +396,10 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         start, end = self.read("pair_start"), self.read("pair_end")
         return end - start, row_numbers(start, end - start)
 
-    def lay_pairs(self, counts: np.ndarray, awake: int, chunks: int) -> np.ndarray:
-        """Make room for so many pairs of each grain, in the chunks of those awake; their rows."""
-        chunk = chunk_starts(awake, chunks)
+    def lay_pairs(self, counts: np.ndarray, *layout: int) -> np.ndarray:
+        """Make room for so many pairs of each grain, in chunks as ``rows.chunk_starts`` has them; their rows."""
+        chunk = chunk_starts(*layout)
+        awake, chunks = chunk[-1], len(chunk) - 1
         before = np.concatenate(([0], np.cumsum(counts)))
         which = np.repeat(np.arange(chunks), np.diff(chunk))
         start = np.zeros(self.grain_count, dtype=np.int32)
@@ -408,9 +410,9 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.write("first", np.repeat(np.arange(self.grain_count), counts), rows)
         return rows
 
-    def rooms_for(self, pairs: np.ndarray, near: np.ndarray, awake: int, chunks: int) -> tuple[int, int]:
+    def rooms_for(self, pairs: np.ndarray, near: np.ndarray, *layout: int) -> tuple[int, int]:
         """Rows a chunk that so many pairs of each grain, and these grains near bodies, need; for ``with_room``."""
-        starts = np.array([0, self.grain_count]) if self.gpu else chunk_starts(awake, chunks)
+        starts = np.array([0, self.grain_count]) if self.gpu else chunk_starts(*layout)
         counts = (pairs, np.bincount(near, minlength=self.grain_count))
         most = [int(np.diff(np.concatenate(([0], np.cumsum(each)))[starts]).max()) for each in counts]
         return most[0], most[1]
@@ -428,9 +430,9 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         counts = self.read("near_end") - start
         return counts, row_numbers(start, counts)
 
-    def lay_near(self, grains: np.ndarray, awake: int, chunks: int) -> np.ndarray:
-        """Make room for these grains near bodies, in the order of memory, in the chunks of those awake; their rows."""
-        chunk = np.searchsorted(chunk_starts(awake, chunks), grains, side="right") - 1
+    def lay_near(self, grains: np.ndarray, *layout: int) -> np.ndarray:
+        """Make room for these grains near bodies, in the order of memory, in chunks likewise; their rows."""
+        chunk = np.searchsorted(chunk_starts(*layout), grains, side="right") - 1
         counts = np.bincount(chunk, minlength=self.chunk_count)
         start = np.arange(self.chunk_count) * self.near_room
         self.write("near_end", (start + counts).astype(np.int32))
@@ -450,6 +452,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         """All are awake, and the kernels are those that know of no sleep."""
         self.rest = ABSENT
         self.count[self.AWAKE], self.count[self.CHUNKS] = self.grain_count, self.chunk_count
+        self.count[self.FAST], self.count[self.FAST_CHUNKS] = self.grain_count, self.chunk_count
         self.count[self.SORTED], self.count[self.SORTED_CELLS] = self.grain_count, self.count[self.CELLS]
 
     def open_balance(self, gravity: tuple[float, float, float]) -> None:
@@ -477,22 +480,25 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         put_rows(field, values, first if rows is None else rows)
 
     def launch(
-        self, most: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float, awake: int
+        self,
+        most: int,
+        before: int,
+        dt: float,
+        limit: float,
+        gravity: tuple[float, float, float],
+        keep: float,
+        awake: int,
     ) -> tuple[int, bool]:
-        """Up to ``most`` steps of the grains awake, fewer where that is many: (steps done, whether lists are due)."""
+        """Up to ``most`` steps of the grains awake, fewer where that is many: (steps done, whether lists are due).
+
+        ``before``: how many steps were made.
+        """
         steps = GRAIN_STEPS_PER_LAUNCH // max(1, awake)
         steps = min(most, MOST_STEPS_PER_LAUNCH, max(STEPS_PER_LAUNCH, steps))
-        self.run(dt, limit, *gravity, keep, steps, self.shapes, self.rest, self.balance)
+        self.run(dt, limit, *gravity, keep, steps, before, self.shapes, self.rest, self.balance)
         return int(self.done[None]), bool(self.halted[None])
 
 
 @ti.data_oriented
 class GpuEngine(GpuLists, GpuSteps, Engine):
     """An engine whose every grain is a chunk, with the lists, loops and sums of a GPU."""
-
-
-def chunk_starts(grain_count: int, chunk_count: int) -> np.ndarray:
-    """First grain of each chunk and the end, shape [chunk_count + 1]; as ``Engine.chunk_range`` has it."""
-    base, rest = divmod(grain_count, chunk_count)
-    c = np.arange(chunk_count + 1)
-    return c * base + np.minimum(c, rest)

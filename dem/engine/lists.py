@@ -5,12 +5,11 @@ Runs every hundred steps or so. The kernels belong to ``dem.engine.engine.Engine
 
 from dem.contact.cohesion import JKR
 from dem.contact.law import adhesive_range
-from dem.shapes.basic import rotate
 from hedgebed_taichi import ti
 
 from .values import EnginePart
 
-__all__ = ["ABSENT", "INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE"]
+__all__ = ["ABSENT", "FLOOR", "INDEX_BITS", "INDEX_MASK", "ITEMS_PER_THREAD", "Lists", "MOST_BODIES", "SAME_IMAGE"]
 
 ITEMS_PER_THREAD = 512
 # Places of the counters in Engine.ticket: of a plain loop over chunks; of ``Engine.run``.
@@ -21,6 +20,7 @@ BUILT = 2  # place of a number of ``dem.engine.sleep.Rest.news``: the other stor
 # fewer.
 LOST, PAIRS_NEEDED, NEAR_NEEDED = range(3)
 SCAN_BLOCKS = 64  # in which cells are added up
+FLOOR = 0  # The body that is the floor, where there is one
 MOST_BODIES = 32  # the floor, a platform's 24 spikes and hull, and some more
 
 # A neighbour's code: its index, and in the upper bits which periodic image is meant. The sign means "touching".
@@ -45,9 +45,11 @@ class Lists(EnginePart):
     """The part of the engine that finds neighbours."""
 
     # Places of the numbers in ``count`` and ``box``. CHUNKS are those of the grains AWAKE (``dem.engine.sleep``: all,
-    # unless a bed lets its grains sleep), of ALL_CHUNKS that there is room for. SORTED of the grains are sorted, into
-    # SORTED_CELLS cells: all, but for sleepers that stay where they are.
+    # unless a bed lets its grains sleep), of ALL_CHUNKS that there is room for; the first FAST_CHUNKS of them are of
+    # the FAST grains, which come first. SORTED of the grains are sorted, into SORTED_CELLS cells: all, but for sleepers
+    # that stay where they are.
     GRAINS, CHUNKS, CHUNK_ROOM, NEAR_ROOM, NX, NY, NZ, CELLS, AWAKE, ALL_CHUNKS, SORTED, SORTED_CELLS = range(12)
+    FAST, FAST_CHUNKS, NUMBERS = range(12, 15)
     PERIOD_X, PERIOD_Y, BOTTOM, TOP, CELL_X, CELL_Y, CELL_Z = range(7)
     # For ``dem.gpu``, which knows of no module here.
     INDEX_BITS, INDEX_MASK, MOST_BODIES = INDEX_BITS, INDEX_MASK, MOST_BODIES
@@ -67,60 +69,25 @@ class Lists(EnginePart):
 
     @ti.func
     def chunk_range(self, c):
-        n = self.count[self.AWAKE]
-        m = self.count[self.CHUNKS]
+        n, m, first, k = self.count[self.FAST], self.count[self.FAST_CHUNKS], 0, c
+        if c >= m:
+            first, k = n, c - m
+            n, m = self.count[self.AWAKE] - n, ti.max(1, self.count[self.CHUNKS] - m)
         base = n // m
         rest = n - base * m
-        start = c * base + ti.min(c, rest)
-        return start, start + base + ti.select(c < rest, 1, 0)
+        start = first + k * base + ti.min(k, rest)
+        return start, start + base + ti.select(k < rest, 1, 0)
 
     @ti.func
     def chunk_of(self, i):
-        m = self.count[self.CHUNKS]
-        base = self.count[self.AWAKE] // m
-        rest = self.count[self.AWAKE] - base * m
+        n, m, first, k = self.count[self.FAST], self.count[self.FAST_CHUNKS], 0, i
+        if i >= n:
+            first, k = m, i - n
+            n, m = self.count[self.AWAKE] - n, ti.max(1, self.count[self.CHUNKS] - m)
+        base = n // m
+        rest = n - base * m
         wide = rest * (base + 1)
-        return ti.select(i < wide, i // (base + 1), rest + (i - wide) // ti.max(base, 1))
-
-    @ti.func
-    def from_body(self, b, x):
-        """From a body's origin, or its nearest image's, to a point."""
-        d = x - self.body_position[b]
-        if self.body_extent[b] < 1e30:
-            d.x -= self.box[self.PERIOD_X] * ti.round(d.x / self.box[self.PERIOD_X])
-            d.y -= self.box[self.PERIOD_Y] * ti.round(d.y / self.box[self.PERIOD_Y])
-        return d
-
-    @ti.func
-    def nearest(self, b, x, reach, shapes: ti.template(), deep: ti.template()):
-        """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point.
-
-        Of bodies farther than ``reach`` the distance may be 1e30. ``deep``: also find how deep a point far inside is.
-        """
-        d = self.from_body(b, x)
-        q = self.body_turn[b]
-        local = rotate(ti.Vector([q[0], -q[1], -q[2], -q[3]]), d)
-        best = ti.cast(1e30, self.real)
-        normal = local * 0.0
-        curvature = best * 0.0
-        primitives = self.body_primitives[b]
-        for k in range(primitives[0], primitives[1]):
-            row = self.primitive_row[k]
-            distance, n_k, c_k = shapes.distance_to(k, self.primitive_kind[k], row, local, reach, deep)
-            if distance < best:
-                best = distance
-                normal = n_k
-                curvature = c_k
-        normal = rotate(q, normal)
-        return best, normal, curvature, d - best * normal
-
-    @ti.func
-    def body_range(self, b, r, curvature):
-        """How far from body b a grain of radius r still feels it [m]; 0 but with JKR."""
-        result = ti.cast(0.0, self.real)
-        if ti.static(self.cohesion == JKR):
-            result = adhesive_range(self.body_pair[b], r / (1.0 + r * curvature))
-        return result
+        return first + ti.select(k < wide, k // (base + 1), rest + (k - wide) // ti.max(base, 1))
 
     @ti.func
     def cell_of(self, x):
@@ -137,13 +104,18 @@ class Lists(EnginePart):
         return (k * self.count[self.NY] + j) * self.count[self.NX] + i
 
     @ti.kernel
-    def sort(self, gx: float, gy: float, gz: float, awake: int, rest: ti.template(), balance: ti.template()):
+    def sort(
+        self, gx: float, gy: float, gz: float, awake: int, anew: int, time: float, slow_time: float,
+        rest: ti.template(), balance: ti.template(),
+    ):  # fmt: skip
         """Wrap the grains into the box and bring them into the order of the curve; ids break ties.
 
-        Those that sleep come behind those awake: each set has the cells for itself. ``awake``: how many were, until
-        now; the others have not moved. A sleeper whose place in memory stays is left where it is, and few change it:
-        the order of sleepers begins where grains wake and fall asleep (``place_asleep``), and from SORTED on, behind
-        the last that wakes, nothing changes: of the grains from its cell on as many lie before it as did.
+        Those that are slow come behind the fast, and behind them those that sleep: each set has the cells for itself.
+        ``awake``: how many did not sleep, until now; the others have not moved. A sleeper whose place in memory stays
+        is left where it is, and few change it: the order of sleepers begins where grains wake and fall asleep
+        (``place_asleep``), and from SORTED on, behind the last that wakes, nothing changes: of the grains from its cell
+        on as many lie before it as did. ``anew``: forces are to be computed anew; else they stay where there is sleep.
+        ``time``, ``slow_time``: for which those will act that a fast grain, and a slow one, has now [s].
         """
         for k in range(self.count[self.SORTED_CELLS]):
             self.cell_fill[k] = 0
@@ -154,7 +126,10 @@ class Lists(EnginePart):
                     a = -ti.floor(x.x / self.box[self.PERIOD_X]) * self.box[self.PERIOD_X]
                     b = -ti.floor(x.y / self.box[self.PERIOD_Y]) * self.box[self.PERIOD_Y]
                     if a != 0.0 or b != 0.0:
-                        balance.turn(0, balance.outside, v.w * ti.Vector([a, b, 0.0]).cross(v.xyz))
+                        p = v.w * v.xyz
+                        if ti.static(rest.on):
+                            p = self.momentum_of(i, rest.slow[self.id[i]], time, slow_time, rest)
+                        balance.turn(0, balance.outside, ti.Vector([a, b, 0.0]).cross(p))
         for i in range(self.count[self.SORTED]):
             cell = 0
             if i < awake:
@@ -169,6 +144,8 @@ class Lists(EnginePart):
                     if i < awake:
                         rest.cell[self.id[i]] = cell
                     r = self.place_asleep(r, rest)
+                elif rest.slow[self.id[i]] == 1:
+                    r += self.count[self.CELLS]
             self.key[i] = r
             ti.atomic_add(self.cell_fill[r], 1)
         for w in range(self.cpu_items):
@@ -212,6 +189,9 @@ class Lists(EnginePart):
                 self.slide[4 * i + 2] = self.spin[o]
                 self.slide[4 * i + 3].xyz = self.origin[o]
                 self.buffer_id[i] = self.id[o]
+                if ti.static(rest.on):
+                    rest.buffer_force[i] = self.force[o]
+                    rest.buffer_torque[i] = self.torque[o]
         for i in range(self.count[self.SORTED]):
             if not self.lies_on(i, awake, rest):
                 self.position[i] = self.slide[4 * i]
@@ -221,10 +201,13 @@ class Lists(EnginePart):
                 self.id[i] = self.buffer_id[i]
                 self.listed[i] = self.slide[4 * i].xyz
                 self.force[i] = self.slide[4 * i + 1].w * ti.Vector([gx, gy, gz])
+                self.torque[i] = ti.Vector.zero(self.real, 3)
                 if ti.static(rest.on):
                     if i >= self.count[self.AWAKE]:
                         self.force[i] = ti.Vector.zero(self.real, 3)
-                self.torque[i] = ti.Vector.zero(self.real, 3)
+                    elif anew == 0:
+                        self.force[i] = rest.buffer_force[i]
+                        self.torque[i] = rest.buffer_torque[i]
 
     @ti.func
     def wrap(self, i):
@@ -250,12 +233,6 @@ class Lists(EnginePart):
         if ti.static(rest.on):
             result = i >= self.count[self.AWAKE] and i >= awake and self.came_from[i] == i
         return result
-
-    @ti.func
-    def place_asleep(self, r, rest: ti.template()):
-        """Where the sleepers of the cell of rank r are listed: in the curve's order too, but begun elsewhere."""
-        turned = r - rest.begins[None]
-        return self.count[self.CELLS] + ti.select(turned < 0, turned + self.count[self.CELLS], turned)
 
     @ti.func
     def first_block(self, w):
@@ -296,6 +273,8 @@ class Lists(EnginePart):
     @ti.func
     def keep_chunk(self, c, rest: ti.template(), balance: ti.template()):
         start, end = self.chunk_range(c)
+        if ti.static(rest.on):
+            self.gather_pushes(c, rest)
         for i in range(start, end):
             self.old_start[i] = self.pair_start[i]
             self.old_end[i] = self.pair_end[i]
@@ -307,8 +286,6 @@ class Lists(EnginePart):
                     self.old_slide[s] = self.slide[s]
                     if ti.static(self.rolling):
                         self.old_roll[s] = self.roll[s]
-                    if ti.static(rest.on):
-                        rest.old_force[s] = rest.force[s]
                     if ti.static(balance.on):
                         balance.old_last[s] = balance.last[s]
         self.old_near_end[c] = self.near_end[c]
@@ -360,6 +337,8 @@ class Lists(EnginePart):
                     rest.news[BUILT] = 0
                 rest.made[None] = self.count[self.AWAKE]
                 rest.whole[None] = 0
+                if self.problem[PAIRS_NEEDED] + self.problem[NEAR_NEEDED] == 0:
+                    rest.changed[None] = 0
                 rest.last[None] = -1
         for _ in range(1):
             self.moved[None] = 0
@@ -387,7 +366,9 @@ class Lists(EnginePart):
                         for part in range(rest.sets):
                             if ti.static(rest.on):
                                 if part == 1:
-                                    r = self.place_asleep(r, rest)
+                                    r += self.count[self.CELLS]
+                                if part == 2:
+                                    r = self.place_asleep(r - self.count[self.CELLS], rest)
                             first, behind = self.cell_start[r], self.cell_start[r + 1]
                             if first >= start and behind <= i:  # grains of this chunk, whose pairs with i are theirs
                                 first = behind
@@ -433,7 +414,7 @@ class Lists(EnginePart):
             if ti.static(self.rolling):
                 self.roll[s] = ti.Vector.zero(self.real, 3)
         if ti.static(rest.on):
-            self.list_sleeper(s, i, j, code, old, rest)
+            self.list_sleeper(s, i, j, code, rest)
         if ti.static(balance.on):
             balance.last[s] = balance.nothing()
             if old >= 0:

@@ -35,6 +35,19 @@ class Pairs(EnginePart):
         return d
 
     @ti.func
+    def spring_force(self, x_i, x_j, bits, u):
+        """What the springs of a pair do to the first [N], by ``dem.contact.law`` without dashpots; 0 apart."""
+        d = self.apart(x_i, x_j, bits)
+        length = d.norm()
+        overlap = x_i.w + x_j.w - length
+        f = d * 0.0
+        if overlap > 0.0:
+            p = self.grain_pair[None]
+            a = ti.sqrt(x_i.w * x_j.w / (x_i.w + x_j.w) * overlap)
+            f = (2.0 / 3.0) * p[0] * a * overlap / length * d - p[1] * a * u.xyz
+        return f
+
+    @ti.func
     def sieve(self, c, dt, rest: ti.template(), balance: ti.template()):
         """Put the numbers of a chunk's rows that touch into ``touching``, from the chunk's first row on; their end.
 
@@ -57,6 +70,8 @@ class Pairs(EnginePart):
             if ti.static(self.cohesion == JKR):
                 sum_r += adhesive_range(self.grain_pair[None], x_i.w * x_j.w / sum_r)
             touching = d.norm_sqr() < sum_r * sum_r
+            if ti.static(rest.on):
+                touching = touching and not self.is_theirs(c, bits & INDEX_MASK)
             self.touching[last] = s
             last += ti.select(touching, 1, 0)
             if touching != (code < 0):
@@ -137,6 +152,9 @@ class Pairs(EnginePart):
         p = self.grain_pair[None]
         held = ti.Vector.zero(self.real, 3)
         largest = ti.Vector([0.0] * LANES, dt=self.real)
+        heavier = 1
+        if ti.static(rest.on):
+            heavier = self.steps_of(c, rest) ** 2
         one = ti.Vector([1.0] * LANES, dt=self.real)  # what lanes without a pair compute with
         # Of each pair: distance, radii, masses, velocity, spins, histories, then what comes out.
         dx, dy, dz, ri, rj, mi, mj, vx, vy, vz = one, one, one, one, one, one, one, one, one, one
@@ -156,6 +174,9 @@ class Pairs(EnginePart):
                 d = self.apart(x_i, x_j, bits)
                 dx[k], dy[k], dz[k], ri[k], rj[k] = d.x, d.y, d.z, x_i.w, x_j.w
                 v_i, v_j = self.velocity[i], self.velocity[j]
+                if ti.static(rest.on):
+                    v_i.w *= heavier
+                    v_j.w *= heavier
                 v = v_i.xyz - v_j.xyz
                 vx[k], vy[k], vz[k], mi[k], mj[k] = v.x, v.y, v.z, v_i.w, v_j.w
                 w_i, w_j = self.spin[i], self.spin[j]
@@ -204,7 +225,10 @@ class Pairs(EnginePart):
     def add_pair(
         self, c, s, start, end, n, f_n, damped, f_t, turn, arm_i, arm_j, dt, rest: ti.template(), balance: ti.template()
     ):
-        """Add a pair's force to its grains, the second only where it is of this chunk too; its force on a sleeper."""
+        """Add a pair's force to its grains, the second only where it is of this chunk too; its force on a sleeper.
+
+        That times the steps of which this one is; and where the second is slow and the first not, it is kept for that.
+        """
         i = self.first[s]
         bits = ~self.pair[s]
         j = bits & INDEX_MASK
@@ -223,5 +247,7 @@ class Pairs(EnginePart):
         held = ti.Vector.zero(self.real, 3)
         if ti.static(rest.on):
             if j >= self.count[self.AWAKE]:
-                held -= f
+                held -= self.steps_of(c, rest) * f
+            elif j >= self.alone_from(c):
+                self.keep_push(s, f, arm_j * t - turn, rest)
         return held

@@ -124,3 +124,37 @@ class Readings(EnginePart):
                 distance, n, curvature, arm = self.nearest(b, self.position[i].xyz, reach, shapes, False)
                 if distance < r + self.body_range(b, r, curvature):
                     ti.atomic_add(counts[self.id[i]], 1)
+
+    @ti.kernel
+    def pushes_kept(self, rest: ti.template(), found: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        """Sums of what is still to reach slow grains: force, and moment about the bed's origin."""
+        for _ in range(1):  # one thread: the sum has one order
+            total, moment = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
+            for i in range(self.count[self.FAST]):
+                for s in range(self.pair_start[i], self.pair_end[i]):
+                    code = self.pair[s]
+                    j = ti.select(code < 0, ~code, code) & INDEX_MASK
+                    if j >= self.count[self.FAST] and j < self.count[self.AWAKE]:
+                        f = ti.cast(rest.push[s], ti.f64)
+                        total += f
+                        moment += ti.cast(self.position[j].xyz, ti.f64).cross(f) + ti.cast(rest.turn[s], ti.f64)
+            for k in ti.static(range(3)):
+                found[k] = total[k]
+                found[k + 3] = moment[k]
+
+    @ti.func
+    def motion_of(self, i, many, dt):
+        """What a grain has in steps of so ``many``, the force to come included: momentum, angular momentum, energy."""
+        x, v, w = self.position[i], self.velocity[i], self.spin[i]
+        own = ti.cast(0.4, self.real) * x.w * x.w
+        heavy = many * many * v.w
+        p = heavy * v.xyz + (many * dt) * self.force[i]
+        turning = x.xyz.cross(p) + (heavy * own) * w.xyz + (many * dt) * self.torque[i]
+        return p, turning, 0.5 * heavy * (v.xyz.norm_sqr() + own * w.xyz.norm_sqr())
+
+    @ti.func
+    def momentum_of(self, i, slow, time, slow_time, rest: ti.template()):
+        """Momentum of a grain, as ``motion_of`` has it, whose force will act for a time [s]."""
+        many = ti.select(slow == 1, rest.pace[None], 1)
+        acts = ti.cast(ti.select(slow == 1, slow_time, time), self.real)
+        return many * many * self.velocity[i].w * self.velocity[i].xyz + acts * self.force[i]

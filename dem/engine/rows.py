@@ -11,7 +11,9 @@ from hedgebed_taichi import ti
 __all__ = [
     "FieldStore",
     "Zeroes",
+    "chunk_starts",
     "copy_fields",
+    "layout_of",
     "put_rows",
     "read_fields",
     "row_numbers",
@@ -146,6 +148,32 @@ def write_fields(table: Any, rows: Mapping[str, Rows], prefix: str, state: Mappi
     """Put back what ``read_fields`` returned; all other rows become zero."""
     for name, where in rows.items():
         put_rows(getattr(table, name), state[prefix + name], where)
+
+
+def chunk_starts(awake: int, chunks: int, fast: int | None = None, fast_chunks: int = 0) -> np.ndarray:
+    """First grain of each chunk and the end, shape [chunks + 1]; as ``Engine.chunk_range`` has it.
+
+    ``awake`` grains in so many ``chunks``; the ``fast`` in the first ``fast_chunks`` of them: all of them when None.
+    """
+    if fast is None or chunks == fast_chunks:
+        return _even_starts(awake, chunks)
+    return np.concatenate(
+        [_even_starts(fast, fast_chunks)[:-1], fast + _even_starts(awake - fast, chunks - fast_chunks)]
+    )
+
+
+def layout_of(state: Mapping[str, np.ndarray]) -> tuple[int, ...]:
+    """Of a bed's state, what ``chunk_starts`` takes: grains awake, chunks, and with sleep the fast and their chunks."""
+    if "sleep_numbers" not in state:
+        return len(state["id"]), len(state["near_count"])
+    awake, chunks, _, fast, fast_chunks = (int(number) for number in state["sleep_numbers"])
+    return awake, chunks, fast, fast_chunks
+
+
+def _even_starts(count: int, chunks: int) -> np.ndarray:
+    base, rest = divmod(count, chunks)
+    c = np.arange(chunks + 1)
+    return c * base + np.minimum(c, rest)
 
 
 @ti.kernel

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from dem.contact.cohesion import JKR
+from dem.contact.law import adhesive_range
 from dem.shapes.basic import BOX, CAPSULE, FRUSTUM, MESH, PLACE_WIDTH, PLACED, TUBE, Shape, distance_to, rotate
 from dem.shapes.mesh import Feature, Mesh, Surface, mesh_tree
 from dem.shapes.solids import box_distance, capsule_distance, tube_distance
@@ -23,6 +25,12 @@ __all__ = ["PLAIN", "ShapeTable", "Shapes"]
 FAR = 1e30
 FEATURE_COUNT = 7
 _LEAST_TRIANGLES = 1024
+# Sleepers lie in the order of the curve from so many blocks of cells behind the bodies on: what wakes and falls asleep
+# there leaves those that come after it in memory where they are. A block is as much of x as the curve does at a time.
+_BEHIND = 2
+_BLOCK = 32
+# Places of the numbers in Rest.near: where bodies are along x, and how far to both sides; below them.
+_MIDDLE, _HALF, _BELOW = range(3)
 
 
 @ti.data_oriented
@@ -189,8 +197,9 @@ class ShapeTable:
         return square, feature, nearest
 
 
+@ti.data_oriented
 class Shapes(EnginePart):
-    """The part of the engine that puts shapes into its fields and takes them out again."""
+    """The part of the engine that puts shapes into its fields, takes them out again, and measures how far they are."""
 
     shapes: Any
     _kept: ShapeTable | None
@@ -271,3 +280,96 @@ class Shapes(EnginePart):
             return
         used = {int(row[0]) for kind, row in zip(kinds, rows, strict=True) if kind % PLACED == MESH}
         self._meshes = [mesh for mesh in self._meshes if self._nodes_of(mesh)[0] in used]
+
+    @ti.func
+    def from_body(self, b, x):
+        """From a body's origin, or its nearest image's, to a point."""
+        d = x - self.body_position[b]
+        if self.body_extent[b] < 1e30:
+            d.x -= self.box[self.PERIOD_X] * ti.round(d.x / self.box[self.PERIOD_X])
+            d.y -= self.box[self.PERIOD_Y] * ti.round(d.y / self.box[self.PERIOD_Y])
+        return d
+
+    @ti.func
+    def nearest(self, b, x, reach, shapes: ti.template(), deep: ti.template()):
+        """Distance, normal and curvature of body b at a point, and the arm from its origin to the nearest point.
+
+        Of bodies farther than ``reach`` the distance may be 1e30. ``deep``: also find how deep a point far inside is.
+        """
+        d = self.from_body(b, x)
+        q = self.body_turn[b]
+        local = rotate(ti.Vector([q[0], -q[1], -q[2], -q[3]]), d)
+        best = ti.cast(1e30, self.real)
+        normal = local * 0.0
+        curvature = best * 0.0
+        primitives = self.body_primitives[b]
+        for k in range(primitives[0], primitives[1]):
+            row = self.primitive_row[k]
+            distance, n_k, c_k = shapes.distance_to(k, self.primitive_kind[k], row, local, reach, deep)
+            if distance < best:
+                best = distance
+                normal = n_k
+                curvature = c_k
+        normal = rotate(q, normal)
+        return best, normal, curvature, d - best * normal
+
+    @ti.func
+    def body_range(self, b, r, curvature):
+        """How far from body b a grain of radius r still feels it [m]; 0 but with JKR."""
+        result = ti.cast(0.0, self.real)
+        if ti.static(self.cohesion == JKR):
+            result = adhesive_range(self.body_pair[b], r / (1.0 + r * curvature))
+        return result
+
+    @ti.func
+    def close_to_body(self, i, reach, shapes: ti.template()):
+        """Whether a body other than the floor is within ``reach`` [m] of a grain's surface."""
+        x = self.position[i]
+        within = x.w + reach
+        found = False
+        for b in range(1, self.body_count[None]):
+            beyond = self.body_extent[b] + within
+            if not found and ti.abs(x.z - self.body_position[b].z) < beyond:  # most bodies are far above
+                if self.from_body(b, x.xyz).norm_sqr() < beyond**2:
+                    distance, n, curvature, arm = self.nearest(b, x.xyz, within, shapes, True)
+                    if distance < within:
+                        found = True
+        return found
+
+    @ti.func
+    def find_bodies(self, rest: ti.template()):
+        """Where the bodies but the floor are along x, and below which height none is: for ``may_be_close``.
+
+        And where sleepers begin in memory: that changes when the bodies have gone two blocks on.
+        """
+        first, last, below = ti.cast(0.0, self.real), ti.cast(0.0, self.real), ti.cast(1e30, self.real)
+        at, period = self.body_position[1].x, self.box[self.PERIOD_X]
+        for b in range(1, self.body_count[None]):
+            x, extent = self.body_position[b], self.body_extent[b]
+            ahead = x.x - at
+            ahead -= period * ti.round(ahead / period)
+            first = ti.min(first, ahead - extent)
+            last = ti.max(last, ahead + extent)
+            below = ti.min(below, x.z - extent)
+        middle = at + 0.5 * (first + last)
+        middle -= period * ti.floor(middle / period)
+        rest.near[_MIDDLE] = middle
+        rest.near[_HALF] = 0.5 * (last - first)
+        rest.near[_BELOW] = below
+        blocks = self.count[self.NX] // _BLOCK
+        if self.body_count[None] > 1 and last - first < period and blocks > 2 * _BEHIND:
+            block = ti.floor(middle / self.box[self.CELL_X], ti.i32) // _BLOCK - _BEHIND
+            block += ti.select(block < 0, blocks, 0)
+            if ti.abs(block - rest.block[None]) > 1:
+                rest.block[None] = block
+                rest.whole[None] = 1
+                rest.begins[None] = self.rank[self.cell_index(block * _BLOCK, 0, 0)]
+
+    @ti.func
+    def may_be_close(self, i, reach, rest: ti.template()):
+        """False where no body can be within ``reach`` [m] of a grain's surface: most lie beside or below them all."""
+        x = self.position[i]
+        within = 1.01 * (x.w + reach)  # round-off decides nothing
+        ahead = ti.abs(x.x - rest.near[_MIDDLE])
+        ahead = ti.min(ahead, self.box[self.PERIOD_X] - ahead)
+        return x.z > rest.near[_BELOW] - within and ahead < rest.near[_HALF] + within

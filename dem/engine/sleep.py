@@ -1,28 +1,41 @@
-"""Grains that sleep: those at rest far from the bodies are not computed until something reaches them.
+"""Grains that are slow, and grains that sleep: what is quiet is computed less often, what rests not at all.
+
+A **slow** grain takes a step every ``pace`` steps of the bed, of that many times the length, as if its mass and inertia
+counted the square of it times: the step stays as far from stability. Forces are those of the true contacts and the true
+weight. So what moves slowly against its weight and its neighbours gives way as it would, for there forces decide; only
+its inertia is wrong. A **sleeper** stands still, an unmovable grain to those awake; its contacts with other sleepers
+keep their springs. All others are **fast**.
 
 The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g gravity, all of the bed:
 
-* A grain falls asleep when its speed and its surface's turning have been below ``speed`` sqrt(g d) at every check for
-  ``calm`` sqrt(d / g), no grain that it touches moves faster, and no body but the floor is within ``reach`` d.
-* Asleep it stands still, an unmovable grain to those awake, and its contacts with other sleepers keep their springs.
-* It wakes when a body comes within ``reach`` d; when the spring force of a contact with a grain awake has changed by
-  ``force`` m g, and by ``share`` of what it was, since the two last were alike, be it that the contact opens or closes;
-  when a grain awake that is listed with it moves faster than ``waking_speed`` sqrt(g d). For the last two all sleepers
-  in its cell of the grid and the 26 around it wake with it. Checked every ``every`` steps, and when lists are made.
+* A fast grain becomes slow when its speed and its surface's turning have been below ``speed`` sqrt(g d) at every look
+  for ``calm`` sqrt(d / g), no fast grain that it touches moves faster, and no body but the floor is within ``reach`` d.
+* A slow grain is fast again when a body comes within ``reach`` d, when it moves faster than ``own`` sqrt(g d), or when
+  the force on it is out of balance: more than ``unbalanced`` of the mean force of its contacts, or of m g where that is
+  more. Those that it touches come with it.
+* A slow grain falls asleep when it has moved below ``still`` sqrt(g d) for as long, and so have those that it touches,
+  none of them fast.
+* A sleeper wakes, and is slow, when the sum of the forces on it has changed by ``change`` of its contacts' mean force
+  (or of m g) since it fell asleep, or when a grain awake that is listed with it moves faster than ``waking_speed``
+  sqrt(g d). All sleepers in its cell of the grid and the 26 around it wake with it. So do those near a body.
 
-Whether a packing that carries F yields under a change of F goes by their ratio, for friction has no force of its own;
-hence ``share``. ``force`` is for contacts that carry next to nothing.
+Looked at every ``every`` steps, a multiple of ``pace``: then slow and fast grains are at the same time. A bed of one
+chunk has no slow grains, and its fast ones fall asleep by the first rule.
 
-In memory those awake come first, in the order of the curve, and chunks, lists and loops are theirs alone; that is all
-that the step knows of sleep. Who sleeps changes when lists are made, on steps that do not depend on how a run is cut,
-by flags that are raised and never lowered within a check: the same bits on any number of threads.
+What fast grains do to a slow one over its step is summed and given to it whole, so that action is reaction. What is
+left is the floor's: ``Bed.reaction`` of the floor has the sleepers' weight, the force of those awake on them, and the
+momentum that a change of pace takes or gives; ``Bed.momentum`` counts slow grains with the mass that they move with. A
+grain that becomes slow keeps its energy, and one that becomes fast its speed; the energy that the latter and falling
+asleep lose is booked with the dashpots' (``Bed.contact_work``).
 
-What a sleeper would have passed on is held by nobody but the floor: ``Bed.reaction`` of the floor has their weight, the
-force of those awake on them, and the momentum that falling asleep took.
+In memory the fast come first, then the slow, then the sleepers, the first two in chunks of their own; that is all that
+the step knows of them. Who is what changes when lists are made, on steps that do not depend on how a run is cut, by
+flags that are raised and never lowered within a check, and by sums in whole numbers: the same bits on any number of
+threads.
 """
 
 import math
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import astuple
 from typing import Protocol
 
 import numpy as np
@@ -30,14 +43,15 @@ import numpy as np
 from .engine import Engine
 from .lists import INDEX_MASK
 from .rows import Rows, put_rows, read_fields, row_numbers, take_rows, write_fields
-from .sleep_kernels import FULL, LEAVING, WOKEN
-from .values import BedFailure, State
+from .sleep_kernels import FALL_ASLEEP, FULL, SLEEPING, SLOW_DOWN, SLOWING, WOKEN
+from .values import BedFailure, Sleep, State
 
-__all__ = ["Sleep", "Sleeper"]
+__all__ = ["Sleeper"]
 
 # A check for grains at rest is worth new lists when this share of those awake can fall asleep.
 _WORTH = 0.02
 _CALM_CHECKS = 4
+_UNITS = 2.0**24  # Whole numbers in which forces are summed, for a grain's weight
 
 
 class SleepyBed(Protocol):
@@ -52,88 +66,126 @@ class SleepyBed(Protocol):
     grain_steps: int
 
 
-@dataclass(frozen=True)
-class Sleep:
-    """When grains sleep and wake; the module has what the numbers are shares of. Raises ValueError: not above 0."""
-
-    speed: float = 5e-3  # A grain slower than this may fall asleep [sqrt(g d)]
-    calm: float = 1.0  # For how long it must be [sqrt(d / g)]
-    reach: float = 3.0  # No grain this near to a body sleeps [d]
-    force: float = 1.0  # Change of a contact's force that wakes [m g], and
-    share: float = 0.5  # the least of it over the force itself [1]; both must be reached
-    waking_speed: float = 5e-2  # Speed of a neighbour that wakes [sqrt(g d)]
-    every: int = 50
-    """Steps between two checks: what wakes makes new lists, and those cost as much as four steps of all grains."""
-
-    def __post_init__(self):
-        for name, value in asdict(self).items():
-            if not 0 < value < math.inf:
-                raise ValueError(f"Sleep: {name} = {value} must be above 0")
-        if int(self.every) != self.every:
-            raise ValueError(f"Sleep: every = {self.every} must be a whole number of steps")
-        if self.waking_speed <= self.speed:
-            raise ValueError(
-                f"Sleep: waking_speed = {self.waking_speed} must be above speed = {self.speed}, or no neighbour of one "
-                f"that may sleep could"
-            )
-
-
 class Sleeper:
     """What a bed needs to let its grains sleep: the rules in its own units, the checks, and its part of the state."""
 
     def __init__(self, bed: SleepyBed, rules: Sleep):
         self.bed, self.rules = bed, rules
-        g = math.hypot(*bed.gravity)
+        e = bed.engine
+        self.gravity = g = math.hypot(*bed.gravity)
         d = bed.mean_diameter
         # The same to the bit in whatever order the grains lie.
-        total = math.fsum(bed.engine.read("velocity")[:, 3])
-        bed.engine.rest.total[None] = total
-        weight = g * total / bed.grain_count
-        self.limit, self.reach = rules.force * weight, rules.reach * d
-        self.fast, self.slow = (share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed))
+        total = math.fsum(e.read("velocity")[:, 3])
+        e.rest.total[None] = total
+        e.rest.per_unit[None] = _UNITS / (g * total / bed.grain_count)
+        # Slow grains take chunks of their own.
+        self.pace = int(rules.pace) if e.chunk_count > 1 else 1
+        e.rest.pace[None] = self.pace
+        self.reach = rules.reach * d
+        self.quick, self.slow, self.own = (
+            share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed, rules.own)
+        )
+        self.still = (rules.still if self.pace > 1 else rules.speed) * math.sqrt(g * d)
         checks = rules.calm * math.sqrt(d / g) / bed.time_step / rules.every / _CALM_CHECKS
         self.rest_every = max(1, round(checks)) * rules.every
-        self.awake = bed.grain_count
+        self.awake = self.fast = bed.grain_count
         self.mass = 0.0
         self.slept = 0.0  # Mass asleep, summed over the steps of the last advance [kg]
-        self.leaving = False
+        self.leaving = 0
+        self.begun_ahead = np.zeros(6)  # ``floor_ahead`` when the last advance began
 
     def check(self) -> bool:
         """The check of this step, if one is due: whether lists are to be made for it."""
-        e, rest, steps = self.bed.engine, self.bed.engine.rest, self.bed.steps
-        if steps % self.rules.every:
+        e, rest, rules, steps = self.bed.engine, self.bed.engine.rest, self.rules, self.bed.steps
+        if steps % rules.every:
             return False
-        if self.awake < self.bed.grain_count:
-            e.check_contacts(self.limit, self.rules.share, self.fast, rest)
-        self.leaving = False
+        if self.fast < self.bed.grain_count:
+            e.check_balance(
+                rules.unbalanced, rules.change, self.own, self.quick, self.reach, self.gravity, rest, e.shapes
+            )
+        self.leaving = 0
         if steps % self.rest_every == 0:
-            e.find_calm(self.slow, _CALM_CHECKS, self.reach, rest, e.shapes)
+            e.find_calm(self.slow, self.still, _CALM_CHECKS, self.reach, rest, e.shapes)
         news = rest.news.to_numpy()
-        self.leaving = steps % self.rest_every == 0 and int(news[LEAVING]) > _WORTH * self.awake
-        return bool(news[WOKEN]) or self.leaving
+        if steps % self.rest_every == 0:
+            self.leaving += SLOW_DOWN * bool(int(news[SLOWING]) > _WORTH * self.fast)
+            self.leaving += FALL_ASLEEP * bool(int(news[SLEEPING]) > _WORTH * self.awake)
+        return bool(news[WOKEN]) or self.leaving > 0
 
-    def rearrange(self, *, all_awake: bool = False) -> None:
-        """Who sleeps from here on; between ``keep_lists`` and ``sort``."""
+    def rearrange(self, *, all_awake: bool) -> None:
+        """Who is fast, slow and asleep from here on; between ``keep_lists`` and ``sort``, and ``settle`` after it."""
         e, rest = self.bed.engine, self.bed.engine.rest
         if all_awake:
             rest.woken.fill(1)
-        elif self.awake < self.bed.grain_count:
-            e.check_contacts(self.limit, self.rules.share, self.fast, rest)
-        e.stir(self.bed.time_step, self.reach, int(self.leaving), rest, e.shapes, e.balance)
+        else:
+            e.change_balance(1.0, rest)
+            if self.leaving:
+                e.sum_bearing(rest)
+        e.stir(self.bed.time_step, self.reach, self.leaving, int(all_awake), rest, e.shapes, e.balance)
         rest.news.fill(0)
-        if self.leaving:
+        if self.leaving & FALL_ASLEEP:
             e.store_contacts(rest)
             needed = int(rest.news[FULL])
             if needed:
                 raise BedFailure(f"there is room for {rest.who.shape[1]} contacts of sleepers and {needed} are needed")
+        self.leaving = 0
+
+    def recount(self) -> None:
+        """Count those awake, who are to be sorted."""
+        e, rest = self.bed.engine, self.bed.engine.rest
         e.recount(e.awake_per_chunk, rest)
-        self.leaving = False
-        self.awake, self.mass = int(e.count[e.AWAKE]), float(rest.mass[None])
+        self.awake, self.fast, self.mass = int(e.count[e.AWAKE]), int(e.count[e.FAST]), float(rest.mass[None])
+
+    def settle(self) -> None:
+        """After lists for which ``rearrange`` was called."""
+        self.bed.engine.change_balance(-1.0, self.bed.engine.rest)
+        self.bed.engine.forget_dashpots(self.bed.engine.rest)
+
+    def computed(self, steps: int) -> int:
+        """Grains computed over so many steps from now on, summed over the steps."""
+        now = self.bed.steps
+        turns = -(-(now + steps) // self.pace) + (-now // self.pace)  # multiples of the pace among these steps
+        return steps * self.fast + turns * (self.awake - self.fast)
+
+    def paces(self) -> np.ndarray:
+        """Steps of the bed for one of each grain awake, in the order of memory, shape [awake]."""
+        return np.where(np.arange(self.awake) < self.fast, 1, self.pace)
+
+    def pushes(self) -> tuple[np.ndarray, np.ndarray]:
+        """What fast grains' steps did that has still to reach slow ones: sums over steps of force [N] and of moment
+        about the bed's origin [N m], shape [3] each."""
+        found = np.zeros(6)
+        self.bed.engine.pushes_kept(self.bed.engine.rest, found)
+        return found[:3], found[3:]
+
+    def times_ahead(self, *, between: bool) -> tuple[float, float]:
+        """For which the forces that a fast grain and a slow one have now will act [s]: ``between`` two steps, or when
+        the next one has moved who takes part in it, for which forces are still to come."""
+        step, due = self.bed.time_step, self.bed.steps % self.pace == 0
+        return step if between else 0.0, step * self.pace if between or not due else 0.0
+
+    def _steps_ahead(self) -> int:
+        """Steps of the bed that slow grains have gone already and the fast have not."""
+        return -self.bed.steps % self.pace
+
+    def impulse_ahead(self) -> np.ndarray:
+        """Of gravity, floor and sleepers on slow grains: what these have had already, over the time step [N], [3]."""
+        mass = float(self.bed.engine.read("velocity")[self.fast : self.awake, 3].sum())
+        return self._steps_ahead() * mass * np.array(self.bed.gravity) - self.floor_ahead()[:3]
+
+    def floor_ahead(self) -> np.ndarray:
+        """What slow grains have done already to the floor and to sleepers: force and torque, times steps, shape [6]."""
+        e = self.bed.engine
+        chunks = slice(int(e.count[e.FAST_CHUNKS]), int(e.count[e.CHUNKS]))
+        return self._steps_ahead() * e.rest.floor.to_numpy()[chunks].astype(float).sum(axis=0)
 
     def on_floor(self) -> np.ndarray:
-        """What sleepers add to the impulse on the floor over the last advance, over the time step [N], shape [3]."""
-        held = np.cumsum(self.bed.engine.rest.held.to_numpy().astype(float), axis=0)[-1]
-        return held + self.slept * np.array(self.bed.gravity)
+        """What sleepers, and steps of slow grains, add to force and torque on the floor over the last advance, times
+        steps, shape [6]."""
+        found = self.begun_ahead - self.floor_ahead()
+        found[:3] += np.cumsum(self.bed.engine.rest.held.to_numpy().astype(float), axis=0)[-1]
+        found[:3] += self.slept * np.array(self.bed.gravity)
+        return found
 
     def contact_counts(self) -> np.ndarray:
         """Contacts of each sleeper, by id, shape [grain_count]; 0 for those awake."""
@@ -149,8 +201,11 @@ class Sleeper:
         counts += np.bincount(owner[~grains & touches], minlength=n)
         start, end = e.read("pair_start")[: self.awake], e.read("pair_end")[: self.awake]
         pair = take_rows(e.pair, row_numbers(start, end - start))
-        others = ~pair[pair < 0] & INDEX_MASK
-        return np.asarray(counts + np.bincount(ids[others[others >= self.awake]], minlength=n), dtype=np.int32)
+        owner = np.repeat(np.arange(self.awake), end - start)
+        others = ~pair & INDEX_MASK
+        # Those of which the other side has no row.
+        alone = (pair < 0) & (others >= np.where(owner < self.fast, self.fast, self.awake))
+        return np.asarray(counts + np.bincount(ids[others[alone]], minlength=n), dtype=np.int32)
 
     def frozen(self) -> State:
         """Contacts of sleepers with one another and the floor: owner and who (ids; a body's number as -1 less it),
@@ -172,7 +227,9 @@ class Sleeper:
     def _rows(self, pairs: np.ndarray) -> dict[str, Rows]:
         """Rows of the fields that the next steps depend on; ``pairs``: those of the pair lists in use."""
         grains = slice(self.bed.grain_count)
-        return {"asleep": grains, "quiet": grains, "force": pairs, "held": slice(self.bed.engine.chunk_count)}
+        of_grains: dict[str, Rows] = dict.fromkeys(("asleep", "slow", "quiet", "sum", "bears"), grains)
+        chunks = slice(self.bed.engine.chunk_count)
+        return of_grains | {"push": pairs, "turn": pairs, "held": chunks, "floor": chunks}
 
     def state(self, rows: np.ndarray) -> State:
         """All that the next steps depend on; ``rows``: of the pair lists, those in use."""
@@ -180,8 +237,10 @@ class Sleeper:
         return {
             "sleep_rules": np.array(astuple(self.rules), dtype=float),
             **read_fields(rest, self._rows(rows), "sleep_"),
-            "sleep_numbers": np.array([self.awake, int(e.count[e.CHUNKS]), self.bed.grain_steps]),
-            "sleep_reals": np.array([self.mass, self.slept]),
+            "sleep_numbers": np.array(
+                [self.awake, int(e.count[e.CHUNKS]), self.bed.grain_steps, self.fast, int(e.count[e.FAST_CHUNKS])]
+            ),
+            "sleep_reals": np.array([self.mass, self.slept, *self.begun_ahead]),
             "sleep_order": np.array([int(rest.begins[None]), int(rest.block[None])]),
             **{f"sleep_store_{name}": values for name, values in self.frozen().items()},
         }
@@ -197,10 +256,11 @@ class Sleeper:
         put_rows(rest.end, end, (0, slice(n)))
         for name in ("who", "slide", "roll"):
             put_rows(getattr(rest, name), state[f"sleep_store_{name}"], (0, slice(len(owner))))
-        for field in (rest.side, rest.news, rest.woken, rest.leaves):
+        for field in (rest.side, rest.news, rest.woken, rest.leaves, rest.changed):
             field.fill(0)
-        self.mass, self.slept = (float(value) for value in state["sleep_reals"])
-        self.awake, _, self.bed.grain_steps = (int(number) for number in state["sleep_numbers"])
+        self.mass, self.slept, *ahead = (float(value) for value in state["sleep_reals"])
+        self.begun_ahead = np.array(ahead)
+        self.awake, _, self.bed.grain_steps, self.fast, _ = (int(number) for number in state["sleep_numbers"])
         rest.begins[None], rest.block[None] = (int(number) for number in state.get("sleep_order", (0, 0)))
         e.find_cells(rest)
         rest.mass[None] = self.mass

@@ -1,5 +1,8 @@
-"""The kernels of sleep (``dem.engine.sleep`` has the rules): they belong to ``dem.engine.engine.Engine``, whose
-fields they use.
+"""The kernels of sleep: who is fast, slow or asleep (``dem.engine.sleep`` has the rules; how slow grains step is in
+``dem.engine.steps``). They belong to ``dem.engine.engine.Engine``, whose fields they use.
+
+Sums over the contacts of a grain are made by whoever has the row, in any order: in whole numbers, so that they have the
+same bits.
 
 A bed whose grains do not sleep has ``ABSENT`` for a table, and its kernels are compiled without all this.
 """
@@ -10,18 +13,13 @@ from .lists import BUILT, INDEX_MASK
 from .rows import Zeroes
 from .values import EnginePart
 
-__all__ = ["FULL", "LEAVING", "Rest", "Sleepers", "WOKEN"]
+__all__ = ["FALL_ASLEEP", "FULL", "Rest", "SLEEPING", "SLOWING", "SLOW_DOWN", "Sleepers", "WOKEN"]
 
 # Frozen contacts that there is room for, of a grain: both sides may keep a contact.
 _STORE_ROOM = 8
-# Sleepers lie in the order of the curve from so many blocks of cells behind the bodies on: what wakes and falls asleep
-# there leaves those that come after it in memory where they are. A block is as much of x as the curve does at a time.
-_BEHIND = 2
-_BLOCK = 32
-# Places of the numbers in Rest.near: where bodies are along x, and how far to both sides; below them.
-_MIDDLE, _HALF, _BELOW = range(3)
-# Places of what a check found, in Rest.news.
-WOKEN, LEAVING, FULL = 0, 1, 3  # and lists.BUILT
+# Places of what was found, in Rest.news, beside lists.BUILT; and what is to be done of it.
+WOKEN, SLOWING, FULL, SLEEPING = 0, 1, 3, 4
+SLOW_DOWN, FALL_ASLEEP = 1, 2
 
 
 @ti.data_oriented
@@ -29,7 +27,7 @@ class Rest:
     """Who sleeps, and the contacts of sleepers with one another. Arrays of grains are by id."""
 
     on = True
-    sets = 2
+    sets = 3  # of cells: of the fast, the slow, and the sleepers
 
     def __init__(self, *, grains: int, cells: int, chunks: int, rows: int, real):
         F = ti.Vector.field
@@ -39,8 +37,19 @@ class Rest:
         )
         self.cell = ti.field(ti.i32, grains)  # a sleeper's
         self.flagged = ti.field(ti.i32, cells)
-        # Of a row of the pair lists whose neighbour sleeps: the spring force that it had when the two were last alike.
-        self.force, self.old_force = (F(3, real, rows) for _ in range(2))
+        # Slow grains, now and before the lists were last made; whether anybody has changed since then.
+        self.slow, self.was_slow = (ti.field(ti.i32, grains) for _ in range(2))
+        self.changed, self.pace = (ti.field(ti.i32, ()) for _ in range(2))
+        # Of a fast grain's row whose neighbour is slow: force and torque on that, summed over steps.
+        self.push, self.turn = (F(3, real, rows) for _ in range(2))
+        self.buffer_force, self.buffer_torque = (F(3, real, grains) for _ in range(2))
+        # In whole numbers, ``per_unit`` of them a newton: the force on a sleeper by those awake, less what it was when
+        # it fell asleep (this while lists are made and looked at; else less what it is). What a sleeper's contacts bear
+        # on average; what those of a grain bear now, and how many they are.
+        self.per_unit = ti.field(ti.f64, ())
+        self.sum = F(3, ti.i64, grains)
+        self.bears = ti.field(ti.f64, grains)
+        self.load, self.contacts = ti.field(ti.i64, grains), ti.field(ti.i32, grains)
         # Frozen contacts, by the id of the grain that keeps them; the other's id, or -1 less a body's number. There
         # are two stores, and ``side`` says which one holds: the other is filled when grains fall asleep.
         self.side = ti.field(ti.i32, ())
@@ -49,18 +58,20 @@ class Rest:
         self.slide = F(4, real, (2, _STORE_ROOM * grains))
         self.roll = F(3, real, (2, _STORE_ROOM * grains))
         self.held = F(3, real, chunks)  # force of those awake on sleepers, summed over steps
+        self.floor = F(6, real, chunks)  # in a chunk's last step, on the floor and on sleepers
         self.mass = ti.field(ti.f64, ())  # of the sleepers [kg]
         self.total = ti.field(ti.f64, ())  # of all grains [kg]
         # Which sleepers the next lists pass over: 1 in ``whole`` is none. Else those of the cells behind that of rank
         # ``last``, whose places stay; and of rows of those behind how many were awake then nothing is to be cleared.
         self.whole, self.last, self.kept, self.made = (ti.field(ti.i32, ()) for _ in range(4))
-        self.news = ti.field(ti.i32, 4)
+        self.news = ti.field(ti.i32, 5)
         self.begins = ti.field(ti.i32, ())  # rank of the cell whose sleepers come first in memory
         self.block = ti.field(ti.i32, ())  # its block along x
         self.near = ti.field(real, 3)
         self._zeroes = Zeroes(
             self.asleep, self.was, self.woken, self.leaves, self.quiet, self.start, self.end,
-            self.side, self.mass, self.news, self.held, self.begins, self.block, self.force,
+            self.side, self.mass, self.news, self.held, self.begins, self.block, self.push,
+            self.turn, self.floor, self.slow, self.was_slow, self.changed, self.sum, self.bears,
         )  # fmt: skip
 
     def clear(self) -> None:
@@ -89,98 +100,25 @@ class Rest:
 class Sleepers(EnginePart):
     """The part of the engine that lets grains sleep."""
 
-    @ti.func
-    def spring_force(self, x_i, x_j, bits, u):
-        """What the springs of a pair do to the first [N], by ``dem.contact.law`` without dashpots; 0 apart."""
-        d = self.apart(x_i, x_j, bits)
-        length = d.norm()
-        overlap = x_i.w + x_j.w - length
-        f = d * 0.0
-        if overlap > 0.0:
-            p = self.grain_pair[None]
-            a = ti.sqrt(x_i.w * x_j.w / (x_i.w + x_j.w) * overlap)
-            f = (2.0 / 3.0) * p[0] * a * overlap / length * d - p[1] * a * u.xyz
-        return f
-
-    @ti.func
-    def close_to_body(self, i, reach, shapes: ti.template()):
-        """Whether a body other than the floor is within ``reach`` [m] of a grain's surface."""
-        x = self.position[i]
-        within = x.w + reach
-        found = False
-        for b in range(1, self.body_count[None]):
-            beyond = self.body_extent[b] + within
-            if not found and ti.abs(x.z - self.body_position[b].z) < beyond:  # most bodies are far above
-                if self.from_body(b, x.xyz).norm_sqr() < beyond**2:
-                    distance, n, curvature, arm = self.nearest(b, x.xyz, within, shapes, True)
-                    if distance < within:
-                        found = True
-        return found
-
-    @ti.kernel
-    def check_contacts(self, limit: float, share: float, fast: float, rest: ti.template()):
-        """Raise the flags of sleepers that are to wake: a contact's force changed by ``limit`` [N] and this share of
-        it, a ``fast`` [m/s] neighbour."""
-        for i in range(self.count[self.AWAKE]):
-            force, part, speed = ti.cast(limit, self.real), ti.cast(share, self.real), ti.cast(fast, self.real)
-            quick = self.velocity[i].xyz.norm_sqr() > speed * speed
-            for s in range(self.pair_start[i], self.pair_end[i]):
-                code = self.pair[s]
-                bits = ti.select(code < 0, ~code, code)
-                j = bits & INDEX_MASK
-                if j >= self.count[self.AWAKE]:
-                    f = self.spring_force(self.position[i], self.position[j], bits, self.slide[s])
-                    before = rest.force[s]
-                    least = ti.max(force * force, part * part * before.norm_sqr())
-                    if quick or (f - before).norm_sqr() > least:
-                        rest.woken[self.id[j]] = 1
-                        rest.news[WOKEN] = 1
-
-    @ti.kernel
-    def find_calm(self, slow: float, patience: int, reach: float, rest: ti.template(), shapes: ti.template()):
-        """Mark who may fall asleep, and count them."""
-        for _ in range(1):
-            rest.news[LEAVING] = 0
-        for i in range(self.count[self.AWAKE]):
-            k = self.id[i]
-            r = self.position[i].w
-            square = ti.cast(slow * slow, self.real)
-            still = self.velocity[i].xyz.norm_sqr() < square and r * r * self.spin[i].xyz.norm_sqr() < square
-            rest.quiet[k] = ti.select(still, rest.quiet[k] + 1, 0)
-            rest.busy[k] = 0
-            rest.leaves[k] = 0
-        for i in range(self.count[self.AWAKE]):
-            a = self.id[i]
-            for s in range(self.pair_start[i], self.pair_end[i]):
-                code = self.pair[s]
-                if code < 0:
-                    j = (~code) & INDEX_MASK
-                    if j < self.count[self.AWAKE]:
-                        b = self.id[j]
-                        if rest.quiet[a] == 0:
-                            rest.busy[b] = 1
-                        if rest.quiet[b] == 0:
-                            rest.busy[a] = 1
-        for i in range(self.count[self.AWAKE]):
-            k = self.id[i]
-            if rest.quiet[k] >= patience and rest.busy[k] == 0:
-                if not self.close_to_body(i, ti.cast(reach, self.real), shapes):
-                    rest.leaves[k] = 1
-                    ti.atomic_add(rest.news[LEAVING], 1)
-
     @ti.kernel
     def stir(
-        self, dt: float, reach: float, leaving: int, rest: ti.template(), shapes: ti.template(), balance: ti.template()
-    ):
-        """Wake those flagged, those around them and those near a body; let fall asleep who may. Before ``sort``."""
+        self, dt: float, reach: float, leaving: int, all_of_them: int, rest: ti.template(), shapes: ti.template(),
+        balance: ti.template(),
+    ):  # fmt: skip
+        """Wake those flagged, those around them and those near a body; let others change their pace, or fall asleep.
+
+        Before ``sort``. Who wakes is slow, where there are slow grains.
+        """
         for _ in range(1):
-            if leaving == 1:
+            if leaving & FALL_ASLEEP != 0:
                 rest.whole[None] = 1
+            rest.changed[None] = 1
             self.find_bodies(rest)
         for r in range(self.count[self.CELLS]):
             rest.flagged[r] = 0
         for k in range(self.count[self.GRAINS]):
             rest.was[k] = rest.asleep[k]
+            rest.was_slow[k] = rest.slow[k]
         for i in range(self.count[self.AWAKE], self.count[self.GRAINS]):
             if rest.woken[self.id[i]] == 1:
                 self.flag_around(rest.cell[self.id[i]], rest)
@@ -191,63 +129,22 @@ class Sleepers(EnginePart):
                 flagged = self.close_to_body(i, ti.cast(reach, self.real), shapes)
             if flagged:
                 rest.asleep[k] = 0
+                rest.slow[k] = ti.select(rest.pace[None] > 1 and all_of_them == 0, 1, 0)
                 rest.quiet[k] = 0
                 place = self.place_asleep(self.rank[rest.cell[k]], rest)
-                ti.atomic_max(rest.last[None], place - self.count[self.CELLS])
+                ti.atomic_max(rest.last[None], place - 2 * self.count[self.CELLS])
         for c in range(self.count[self.CHUNKS]):
-            if leaving == 1:
-                start, end = self.chunk_range(c)
-                for i in range(start, end):
-                    k = self.id[i]
-                    if rest.leaves[k] == 1:
-                        v = self.velocity[i]
-                        if ti.static(balance.on):
-                            self.balance_leaving(c, i, balance)
-                        rest.asleep[k] = 1
-                        rest.held[c] = rest.held[c] + v.xyz * (v.w / ti.cast(dt, self.real))
-                        v.xyz = ti.Vector.zero(self.real, 3)
-                        self.velocity[i] = v
-                        self.spin[i] = ti.Vector.zero(self.real, 4)
+            start, end = self.chunk_range(c)
+            for i in range(start, end):
+                k = self.id[i]
+                wakes = rest.slow[k] == 1 and rest.woken[k] == 1
+                if wakes:
+                    rest.leaves[k] = 0
+                due = leaving & ti.select(self.next_sleep(i, rest), FALL_ASLEEP, SLOW_DOWN)
+                if wakes or (due != 0 and rest.leaves[k] == 1):
+                    self.change_pace(c, i, dt, rest, balance)
         for k in range(self.count[self.GRAINS]):
             rest.woken[k] = 0
-
-    @ti.func
-    def find_bodies(self, rest: ti.template()):
-        """Where the bodies but the floor are along x, and below which height none is: for ``may_be_close``.
-
-        And where sleepers begin in memory: that changes when the bodies have gone two blocks on.
-        """
-        first, last, below = ti.cast(0.0, self.real), ti.cast(0.0, self.real), ti.cast(1e30, self.real)
-        at, period = self.body_position[1].x, self.box[self.PERIOD_X]
-        for b in range(1, self.body_count[None]):
-            x, extent = self.body_position[b], self.body_extent[b]
-            ahead = x.x - at
-            ahead -= period * ti.round(ahead / period)
-            first = ti.min(first, ahead - extent)
-            last = ti.max(last, ahead + extent)
-            below = ti.min(below, x.z - extent)
-        middle = at + 0.5 * (first + last)
-        middle -= period * ti.floor(middle / period)
-        rest.near[_MIDDLE] = middle
-        rest.near[_HALF] = 0.5 * (last - first)
-        rest.near[_BELOW] = below
-        blocks = self.count[self.NX] // _BLOCK
-        if self.body_count[None] > 1 and last - first < period and blocks > 2 * _BEHIND:
-            block = ti.floor(middle / self.box[self.CELL_X], ti.i32) // _BLOCK - _BEHIND
-            block += ti.select(block < 0, blocks, 0)
-            if ti.abs(block - rest.block[None]) > 1:
-                rest.block[None] = block
-                rest.whole[None] = 1
-                rest.begins[None] = self.rank[self.cell_index(block * _BLOCK, 0, 0)]
-
-    @ti.func
-    def may_be_close(self, i, reach, rest: ti.template()):
-        """False where no body can be within ``reach`` [m] of a grain's surface: most lie beside or below them all."""
-        x = self.position[i]
-        within = 1.01 * (x.w + reach)  # round-off decides nothing
-        ahead = ti.abs(x.x - rest.near[_MIDDLE])
-        ahead = ti.min(ahead, self.box[self.PERIOD_X] - ahead)
-        return x.z > rest.near[_BELOW] - within and ahead < rest.near[_HALF] + within
 
     @ti.func
     def flag_around(self, cell, rest: ti.template()):
@@ -332,36 +229,43 @@ class Sleepers(EnginePart):
         return n
 
     @ti.func
-    def list_sleeper(self, s, i, j, code, old, rest: ti.template()):
-        """Springs out of the store and the force to compare with, of a row that was ``old`` (-1: none) before."""
+    def list_sleeper(self, s, i, j, code, rest: ti.template()):
+        """Springs out of the store for a row; and nothing for that of a slow grain with a fast one, who has them."""
         a, b = self.id[i], self.id[j]
-        if rest.was[a] == 1 and rest.was[b] == 1:
-            sign = ti.cast(1.0, self.real)
-            side = rest.side[None]
-            kept = rest.find(a, b)
-            if kept < 0:
-                kept = rest.find(b, a)
-                sign = -sign
-            if kept >= 0:
-                self.pair[s] = ~code
-                slide = rest.slide[side, kept]
-                slide.xyz = sign * slide.xyz
-                self.slide[s] = slide
-                if ti.static(self.rolling):
-                    self.roll[s] = sign * rest.roll[side, kept]
-        f = self.position[i].xyz * 0.0
-        if j >= self.count[self.AWAKE] and self.pair[s] < 0:
-            if rest.was[a] == 0 and rest.was[b] == 1:
-                f = rest.old_force[old]
-            else:
-                f = self.spring_force(self.position[i], self.position[j], code, self.slide[s])
-        rest.force[s] = f
+        if rest.changed[None] == 1:
+            if rest.was[a] == 1 and rest.was[b] == 1:
+                sign = ti.cast(1.0, self.real)
+                side = rest.side[None]
+                kept = rest.find(a, b)
+                if kept < 0:
+                    kept = rest.find(b, a)
+                    sign = -sign
+                if kept >= 0:
+                    self.pair[s] = ~code
+                    slide = rest.slide[side, kept]
+                    slide.xyz = sign * slide.xyz
+                    self.slide[s] = slide
+                    if ti.static(self.rolling):
+                        self.roll[s] = sign * rest.roll[side, kept]
+        if i >= self.count[self.FAST] and j < self.count[self.FAST]:
+            self.pair[s] = code
+            self.slide[s] = ti.Vector.zero(self.real, 4)
+            if ti.static(self.rolling):
+                self.roll[s] = ti.Vector.zero(self.real, 3)
+        rest.push[s] = ti.Vector.zero(self.real, 3)
+        rest.turn[s] = ti.Vector.zero(self.real, 3)
+
+    @ti.func
+    def place_asleep(self, r, rest: ti.template()):
+        """Where the sleepers of the cell of rank r are listed: in the curve's order too, but begun elsewhere."""
+        turned = r - rest.begins[None]
+        return 2 * self.count[self.CELLS] + ti.select(turned < 0, turned + self.count[self.CELLS], turned)
 
     @ti.func
     def wake_near(self, s, i, b, rest: ti.template()):
         """The springs of a grain that slept on body b, for a row of the near list."""
         a = self.id[i]
-        if rest.was[a] == 1:
+        if rest.changed[None] == 1 and rest.was[a] == 1:
             kept = rest.find(a, -1 - b)
             if kept >= 0:
                 self.near_slide[s] = rest.slide[rest.side[None], kept]
@@ -369,21 +273,218 @@ class Sleepers(EnginePart):
 
     @ti.kernel
     def recount(self, grains_per_chunk: int, rest: ti.template()):
-        """How many are awake, in how many chunks; the mass of the others; how many are to be sorted."""
+        """How many are awake and fast, in how many chunks; the mass of the sleepers; how many are to be sorted."""
         for _ in range(1):
-            sets = 2 * self.count[self.CELLS]
-            cells = ti.select(rest.whole[None] == 1, sets, self.count[self.CELLS] + rest.last[None] + 1)
+            sets = 3 * self.count[self.CELLS]
+            cells = ti.select(rest.whole[None] == 1, sets, 2 * self.count[self.CELLS] + rest.last[None] + 1)
             until = self.count[self.GRAINS]
             if cells < sets:
                 until = self.cell_start[cells]
-            awake = 0
+            awake, slow = 0, 0
             mass = ti.cast(0.0, ti.f64)
             for i in range(until):
                 if rest.asleep[self.id[i]] == 0:
                     mass += ti.cast(self.velocity[i].w, ti.f64)
                     awake += 1
+                    slow += rest.slow[self.id[i]]
             rest.mass[None] = rest.total[None] - mass
             self.count[self.SORTED], self.count[self.SORTED_CELLS] = until, cells
-            self.count[self.AWAKE] = awake
-            chunks = (awake + grains_per_chunk - 1) // grains_per_chunk
-            self.count[self.CHUNKS] = ti.max(1, ti.min(self.count[self.ALL_CHUNKS], chunks))
+            self.count[self.AWAKE], self.count[self.FAST] = awake, awake - slow
+            room = self.count[self.ALL_CHUNKS] - ti.min(slow, 1)
+            chunks = ti.max(1, ti.min(room, (awake - slow + grains_per_chunk - 1) // grains_per_chunk))
+            self.count[self.FAST_CHUNKS] = chunks
+            room = self.count[self.ALL_CHUNKS] - chunks
+            self.count[self.CHUNKS] = chunks + ti.min(room, (slow + grains_per_chunk - 1) // grains_per_chunk)
+
+    @ti.func
+    def whole_number(self, value, rest: ti.template()):
+        """A force in units so small that no grain feels one."""
+        return ti.cast(ti.round(ti.cast(value, ti.f64) * rest.per_unit[None]), ti.i64)
+
+    @ti.func
+    def sum_on_sleepers(self, sign: ti.template(), rest: ti.template()):
+        """Add what those awake do to sleepers, ``sign`` times, to the sums that say how far these are from balance."""
+        for i in range(self.count[self.AWAKE]):
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                code = self.pair[s]
+                if code < 0:
+                    j = (~code) & INDEX_MASK
+                    if j >= self.count[self.AWAKE]:
+                        f = self.spring_force(self.position[i], self.position[j], ~code, self.slide[s])
+                        for d in ti.static(range(3)):
+                            ti.atomic_add(rest.sum[self.id[j]][d], self.whole_number(-sign * f[d], rest))
+
+    @ti.kernel
+    def change_balance(self, sign: ti.template(), rest: ti.template()):
+        """``sum_on_sleepers``: added before who sleeps changes and taken off after it, so that the sums go on."""
+        self.sum_on_sleepers(sign, rest)
+
+    @ti.kernel
+    def forget_dashpots(self, rest: ti.template()):
+        """Of pairs with a grain whose pace has changed: what their dashpots remember is of other masses and steps."""
+        for i in range(self.count[self.AWAKE]):
+            a = self.id[i]
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                code = self.pair[s]
+                b = self.id[ti.select(code < 0, ~code, code) & INDEX_MASK]
+                if rest.was_slow[a] != rest.slow[a] or rest.was_slow[b] != rest.slow[b]:
+                    self.slide[s].w = 0.0
+
+    @ti.func
+    def sum_loads(self, rest: ti.template()):
+        """Of those that are marked in ``rest.busy``: sum and number of their contacts' forces."""
+        for i in range(self.count[self.AWAKE]):
+            a = self.id[i]
+            start, end = self.chunk_range(self.chunk_of(i))
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                code = self.pair[s]
+                if code < 0:
+                    j = (~code) & INDEX_MASK
+                    b = self.id[j]
+                    both = (j >= start and j < end) or j >= self.alone_from(self.chunk_of(i))
+                    if rest.busy[a] == 1 or (both and rest.busy[b] == 1):
+                        f = self.spring_force(self.position[i], self.position[j], ~code, self.slide[s]).norm()
+                        ti.atomic_add(rest.load[a], self.whole_number(f, rest))
+                        ti.atomic_add(rest.contacts[a], 1)
+                        if both:
+                            ti.atomic_add(rest.load[b], self.whole_number(f, rest))
+                            ti.atomic_add(rest.contacts[b], 1)
+
+    @ti.func
+    def mean_load(self, k, rest: ti.template()):
+        """Mean force of a grain's contacts, as whole numbers are."""
+        return ti.cast(rest.load[k], ti.f64) / ti.max(1, rest.contacts[k])
+
+    @ti.kernel
+    def check_balance(
+        self, unbalanced: float, change: float, own: float, quick: float, reach: float, gravity: float,
+        rest: ti.template(), shapes: ti.template(),
+    ):  # fmt: skip
+        """Raise the flags of slow grains that are to be fast, and of sleepers that are to wake.
+
+        ``unbalanced``, ``change``: of the force on a slow grain, and of its change on a sleeper, over the mean force of
+        its contacts. ``own``: speed of a slow grain, ``quick``: of a sleeper's neighbour [m/s]. ``reach``: distance of
+        a body from a slow grain [m].
+        """
+        for _ in range(1):
+            self.find_bodies(rest)
+        for c in range(self.count[self.FAST_CHUNKS], self.count[self.CHUNKS]):
+            self.gather_pushes(c, rest)
+        for i in range(self.count[self.AWAKE]):
+            k, v = self.id[i], self.velocity[i]
+            rest.load[k] = 0
+            rest.contacts[k] = 0
+            rest.busy[k] = 0
+            if i >= self.count[self.FAST]:
+                if self.force[i].norm() > unbalanced * v.w * gravity:
+                    rest.busy[k] = 1
+                if self.surface_speed(i) > own or self.may_be_close(i, ti.cast(reach, self.real), rest):
+                    near = self.surface_speed(i) > own
+                    if not near:
+                        near = self.close_to_body(i, ti.cast(reach, self.real), shapes)
+                    if near:
+                        rest.woken[k] = 1
+        self.sum_loads(rest)
+        self.sum_on_sleepers(1.0, rest)
+        for i in range(self.count[self.FAST], self.count[self.AWAKE]):
+            k = self.id[i]
+            if rest.busy[k] == 1:
+                if rest.per_unit[None] * self.force[i].norm() > unbalanced * self.mean_load(k, rest):
+                    rest.woken[k] = 1
+        for i in range(self.count[self.AWAKE]):
+            rest.busy[self.id[i]] = 0
+        for i in range(self.count[self.AWAKE]):
+            goes = self.surface_speed(i) > quick
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                code = self.pair[s]
+                j = ti.select(code < 0, ~code, code) & INDEX_MASK
+                b = self.id[j]
+                if j >= self.count[self.AWAKE]:
+                    u = ti.Vector([ti.cast(rest.sum[b][d], ti.f64) for d in range(3)])
+                    least = ti.max(rest.bears[b], rest.per_unit[None] * self.velocity[j].w * gravity)
+                    if goes or u.norm() > change * least:
+                        rest.woken[b] = 1
+                        rest.news[WOKEN] = 1
+                elif code < 0 and i >= self.count[self.FAST]:
+                    # Those that one touches come with it.
+                    if rest.woken[self.id[i]] == 1:
+                        rest.busy[b] = 1
+                    if rest.woken[b] == 1 and j >= self.count[self.FAST]:
+                        rest.busy[self.id[i]] = 1
+        self.sum_on_sleepers(-1.0, rest)
+        for i in range(self.count[self.FAST], self.count[self.AWAKE]):
+            k = self.id[i]
+            if rest.busy[k] == 1:
+                rest.woken[k] = 1
+            if rest.woken[k] == 1:
+                rest.news[WOKEN] = 1
+
+    @ti.func
+    def surface_speed(self, i):
+        """The larger of a grain's speed and of what its surface has by its spin [m/s]."""
+        return ti.max(self.velocity[i].xyz.norm(), self.position[i].w * self.spin[i].xyz.norm())
+
+    @ti.kernel
+    def find_calm(
+        self, slow: float, still: float, patience: int, reach: float, rest: ti.template(), shapes: ti.template()
+    ):
+        """Mark who may become slow, or fall asleep, and count them.
+
+        ``slow``, ``still``: speeds [m/s] below which a fast grain, and a slow one, must have been ``patience`` times.
+        """
+        for _ in range(1):
+            rest.news[SLOWING] = 0
+            rest.news[SLEEPING] = 0
+        for i in range(self.count[self.AWAKE]):
+            k = self.id[i]
+            limit = ti.cast(ti.select(i < self.count[self.FAST], slow, still), self.real)
+            rest.quiet[k] = ti.select(self.surface_speed(i) < limit, rest.quiet[k] + 1, 0)
+            rest.busy[k] = 0
+            rest.leaves[k] = 0
+        for i in range(self.count[self.AWAKE]):
+            a = self.id[i]
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                code = self.pair[s]
+                if code < 0:
+                    j = (~code) & INDEX_MASK
+                    if j < self.count[self.AWAKE]:
+                        b = self.id[j]
+                        if self.keeps_up(j, i, rest):
+                            rest.busy[a] = 1
+                        if self.keeps_up(i, j, rest):
+                            rest.busy[b] = 1
+        for i in range(self.count[self.AWAKE]):
+            k = self.id[i]
+            if rest.quiet[k] >= patience and rest.busy[k] == 0:
+                if i >= self.count[self.FAST] or not self.close_to_body(i, ti.cast(reach, self.real), shapes):
+                    rest.leaves[k] = 1
+                    ti.atomic_add(rest.news[ti.select(self.next_sleep(i, rest), SLEEPING, SLOWING)], 1)
+
+    @ti.func
+    def next_sleep(self, i, rest: ti.template()):
+        """Whether what is next for a grain that is quiet is to sleep."""
+        return i >= self.count[self.FAST] or rest.pace[None] == 1
+
+    @ti.func
+    def keeps_up(self, i, j, rest: ti.template()):
+        """Whether grain i keeps its neighbour j from what is next: it is not quiet; it is fast, and j slow."""
+        fast = i < self.count[self.FAST]
+        result = fast and rest.quiet[self.id[i]] == 0
+        if j >= self.count[self.FAST]:
+            result = fast or rest.quiet[self.id[i]] == 0
+        return result
+
+    @ti.kernel
+    def sum_bearing(self, rest: ti.template()):
+        """What sleepers-to-be bear: the mean force of their contacts."""
+        for i in range(self.count[self.AWAKE]):
+            k = self.id[i]
+            rest.load[k] = 0
+            rest.contacts[k] = 0
+            rest.busy[k] = rest.leaves[k]
+        self.sum_loads(rest)
+        for i in range(self.count[self.AWAKE]):
+            k = self.id[i]
+            if rest.leaves[k] == 1:
+                rest.bears[k] = self.mean_load(k, rest)
+                rest.sum[k] = ti.Vector.zero(ti.i64, 3)

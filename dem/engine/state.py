@@ -20,9 +20,9 @@ from dem.grains.materials import Material
 from .bodies import BedBodies
 from .engine import Engine
 from .lists import ABSENT, INDEX_BITS, INDEX_MASK
-from .rows import read_fields, take_rows, twins_of, write_fields
-from .sleep import Sleep, Sleeper
-from .values import BedSettings, State
+from .rows import layout_of, read_fields, take_rows, twins_of, write_fields
+from .sleep import Sleeper
+from .values import BedSettings, Sleep, State
 
 __all__ = ["BedState", "Checkpoint", "adopt", "laid_end_to_end", "read_file", "touching_pairs", "whole_file"]
 
@@ -41,7 +41,7 @@ ABOUT = ("material", "material_numbers", "cohesion", "tangential", "size", "heig
 
 
 _BED_NUMBERS = ("steps", "list_count", "grain_steps", "steps_since_lists", "reaction_steps", "skin", "tallied")
-_SLEEP_NUMBERS = ("awake", "mass", "slept", "leaving")
+_SLEEP_NUMBERS = ("awake", "fast", "mass", "slept", "leaving", "begun_ahead")
 
 
 @dataclass(eq=False)
@@ -105,17 +105,17 @@ class BedState(BedBodies):
             )
         if values["position"].dtype != self.runtime.precision:
             raise ValueError(f"this state is in {values['position'].dtype}, the bed in {self.runtime.precision}")
-        awake, chunks = values.get("sleep_numbers", (self.grain_count, e.chunk_count))[:2]
-        self.make_room(*e.rooms_for(values["pair_count"], values["near_grain"], awake, chunks))
+        layout = layout_of(values)
+        self.make_room(*e.rooms_for(values["pair_count"], values["near_grain"], *layout))
         e = self.engine
         for name in (*GRAIN_FIELDS, *BODY_FIELDS):
             e.write(name, values[name])
         e.restore_shapes(values)
-        rows = e.lay_pairs(values["pair_count"], awake, chunks)
+        rows = e.lay_pairs(values["pair_count"], *layout)
         touching = rows[values["pair"] < 0]
         for name, at in (("pair", rows), ("slide", touching), *((("roll", touching),) if e.rolling else ())):
             e.write(name, values[name], at)
-        near = _write_near(e, values, awake, chunks)
+        near = _write_near(e, values, *layout)
         if e.gpu:
             e.write("near_push", values["near_push"], near)
         e.balance = ABSENT
@@ -135,8 +135,8 @@ class BedState(BedBodies):
         e.wake_all()
         if "sleep_rules" in values:
             e.let_sleep()
-            e.count[e.AWAKE], e.count[e.CHUNKS] = int(awake), int(chunks)
-            self.sleeper = Sleeper(self, Sleep(*values["sleep_rules"][:-1], every=int(values["sleep_rules"][-1])))
+            e.count[e.AWAKE], e.count[e.CHUNKS], e.count[e.FAST], e.count[e.FAST_CHUNKS] = layout
+            self.sleeper = Sleeper(self, Sleep.of_numbers(values["sleep_rules"].tolist()))
             self.sleeper.restore(values, rows)
 
     def successor(self, values: State, *, keep: np.ndarray | None = None, **changes: Any) -> Self:
@@ -357,8 +357,8 @@ def touching_pairs(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return first, bits & INDEX_MASK, np.column_stack([image % 3 - 1, image // 3 - 1])
 
 
-def _write_near(e: Engine, values: Mapping[str, np.ndarray], awake: int, chunks: int) -> np.ndarray:
+def _write_near(e: Engine, values: Mapping[str, np.ndarray], *layout: int) -> np.ndarray:
     """Put the lists of grains near bodies into the engine; their rows."""
-    rows = e.lay_near(values["near_grain"], awake, chunks)
+    rows = e.lay_near(values["near_grain"], *layout)
     write_fields(e, dict.fromkeys(NEAR_FIELDS, rows), "", values)
     return rows

@@ -1,12 +1,16 @@
 """The time step: kick and drift, forces between grains and on bodies, and the loops over chunks of grains.
 
+With sleep (``dem.engine.sleep``) a slow grain has the row of its pair with another slow grain or a sleeper, but not
+with a fast one: that is the fast grain's. What the fast grain's steps did to it is summed in that row (``keep_push``)
+and taken out of it where the slow grain moves, or where lists are made (``gather_pushes``).
+
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
 
 from dem.contact.law import contact_force, onset_of, springs_hold, turning_torque
 from hedgebed_taichi import ti
 
-from .lists import CACHE_LINE, FINISHED, ITEMS_PER_THREAD, QUEUE
+from .lists import CACHE_LINE, FINISHED, FLOOR, INDEX_MASK, ITEMS_PER_THREAD, QUEUE
 from .values import EnginePart
 
 __all__ = ["Steps"]
@@ -20,17 +24,26 @@ class Steps(EnginePart):
     """The part of the engine that moves grains and bodies and computes forces."""
 
     @ti.func
-    def move(self, c, dt, limit, gravity, keep):
+    def move(self, c, dt, limit, gravity, keep, rest: ti.template()):
         """Kick and drift the grains of a chunk, with chunk 0 the bodies; drag leaves ``keep`` of a grain's speed."""
         start, end = self.chunk_range(c)
         far = 0
+        step, kept, many = dt, keep, 1
+        if ti.static(rest.on):
+            many = self.steps_of(c, rest)
+            if c >= self.count[self.FAST_CHUNKS]:
+                self.gather_pushes(c, rest)
+                kept = ti.pow(keep, many)
+            step = dt * many
         for i in range(start, end):
             x, v, w = self.position[i], self.velocity[i], self.spin[i]
             f, t = self.force[i], self.torque[i]
-            inverse = dt / v.w
-            v.xyz = keep * v.xyz + f * inverse
-            w.xyz = keep * w.xyz + t * (2.5 * inverse / (x.w * x.w))
-            x.xyz += v.xyz * dt
+            inverse = step / v.w
+            if ti.static(rest.on):
+                inverse /= many * many
+            v.xyz = kept * v.xyz + f * inverse
+            w.xyz = kept * w.xyz + t * (2.5 * inverse / (x.w * x.w))
+            x.xyz += v.xyz * step
             self.position[i] = x
             self.velocity[i] = v
             self.spin[i] = w
@@ -52,6 +65,91 @@ class Steps(EnginePart):
             self.moved[None] = 1
 
     @ti.func
+    def steps_of(self, c, rest: ti.template()):
+        """Of how many steps one of chunk c is; its grains' mass counts the square of it times."""
+        return ti.select(c < self.count[self.FAST_CHUNKS], 1, rest.pace[None])
+
+    @ti.func
+    def is_due(self, c, step, rest: ti.template()):
+        """Whether chunk c takes this step, before which so many were made."""
+        return c < self.count[self.FAST_CHUNKS] or step % rest.pace[None] == 0
+
+    @ti.func
+    def alone_from(self, c):
+        """From which grain on the pairs of chunk c are in its lists alone."""
+        return ti.select(c < self.count[self.FAST_CHUNKS], self.count[self.FAST], self.count[self.AWAKE])
+
+    @ti.func
+    def is_theirs(self, c, j):
+        """Whether the pair of a grain of chunk c with j is j's, which is fast, and the grain slow."""
+        return c >= self.count[self.FAST_CHUNKS] and j < self.count[self.FAST]
+
+    @ti.func
+    def keep_push(self, s, f, t, rest: ti.template()):
+        """Of a step of a fast grain: force -f and torque t on the slow one of its row."""
+        rest.push[s] = rest.push[s] - f
+        rest.turn[s] = rest.turn[s] + t
+
+    @ti.func
+    def gather_pushes(self, c, rest: ti.template()):
+        """Put what fast grains did to the slow ones of chunk c, over the steps of one of theirs, into their forces."""
+        if c >= self.count[self.FAST_CHUNKS]:
+            start, end = self.chunk_range(c)
+            share = 1.0 / ti.cast(rest.pace[None], self.real)
+            for i in range(start, end):
+                f, t = self.force[i], self.torque[i]
+                for s in range(self.pair_start[i], self.pair_end[i]):
+                    code = self.pair[s]
+                    j = ti.select(code < 0, ~code, code) & INDEX_MASK
+                    if j < self.count[self.FAST]:
+                        for o in range(self.pair_start[j], self.pair_end[j]):
+                            theirs = self.pair[o]
+                            if (ti.select(theirs < 0, ~theirs, theirs) & INDEX_MASK) == i:
+                                f += share * rest.push[o]
+                                t += share * rest.turn[o]
+                                rest.push[o] = ti.Vector.zero(self.real, 3)
+                                rest.turn[o] = ti.Vector.zero(self.real, 3)
+                self.force[i] = f
+                self.torque[i] = t
+
+    @ti.func
+    def change_pace(self, c, i, dt, rest: ti.template(), balance: ti.template()):
+        """Let a grain of chunk c become what its flags say, and book what its motion loses by it.
+
+        From fast to slow it keeps its energy, for its speed is mostly vibration; from slow to fast its speed, for this
+        is mostly the sand's, and has less energy by it. None is made.
+        """
+        k = self.id[i]
+        slow = i >= self.count[self.FAST]
+        many = ti.select(slow, rest.pace[None], 1)
+        step = ti.cast(dt, self.real)
+        p, turning, energy = self.motion_of(i, many, step)
+        after, turning_after, energy_after = p * 0.0, p * 0.0, energy * 0.0
+        rest.quiet[k] = 0
+        v, w = self.velocity[i], self.spin[i]
+        if rest.leaves[k] == 1 and self.next_sleep(i, rest):
+            rest.asleep[k] = 1
+            rest.slow[k] = 0
+            v.xyz = ti.Vector.zero(self.real, 3)
+            w = ti.Vector.zero(self.real, 4)
+            self.velocity[i] = v
+            self.spin[i] = w
+            self.force[i] = ti.Vector.zero(self.real, 3)
+            self.torque[i] = ti.Vector.zero(self.real, 3)
+        else:
+            rest.slow[k] = 1 - rest.slow[k]
+            if not slow:
+                v.xyz /= rest.pace[None]
+                w.xyz /= rest.pace[None]
+                self.velocity[i] = v
+                self.spin[i] = w
+            after, turning_after, energy_after = self.motion_of(i, ti.select(slow, 1, rest.pace[None]), step)
+        rest.held[c] = rest.held[c] + (p - after) / step
+        if ti.static(balance.on):
+            balance.turn(c, balance.outside, turning_after - turning)
+            balance.lose(c, energy - energy_after)
+
+    @ti.func
     def turn_body(self, b, dt):
         w = self.body_spin[b]
         if w.norm_sqr() > 0.0:
@@ -70,22 +168,30 @@ class Steps(EnginePart):
     @ti.func
     def push(self, c, dt, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         """Forces between the grains of a chunk and all that they touch."""
-        start, end = self.chunk_range(c)
+        many = 1  # Of how many steps this one is
+        if ti.static(rest.on):
+            many = self.steps_of(c, rest)
+            dt *= many
         # First find out which pairs touch, then their forces.
         base = c * self.count[self.CHUNK_ROOM]
         last = self.sieve(c, dt, rest, balance)
         if ti.static(balance.on):
             self.balance_weight(c, dt, balance)
         largest, held = self.push_lanes(c, base, last, dt, rest, balance)
+        on_floor = self.pushes[c, FLOOR]
         for s in range(c * self.count[self.NEAR_ROOM], self.near_end[c]):
-            largest = ti.max(largest, self.push_near(c, s, dt, shapes, balance))
+            largest = ti.max(largest, self.push_near(c, s, dt, many, shapes, balance))
         self.overlap[c] = ti.max(self.overlap[c], largest)
         if ti.static(rest.on):
             rest.held[c] = rest.held[c] + held
+            on_floor = self.pushes[c, FLOOR] - on_floor
+            for k in ti.static(range(3)):
+                on_floor[k] += held[k]
+            rest.floor[c] = on_floor / many
 
     @ti.func
-    def push_near(self, c, s, dt, shapes: ti.template(), balance: ti.template()):
-        """Force between a grain and a body; returns overlap over diameter."""
+    def push_near(self, c, s, dt, many, shapes: ti.template(), balance: ti.template()):
+        """Force between a grain and a body, in a step of so ``many``; returns overlap over diameter."""
         i = self.near_grain[s]
         b = self.near_body[s]
         x = self.position[i]
@@ -103,8 +209,9 @@ class Steps(EnginePart):
             p = self.body_pair[b]
             u = self.near_slide[s]
             onset = onset_of(v_n, overlap, dt, u.w, self.cohesion)
+            mass = many * many * self.velocity[i].w
             f_n, damped, f_t, k_t, a, root, load, grown = contact_force(
-                p, n, v_n, v_t, overlap, radius, self.velocity[i].w, onset, dt, u, self.tensile, self.cohesion,
+                p, n, v_n, v_t, overlap, radius, mass, onset, dt, u, self.tensile, self.cohesion,
                 self.rescaled, -dt * parting, middle, angle,
             )  # fmt: skip
             self.near_slide[s] = u
@@ -122,7 +229,7 @@ class Steps(EnginePart):
                 t_body -= turn
             self.force[i] = self.force[i] + (f)
             self.torque[i] = self.torque[i] + (t)
-            self.push_body(c, s, b, f, t_body)
+            self.push_body(c, s, b, many * f, many * t_body)
             result = overlap / (2.0 * x.w)
             if ti.static(balance.on):
                 held_t, held_r = springs_hold(p, n, overlap, radius, u, self.near_roll[s], self.cohesion)
@@ -181,11 +288,12 @@ class Steps(EnginePart):
         gz: float,
         keep: float,
         steps: int,
+        before: int,
         shapes: ti.template(),
         rest: ti.template(),
         balance: ti.template(),
     ):
-        """Up to ``steps`` steps on a CPU; stops by itself where new lists are needed.
+        """Up to ``steps`` steps on a CPU, ``before`` of which were made; stops by itself where new lists are needed.
 
         Then halted is 1, done says how many steps are whole, and the forces of the next one are still to come.
 
@@ -219,9 +327,14 @@ class Steps(EnginePart):
                         for k in range(chunks):
                             c = ti.select(own + k < chunks, own + k, own + k - chunks)
                             if self.claim[c * CACHE_LINE] <= phase:
+                                rests = False
                                 if ti.atomic_max(self.claim[c * CACHE_LINE], phase + 1) <= phase:
-                                    if phase % 2 == 0:
-                                        self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep)
+                                    if ti.static(rest.on):
+                                        rests = not self.is_due(c, before + phase // 2, rest)
+                                    if rests:
+                                        pass
+                                    elif phase % 2 == 0:
+                                        self.move(c, dt, limit, ti.Vector([gx, gy, gz]), keep, rest)
                                     else:
                                         self.push(c, dt, shapes, rest, balance)
                                     ti.atomic_add(self.ticket[FINISHED], 1)
@@ -235,12 +348,16 @@ class Steps(EnginePart):
                             phase = 2 * steps
 
     @ti.kernel
-    def push_all(self, dt: float, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
-        """The forces of the step that was interrupted by new lists."""
+    def push_all(self, dt: float, before: int, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
+        """The forces of the step that was interrupted by new lists, ``before`` which so many were made."""
         for _ in range(1):
             self.ticket[QUEUE] = 0
         for w in range(self.cpu_items):
             c = self.next_chunk(w)
             while c < self.count[self.CHUNKS]:
-                self.push(c, dt, shapes, rest, balance)
+                if ti.static(rest.on):
+                    if dt == 0.0 or self.is_due(c, before, rest):
+                        self.push(c, dt, shapes, rest, balance)
+                else:
+                    self.push(c, dt, shapes, rest, balance)
                 c = self.next_chunk(w)

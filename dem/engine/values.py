@@ -1,14 +1,17 @@
-"""Plain values that the modules of the engine share: settings, the state, what the grains do, and the one failure."""
+"""Plain values that the modules of the engine share: settings, the rules of sleep, the state, what the
+grains do, and the one failure."""
 
+import math
 import warnings
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dem.grains.materials import Material
 
-__all__ = ["BedFailure", "BedSettings", "EnginePart", "Grains", "State"]
+__all__ = ["BedFailure", "BedSettings", "EnginePart", "Grains", "Sleep", "State", "refuse_sleep"]
 
 State = dict[str, np.ndarray]  # Arrays by name: everything that the next step of a bed depends on, to the bit
 
@@ -79,3 +82,59 @@ class Grains:
         """Deprecated: the array of this name."""
         warnings.warn(f'grains["{name}"] is deprecated: use grains.{name}', DeprecationWarning, stacklevel=2)
         return self.as_dict()[name]
+
+
+@dataclass(frozen=True)
+class Sleep:
+    """When grains are slow, sleep and wake; the module has what the numbers are shares of.
+
+    Raises ValueError: a number that is not above 0, or not whole; ``every`` that is no multiple of ``pace``.
+    """
+
+    speed: float = 5e-3  # A fast grain below this may become slow [sqrt(g d)]
+    calm: float = 1.0  # For how long it must be, and a slow one to fall asleep [sqrt(d / g)]
+    reach: float = 3.0  # No grain this near to a body is slow or sleeps [d]
+    pace: int = 16
+    """Steps of the bed for one of a slow grain, whose mass counts the square of it times; 1: none is slow."""
+    own: float = 2e-2  # A slow grain above this is fast again [sqrt(g d)]
+    unbalanced: float = 0.2  # So is one on which this force is out of balance [its contacts' mean force, or m g]
+    still: float = 3e-4  # A slow grain below this may fall asleep [sqrt(g d)]
+    change: float = 0.03  # A sleeper wakes when the force on it has changed by this [its contacts' mean force, or m g],
+    waking_speed: float = 5e-2  # or a neighbour has this speed [sqrt(g d)]
+    every: int = 96
+    """Steps between two checks: what changes makes new lists, and those cost as much as four steps of all grains."""
+
+    def __post_init__(self):
+        for name, value in asdict(self).items():
+            if not 0 < value < math.inf:
+                raise ValueError(f"Sleep: {name} = {value} must be above 0")
+        for name in ("every", "pace"):
+            if int(getattr(self, name)) != getattr(self, name):
+                raise ValueError(f"Sleep: {name} = {getattr(self, name)} must be a whole number of steps")
+        if self.every % self.pace:
+            raise ValueError(f"Sleep: every = {self.every} must be a multiple of pace = {self.pace}")
+        if self.waking_speed <= self.speed or self.own <= self.speed / self.pace:
+            raise ValueError(
+                f"Sleep: waking_speed = {self.waking_speed} must be above speed = {self.speed}, and own = {self.own} "
+                f"above speed / pace, or what falls asleep would wake at once"
+            )
+
+    @classmethod
+    def of_numbers(cls, numbers: Sequence[float]) -> "Sleep":
+        """The rules of a state. Raises ValueError for those of a version that had others."""
+        if len(numbers) != len(fields(cls)):
+            raise ValueError(f"this state has {len(numbers)} rules of sleep, of an earlier version; {len(fields(cls))} "
+                             f"were expected: wake the bed with the version that made it")  # fmt: skip
+        given = {field.name: number for field, number in zip(fields(cls), numbers, strict=True)}
+        own = {name: float(number) for name, number in given.items() if name not in ("pace", "every")}
+        return cls(**own, pace=int(given["pace"]), every=int(given["every"]))
+
+
+def refuse_sleep(*, arch: str, cohesion: str, floor: bool = True, gravity: float = math.inf) -> None:
+    """Raise ValueError, naming what it is, for a bed whose grains cannot sleep."""
+    if arch != "cpu":
+        raise ValueError(f"sleep with arch = {arch!r}: grains sleep on a CPU only so far, arch = 'cpu' would do")
+    if not floor or not gravity:
+        raise ValueError("grains sleep in a bed with a floor and gravity only: they must lie on something")
+    if cohesion == "jkr":
+        raise ValueError("sleep with cohesion = 'jkr': what wakes such grains is not measured; dmt or none would do")

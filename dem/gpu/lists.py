@@ -118,7 +118,10 @@ class GpuLists(Part):
         return total
 
     @ti.kernel
-    def sort(self, gx: float, gy: float, gz: float, awake: int, rest: ti.template(), balance: ti.template()):
+    def sort(
+        self, gx: float, gy: float, gz: float, awake: int, anew: int, time: float, slow_time: float,
+        rest: ti.template(), balance: ti.template(),
+    ):  # fmt: skip
         """Wrap the grains into the box and bring them into the order of the curve; ids break ties."""
         for k in range(self.cell_capacity):
             self.cell_fill[k] = 0

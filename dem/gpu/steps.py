@@ -30,7 +30,14 @@ class GpuSteps(Part):
     """The part of the engine that moves grains and bodies and computes forces, on a GPU."""
 
     def launch(
-        self, most: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float, awake: int
+        self,
+        most: int,
+        before: int,
+        dt: float,
+        limit: float,
+        gravity: tuple[float, float, float],
+        keep: float,
+        awake: int,
     ) -> tuple[int, bool]:
         """As ``Engine.launch``; looks whether new lists are needed once for STEPS_PER_LOOK steps."""
         self.done[None] = 0
@@ -62,7 +69,7 @@ class GpuSteps(Part):
         for _ in ti.static(range(steps)):
             for i in range(self.capacity):
                 if i < self.count[self.GRAINS] and self.halted[None] == 0:
-                    self.move(i, dt, limit, ti.Vector([gx, gy, gz]), keep)
+                    self.move(i, dt, limit, ti.Vector([gx, gy, gz]), keep, rest)
             ti.loop_config(block_dim=BLOCK)
             for i in range(self.capacity):
                 if i < self.count[self.GRAINS] and self.moved[None] == 0:
@@ -76,7 +83,7 @@ class GpuSteps(Part):
                     self.halted[None] = 1
 
     @ti.kernel
-    def push_all(self, dt: float, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
+    def push_all(self, dt: float, before: int, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         """The forces of the step that was interrupted by new lists."""
         for i in range(self.capacity):
             if i < self.count[self.GRAINS]:
@@ -162,7 +169,7 @@ class GpuSteps(Part):
             if s == self.near_start[i]:
                 largest = self.overlap[i]
                 for row in range(s, self.near_start[i + 1]):
-                    largest = ti.max(largest, self.push_near(i, row, dt, shapes, balance))
+                    largest = ti.max(largest, self.push_near(i, row, dt, 1, shapes, balance))
                 self.overlap[i] = largest
 
     @ti.func

@@ -13,7 +13,8 @@ from typing import Any, Generic, TypeVar
 
 from coupling import BedGround
 from coupling.members import Member
-from dem import Bed, Graded, Sleep
+from dem import Bed, Graded
+from dem.engine.values import refuse_sleep
 from dem.grains.materials import Material
 from dem.grains.materials import material as find_material
 from experiments.platform.surfaces import find_surface, surface_names
@@ -145,6 +146,8 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     def check(self) -> None:
         """Raise ValueError, naming key, value and what would do, for a bed that does not suit this trial."""
         self.material, self.members()
+        if self.settings.sleep:
+            refuse_sleep(arch=self.settings.arch, cohesion=self.material.cohesion)
         check_where(arch=self.settings.arch, threads=self.settings.threads)
         self.check_bed()
 
@@ -223,7 +226,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         bed.max_overlap, bed.overlap_limit = 0.0, run_limit(s.max_overlap)
         bed.mark_origin()
         if s.sleep:
-            bed.let_sleep(Sleep(force=s.sleep_force, share=s.sleep_share))
+            bed.let_sleep(s.sleep_rules)
         return self.run_on(ground)
 
     def stepping(self) -> Mapping[str, Any]:

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from dem.engine.values import Sleep
 from experiments.platform.settings import NotNegative, Positive
 from experiments.runs.strict import StrictSettings
 
@@ -50,10 +51,14 @@ class GrainsSettings(StrictSettings):
     iterations: int = Field(1, ge=1, le=50)
     """On a bed, or coupled: how often a step is computed at most; 1: explicit."""
     sleep: bool = False
-    """On a bed: whether grains at rest are left out until something reaches them (docs/bed.md)."""
+    """On a bed: whether quiet grains are computed every so many steps only, and those at rest not at all
+    (docs/bed.md)."""
+    sleep_pace: int = Field(16, ge=1, le=64)
+    """Of sleep: steps of the bed for one of a quiet grain, whose mass counts the square of it times; 1: there are none
+    [1]."""
     sleep_force: Positive = 1.0
-    """Of sleep: change of a contact's force that wakes a grain, over its weight [1], and"""
-    sleep_share: Positive = Field(0.5, description="Of sleep: the least of it over the force itself [1].")
+    """Of the rules of sleep before 2026-11-26; no longer used [1]."""
+    sleep_share: Positive = Field(0.5, description="Likewise [1].")
     frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
     arch: Literal["cpu", "cuda"] = Field("cpu", description="On a bed: where it is computed.")
@@ -69,12 +74,19 @@ class GrainsSettings(StrictSettings):
         return say("uneven_steps", s=self) if self.substeps % self.body_steps else None
 
     def sleep_fault(self) -> str | None:
-        """A rule of sleep that is given where nothing sleeps, in words."""
+        """A rule of sleep that is given where nothing sleeps, or that there is no more, in words."""
+        fields = GrainsSettings.model_fields
         for key in ("sleep_force", "sleep_share"):
-            value = getattr(self, key)
-            if not self.sleep and value != GrainsSettings.model_fields[key].default:
-                return say("of_sleep", key=key, value=value)
+            if getattr(self, key) != fields[key].default:
+                return say("sleep_once", key=key, value=getattr(self, key), default=fields[key].default)
+        if not self.sleep and self.sleep_pace != fields["sleep_pace"].default:
+            return say("of_sleep", key="sleep_pace", value=self.sleep_pace)
         return say("sleep_on_gpu", s=self) if self.sleep and self.arch != "cpu" else None
+
+    @property
+    def sleep_rules(self) -> Sleep:
+        """The rules of sleep."""
+        return Sleep(pace=self.sleep_pace, every=self.sleep_pace * max(1, round(Sleep.every / self.sleep_pace)))
 
 
 class TumbleBedSettings(GrainsSettings):

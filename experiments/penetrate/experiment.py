@@ -118,6 +118,8 @@ class _Work:
         if kept is not None:
             stepper.restore(kept)
             self.progress.message(f"{unit.title}: goes on at {stepper.time:.4g} s")
+        elif settings.sleep:
+            bed.let_sleep()
         frames = None
         if unit.id in shown_units(self.units):
             lasts = expected_time(settings, unit, beds.expected_stiffness(settings))
@@ -147,7 +149,11 @@ class _Work:
             raise RuntimeError(say("failed", unit=unit, error=error, remedy=_remedy(error))) from error
         self.plan.is_over(unit, stepper.time)
         folder.write_series(unit.id, series.columns())
-        kept_of_bed = {"max_overlap": float(bed.max_overlap), "code": beds.fingerprint()}
+        all_of_them = bed.grain_count * stepper.count * settings.substeps
+        kept_of_bed = {
+            "max_overlap": float(bed.max_overlap), "code": beds.fingerprint(),
+            "computed_share": ground.grain_steps / max(1, all_of_them),
+        }  # fmt: skip
         folder.mark_done(unit.id, series.facts() | kept_of_bed)
         folder.drop_checkpoint(unit.id)
 

@@ -182,7 +182,9 @@ class Findings:
         for unit in self.units:
             bed, model = self.beds[unit.id], self.models[unit.id]
             numbers = bed.quantities() | {f"model_{name}": value for name, value in model.quantities().items()}
-            kept = {"ended": bed.ended, "max_overlap": notes.get(unit.id, {}).get("max_overlap"), "quantities": numbers}
+            note = notes.get(unit.id, {})
+            kept = {"ended": bed.ended, "max_overlap": note.get("max_overlap"), "quantities": numbers}
+            kept |= {"computed_share": note["computed_share"]} if "computed_share" in note else {}
             files = {"series": f"series/{unit.id}.csv", "model_series": f"series/{unit.id}.model.csv"}
             entries.append({name: getattr(unit, name) for name in ("id", "kind", "seed", "speed")} | files | kept)
             if (moments := moments_of(bed)) is not None:

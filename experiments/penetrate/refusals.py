@@ -2,6 +2,7 @@
 
 import math
 
+from dem.engine.values import refuse_sleep
 from experiments.campaign.files import check_target
 from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.where import check_memory, check_where
@@ -37,6 +38,8 @@ def check(settings: PenetrateSettings) -> None:
     if count > MOST_GRAINS:
         least = settings.grain * (count / MOST_GRAINS) ** (1 / 3)
         raise ValueError(say("grain_count", s=settings, count=count, most=MOST_GRAINS, least=least))
+    if settings.sleep:
+        refuse_sleep(arch=settings.arch, cohesion=beds.find_material(settings).cohesion)
     check_where(arch=settings.arch, threads=settings.threads, precision=settings.precision)
     if settings.young is not None:
         most = beds.find_material(settings).young

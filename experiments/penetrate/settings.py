@@ -123,6 +123,7 @@ class PenetrateSettings(StrictSettings):
     precision: Precision = "float64"
     arch: Arch = "cpu"
     threads: Threads = None
+    sleep: bool = Field(False, description="Compute quiet grains less often, those at rest not at all (docs/bed.md).")
     allow_coarse: bool = Field(False, description="Take a tip of less than five grains across, for a quick look.")
     cache: bool = Field(True, description="Keep prepared beds and use those kept.")
 
@@ -190,7 +191,7 @@ class PenetrateSettings(StrictSettings):
 
     def _bed(self) -> str | None:
         if self.ground == "spring-damper":  # there is none then
-            return None
+            return say("sleep_without_bed") if self.sleep else None
         width, height = min(self.bed_size[:2]), self.bed_size[2]
         wide, deep = 4 * self.tip_diameter, self.depth + self.tip_diameter
         if width < wide * (1 - 1e-9):

@@ -61,6 +61,6 @@ def test_a_state_held_under_another_gravity_or_other_rules_of_sleep_is_not_taken
         bed.set_gravity(1.62)
     else:
         bed.wake()
-        bed.let_sleep(Sleep(calm=5.0, every=7))
+        bed.let_sleep(Sleep(calm=5.0, pace=7, every=7))
     with pytest.raises(ValueError, match="gravity or the rules of sleep are others by now"):
         bed.rollback(held)

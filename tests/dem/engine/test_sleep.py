@@ -49,14 +49,11 @@ def pressed(layer, rules=None):
     if rules:
         bed.let_sleep(rules)
     rows, left, momentum, impulse = [], 2000, [], 0.0
-    mass = bed.grains().mass
     while left > 0:
         bed.advance(50)
         left -= 50
         impulse += 50 * bed.time_step * (-bed.reaction(0)[0][2] - bed.reaction(1)[0][2] - bed.weight)
-        grains = bed.grains()
-        speed = grains.velocity[:, 2] + 0.5 * bed.time_step * grains.force[:, 2] / mass
-        momentum.append(mass @ speed - impulse)
+        momentum.append(bed.momentum()[2] - impulse)
         rows.append([bed.reaction(1)[0][2], bed.floor_force / bed.weight, bed.awake_count])
     return np.array(rows), bed_energies(bed, bodies={}), np.ptp(momentum)
 
@@ -67,7 +64,7 @@ def test_what_reaches_a_bed_is_the_same_with_grains_asleep(layer):
     1e-4 off as measured: what the layer beyond those awake gives way by, and they do not.
     """
     plain, energies, _ = pressed(layer)
-    found, asleep_energies, drift = pressed(layer, Sleep(calm=0.3))
+    found, asleep_energies, drift = pressed(layer, Sleep(every=48, calm=0.3))
     assert plain[:, 2].min() == 2 * ROWS * COLUMNS and found[:, 2].min() < ROWS * COLUMNS
     assert np.abs(found[:, 0] - plain[:, 0]).max() < 1e-3 * plain[:, 0].max()
     assert np.abs(found[:, 1] - plain[:, 1]).max() < 1e-3 * plain[:, 1].max()
@@ -84,7 +81,7 @@ def test_woken_at_once_they_go_on_as_if_they_had_not_slept(layer):
     bed, state = layer
     bed.restore(state)
     bed.move_body(1, position=(0.02, 0.012, 0.05), velocity=(0.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(calm=0.1))
+    bed.let_sleep(Sleep(every=48, calm=0.1))
     bed.advance(600)
     assert bed.awake_count == 0 and bed.asleep.all()
     before = bed.grains()
@@ -133,13 +130,13 @@ def test_a_held_state_is_taken_back_with_its_sleepers_to_the_same_bits(layer):
 
     bed, state = layer
     bed.restore(state)
-    bed.let_sleep(Sleep(calm=0.3))
+    bed.let_sleep(Sleep(every=48, calm=0.3))
     bed.advance(200)
-    awake = bed.awake_count
+    fast = bed.sleeper.fast
     held, then = bed.checkpoint(), bits()
     bed.advance(500)
     after = bits()
-    assert bed.awake_count < awake
+    assert bed.sleeper.fast < fast
     for _ in range(2):
         bed.rollback(held)
         assert bits() == then
@@ -150,8 +147,10 @@ def test_a_held_state_is_taken_back_with_its_sleepers_to_the_same_bits(layer):
 def test_what_cannot_be_is_refused(layer):
     with pytest.raises(ValueError, match=r"waking_speed = 0.001 must be above speed = 0.005"):
         Sleep(waking_speed=1e-3)
-    with pytest.raises(ValueError, match="force = 0 must be above 0"):
-        Sleep(force=0)
+    with pytest.raises(ValueError, match="change = 0 must be above 0"):
+        Sleep(change=0)
+    with pytest.raises(ValueError, match="every = 50 must be a multiple of pace = 16"):
+        Sleep(every=50)
     bed = Bed.from_grains(
         STUFF, positions=np.array([[0.01, 0.01, 0.01]]), radii=np.array([0.002]), size=(0.02, 0.02, 0.02), gravity=0.0,
         threads=2,
@@ -165,14 +164,14 @@ def test_one_that_is_woken_wakes_its_cell_and_the_26_around_it_across_the_period
     bed, state = layer
     bed.restore(state)
     bed.move_body(1, position=(0.06, 0.012, 0.5), velocity=(0.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(calm=0.3))
+    bed.let_sleep(Sleep(every=48, calm=0.3))
     bed.advance(1500)
     asleep = bed.asleep
     position = bed.grains(contacts=False).position
     corner = int(np.argmin(np.where(asleep, position.sum(axis=1), np.inf)))
     assert asleep.mean() > 0.9
     bed.engine.rest.woken[corner] = 1
-    bed.make_lists()
+    bed.make_lists(anew=False, stirred=True)
     count, box = bed.engine.count.to_numpy()[4:7], bed.engine.box.to_numpy()
     cells = np.floor((position - [0.0, 0.0, box[2]]) / box[4:7]).astype(int)
     apart = np.abs(cells - cells[corner])
@@ -209,7 +208,7 @@ def skimmed(steps, *, wide=0.05, cut=None):
     bed.move_body(ball, velocity=(10.0, 0.0, 0.0))
     above = bed.add_body(Ball(radius=wide), position=(0.05, 0.006, 3.0))
     bed.move_body(above, velocity=(10.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(calm=0.05))
+    bed.let_sleep(Sleep(every=48, calm=0.05))
     begins, done, state = set(), 0, None
     while done < steps:
         bed.advance(100)
@@ -246,21 +245,21 @@ def test_sleepers_that_lists_pass_over_are_where_sorting_all_would_put_them(monk
     """With all grains sorted every time the state has the same bits, and else those far behind are left out."""
     sorted_ones = []
 
-    def counted(self, **more):
-        rearrange(self, **more)
+    def counted(self):
+        recount(self)
         sorted_ones.append(int(self.bed.engine.count[Lists.SORTED]))
 
-    def all_of_them(self, **more):
+    def all_of_them(self):
         self.bed.engine.rest.whole[None] = 1
-        counted(self, **more)
+        counted(self)
 
-    steps, rearrange = 3000, Sleeper.rearrange
-    monkeypatch.setattr(Sleeper, "rearrange", counted)
+    steps, recount = 3000, Sleeper.recount
+    monkeypatch.setattr(Sleeper, "recount", counted)
     found, _ = skimmed(steps, cut=1500)
     left_out = np.array(sorted_ones) < found.grain_count
     assert 0.3 < left_out.mean() < 1 and min(sorted_ones) < 0.5 * found.grain_count
     state, sorted_ones = found.state(), []
-    monkeypatch.setattr(Sleeper, "rearrange", all_of_them)
+    monkeypatch.setattr(Sleeper, "recount", all_of_them)
     plain, _ = skimmed(steps, cut=1500)
     assert set(sorted_ones) == {plain.grain_count}
     assert {name: values.tobytes() for name, values in plain.state().items()} == {
@@ -272,7 +271,7 @@ def test_lists_that_were_interrupted_leave_nobody_behind_who_was_woken(layer, mo
     """Ctrl-C between the waking and the sorting: the next lists sort those who were woken before it too."""
     bed, state = layer
     bed.restore(state)
-    bed.let_sleep(Sleep(calm=0.1))
+    bed.let_sleep(Sleep(every=48, calm=0.1))
     bed.advance(1200)
     assert 0 < bed.awake_count < 0.5 * bed.grain_count and bed.engine.rest.whole[None] == 0
 
@@ -283,6 +282,6 @@ def test_lists_that_were_interrupted_leave_nobody_behind_who_was_woken(layer, mo
     with monkeypatch.context() as patch:
         patch.setattr(bed.engine, "sort", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            bed.make_lists()
-    bed.make_lists()
+            bed.make_lists(anew=False, stirred=True)
+    bed.make_lists(anew=False, stirred=True)
     assert bed.awake_count == int((~bed.asleep).sum())

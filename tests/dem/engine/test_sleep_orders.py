@@ -36,7 +36,7 @@ def two_layers():
     )  # fmt: skip
     bed.advance(300, drag_time=2e-3)
     bed.add_body(Ball(radius=5e-3), position=(0.05, 0.008, 0.02))
-    bed.let_sleep(Sleep(calm=0.05))
+    bed.let_sleep(Sleep(calm=0.05, pace=4, every=8, still=1e-3))
     return bed
 
 
@@ -80,15 +80,15 @@ def tracked(bed, chance, folder):
 @pytest.mark.long
 def test_orders_drawn_by_chance_have_the_bits_of_sorting_all_grains_every_time(tmp_path, monkeypatch):
     monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 20)
-    sorted_ones, rearrange, all_of_them = [], Sleeper.rearrange, False
+    sorted_ones, recount, all_of_them = [], Sleeper.recount, False
 
-    def counted(self, **more):
+    def counted(self):
         if all_of_them:
             self.bed.engine.rest.whole[None] = 1
-        rearrange(self, **more)
+        recount(self)
         sorted_ones.append(int(self.bed.engine.count[Lists.SORTED]) / self.bed.grain_count)
 
-    monkeypatch.setattr(Sleeper, "rearrange", counted)
+    monkeypatch.setattr(Sleeper, "recount", counted)
     found = tracked(two_layers(), np.random.default_rng(SEED), tmp_path)
     assert min(sorted_ones) < 0.5 and np.mean(np.array(sorted_ones) < 1) > 0.3
     assert min(awake for _, awake, _ in found) < 0.3 * 2 * COLUMNS * ROWS

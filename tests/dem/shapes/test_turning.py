@@ -62,7 +62,7 @@ def test_grains_on_a_floor_under_bodies_turn_by_weight_floor_sides_sleepers_and_
     bed.track_contact_work()
     before = bed.angular_momentum()
     if sleeps:
-        bed.let_sleep(Sleep(speed=0.05, waking_speed=0.3, calm=0.3, every=10))
+        bed.let_sleep(Sleep(speed=0.05, waking_speed=0.3, calm=0.3, every=16))
     bed.move_body(1, velocity=(0.15, 0.02, -0.1), spin=(3.0, 1.0, 0.0))
     bed.move_body(2, velocity=(0.0, 0.0, -0.2), spin=(0.0, 8.0, 2.0))
     bed.advance(150)
