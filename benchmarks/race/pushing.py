@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.race.entrants import LAMMPS, TIME_STEP, PeerError
 from benchmarks.race.grains import BENCH, DIAMETER, Grains, write_data
 from dem import Bed, Cylinder
-from dem.engine.sleep import Sleep
+from dem.engine.values import Sleep
 from experiments.validate.base.peers import run_deck
 
 __all__ = ["SAMPLES", "Push", "Pushed", "push_lammps", "push_ours", "read_push"]

@@ -480,15 +480,9 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         put_rows(field, values, first if rows is None else rows)
 
     def launch(
-        self,
-        most: int,
-        before: int,
-        dt: float,
-        limit: float,
-        gravity: tuple[float, float, float],
-        keep: float,
+        self, most: int, before: int, dt: float, limit: float, gravity: tuple[float, float, float], keep: float,
         awake: int,
-    ) -> tuple[int, bool]:
+    ) -> tuple[int, bool]:  # fmt: skip
         """Up to ``most`` steps of the grains awake, fewer where that is many: (steps done, whether lists are due).
 
         ``before``: how many steps were made.

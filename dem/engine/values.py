@@ -94,7 +94,7 @@ class Sleep:
     speed: float = 5e-3  # A fast grain below this may become slow [sqrt(g d)]
     calm: float = 1.0  # For how long it must be, and a slow one to fall asleep [sqrt(d / g)]
     reach: float = 3.0  # No grain this near to a body is slow or sleeps [d]
-    pace: int = 16
+    pace: int = 4
     """Steps of the bed for one of a slow grain, whose mass counts the square of it times; 1: none is slow."""
     own: float = 2e-2  # A slow grain above this is fast again [sqrt(g d)]
     unbalanced: float = 0.2  # So is one on which this force is out of balance [its contacts' mean force, or m g]

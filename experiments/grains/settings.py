@@ -53,7 +53,7 @@ class GrainsSettings(StrictSettings):
     sleep: bool = False
     """On a bed: whether quiet grains are computed every so many steps only, and those at rest not at all
     (docs/bed.md)."""
-    sleep_pace: int = Field(16, ge=1, le=64)
+    sleep_pace: int = Field(Sleep.pace, ge=1, le=64)
     """Of sleep: steps of the bed for one of a quiet grain, whose mass counts the square of it times; 1: there are none
     [1]."""
     sleep_force: Positive = 1.0

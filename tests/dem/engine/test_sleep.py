@@ -149,7 +149,7 @@ def test_what_cannot_be_is_refused(layer):
         Sleep(waking_speed=1e-3)
     with pytest.raises(ValueError, match="change = 0 must be above 0"):
         Sleep(change=0)
-    with pytest.raises(ValueError, match="every = 50 must be a multiple of pace = 16"):
+    with pytest.raises(ValueError, match="every = 50 must be a multiple of pace = 4"):
         Sleep(every=50)
     bed = Bed.from_grains(
         STUFF, positions=np.array([[0.01, 0.01, 0.01]]), radii=np.array([0.002]), size=(0.02, 0.02, 0.02), gravity=0.0,

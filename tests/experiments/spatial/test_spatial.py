@@ -42,7 +42,7 @@ def test_the_cube_that_ships_loads_and_is_what_the_documentation_runs():
         ({"actuator": "brake", "torque": (1.0, 0.0, 0.0)}, "wheel_speed_0 about x = 0 rad/s"),
         ({"actuator": "brake"}, "torque is not given"),
         ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
-        ({"ground": "bed", "sleep_pace": 4}, "sleep_pace = 4 is of sleep, which is off"),
+        ({"ground": "bed", "sleep_pace": 8}, "sleep_pace = 8 is of sleep, which is off"),
         ({"ground": "bed", "sleep_share": 0.4}, "sleep_share = 0.4 is of the rules of sleep before"),
         ({"mu_s": 0.1, "mu_d": 0.2}, "mu_d = 0.2 is above mu_s = 0.1"),
         ({"torque": 0.1}, "it must be a list"),
