@@ -94,7 +94,8 @@ class BedState(BedBodies):
     def restore(self, values: State) -> None:
         """Go back to a state of this bed, or of one that was made with the same settings.
 
-        Raises ValueError: a state of another number of grains, of another layout or precision.
+        Raises ValueError: a state of another number of grains, of another layout or precision, or of rules of sleep
+        that there are no more.
         """
         self.check_valid()
         e = self.engine
@@ -105,6 +106,7 @@ class BedState(BedBodies):
             )
         if values["position"].dtype != self.runtime.precision:
             raise ValueError(f"this state is in {values['position'].dtype}, the bed in {self.runtime.precision}")
+        rules = Sleep.of_numbers(values["sleep_rules"].tolist()) if "sleep_rules" in values else None
         layout = layout_of(values)
         self.make_room(*e.rooms_for(values["pair_count"], values["near_grain"], *layout))
         e = self.engine
@@ -133,10 +135,10 @@ class BedState(BedBodies):
         self.time_step, self.skin, self.gravity = reals[0], reals[1], tuple(reals[2:5])
         self.surface, self.packing_fraction, self.overlap_limit = reals[5:]
         e.wake_all()
-        if "sleep_rules" in values:
+        if rules is not None:
             e.let_sleep()
             e.count[e.AWAKE], e.count[e.CHUNKS], e.count[e.FAST], e.count[e.FAST_CHUNKS] = layout
-            self.sleeper = Sleeper(self, Sleep.of_numbers(values["sleep_rules"].tolist()))
+            self.sleeper = Sleeper(self, rules)
             self.sleeper.restore(values, rows)
 
     def successor(self, values: State, *, keep: np.ndarray | None = None, **changes: Any) -> Self:

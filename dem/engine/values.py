@@ -123,8 +123,10 @@ class Sleep:
     def of_numbers(cls, numbers: Sequence[float]) -> "Sleep":
         """The rules of a state. Raises ValueError for those of a version that had others."""
         if len(numbers) != len(fields(cls)):
-            raise ValueError(f"this state has {len(numbers)} rules of sleep, of an earlier version; {len(fields(cls))} "
-                             f"were expected: wake the bed with the version that made it")  # fmt: skip
+            raise ValueError(
+                f"this state has {len(numbers)} rules of sleep, of an earlier version, and {len(fields(cls))} were "
+                f"expected: go on with the version that made it, or begin anew"
+            )
         given = {field.name: number for field, number in zip(fields(cls), numbers, strict=True)}
         own = {name: float(number) for name, number in given.items() if name not in ("pace", "every")}
         return cls(**own, pace=int(given["pace"]), every=int(given["every"]))

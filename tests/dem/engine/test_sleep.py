@@ -159,6 +159,20 @@ def test_what_cannot_be_is_refused(layer):
         bed.let_sleep()
 
 
+def test_a_state_of_earlier_rules_of_sleep_is_refused_and_the_bed_stays_as_it_is(layer):
+    """Before 2026-11-26 there were seven rules, and no slow grains to count."""
+    bed, state = layer
+    bed.restore(state)
+    bed.let_sleep(Sleep(every=48, calm=0.3))
+    bed.advance(100)
+    before = bed.state()
+    earlier = before | {"sleep_rules": before["sleep_rules"][:7], "sleep_numbers": before["sleep_numbers"][:3]}
+    with pytest.raises(ValueError, match="7 rules of sleep, of an earlier version, and 10 were expected"):
+        bed.restore(earlier)
+    after = bed.state()
+    assert [name for name in before if not np.array_equal(before[name], after[name])] == []
+
+
 def test_one_that_is_woken_wakes_its_cell_and_the_26_around_it_across_the_periodic_sides(layer):
     """And nobody else; the corner grain's cell has neighbours at the other ends."""
     bed, state = layer
