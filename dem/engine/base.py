@@ -145,11 +145,12 @@ class BedBase:
         return [self.engine.read(name)[awake].astype(float) for name in names]
 
     def paces(self) -> np.ndarray:
-        """Steps of the bed for one of each grain awake, in the order of memory: 1, but of the slow; shape [awake].
+        """Steps of the bed for one of each grain awake, in the order of memory: 1, but of the slow; shape [awake]."""
+        return np.ones(self.grain_count) if self.sleeper is None else self.sleeper.of_slow(self.sleeper.pace)
 
-        A slow grain moves as if it had the square of it times its mass.
-        """
-        return np.ones(self.grain_count, dtype=int) if self.sleeper is None else self.sleeper.paces()
+    def heaviness(self) -> np.ndarray:
+        """How many times its mass each grain awake moves with, likewise."""
+        return np.ones(self.grain_count) if self.sleeper is None else self.sleeper.of_slow(self.sleeper.heavy)
 
     def rates_now(
         self, position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, force: np.ndarray, torque: np.ndarray
@@ -157,8 +158,8 @@ class BedBase:
         """Velocity [m/s] and spin [rad/s] at the time of the positions, half a step after the engine's, of its rows:
         of all grains, or of those awake."""
         half = np.ones(len(position))
-        half[: self.awake_count] = self.paces()[: len(half)]
-        half = 0.5 * self.time_step / half[:, None]
+        half[: self.awake_count] = (self.paces() / self.heaviness())[: len(half)]
+        half = 0.5 * self.time_step * half[:, None]
         radius, mass = position[:, 3], velocity[:, 3]
         now = velocity[:, :3] + half * force / mass[:, None]
         return now, spin[:, :3] + half * torque * (2.5 / (mass * radius**2))[:, None]

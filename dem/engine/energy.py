@@ -39,7 +39,7 @@ def bed_energies(bed: BedState, *, bodies: Mapping[int, Gap]) -> dict[str, float
     """
     position, kept = (bed.engine.read(name).astype(float) for name in ("position", "velocity"))
     awake = slice(0, bed.awake_count)
-    radius, mass = position[awake, 3], bed.paces() ** 2 * kept[awake, 3]
+    radius, mass = position[awake, 3], bed.heaviness() * kept[awake, 3]
     velocity, rates = bed.rates_now(position[awake], kept[awake], *bed.awake_rows("spin", "force", "torque"))
     moving = 0.5 * mass @ (velocity**2).sum(axis=1)
     turning = 0.2 * (mass * radius**2) @ (rates**2).sum(axis=1)

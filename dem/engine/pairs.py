@@ -152,9 +152,9 @@ class Pairs(EnginePart):
         p = self.grain_pair[None]
         held = ti.Vector.zero(self.real, 3)
         largest = ti.Vector([0.0] * LANES, dt=self.real)
-        heavier = 1
+        heavy = ti.cast(1.0, self.real)
         if ti.static(rest.on):
-            heavier = self.steps_of(c, rest) ** 2
+            heavy = self.heaviness(c, rest)
         one = ti.Vector([1.0] * LANES, dt=self.real)  # what lanes without a pair compute with
         # Of each pair: distance, radii, masses, velocity, spins, histories, then what comes out.
         dx, dy, dz, ri, rj, mi, mj, vx, vy, vz = one, one, one, one, one, one, one, one, one, one
@@ -175,8 +175,8 @@ class Pairs(EnginePart):
                 dx[k], dy[k], dz[k], ri[k], rj[k] = d.x, d.y, d.z, x_i.w, x_j.w
                 v_i, v_j = self.velocity[i], self.velocity[j]
                 if ti.static(rest.on):
-                    v_i.w *= heavier
-                    v_j.w *= heavier
+                    v_i.w *= heavy
+                    v_j.w *= heavy
                 v = v_i.xyz - v_j.xyz
                 vx[k], vy[k], vz[k], mi[k], mj[k] = v.x, v.y, v.z, v_i.w, v_j.w
                 w_i, w_j = self.spin[i], self.spin[j]

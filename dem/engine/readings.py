@@ -143,11 +143,12 @@ class Readings(EnginePart):
                 found[k + 3] = moment[k]
 
     @ti.func
-    def motion_of(self, i, many, dt):
-        """What a grain has in steps of so ``many``, the force to come included: momentum, angular momentum, energy."""
+    def motion_of(self, i, slow, dt, rest: ti.template()):
+        """What a grain has, ``slow`` or not, the force to come included: momentum, angular momentum, energy."""
         x, v, w = self.position[i], self.velocity[i], self.spin[i]
         own = ti.cast(0.4, self.real) * x.w * x.w
-        heavy = many * many * v.w
+        many = ti.select(slow, rest.pace[None], 1)
+        heavy = ti.cast(ti.select(slow, rest.heavy[None], 1.0), self.real) * v.w
         p = heavy * v.xyz + (many * dt) * self.force[i]
         turning = x.xyz.cross(p) + (heavy * own) * w.xyz + (many * dt) * self.torque[i]
         return p, turning, 0.5 * heavy * (v.xyz.norm_sqr() + own * w.xyz.norm_sqr())
@@ -155,6 +156,6 @@ class Readings(EnginePart):
     @ti.func
     def momentum_of(self, i, slow, time, slow_time, rest: ti.template()):
         """Momentum of a grain, as ``motion_of`` has it, whose force will act for a time [s]."""
-        many = ti.select(slow == 1, rest.pace[None], 1)
+        heavy = ti.cast(ti.select(slow == 1, rest.heavy[None], 1.0), self.real)
         acts = ti.cast(ti.select(slow == 1, slow_time, time), self.real)
-        return many * many * self.velocity[i].w * self.velocity[i].xyz + acts * self.force[i]
+        return heavy * self.velocity[i].w * self.velocity[i].xyz + acts * self.force[i]

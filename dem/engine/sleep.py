@@ -81,6 +81,7 @@ class Sleeper:
         # Slow grains take chunks of their own.
         self.pace = int(rules.pace) if e.chunk_count > 1 else 1
         e.rest.pace[None] = self.pace
+        e.rest.heavy[None] = self.heavy = rules.heavy(self.pace)
         self.reach = rules.reach * d
         self.quick, self.slow, self.own = (
             share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed, rules.own)
@@ -147,9 +148,9 @@ class Sleeper:
         turns = -(-(now + steps) // self.pace) + (-now // self.pace)  # multiples of the pace among these steps
         return steps * self.fast + turns * (self.awake - self.fast)
 
-    def paces(self) -> np.ndarray:
-        """Steps of the bed for one of each grain awake, in the order of memory, shape [awake]."""
-        return np.where(np.arange(self.awake) < self.fast, 1, self.pace)
+    def of_slow(self, number: float) -> np.ndarray:
+        """1 of each fast grain, ``number`` of each slow one, in the order of memory, shape [awake]."""
+        return np.where(np.arange(self.awake) < self.fast, 1.0, number)
 
     def pushes(self) -> tuple[np.ndarray, np.ndarray]:
         """What fast grains' steps did that has still to reach slow ones: sums over steps of force [N] and of moment

@@ -40,6 +40,7 @@ class Rest:
         # Slow grains, now and before the lists were last made; whether anybody has changed since then.
         self.slow, self.was_slow = (ti.field(ti.i32, grains) for _ in range(2))
         self.changed, self.pace = (ti.field(ti.i32, ()) for _ in range(2))
+        self.heavy = ti.field(ti.f64, ())  # how many times its mass a slow grain moves with
         # Of a fast grain's row whose neighbour is slow: force and torque on that, summed over steps.
         self.push, self.turn = (F(3, real, rows) for _ in range(2))
         self.buffer_force, self.buffer_torque = (F(3, real, grains) for _ in range(2))

@@ -40,7 +40,7 @@ class Steps(EnginePart):
             f, t = self.force[i], self.torque[i]
             inverse = step / v.w
             if ti.static(rest.on):
-                inverse /= many * many
+                inverse /= self.heaviness(c, rest)
             v.xyz = kept * v.xyz + f * inverse
             w.xyz = kept * w.xyz + t * (2.5 * inverse / (x.w * x.w))
             x.xyz += v.xyz * step
@@ -66,8 +66,13 @@ class Steps(EnginePart):
 
     @ti.func
     def steps_of(self, c, rest: ti.template()):
-        """Of how many steps one of chunk c is; its grains' mass counts the square of it times."""
+        """Of how many steps one of chunk c is."""
         return ti.select(c < self.count[self.FAST_CHUNKS], 1, rest.pace[None])
+
+    @ti.func
+    def heaviness(self, c, rest: ti.template()):
+        """How many times their mass the grains of chunk c move with."""
+        return ti.cast(ti.select(c < self.count[self.FAST_CHUNKS], 1.0, rest.heavy[None]), self.real)
 
     @ti.func
     def is_due(self, c, step, rest: ti.template()):
@@ -121,9 +126,8 @@ class Steps(EnginePart):
         """
         k = self.id[i]
         slow = i >= self.count[self.FAST]
-        many = ti.select(slow, rest.pace[None], 1)
         step = ti.cast(dt, self.real)
-        p, turning, energy = self.motion_of(i, many, step)
+        p, turning, energy = self.motion_of(i, slow, step, rest)
         after, turning_after, energy_after = p * 0.0, p * 0.0, energy * 0.0
         rest.quiet[k] = 0
         v, w = self.velocity[i], self.spin[i]
@@ -139,11 +143,12 @@ class Steps(EnginePart):
         else:
             rest.slow[k] = 1 - rest.slow[k]
             if not slow:
-                v.xyz /= rest.pace[None]
-                w.xyz /= rest.pace[None]
+                less = 1.0 / ti.sqrt(ti.cast(rest.heavy[None], self.real))
+                v.xyz *= less
+                w.xyz *= less
                 self.velocity[i] = v
                 self.spin[i] = w
-            after, turning_after, energy_after = self.motion_of(i, ti.select(slow, 1, rest.pace[None]), step)
+            after, turning_after, energy_after = self.motion_of(i, not slow, step, rest)
         rest.held[c] = rest.held[c] + (p - after) / step
         if ti.static(balance.on):
             balance.turn(c, balance.outside, turning_after - turning)
@@ -168,9 +173,10 @@ class Steps(EnginePart):
     @ti.func
     def push(self, c, dt, shapes: ti.template(), rest: ti.template(), balance: ti.template()):
         """Forces between the grains of a chunk and all that they touch."""
-        many = 1  # Of how many steps this one is
+        # Of how many steps this one is, and how many times their mass grains count.
+        many, heavy = 1, ti.cast(1.0, self.real)
         if ti.static(rest.on):
-            many = self.steps_of(c, rest)
+            many, heavy = self.steps_of(c, rest), self.heaviness(c, rest)
             dt *= many
         # First find out which pairs touch, then their forces.
         base = c * self.count[self.CHUNK_ROOM]
@@ -180,7 +186,7 @@ class Steps(EnginePart):
         largest, held = self.push_lanes(c, base, last, dt, rest, balance)
         on_floor = self.pushes[c, FLOOR]
         for s in range(c * self.count[self.NEAR_ROOM], self.near_end[c]):
-            largest = ti.max(largest, self.push_near(c, s, dt, many, shapes, balance))
+            largest = ti.max(largest, self.push_near(c, s, dt, many, heavy, shapes, balance))
         self.overlap[c] = ti.max(self.overlap[c], largest)
         if ti.static(rest.on):
             rest.held[c] = rest.held[c] + held
@@ -190,8 +196,8 @@ class Steps(EnginePart):
             rest.floor[c] = on_floor / many
 
     @ti.func
-    def push_near(self, c, s, dt, many, shapes: ti.template(), balance: ti.template()):
-        """Force between a grain and a body, in a step of so ``many``; returns overlap over diameter."""
+    def push_near(self, c, s, dt, many, heavy, shapes: ti.template(), balance: ti.template()):
+        """Force between a grain, so ``heavy``, and a body, in a step of so ``many``; returns overlap over diameter."""
         i = self.near_grain[s]
         b = self.near_body[s]
         x = self.position[i]
@@ -209,7 +215,7 @@ class Steps(EnginePart):
             p = self.body_pair[b]
             u = self.near_slide[s]
             onset = onset_of(v_n, overlap, dt, u.w, self.cohesion)
-            mass = many * many * self.velocity[i].w
+            mass = heavy * self.velocity[i].w
             f_n, damped, f_t, k_t, a, root, load, grown = contact_force(
                 p, n, v_n, v_t, overlap, radius, mass, onset, dt, u, self.tensile, self.cohesion,
                 self.rescaled, -dt * parting, middle, angle,

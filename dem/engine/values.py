@@ -95,7 +95,9 @@ class Sleep:
     calm: float = 1.0  # For how long it must be, and a slow one to fall asleep [sqrt(d / g)]
     reach: float = 3.0  # No grain this near to a body is slow or sleeps [d]
     pace: int = 4
-    """Steps of the bed for one of a slow grain, whose mass counts the square of it times; 1: none is slow."""
+    """Steps of the bed for one of a slow grain; 1: none is slow."""
+    stretch: float = 2.0
+    """How much nearer to the limit of stability such a step is: mass and inertia count (pace / stretch)^2 times."""
     own: float = 2e-2  # A slow grain above this is fast again [sqrt(g d)]
     unbalanced: float = 0.2  # So is one on which this force is out of balance [its contacts' mean force, or m g]
     still: float = 3e-4  # A slow grain below this may fall asleep [sqrt(g d)]
@@ -113,11 +115,17 @@ class Sleep:
                 raise ValueError(f"Sleep: {name} = {getattr(self, name)} must be a whole number of steps")
         if self.every % self.pace:
             raise ValueError(f"Sleep: every = {self.every} must be a multiple of pace = {self.pace}")
-        if self.waking_speed <= self.speed or self.own <= self.speed / self.pace:
+        if self.stretch < 1:
+            raise ValueError(f"Sleep: stretch = {self.stretch} must be 1 or more: at 1 a slow grain is as far from it")
+        if self.waking_speed <= self.speed or self.own <= self.speed / math.sqrt(self.heavy(self.pace)):
             raise ValueError(
                 f"Sleep: waking_speed = {self.waking_speed} must be above speed = {self.speed}, and own = {self.own} "
-                f"above speed / pace, or what falls asleep would wake at once"
+                f"above what is left of it with the larger mass, or what falls asleep would wake at once"
             )
+
+    def heavy(self, pace: int) -> float:
+        """How many times their mass and inertia slow grains of this pace move with."""
+        return max(1.0, pace / self.stretch) ** 2
 
     @classmethod
     def of_numbers(cls, numbers: Sequence[float]) -> "Sleep":

@@ -169,7 +169,7 @@ class GpuSteps(Part):
             if s == self.near_start[i]:
                 largest = self.overlap[i]
                 for row in range(s, self.near_start[i + 1]):
-                    largest = ti.max(largest, self.push_near(i, row, dt, 1, shapes, balance))
+                    largest = ti.max(largest, self.push_near(i, row, dt, 1, 1.0, shapes, balance))
                 self.overlap[i] = largest
 
     @ti.func
