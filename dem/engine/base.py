@@ -148,21 +148,23 @@ class BedBase:
         """Steps of the bed for one of each grain awake, in the order of memory: 1, but of the slow; shape [awake]."""
         return np.ones(self.grain_count) if self.sleeper is None else self.sleeper.of_slow(self.sleeper.pace)
 
-    def heaviness(self) -> np.ndarray:
-        """How many times its mass each grain awake moves with, likewise."""
-        return np.ones(self.grain_count) if self.sleeper is None else self.sleeper.of_slow(self.sleeper.heavy)
+    def heaviness(self) -> tuple[np.ndarray, np.ndarray]:
+        """How many times its mass, and its moment of inertia, each grain awake moves with, likewise."""
+        if self.sleeper is None:
+            return np.ones(self.grain_count), np.ones(self.grain_count)
+        return self.sleeper.of_slow(self.sleeper.heavy), self.sleeper.of_slow(self.sleeper.stout)
 
     def rates_now(
         self, position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, force: np.ndarray, torque: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Velocity [m/s] and spin [rad/s] at the time of the positions, half a step after the engine's, of its rows:
         of all grains, or of those awake."""
-        half = np.ones(len(position))
-        half[: self.awake_count] = (self.paces() / self.heaviness())[: len(half)]
-        half = 0.5 * self.time_step * half[:, None]
+        half = np.full((2, len(position)), 0.5 * self.time_step)
+        for row, heavier in zip(half, self.heaviness(), strict=True):
+            row[: self.awake_count] *= (self.paces() / heavier)[: len(row)]
         radius, mass = position[:, 3], velocity[:, 3]
-        now = velocity[:, :3] + half * force / mass[:, None]
-        return now, spin[:, :3] + half * torque * (2.5 / (mass * radius**2))[:, None]
+        now = velocity[:, :3] + (half[0] / mass)[:, None] * force
+        return now, spin[:, :3] + (half[1] * 2.5 / (mass * radius**2))[:, None] * torque
 
     @property
     def height(self) -> float:

@@ -280,7 +280,7 @@ class BedCore(BedState):
         them, and without the impulse of gravity, floor and sleepers that they have had before its time.
         """
         v, f = self.awake_rows("velocity", "force")
-        many, heavy = self.paces()[:, None], self.heaviness()[:, None]
+        many, heavy = self.paces()[:, None], self.heaviness()[0][:, None]
         found = (heavy * v[:, 3:] * v[:, :3] + self.time_step * many * f).sum(axis=0)
         if self.sleeper is not None:
             found += self.time_step * (self.sleeper.pushes()[0] - self.sleeper.impulse_ahead())
@@ -301,9 +301,9 @@ class BedCore(BedState):
         sums = self._balance().sums()
         x, v, w, f, t = self.awake_rows("position", "velocity", "spin", "force", "torque")
         radius, mass = x[:, 3], v[:, 3]
-        many, heavy = self.paces()[:, None], self.heaviness()[:, None]
+        many, (heavy, stout) = self.paces()[:, None], (each[:, None] for each in self.heaviness())
         momentum = heavy * mass[:, None] * v[:, :3] + self.time_step * many * f
-        own = heavy * (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * many * t
+        own = stout * (0.4 * mass * radius**2)[:, None] * w[:, :3] + self.time_step * many * t
         total = np.cross(x[:, :3], momentum).sum(axis=0) + own.sum(axis=0)
         if self.sleeper is not None:
             total += self.time_step * self.sleeper.pushes()[1]

@@ -39,10 +39,11 @@ def bed_energies(bed: BedState, *, bodies: Mapping[int, Gap]) -> dict[str, float
     """
     position, kept = (bed.engine.read(name).astype(float) for name in ("position", "velocity"))
     awake = slice(0, bed.awake_count)
-    radius, mass = position[awake, 3], bed.heaviness() * kept[awake, 3]
+    radius, (heavy, stout) = position[awake, 3], bed.heaviness()
+    mass = kept[awake, 3]
     velocity, rates = bed.rates_now(position[awake], kept[awake], *bed.awake_rows("spin", "force", "torque"))
-    moving = 0.5 * mass @ (velocity**2).sum(axis=1)
-    turning = 0.2 * (mass * radius**2) @ (rates**2).sum(axis=1)
+    moving = 0.5 * (heavy * mass) @ (velocity**2).sum(axis=1)
+    turning = 0.2 * (stout * mass * radius**2) @ (rates**2).sum(axis=1)
     height = -(kept[:, 3] @ (position[:, :3] @ np.array(bed.gravity, dtype=float)))
     state = bed.state()
     surfaces: dict[int, Gap] = {}

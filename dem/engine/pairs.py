@@ -35,6 +35,12 @@ class Pairs(EnginePart):
         return d
 
     @ti.func
+    def overlap_of(self, i, bits):
+        """Of a grain and its neighbour, over their mean diameter [1]."""
+        x_i, x_j = self.position[i], self.position[bits & INDEX_MASK]
+        return 1.0 - self.apart(x_i, x_j, bits).norm() / (x_i.w + x_j.w)
+
+    @ti.func
     def spring_force(self, x_i, x_j, bits, u):
         """What the springs of a pair do to the first [N], by ``dem.contact.law`` without dashpots; 0 apart."""
         d = self.apart(x_i, x_j, bits)

@@ -143,15 +143,21 @@ class Readings(EnginePart):
                 found[k + 3] = moment[k]
 
     @ti.func
+    def surface_speed(self, i):
+        """The larger of a grain's speed and of what its surface has by its spin [m/s]."""
+        return ti.max(self.velocity[i].xyz.norm(), self.position[i].w * self.spin[i].xyz.norm())
+
+    @ti.func
     def motion_of(self, i, slow, dt, rest: ti.template()):
         """What a grain has, ``slow`` or not, the force to come included: momentum, angular momentum, energy."""
         x, v, w = self.position[i], self.velocity[i], self.spin[i]
         own = ti.cast(0.4, self.real) * x.w * x.w
         many = ti.select(slow, rest.pace[None], 1)
-        heavy = ti.cast(ti.select(slow, rest.heavy[None], 1.0), self.real) * v.w
-        p = heavy * v.xyz + (many * dt) * self.force[i]
-        turning = x.xyz.cross(p) + (heavy * own) * w.xyz + (many * dt) * self.torque[i]
-        return p, turning, 0.5 * heavy * (v.xyz.norm_sqr() + own * w.xyz.norm_sqr())
+        mass = ti.cast(ti.select(slow, rest.heavy[None], 1.0), self.real) * v.w
+        inertia = ti.cast(ti.select(slow, rest.stout[None], 1.0), self.real) * own * v.w
+        p = mass * v.xyz + (many * dt) * self.force[i]
+        turning = x.xyz.cross(p) + inertia * w.xyz + (many * dt) * self.torque[i]
+        return p, turning, 0.5 * (mass * v.xyz.norm_sqr() + inertia * w.xyz.norm_sqr())
 
     @ti.func
     def momentum_of(self, i, slow, time, slow_time, rest: ti.template()):

@@ -40,6 +40,9 @@ from typing import Protocol
 
 import numpy as np
 
+from dem.contact.timestep import contact_time, stable_step
+from dem.grains.materials import Material
+
 from .engine import Engine
 from .lists import INDEX_MASK
 from .rows import Rows, put_rows, read_fields, row_numbers, take_rows, write_fields
@@ -58,6 +61,7 @@ class SleepyBed(Protocol):
     """What the sleep of grains needs of a bed (``dem.engine.base.BedBase``)."""
 
     engine: Engine
+    material: Material
     gravity: tuple[float, float, float]
     time_step: float
     grain_count: int
@@ -81,12 +85,14 @@ class Sleeper:
         # Slow grains take chunks of their own.
         self.pace = int(rules.pace) if e.chunk_count > 1 else 1
         e.rest.pace[None] = self.pace
-        e.rest.heavy[None] = self.heavy = rules.heavy(self.pace)
+        self.heavy, self.stout = rules.heaviness(self.pace)
+        e.rest.heavy[None], e.rest.stout[None] = self.heavy, self.stout
         self.reach = rules.reach * d
         self.quick, self.slow, self.own = (
             share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed, rules.own)
         )
         self.still = (rules.still if self.pace > 1 else rules.speed) * math.sqrt(g * d)
+        self.firm = self._firm()
         checks = rules.calm * math.sqrt(d / g) / bed.time_step / rules.every / _CALM_CHECKS
         self.rest_every = max(1, round(checks)) * rules.every
         self.awake = self.fast = bed.grain_count
@@ -95,6 +101,18 @@ class Sleeper:
         self.leaving = 0
         self.begun_ahead = np.zeros(6)  # ``floor_ahead`` when the last advance began
 
+    def _firm(self) -> float:
+        """The largest overlap over diameter at which a slow grain's step is stable with six neighbours [1]."""
+        bed = self.bed
+        if self.pace == 1:
+            return math.inf
+        radius = float(bed.engine.read("position")[:, 3].min())
+        some = 0.01
+        time = contact_time(bed.material, diameter=2 * radius, max_overlap=some)
+        normal, spin = (stable_step(bed.material.restitution, neighbours=6, sticking=s) for s in (False, True))
+        steps = min(math.sqrt(self.heavy) * normal, math.sqrt(self.stout) * spin)
+        return some * (steps * time / (self.pace * bed.time_step)) ** 4  # a contact's time goes with its root's root
+
     def check(self) -> bool:
         """The check of this step, if one is due: whether lists are to be made for it."""
         e, rest, rules, steps = self.bed.engine, self.bed.engine.rest, self.rules, self.bed.steps
@@ -102,11 +120,19 @@ class Sleeper:
             return False
         if self.fast < self.bed.grain_count:
             e.check_balance(
-                rules.unbalanced, rules.change, self.own, self.quick, self.reach, self.gravity, rest, e.shapes
+                rules.unbalanced,
+                rules.change,
+                self.own,
+                self.quick,
+                self.reach,
+                self.firm,
+                self.gravity,
+                rest,
+                e.shapes,
             )
         self.leaving = 0
         if steps % self.rest_every == 0:
-            e.find_calm(self.slow, self.still, _CALM_CHECKS, self.reach, rest, e.shapes)
+            e.find_calm(self.slow, self.still, _CALM_CHECKS, self.reach, self.firm, rest, e.shapes)
         news = rest.news.to_numpy()
         if steps % self.rest_every == 0:
             self.leaving += SLOW_DOWN * bool(int(news[SLOWING]) > _WORTH * self.fast)

@@ -40,7 +40,8 @@ class Rest:
         # Slow grains, now and before the lists were last made; whether anybody has changed since then.
         self.slow, self.was_slow = (ti.field(ti.i32, grains) for _ in range(2))
         self.changed, self.pace = (ti.field(ti.i32, ()) for _ in range(2))
-        self.heavy = ti.field(ti.f64, ())  # how many times its mass a slow grain moves with
+        # How many times its mass, and its moment of inertia, a slow grain moves with.
+        self.heavy, self.stout = (ti.field(ti.f64, ()) for _ in range(2))
         # Of a fast grain's row whose neighbour is slow: force and torque on that, summed over steps.
         self.push, self.turn = (F(3, real, rows) for _ in range(2))
         self.buffer_force, self.buffer_torque = (F(3, real, grains) for _ in range(2))
@@ -358,14 +359,14 @@ class Sleepers(EnginePart):
 
     @ti.kernel
     def check_balance(
-        self, unbalanced: float, change: float, own: float, quick: float, reach: float, gravity: float,
+        self, unbalanced: float, change: float, own: float, quick: float, reach: float, firm: float, gravity: float,
         rest: ti.template(), shapes: ti.template(),
     ):  # fmt: skip
         """Raise the flags of slow grains that are to be fast, and of sleepers that are to wake.
 
         ``unbalanced``, ``change``: of the force on a slow grain, and of its change on a sleeper, over the mean force of
         its contacts. ``own``: speed of a slow grain, ``quick``: of a sleeper's neighbour [m/s]. ``reach``: distance of
-        a body from a slow grain [m].
+        a body from a slow grain [m]. ``firm``: the most that a slow grain may overlap another, over their diameter [1].
         """
         for _ in range(1):
             self.find_bodies(rest)
@@ -392,6 +393,13 @@ class Sleepers(EnginePart):
             if rest.busy[k] == 1:
                 if rest.per_unit[None] * self.force[i].norm() > unbalanced * self.mean_load(k, rest):
                     rest.woken[k] = 1
+            for s in range(self.pair_start[i], self.pair_end[i]):
+                bits = ti.select(self.pair[s] < 0, ~self.pair[s], self.pair[s])
+                if self.overlap_of(i, bits) > firm:
+                    j = bits & INDEX_MASK
+                    rest.woken[k] = 1
+                    if j >= self.count[self.FAST] and j < self.count[self.AWAKE]:
+                        rest.woken[self.id[j]] = 1
         for i in range(self.count[self.AWAKE]):
             rest.busy[self.id[i]] = 0
         for i in range(self.count[self.AWAKE]):
@@ -420,18 +428,15 @@ class Sleepers(EnginePart):
             if rest.woken[k] == 1:
                 rest.news[WOKEN] = 1
 
-    @ti.func
-    def surface_speed(self, i):
-        """The larger of a grain's speed and of what its surface has by its spin [m/s]."""
-        return ti.max(self.velocity[i].xyz.norm(), self.position[i].w * self.spin[i].xyz.norm())
-
     @ti.kernel
     def find_calm(
-        self, slow: float, still: float, patience: int, reach: float, rest: ti.template(), shapes: ti.template()
-    ):
+        self, slow: float, still: float, patience: int, reach: float, firm: float, rest: ti.template(),
+        shapes: ti.template(),
+    ):  # fmt: skip
         """Mark who may become slow, or fall asleep, and count them.
 
         ``slow``, ``still``: speeds [m/s] below which a fast grain, and a slow one, must have been ``patience`` times.
+        ``firm``: as in ``check_balance``.
         """
         for _ in range(1):
             rest.news[SLOWING] = 0
@@ -450,9 +455,10 @@ class Sleepers(EnginePart):
                     j = (~code) & INDEX_MASK
                     if j < self.count[self.AWAKE]:
                         b = self.id[j]
-                        if self.keeps_up(j, i, rest):
+                        pressed = self.overlap_of(i, ~code) > firm
+                        if pressed or self.keeps_up(j, i, rest):
                             rest.busy[a] = 1
-                        if self.keeps_up(i, j, rest):
+                        if pressed or self.keeps_up(i, j, rest):
                             rest.busy[b] = 1
         for i in range(self.count[self.AWAKE]):
             k = self.id[i]

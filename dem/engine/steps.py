@@ -28,13 +28,14 @@ class Steps(EnginePart):
         """Kick and drift the grains of a chunk, with chunk 0 the bodies; drag leaves ``keep`` of a grain's speed."""
         start, end = self.chunk_range(c)
         far = 0
-        step, kept, many = dt, keep, 1
+        step, kept, many, rounder = dt, keep, 1, ti.cast(2.5, self.real)
         if ti.static(rest.on):
             many = self.steps_of(c, rest)
             if c >= self.count[self.FAST_CHUNKS]:
                 self.gather_pushes(c, rest)
                 kept = ti.pow(keep, many)
             step = dt * many
+            rounder *= self.heaviness(c, rest) / self.stoutness(c, rest)
         for i in range(start, end):
             x, v, w = self.position[i], self.velocity[i], self.spin[i]
             f, t = self.force[i], self.torque[i]
@@ -42,7 +43,7 @@ class Steps(EnginePart):
             if ti.static(rest.on):
                 inverse /= self.heaviness(c, rest)
             v.xyz = kept * v.xyz + f * inverse
-            w.xyz = kept * w.xyz + t * (2.5 * inverse / (x.w * x.w))
+            w.xyz = kept * w.xyz + t * (rounder * inverse / (x.w * x.w))
             x.xyz += v.xyz * step
             self.position[i] = x
             self.velocity[i] = v
@@ -73,6 +74,11 @@ class Steps(EnginePart):
     def heaviness(self, c, rest: ti.template()):
         """How many times their mass the grains of chunk c move with."""
         return ti.cast(ti.select(c < self.count[self.FAST_CHUNKS], 1.0, rest.heavy[None]), self.real)
+
+    @ti.func
+    def stoutness(self, c, rest: ti.template()):
+        """How many times their moment of inertia."""
+        return ti.cast(ti.select(c < self.count[self.FAST_CHUNKS], 1.0, rest.stout[None]), self.real)
 
     @ti.func
     def is_due(self, c, step, rest: ti.template()):
@@ -119,10 +125,9 @@ class Steps(EnginePart):
 
     @ti.func
     def change_pace(self, c, i, dt, rest: ti.template(), balance: ti.template()):
-        """Let a grain of chunk c become what its flags say, and book what its motion loses by it.
+        """Let a grain of chunk c become what its flags say, and book what its motion loses or gains by it.
 
-        From fast to slow it keeps its energy, for its speed is mostly vibration; from slow to fast its speed, for this
-        is mostly the sand's, and has less energy by it. None is made.
+        It keeps its speed, whatever its mass is then: most of it is the sand's own.
         """
         k = self.id[i]
         slow = i >= self.count[self.FAST]
@@ -142,12 +147,6 @@ class Steps(EnginePart):
             self.torque[i] = ti.Vector.zero(self.real, 3)
         else:
             rest.slow[k] = 1 - rest.slow[k]
-            if not slow:
-                less = 1.0 / ti.sqrt(ti.cast(rest.heavy[None], self.real))
-                v.xyz *= less
-                w.xyz *= less
-                self.velocity[i] = v
-                self.spin[i] = w
             after, turning_after, energy_after = self.motion_of(i, not slow, step, rest)
         rest.held[c] = rest.held[c] + (p - after) / step
         if ti.static(balance.on):

@@ -96,12 +96,14 @@ class Sleep:
     reach: float = 3.0  # No grain this near to a body is slow or sleeps [d]
     pace: int = 4
     """Steps of the bed for one of a slow grain; 1: none is slow."""
-    stretch: float = 2.0
-    """How much nearer to the limit of stability such a step is: mass and inertia count (pace / stretch)^2 times."""
+    stretch: float = 4.0
+    """How much nearer to the limit of stability such a step is: a slow grain's mass counts (pace / stretch)^2 times,"""
+    spin_stretch: float = 1.6
+    """and its moment of inertia (pace / spin_stretch)^2 times; none counts less than once."""
     own: float = 2e-2  # A slow grain above this is fast again [sqrt(g d)]
     unbalanced: float = 0.2  # So is one on which this force is out of balance [its contacts' mean force, or m g]
-    still: float = 3e-4  # A slow grain below this may fall asleep [sqrt(g d)]
-    change: float = 0.03  # A sleeper wakes when the force on it has changed by this [its contacts' mean force, or m g],
+    still: float = 3e-3  # A slow grain below this may fall asleep [sqrt(g d)]
+    change: float = 0.1  # A sleeper wakes when the force on it has changed by this [its contacts' mean force, or m g],
     waking_speed: float = 5e-2  # or a neighbour has this speed [sqrt(g d)]
     every: int = 96
     """Steps between two checks: what changes makes new lists, and those cost as much as four steps of all grains."""
@@ -115,17 +117,18 @@ class Sleep:
                 raise ValueError(f"Sleep: {name} = {getattr(self, name)} must be a whole number of steps")
         if self.every % self.pace:
             raise ValueError(f"Sleep: every = {self.every} must be a multiple of pace = {self.pace}")
-        if self.stretch < 1:
-            raise ValueError(f"Sleep: stretch = {self.stretch} must be 1 or more: at 1 a slow grain is as far from it")
-        if self.waking_speed <= self.speed or self.own <= self.speed / math.sqrt(self.heavy(self.pace)):
+        for name in ("stretch", "spin_stretch"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"Sleep: {name} = {getattr(self, name)} must be 1 or more: at 1 no step is nearer")
+        if min(self.waking_speed, self.own) <= self.speed:
             raise ValueError(
-                f"Sleep: waking_speed = {self.waking_speed} must be above speed = {self.speed}, and own = {self.own} "
-                f"above what is left of it with the larger mass, or what falls asleep would wake at once"
+                f"Sleep: waking_speed = {self.waking_speed} and own = {self.own} must be above speed = {self.speed}, "
+                f"or what becomes slow or falls asleep would be fast at once"
             )
 
-    def heavy(self, pace: int) -> float:
-        """How many times their mass and inertia slow grains of this pace move with."""
-        return max(1.0, pace / self.stretch) ** 2
+    def heaviness(self, pace: int) -> tuple[float, float]:
+        """How many times their mass, and their moment of inertia, slow grains of this pace move with."""
+        return max(1.0, pace / self.stretch) ** 2, max(1.0, pace / self.spin_stretch) ** 2
 
     @classmethod
     def of_numbers(cls, numbers: Sequence[float]) -> "Sleep":

@@ -145,7 +145,7 @@ def test_a_held_state_is_taken_back_with_its_sleepers_to_the_same_bits(layer):
 
 
 def test_what_cannot_be_is_refused(layer):
-    with pytest.raises(ValueError, match=r"waking_speed = 0.001 must be above speed = 0.005"):
+    with pytest.raises(ValueError, match=r"waking_speed = 0.001 and own = 0.02 must be above speed = 0.005"):
         Sleep(waking_speed=1e-3)
     with pytest.raises(ValueError, match="change = 0 must be above 0"):
         Sleep(change=0)
@@ -167,7 +167,7 @@ def test_a_state_of_earlier_rules_of_sleep_is_refused_and_the_bed_stays_as_it_is
     bed.advance(100)
     before = bed.state()
     earlier = before | {"sleep_rules": before["sleep_rules"][:7], "sleep_numbers": before["sleep_numbers"][:3]}
-    with pytest.raises(ValueError, match="7 rules of sleep, of an earlier version, and 10 were expected"):
+    with pytest.raises(ValueError, match="7 rules of sleep, of an earlier version, and 12 were expected"):
         bed.restore(earlier)
     after = bed.state()
     assert [name for name in before if not np.array_equal(before[name], after[name])] == []
