@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from experiments.runs.strict import NotNegative, Positive, SeedNumber, StrictSettings, Threads
+from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.sentences import Sentences
 
 if TYPE_CHECKING:
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
 
 say = Sentences(__package__)
-
-STANDARD_GRAVITY = 9.80665
-"""Unit of `rig` [m/s2]."""
 
 _MATERIALS = "sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml"
 _SOFTENED = "Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
