@@ -30,7 +30,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 }  # fmt: skip
 """Kind -> unit -> how many of the SI unit it is."""
 
-_TYPED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.].*?)\s*")
+_TYPED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![eE][+-]?\d)\s*([^\d\s.].*?)\s*")
 _STATED = re.compile(r"(?:([0-9.]+) )?(\S.*)")
 
 

@@ -13,7 +13,7 @@ from experiments.hop.settings import HopSettings
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.registry import EXPERIMENTS
 from experiments.runs.strict import plain_kinds
-from experiments.runs.units import find_unit, in_both
+from experiments.runs.units import find_unit, has_unit, in_both
 from experiments.spatial.settings import SpatialSettings
 from experiments.tumble.campaign_settings import CampaignSettings
 from experiments.tumble.settings import TumbleSettings
@@ -43,11 +43,17 @@ def test_a_number_is_read_in_the_unit_behind_it(text, stated, number):
     assert unit.value_of(text) == pytest.approx(number, rel=1e-15)
 
 
+@pytest.mark.parametrize("text", ["1e-3", "-2E+05", "1e3", ".5", "7.", "1e-30"])
+def test_a_plain_number_has_no_unit(text):
+    assert not has_unit(text)
+    assert has_unit(f"{text}g")
+
+
 def test_a_rig_in_g_is_the_same_number_to_the_last_bit():
     assert TumbleSettings(rig="0.0085g") == TumbleSettings(rig=0.0085)
 
 
-@pytest.mark.parametrize("text", ["0.1", "g", "fast", "1e-3 parsec", "1e-3kg", "nang", "1e-3g.", "--1g", ""])
+@pytest.mark.parametrize("text", ["0.1", "1e-3", "g", "fast", "1e-3 parsec", "1e-3kg", "nang", "1e-3g.", "--1g", ""])
 def test_what_has_no_unit_of_the_kind_is_refused_by_name(text):
     unit = find_unit("Gravity [m/s2].")
     assert unit is not None
