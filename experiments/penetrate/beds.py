@@ -18,8 +18,8 @@ from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
 
-from .following import pace_of
 from .settings import PenetrateSettings
+from .similarity import pace_of
 from .units import RAIN, deepest
 
 __all__ = [

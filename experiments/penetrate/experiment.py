@@ -34,12 +34,12 @@ from . import beds
 from .amended import run_without_bed
 from .beds import fingerprint
 from .findings import BedFacts
-from .following import fast_for_gravity, similarity_of
 from .recorded import campaign_of, sensors_of
 from .refusals import check
 from .rest import made_units, sinks_away
 from .result import conclude, softening_note, staged_note, stiffer_note
 from .settings import PenetrateSettings, say
+from .similarity import fast_for_gravity, similarity_of
 from .units import PenetratePlan, Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
 
 __all__ = ["Frames", "check", "fingerprint", "resume", "run"]

@@ -19,10 +19,10 @@ from . import beds
 from .amended import kept_law, run_beside
 from .departures import departures
 from .findings import BedFacts, Findings, bed_entry, bed_quantities, drop_note
-from .following import fast_for_gravity, pace_of, similarity_of
 from .reference import compare_with, read_reference
 from .rest import answer
 from .settings import PenetrateSettings, say
+from .similarity import fast_for_gravity, pace_of, similarity_of
 from .units import Unit, make_spike
 
 __all__ = [

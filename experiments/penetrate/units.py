@@ -18,8 +18,8 @@ from experiments.runs.types import Json
 from experiments.runs.whole_runs import PictureCosts
 from rigid import Spike
 
-from .following import pace_of
 from .settings import PenetrateSettings
+from .similarity import pace_of
 
 __all__ = ["RAIN", "PenetratePlan", "Unit", "deepest", "expected_time", "make_run", "make_spike", "plan_units"]
 
