@@ -71,8 +71,8 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
                 find_material(settings), packing=settings.packing, **options,
                 progress=BedProgress(progress, name, asked_to_stop, tapped=settings.packing is not None),
             )  # fmt: skip
-        staged = {"progress": progress, "asked_to_stop": asked_to_stop, "name": name}
-        bed = staged_bed(find_material(settings), stages, **options, **staged)
+        stuff, ending = find_material(settings), asked_to_stop
+        bed = staged_bed(stuff, stages, progress=progress, asked_to_stop=ending, name=name, **options)
     if first != settings.gravity:
         bed.set_gravity(settings.gravity)
         _come_to_rest(bed, unit=math.sqrt(settings.grain / first))

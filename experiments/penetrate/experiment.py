@@ -64,7 +64,8 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
         if note := staged_note(settings):
             progress.message(note)
         progress.message(softening_note(settings, softening))
-        dropped = f", a dropped spike moves {settings.mass:.4g} kg" if settings.drop_speeds else ""
+        any_drops = any(unit.kind == "drop" for unit in units)
+        dropped = f", a dropped spike moves {settings.mass:.4g} kg" if any_drops else ""
         progress.message(f"the load is {settings.weight:.4g} N{dropped}")
         if sinks_away(settings):
             rests = beds.expected_bearing(settings).depth(settings.weight)

@@ -33,8 +33,8 @@ def check(settings: PenetrateSettings) -> None:
         return
     stuff = beds.find_material(settings)
     if settings.bed_stages is not None:
-        bed = {"size": settings.bed_size, "grain": settings.grain, "spread": settings.spread}
-        check_bed_stages(settings.bed_stages, stuff, **bed)
+        size, grain, spread = settings.bed_size, settings.grain, settings.spread
+        check_bed_stages(settings.bed_stages, stuff, size=size, grain=grain, spread=spread)
     for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
         if seeds and not speeds:
             raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")

@@ -81,4 +81,4 @@ def in_both(name: str, value: Any, unit: Unit | None) -> Iterator[str]:
     for number in value if isinstance(value, list | tuple) else (value,):
         if isinstance(number, int | float) and not isinstance(number, bool):
             si = number * unit.factor
-            yield f"{name} = {number:g} is {si:.4g} m/s2, {si / STANDARD_GRAVITY:.4g} g"
+            yield f"{name}: {si:.4g} m/s2, which is {si / STANDARD_GRAVITY:.4g} g"

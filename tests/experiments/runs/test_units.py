@@ -99,7 +99,7 @@ def test_several_numbers_may_have_several_units():
 
 def test_what_a_bare_number_means_is_told_in_both_units():
     (line,) = in_both("gravity", 0.0098, find_unit("Gravity [m/s2]."))
-    assert line.startswith("gravity = 0.0098")
+    assert "0.0098 m/s2" in line
     assert f"{0.0098 / G:.4g} g" in line
     (line,) = in_both("rig", 0.0085, find_unit("g_sim [9.80665 m/s2]."))
     assert f"{0.0085 * G:.4g} m/s2" in line
