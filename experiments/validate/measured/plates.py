@@ -26,10 +26,12 @@ import numpy as np
 
 from dem import Bed, Cylinder, Material
 from experiments.runs.types import Json
-from experiments.validate.base.case import Tell, tracked
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, near_zero, tracked
 from experiments.validate.base.drops import drive_down, part
 
-__all__ = ["DATA", "PLATES", "Push", "grid_of", "measured_pushes", "predicted", "settings", "stiffness"]
+from . import say
+
+__all__ = ["CASES", "PLATES", "Push", "compared_with", "measured_pushes", "predicted", "settings"]
 
 DATA = Path(__file__).parents[2] / "examples" / "cmu-plate-sinkage"
 PLATES = (0.06, 0.08, 0.1)  # diameters [m]
@@ -48,6 +50,8 @@ SMALL_BOX, STIFF = (0.18, 0.18, 0.14), 8e7
 """For what else may count, with the smallest plate in coarse grains: a narrower bed, and stiffer grains in it."""
 SMALL_SEEDS = (1, 2)
 STEP = 0.00025  # between two depths of a curve [m]
+BAND, POWER_BAND = 0.25, 0.3  # of K and of the curves, of the exponent [1]; ours
+DOTS = 40  # of a curve in a figure
 
 
 @dataclass(frozen=True)
@@ -112,7 +116,9 @@ def on_grid(run: Mapping[str, np.ndarray], grid: np.ndarray) -> np.ndarray:
     depth, force = run["depth"][order], run["force"][order]
     places = np.searchsorted(depth, edges)
     plain = np.interp(grid, depth, force)
-    means = [float(force[a:b].mean()) if b > a else float(at) for (a, b), at in zip(pairwise(places), plain, strict=True)]
+    means = [
+        float(force[a:b].mean()) if b > a else float(at) for (a, b), at in zip(pairwise(places), plain, strict=True)
+    ]
     return np.array(means)
 
 
@@ -231,3 +237,79 @@ def beside(prediction: Mapping[str, Any], key: str, changed: Any, plain: Any, **
     count, grid = min(map(len, pairs)), grid_of(DEEP[0])
     each = [[stiffness(grid, force) for force in forces[:count]] for forces in pairs]
     return float(np.mean(np.array(each[0]) / np.array(each[1]))) - 1
+
+
+def compared_with(prediction: Mapping[str, Any]) -> Outcome:
+    """The prediction held against the nine curves. ``prediction``: as ``predicted`` gives it."""
+    rows = held(prediction)
+    names = [f"{1e3 * one.diameter:.0f} mm" for one in rows]
+    ours, theirs = ([getattr(one, key) for one in rows] for key in ("ours", "theirs"))
+    powers = [exponent(PLATES, values) for values in (theirs, ours)]
+    numbers = [
+        Comparison(f"K, plate of {name}", "N/m", one.theirs, one.ours, BAND)
+        for name, one in zip(names, rows, strict=True)
+    ]
+    numbers += [
+        near_zero(f"the whole curve, plate of {name}, rms over the measured one's", one.off, BAND)
+        for name, one in zip(names, rows, strict=True)
+    ]
+    numbers.append(Comparison("exponent of the diameter in K", "1", *powers, POWER_BAND, False))
+    small = {"grain": COARSE}
+    narrow = beside(prediction, "box", SMALL_BOX, BOX, **small)
+    stiff = beside(prediction, "young", STIFF, YOUNG, box=SMALL_BOX, **small)
+    each = "; ".join(
+        say(
+            "plate", name=name, theirs=one.theirs, spread=100 * one.stiffnesses(one.measured).std(ddof=1) / one.theirs,
+            ours=one.ours, chance=100 * one.chance, finer=100 * one.finer,
+        )
+        for name, one in zip(names, rows, strict=True)
+    )  # fmt: skip
+    kept = [row for row in prediction["pushes"] if tuple(row["box"]) == BOX]
+    fine = [row for row in kept if row["grain"] == FINE]
+    packing = np.array([row["packing"] for row in fine])
+    words = say(
+        "pushes", each=each, fine=1e3 * FINE, coarse=1e3 * COARSE, across=PLATES[0] / FINE, seeds=len(SEEDS),
+        count=int(np.mean([row["count"] for row in fine])), packing=float(packing.mean()),
+        density=float(packing.mean()) * SAND.density, box=" x ".join(f"{1e3 * side:g}" for side in BOX),
+        inertial=INERTIAL, rolling=SAND.rolling_friction, overlap=100 * max(row["overlap"] for row in fine),
+    )  # fmt: skip
+    rest = say(
+        "rest", narrow=100 * narrow, small=1e3 * SMALL_BOX[0], stiff=100 * stiff, times=STIFF / YOUNG,
+        coarse=1e3 * COARSE, thick=1e3 * THICK,
+    )  # fmt: skip
+    return Outcome(numbers, list(_plots(rows, names)), [words, rest, _collapse(rows)])
+
+
+def _plots(rows: Sequence[Held], names: Sequence[str]) -> Iterator[Plot]:
+    for one, name in zip(rows, names, strict=True):
+        depth = 1e3 * one.grid
+        curves = [Curve(f"measured, push {k}", depth, force, False) for k, force in enumerate(one.measured, 1)]
+        some = slice(None, None, max(1, len(depth) // DOTS))
+        curves += [Curve(f"bed {k}, predicted", depth[some], f[some]) for k, f in enumerate(one.fine, 1)]
+        yield Plot(f"Plate of {name}", "depth [mm]", "force [N]", curves)
+    curves = []
+    for one, name in zip(rows, names, strict=True):
+        unit, x = BULK_DENSITY * GRAVITY * one.diameter**3, one.grid / one.diameter
+        some = slice(None, None, max(1, len(x) // DOTS))
+        curves.append(Curve(f"measured, {name}", x, one.measured.mean(axis=0) / unit, False))
+        curves.append(Curve(f"bed, {name}", x[some], one.fine.mean(axis=0)[some] / unit))
+    yield Plot("One curve for all plates, were it so", "z / D [1]", "F / (rho g D^3) [1]", curves)
+
+
+def _collapse(rows: Sequence[Held]) -> str:
+    """What of the curves no bed without cohesion, walls and grains' size can have, in words."""
+    share = min(float(one.grid[-1]) / one.diameter for one in rows)
+    found = []
+    for kind in ("measured", "fine"):
+        forces = [np.interp(share * one.diameter, one.grid, getattr(one, kind).mean(axis=0)) for one in rows]
+        units = [BULK_DENSITY * GRAVITY * one.diameter**3 for one in rows]
+        found.append([float(force / unit) for force, unit in zip(forces, units, strict=True)])
+    measured, ours = (listed(values, ".2f") for values in found)
+    return say("collapse", share=share, measured=measured, ours=ours, power=exponent(PLATES, found[0]) + 3)
+
+
+def _compute(tell: Tell) -> Outcome:
+    return compared_with(predicted(tell))
+
+
+CASES = {"plates-in-sand": _compute}
