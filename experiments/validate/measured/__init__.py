@@ -1,6 +1,6 @@
 """Cases of the verification suite that hold the bed against measured experiments: plates in sand, drops of balls.
 
-Imports `dem`, `experiments.validate.base`, `vis.page`.
+Imports `dem`, `experiments.runs`, `experiments.validate.base`, `vis.page`.
 """
 
 from vis.page.sentences import Sentences

@@ -1,6 +1,5 @@
 """Cases that hold the bed against measured experiments: what is chosen, what counts, how curves are compared."""
 
-import json
 import math
 from pathlib import Path
 
