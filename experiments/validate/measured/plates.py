@@ -9,9 +9,10 @@ Without cohesion, and where neither grains nor speed nor walls count, a plate's 
 with one f for all plates: bulk density rho, diameter D, depth z. So one figure shows what of the measured curves any
 such bed can have, and grains of two sizes show what their size does.
 
-Each bed is periodic sideways, ``BOX`` large, and takes the three plates one after the other, each in a fresh copy. A
-plate goes at the speed at which the inertial number (speed / D) d sqrt(density / (rho g D / 2)) is ``INERTIAL``: the
-pressure is that of the bed at half a plate's depth, which is less than what the plate adds.
+Each bed is periodic sideways and three diameters of its largest plate wide; plates go into fresh copies of it, one
+each. The two larger ones are 8 and 10 grains across in the coarse grains, the smallest is 8 in finer ones, in a bed of
+its own. A plate goes at the speed at which the inertial number (speed / D) d sqrt(density / (rho g D / 2)) is
+``INERTIAL``: the pressure is that of the bed at half a plate's depth, which is less than what the plate adds.
 """
 
 import csv
@@ -47,8 +48,8 @@ DEEP = (0.031, 0.029, 0.02)  # how far each is pushed [m]: as the shortest of it
 COARSE, FINE = 0.01, 0.0075  # mean diameters of the grains [m]: 6 and 8 across the smallest plate
 SEEDS = (1, 2, 3)
 SMALL_BOX, STIFF = (0.18, 0.18, 0.14), 8e7
-"""For what else may count, with the smallest plate in coarse grains: a narrower bed, and stiffer grains in it."""
-SMALL_SEEDS = (1, 2)
+"""The bed of the smallest plate; stiffer grains in it, to see what softness does."""
+SMALL_SEEDS, STIFF_SEEDS = (1, 2), (1,)  # of the smallest plate in its bed of coarse grains
 STEP = 0.00025  # between two depths of a curve [m]
 BAND, POWER_BAND = 0.25, 0.3  # of K and of the curves, of the exponent [1]; ours
 DOTS = 40  # of a curve in a figure
@@ -100,7 +101,7 @@ def settings() -> Json:
         "spread": SPREAD, "young": YOUNG, "box": list(BOX), "gravity": GRAVITY, "bulk_density": BULK_DENSITY,
         "plates": list(PLATES), "thick": THICK, "inertial_number": INERTIAL, "depths": list(DEEP), "coarse": COARSE,
         "fine": FINE, "seeds": list(SEEDS), "small_box": list(SMALL_BOX), "small_seeds": list(SMALL_SEEDS),
-        "stiff": STIFF, "step": STEP,
+        "stiff": STIFF, "stiff_seeds": list(STIFF_SEEDS), "step": STEP,
     }  # fmt: skip
 
 
@@ -123,10 +124,11 @@ def on_grid(run: Mapping[str, np.ndarray], grid: np.ndarray) -> np.ndarray:
 
 
 def pushes() -> list[Push]:
-    """Every push of the prediction, the quick ones first."""
+    """Every push of the prediction."""
     coarse = [Push(d, COARSE, seed) for seed in SEEDS for d in PLATES]
-    small = [Push(PLATES[0], COARSE, s, SMALL_BOX, young) for s in SMALL_SEEDS for young in (YOUNG, STIFF)]
-    return [*coarse, *(Push(d, FINE, seed) for seed in SEEDS for d in PLATES), *small]
+    fine = [Push(PLATES[0], FINE, seed, SMALL_BOX) for seed in SEEDS]
+    small = [Push(PLATES[0], COARSE, seed, SMALL_BOX) for seed in SMALL_SEEDS]
+    return [*coarse, *fine, *small, *(Push(PLATES[0], COARSE, seed, SMALL_BOX, STIFF) for seed in STIFF_SEEDS)]
 
 
 def predicted(tell: Tell) -> Json:
@@ -177,9 +179,9 @@ class Held:
     """One plate, predicted and measured, on the depths that all its measured pushes reach."""
 
     diameter: float  # [m]
+    grain: float  # of the beds that count [m]
     grid: np.ndarray  # depths [m], shape [n]
-    fine: np.ndarray  # forces of the beds of fine grains [N], shape [beds, n]
-    coarse: np.ndarray  # of those of coarse ones
+    beds: np.ndarray  # forces in them [N], shape [beds, n]
     measured: np.ndarray  # of the measured pushes, shape [3, n]
 
     def stiffnesses(self, forces: np.ndarray) -> np.ndarray:
@@ -188,8 +190,8 @@ class Held:
 
     @property
     def ours(self) -> float:
-        """K of the mean curve of the fine grains [N/m]."""
-        return stiffness(self.grid, self.fine.mean(axis=0))
+        """K of the mean predicted curve [N/m]."""
+        return stiffness(self.grid, self.beds.mean(axis=0))
 
     @property
     def theirs(self) -> float:
@@ -199,20 +201,14 @@ class Held:
     @property
     def chance(self) -> float:
         """Standard error of ours, from how beds differ [1]."""
-        each = self.stiffnesses(self.fine)
+        each = self.stiffnesses(self.beds)
         return float(each.std(ddof=1) / math.sqrt(len(each)) / each.mean()) if len(each) > 1 else math.nan
-
-    @property
-    def finer(self) -> float:
-        """What grains of no size would add to ours, on a straight line through the two sizes [1]."""
-        coarse = stiffness(self.grid, self.coarse.mean(axis=0))
-        return (self.ours - coarse) / self.ours * FINE / (COARSE - FINE)
 
     @property
     def off(self) -> float:
         """How far the mean curves are apart, over the measured one; root mean squares [1]."""
         wanted = self.measured.mean(axis=0)
-        return float(np.sqrt(((self.fine.mean(axis=0) - wanted) ** 2).mean() / (wanted**2).mean()))
+        return float(np.sqrt(((self.beds.mean(axis=0) - wanted) ** 2).mean() / (wanted**2).mean()))
 
 
 def held(prediction: Mapping[str, Any]) -> list[Held]:
@@ -220,28 +216,39 @@ def held(prediction: Mapping[str, Any]) -> list[Held]:
     curves: dict[float, list[tuple[np.ndarray, np.ndarray]]] = {}
     for diameter, _, depth, force in measured_pushes():
         curves.setdefault(diameter, []).append((depth, force))
-    fine, coarse = (by_plate(prediction, grain=grain) for grain in (FINE, COARSE))
+    coarse, fine = by_plate(prediction, grain=COARSE), by_plate(prediction, grain=FINE, box=SMALL_BOX)
     rows = []
     for diameter, deep in zip(PLATES, DEEP, strict=True):
         grid = grid_of(min(deep, *(float(depth.max()) for depth, _ in curves[diameter])))
         measured = np.array([np.interp(grid, depth, force) for depth, force in curves[diameter]])
-        n = len(grid)
-        rows.append(Held(diameter, grid, fine[diameter][:, :n], coarse[diameter][:, :n], measured))
+        grain = FINE if diameter in fine else COARSE
+        rows.append(Held(diameter, grain, grid, (coarse | fine)[diameter][:, : len(grid)], measured))
     return rows
 
 
-def beside(prediction: Mapping[str, Any], key: str, changed: Any, plain: Any, **others: Any) -> float:
-    """Mean ratio less one of K of the smallest plate in coarse grains, where one setting is another; bed by bed [1]."""
-    many = {"grain": COARSE} | others
-    pairs = [by_plate(prediction, **many | {key: value})[PLATES[0]] for value in (changed, plain)]
-    count, grid = min(map(len, pairs)), grid_of(DEEP[0])
-    each = [[stiffness(grid, force) for force in forces[:count]] for forces in pairs]
-    return float(np.mean(np.array(each[0]) / np.array(each[1]))) - 1
+def effects(prediction: Mapping[str, Any]) -> dict[str, float]:
+    """What K of the smallest plate owes to the grains' size, the bed's width and the softness; bed by bed [1].
+
+    ``size``: c of K = K_0 (1 - c d / D), from coarse and fine grains in the small bed. ``narrow``, ``stiff``: mean
+    ratio less one of a narrower bed, of stiffer grains in it.
+    """
+    smallest, grid = PLATES[0], grid_of(DEEP[0])
+
+    def each(**wanted: Any) -> np.ndarray:
+        return np.array([stiffness(grid, force) for force in by_plate(prediction, **wanted)[smallest]])
+
+    wide, small = each(grain=COARSE), each(grain=COARSE, box=SMALL_BOX)
+    fine, stiff = each(grain=FINE, box=SMALL_BOX), each(grain=COARSE, box=SMALL_BOX, young=STIFF)
+    ratio = float(small.mean() / fine.mean())  # (1 - c d / D) / (1 - c d' / D)
+    return {
+        "size": smallest * (1 - ratio) / (COARSE - ratio * FINE), "narrow": float(small.mean() / wide.mean()) - 1,
+        "stiff": float((stiff / small[: len(stiff)]).mean()) - 1,
+    }  # fmt: skip
 
 
 def compared_with(prediction: Mapping[str, Any]) -> Outcome:
     """The prediction held against the nine curves. ``prediction``: as ``predicted`` gives it."""
-    rows = held(prediction)
+    rows, other = held(prediction), effects(prediction)
     names = [f"{1e3 * one.diameter:.0f} mm" for one in rows]
     ours, theirs = ([getattr(one, key) for one in rows] for key in ("ours", "theirs"))
     powers = [exponent(PLATES, values) for values in (theirs, ours)]
@@ -254,28 +261,25 @@ def compared_with(prediction: Mapping[str, Any]) -> Outcome:
         for name, one in zip(names, rows, strict=True)
     ]
     numbers.append(Comparison("exponent of the diameter in K", "1", *powers, POWER_BAND, False))
-    small = {"grain": COARSE}
-    narrow = beside(prediction, "box", SMALL_BOX, BOX, **small)
-    stiff = beside(prediction, "young", STIFF, YOUNG, box=SMALL_BOX, **small)
     each = "; ".join(
         say(
             "plate", name=name, theirs=one.theirs, spread=100 * one.stiffnesses(one.measured).std(ddof=1) / one.theirs,
-            ours=one.ours, chance=100 * one.chance, finer=100 * one.finer,
+            ours=one.ours, chance=100 * one.chance, across=one.diameter / one.grain, beds=len(one.beds),
+            finer=100 * (1 / (1 - other["size"] * one.grain / one.diameter) - 1),
         )
         for name, one in zip(names, rows, strict=True)
     )  # fmt: skip
-    kept = [row for row in prediction["pushes"] if tuple(row["box"]) == BOX]
-    fine = [row for row in kept if row["grain"] == FINE]
-    packing = np.array([row["packing"] for row in fine])
+    kept = [row for row in prediction["pushes"] if row["young"] == YOUNG]
+    packing = np.array([row["packing"] for row in kept])
     words = say(
-        "pushes", each=each, fine=1e3 * FINE, coarse=1e3 * COARSE, across=PLATES[0] / FINE, seeds=len(SEEDS),
-        count=int(np.mean([row["count"] for row in fine])), packing=float(packing.mean()),
-        density=float(packing.mean()) * SAND.density, box=" x ".join(f"{1e3 * side:g}" for side in BOX),
-        inertial=INERTIAL, rolling=SAND.rolling_friction, overlap=100 * max(row["overlap"] for row in fine),
+        "pushes", each=each, fine=1e3 * FINE, coarse=1e3 * COARSE, packing=float(packing.mean()),
+        density=float(packing.mean()) * SAND.density, inertial=INERTIAL, rolling=SAND.rolling_friction,
+        least=min(row["count"] for row in kept), most=max(row["count"] for row in kept),
+        overlap=100 * max(row["overlap"] for row in kept),
     )  # fmt: skip
     rest = say(
-        "rest", narrow=100 * narrow, small=1e3 * SMALL_BOX[0], stiff=100 * stiff, times=STIFF / YOUNG,
-        coarse=1e3 * COARSE, thick=1e3 * THICK,
+        "rest", narrow=100 * other["narrow"], small=1e3 * SMALL_BOX[0], wide=1e3 * BOX[0], stiff=100 * other["stiff"],
+        times=STIFF / YOUNG, coarse=1e3 * COARSE, thick=1e3 * THICK,
     )  # fmt: skip
     return Outcome(numbers, list(_plots(rows, names)), [words, rest, _collapse(rows)])
 
@@ -285,14 +289,14 @@ def _plots(rows: Sequence[Held], names: Sequence[str]) -> Iterator[Plot]:
         depth = 1e3 * one.grid
         curves = [Curve(f"measured, push {k}", depth, force, False) for k, force in enumerate(one.measured, 1)]
         some = slice(None, None, max(1, len(depth) // DOTS))
-        curves += [Curve(f"bed {k}, predicted", depth[some], f[some]) for k, f in enumerate(one.fine, 1)]
+        curves += [Curve(f"bed {k}, predicted", depth[some], f[some]) for k, f in enumerate(one.beds, 1)]
         yield Plot(f"Plate of {name}", "depth [mm]", "force [N]", curves)
     curves = []
     for one, name in zip(rows, names, strict=True):
         unit, x = BULK_DENSITY * GRAVITY * one.diameter**3, one.grid / one.diameter
         some = slice(None, None, max(1, len(x) // DOTS))
         curves.append(Curve(f"measured, {name}", x, one.measured.mean(axis=0) / unit, False))
-        curves.append(Curve(f"bed, {name}", x[some], one.fine.mean(axis=0)[some] / unit))
+        curves.append(Curve(f"bed, {name}", x[some], one.beds.mean(axis=0)[some] / unit))
     yield Plot("One curve for all plates, were it so", "z / D [1]", "F / (rho g D^3) [1]", curves)
 
 
@@ -300,7 +304,7 @@ def _collapse(rows: Sequence[Held]) -> str:
     """What of the curves no bed without cohesion, walls and grains' size can have, in words."""
     share = min(float(one.grid[-1]) / one.diameter for one in rows)
     found = []
-    for kind in ("measured", "fine"):
+    for kind in ("measured", "beds"):
         forces = [np.interp(share * one.diameter, one.grid, getattr(one, kind).mean(axis=0)) for one in rows]
         units = [BULK_DENSITY * GRAVITY * one.diameter**3 for one in rows]
         found.append([float(force / unit) for force, unit in zip(forces, units, strict=True)])
