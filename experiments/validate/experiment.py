@@ -208,7 +208,9 @@ def keep(cases: Sequence[Json], *, command: str) -> None:
     before = dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
     now = [dict(row) | {"command": command} for row in cases]
     known = {row["id"]: row for row in [*(before["cases"] if before else ()), *now] if row["status"] in _RAN}
-    rows = [case.about() | known[case.id] if case.id in known else case.head() for case in SUITE]
+    rows = [
+        case.about() | known[case.id] | {"family": case.family} if case.id in known else case.head() for case in SUITE
+    ]
     for case, row in zip(SUITE, rows, strict=True):
         row["status"] = case.counted(row["status"])
         if row["status"] in _OUTSIDE:
