@@ -160,14 +160,15 @@ _MODULES = {
     "experiments.validate": {
         "experiments.validate": "document=experiment",
         "experiments.validate.base": "case cloud drops energy kept=drops parts=drops peers spheres",
-        "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
+        "experiments.validate.beds": "dosta friction_angle intrusion low_gravity silo slump",
+        "experiments.validate.measured": "impact",
         "experiments.validate.contacts": (
             "books=balances cohesion collisions integrator large_body laws=other_codes microslip=law_alone "
             "oblique=impacts one_grain restitution=collisions sliding=other_codes spinning=impacts"
         ),
     },
     "experiments.validate.base": {"experiments.validate.base": "parts=drops"},
-    "experiments.validate.beds": {"experiments.validate": "words=beds"},
+    "experiments.validate.beds": {"experiments.validate": "words=beds", "experiments.validate.measured": "impact"},
     "experiments.validate.contacts": {
         "experiments.validate": "words=contacts",
         "experiments.validate.contacts": (

@@ -142,23 +142,23 @@ def separated(falls: Sequence[Fall], speeds: Sequence[float]) -> Separated:
     squares = 0.5 * (at[:, 1:] + at[:, :-1])
     passed = (edges[None, 1:] <= ends[:, None]) & (edges[None, :-1] >= [[float(one["depth"][0])] for one in falls])
     force, squares = (np.where(passed, values, np.nan) for values in (force, squares))
-    drag, error, rest, kept = [], [], [], []
+    rows: list[tuple[float, float, float]] = []
+    kept = []
     for k in range(len(edges) - 1):
         here = passed[:, k]
         if not here.any():
             continue
         x, y = squares[here, k], force[here, k]
-        slope, off = (drag[-1] if drag else 0.0), math.nan
-        if len({speeds[i] for i in np.flatnonzero(here)}) > 1 and len(x) > 2:
-            slope, _ = np.polyfit(x, y, 1)
-            left = y - np.polyval(np.polyfit(x, y, 1), x)
+        slope, off = (rows[-1][0] if rows else 0.0), math.nan
+        if len({speed for speed, by in zip(speeds, here, strict=True) if by}) > 1 and len(x) > 2:
+            line = np.polyfit(x, y, 1)
+            slope, left = float(line[0]), y - np.polyval(line, x)
             off = math.sqrt(float(left @ left) / (len(x) - 2) / float(((x - x.mean()) ** 2).sum()))
-        drag.append(float(slope))
-        error.append(off)
-        rest.append(float((y - slope * x).mean()))
+        rows.append((slope, off, float((y - slope * x).mean())))
         kept.append(k)
     middles = 0.5 * (edges[1:] + edges[:-1])
-    return Separated(*map(np.array, (middles[kept], drag, error, rest)), squares[:, kept], force[:, kept])
+    drag, error, rest = np.array(rows).T
+    return Separated(middles[kept], drag, error, rest, squares[:, kept], force[:, kept])
 
 
 @dataclass(frozen=True)

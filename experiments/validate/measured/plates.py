@@ -251,7 +251,7 @@ def compared_with(prediction: Mapping[str, Any]) -> Outcome:
     rows, other = held(prediction), effects(prediction)
     names = [f"{1e3 * one.diameter:.0f} mm" for one in rows]
     ours, theirs = ([getattr(one, key) for one in rows] for key in ("ours", "theirs"))
-    powers = [exponent(PLATES, values) for values in (theirs, ours)]
+    wanted, found = (exponent(PLATES, values) for values in (theirs, ours))
     numbers = [
         Comparison(f"K, plate of {name}", "N/m", one.theirs, one.ours, BAND)
         for name, one in zip(names, rows, strict=True)
@@ -260,7 +260,7 @@ def compared_with(prediction: Mapping[str, Any]) -> Outcome:
         near_zero(f"the whole curve, plate of {name}, rms over the measured one's", one.off, BAND)
         for name, one in zip(names, rows, strict=True)
     ]
-    numbers.append(Comparison("exponent of the diameter in K", "1", *powers, POWER_BAND, False))
+    numbers.append(Comparison("exponent of the diameter in K", "1", wanted, found, POWER_BAND, False))
     each = "; ".join(
         say(
             "plate", name=name, theirs=one.theirs, spread=100 * one.stiffnesses(one.measured).std(ddof=1) / one.theirs,
