@@ -42,7 +42,7 @@ from .settings import PenetrateSettings, say
 from .similarity import fast_for_gravity, similarity_of
 from .units import PenetratePlan, Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
 
-__all__ = ["Frames", "check", "fingerprint", "resume", "run"]
+__all__ = ["Frames", "check", "compute", "fingerprint", "resume", "run"]
 
 ROOM = 0.8
 """Share of `max_overlap` that is aimed at where grains were too soft [1]."""
@@ -53,6 +53,17 @@ LEAST_STIFFER = 1.25
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     if settings.ground == "spring-damper":
         return run_without_bed(settings, folder, progress)
+    with folder.lock():
+        result = compute(settings, folder, progress)
+        draw_report(folder, progress, _picture_costs(folder.path, result))
+    return result
+
+
+def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
+    """All runs on beds that are not finished yet, and the result in the folder, without a report.
+
+    Raises RuntimeError where a bed cannot be prepared or a run cannot go on.
+    """
     settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
     softening = beds.choose_softness(settings)
     units = made_units(settings, plan_units(settings))
@@ -87,7 +98,6 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
             campaign = campaign_of(settings, result, folder, sensors_of(settings))
             target = place_campaign(settings.campaign, campaign, keep_out=folder.path)
             progress.message(f"campaign {target}: `hedgebed diagnose {target}` says what the spring-damper lacks")
-        draw_report(folder, progress, _picture_costs(folder.path, result))
     return result
 
 
