@@ -1,8 +1,8 @@
-"""A penetration case made again with finer grains, wider and deeper beds, stiffer grains and other speeds, on several beds.
+"""A penetration case on finer grains, in wider and deeper beds, stiffer, at other speeds, on several beds.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed converge`; calling one imports what computes.
 
-Imports `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `vis`.
+Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `vis`.
 """
 
 from experiments.runs.registry import face

@@ -18,7 +18,7 @@ from experiments.penetrate.fit import Moments
 from experiments.runs.types import Json
 
 from .design import BASE, Variant
-from .statistics import Extrapolation, Interval, Size, extrapolate, interval_of, paired
+from .statistics import CONFIDENCE, Extrapolation, Interval, Size, extrapolate, interval_of, paired
 
 __all__ = ["QUANTITIES", "REST", "Finding", "findings_of", "numbers_of", "two_finest"]
 
@@ -164,7 +164,9 @@ def findings_of(variants: Sequence[Variant], values: Values, *, life: float, tip
         differences = []
         for variant in variants:
             if variant.what in REST and (between := paired(own[BASE], own[variant.id])) is not None:
-                shared = {seed: own[variant.id][seed] - own[BASE][seed] for seed in own[BASE] if seed in own[variant.id]}
+                shared = {
+                    seed: own[variant.id][seed] - own[BASE][seed] for seed in own[BASE] if seed in own[variant.id]
+                }
                 differences.append(Difference(variant, between, shared))
         found[name] = Finding(name, sizes, line, tuple(differences))
     return found
@@ -173,7 +175,7 @@ def findings_of(variants: Sequence[Variant], values: Values, *, life: float, tip
 def two_finest(finding: Finding) -> Json | None:
     """Do the two finest grains agree within 5 %? None below two sizes.
 
-    "difference" is that of the coarser from the finer over the finer's mean [1], "half" of its interval (None: one bed);
+    "difference" is that of the coarser from the finer over the finer's mean [1], "half" its interval's;
     "verdict": yes where all of the interval is within, no where none of it is, else open.
     """
     if len(finding.sizes) < 2:
@@ -198,7 +200,7 @@ def _welch(one: Sequence[float], other: Sequence[float]) -> float | None:
 
     if len(one) < 2 or len(other) < 2:
         return None
-    low, high = ttest_ind(other, one, equal_var=False).confidence_interval(0.95)
+    low, high = ttest_ind(other, one, equal_var=False).confidence_interval(CONFIDENCE)
     return 0.5 * float(high - low)
 
 

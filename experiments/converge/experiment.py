@@ -1,8 +1,8 @@
 """`hedgebed converge`: a penetration case on finer grains, in wider and deeper beds, stiffer, at other speeds.
 
-Every member is an ordinary `penetrate` run in a folder of its own, found again by its settings. After each the result is
-written anew from those that are there, so that a sweep that is stopped has one. A member that fails is told, and the
-others are made; `hedgebed resume` tries it again.
+Every member is an ordinary `penetrate` run in a folder of its own, found again by its settings. After each the result
+is written anew from those that are there, so that a sweep that is stopped has one. A member that fails is told, and
+the others are made; `hedgebed resume` tries it again.
 """
 
 from collections.abc import Sequence
@@ -130,16 +130,18 @@ def _carry_out(settings: ConvergeSettings, folder: RunFolder, progress: Progress
         for line in (*plan_told(settings, members, work.left_out), *doubts(settings)):
             progress.message(line)
         progress.plan({member.id: 3600 * member.core_hours for member in members}, seconds={"report": 10.0}, unit=1.0)
+        result: Result | None = None
         for member in members:
             work.make(member)
             if work.numbers:
                 result = work.keep()
-        if not work.numbers:
+        if result is None:
             raise RuntimeError(next(iter(work.failed.values())))
         draw_report(folder, progress)
     return result
 
 
 run, resume = whole_run(
-    "converge", ConvergeSettings, _carry_out, check=check, material_copy=MATERIAL_COPY, code=fingerprint, as_given=False,
+    "converge", ConvergeSettings, _carry_out, check=check, material_copy=MATERIAL_COPY, code=fingerprint,
+    as_given=False,
 )  # fmt: skip

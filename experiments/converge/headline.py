@@ -1,4 +1,4 @@
-"""What a sweep shows on the terminal in the end: its numbers with their errors, what to be warned of, and the verdicts."""
+"""What a sweep shows on the terminal in the end: numbers with their errors, warnings, verdicts."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -95,7 +95,7 @@ def conclude(
     return Result.make(
         "converge",
         code=beds.fingerprint(),
-        title=f"A {1e3 * tip:g} mm spike in {beds.find_material(settings).name}: what finer grains and larger beds change",
+        title=f"A {1e3 * tip:g} mm spike in {beds.find_material(settings).name}, with its errors",
         status="done" if len(done) == len(members) else "stopped",
         quantities=entries,
         departures={"sentences": list(_sentences(found, settings, variants))},
@@ -140,9 +140,7 @@ def _standing(sinkage: Finding, load: float) -> dict[str, Json]:
         "total": sinkage.total,
     }  # fmt: skip
     entry = quantity(load / deep, "N/m", "load over the sinkage above: the K of a foot that stands", std=None)
-    return {
-        "stiffness_standing": entry | {key: None if of is None else steep * of for key, of in errors.items()}
-    }
+    return {"stiffness_standing": entry | {key: None if of is None else steep * of for key, of in errors.items()}}
 
 
 _NAMES = {"chance": "± chance", "grain_size": "± grain size", "rest": "± the rest", "total": "± all"}

@@ -53,18 +53,17 @@ class ConvergeSettings(PenetrateSettings):
     # Speeds and sizes
     speed_grain: Positive | None = None
     """Mean grain diameter that speeds and lowering_speed are meant for [m]: grains of diameter d are driven at
-    speed_grain / d times these, which is the same inertial number; the finest grains of the sweep if not given."""
+    speed_grain / d times these, which is the same inertial number; the finest of the sweep if not given."""
     life_grain: Positive = 0.0002
-    """Mean diameter of the real grains [m]: sizes are extrapolated to it, and the speed that has the same inertial
-    number among them is told."""
+    """Mean diameter of the real grains [m]: the line through the sizes is followed to it."""
 
     # The work
     budget: Positive | None = None
-    """Time of one core that the sweep may take by its estimate [h]: the runs that go beyond are left out, and the result
-    says which; all are made if not given."""
+    """Time of one core that the sweep may take by its estimate [h]: runs that go beyond are left out, and told; all are
+    made if not given."""
     members: str | None = Field(None, min_length=1)
-    """Folder where the member runs are kept, each found again by its settings: sweeps that share it share them; 'members'
-    in the run's folder if not given."""
+    """Folder where member runs are kept, each found again by its settings, so that sweeps share them; 'members' in the
+    run's folder if not given."""
 
     @model_validator(mode="after")
     def _varied(self) -> Self:

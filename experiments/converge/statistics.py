@@ -1,13 +1,13 @@
 """Errors of a number that several beds give: chance over beds, and what finer grains would change.
 
 Chance. A mean over n beds lies within t s / sqrt(n) of what ever more beds would give, t Student's at 95 % and n - 1
-degrees of freedom. Two cases are compared bed by bed, on beds of the same seeds: the interval is that of the differences.
+degrees of freedom. Two cases are compared bed by bed: the interval is that of the differences.
 
-Grain size. A straight line in x = d / D through the means over beds, of the weights n_i / x_i^2 (the scatter of beds goes
-about as d, and weights that were taken from the scatter of a few beds would make the intervals too narrow). At the real
-grain it is a = sum c_i m_i, and the variance of that is sum c_i^2 s_i^2 / n_i, with the degrees of freedom of Welch and
-Satterthwaite: sizes are independent, for beds of other grains are other beds. A size with one bed has the scatter that
-the others have together, over x. How wrong the line itself may be is told by other lines:
+Grain size. A straight line in x = d / D through the means over beds, of the weights n_i / x_i^2 (the scatter of beds
+goes about as d, and weights that were taken from the scatter of a few beds would make the intervals too narrow). At
+the real grain it is a = sum c_i m_i, of the variance sum c_i^2 s_i^2 / n_i with the degrees of freedom of Welch and
+Satterthwaite: sizes are independent, for beds of other grains are other beds. A size with one bed has the scatter over
+x that the others have together. How wrong the line itself may be is told by other lines:
     three sizes and more: the larger of what the line without the coarsest grains, and what one in x^2, moves a by;
     two sizes: all of the way from the finest grains to a;
     one size: unknown.
@@ -111,7 +111,9 @@ def extrapolate(sizes: Sequence[Size], to: float, *, points: int = 25) -> Extrap
     drawn = [(float(end), _shares(x, weights, float(end))) for end in np.linspace(to, x[-1], points)]
     misfit = None
     if errors is not None and len(sizes) > 2:
-        off = np.array([abs(float(_shares(x, weights, own) @ means) - mean) for own, mean in zip(x, means, strict=True)])
+        off = np.array(
+            [abs(float(_shares(x, weights, own) @ means) - mean) for own, mean in zip(x, means, strict=True)]
+        )
         misfit = float(np.max(off / np.maximum(errors[0], 1e-300)))
     return Extrapolation(
         value, _half(at, errors), grain, one - zero, without, squared, misfit,

@@ -61,8 +61,7 @@ def _figure(report: Report, name: str, told: Result) -> Block:
     else:
         sizes = drawing.subplots()
     _over_size(sizes, told, report.result["life"], scale)
-    words = f"{entry['note'] or name.replace('_', ' ')}"
-    sizes.set_title(f"{capital(words)}{f' [{unit}]' if unit else ''}")
+    sizes.set_title(f"{capital(entry['note'])}{f' [{unit}]' if unit else ''}")
     handles = [
         handle("a bed", BED, marker="o", ms=3.5, ls="", alpha=0.45),
         handle("mean, 95 %", INK, marker="s", ms=4.5, ls=""),
@@ -91,7 +90,8 @@ def _over_size(axis: Axes, told: Result, life: float, scale: float) -> None:
         values = scale * np.array(size["values"])
         axis.plot(np.full(len(values), size["x"]), values, color=BED, marker="o", ms=3.5, ls="", alpha=0.45)
         half = None if size["half"] is None else scale * size["half"]
-        axis.errorbar([size["x"]], [scale * size["mean"]], yerr=half, color=INK, marker="s", ms=4.5, capsize=3, zorder=4)
+        mean = scale * size["mean"]
+        axis.errorbar([size["x"]], [mean], yerr=half, color=INK, marker="s", ms=4.5, capsize=3, zorder=4)
     if told["line"]:
         x, y = (np.array([point[k] for point in told["line"]], dtype=float) for k in (0, 1))
         axis.plot(x, scale * y, color=MODEL, ls=DASHED, lw=1.4)
@@ -101,7 +101,8 @@ def _over_size(axis: Axes, told: Result, life: float, scale: float) -> None:
         value = scale * told["value"]
         for error, width in ((told["total"], 1.0), (told["chance"], 3.0)):
             if error is not None:
-                axis.errorbar([life], [value], yerr=scale * error, color=MODEL, elinewidth=width, capsize=3 if width == 1 else 0)
+                capped = 3 if width == 1.0 else 0
+                axis.errorbar([life], [value], yerr=scale * error, color=MODEL, elinewidth=width, capsize=capped)
         axis.plot([life], [value], color=MODEL, marker="D", ms=5.5, zorder=5)
     axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
     ends = [size["x"] for size in told["sizes"]]
@@ -123,6 +124,6 @@ def _changes(axis: Axes, changes: Result, scale: float, unit: str) -> None:
 
 
 def _label(one: Result) -> str:
-    value = one["value"]
-    shown = f"{100 * value:g} %" if one["what"] == "overlap" else f"x {value:g}" if one["what"] == "speed" else f"{value:g} D"
-    return f"{one['what']}\n{shown}"
+    what, value = one["what"], one["value"]
+    shown = {"overlap": f"{100 * value:g} %", "speed": f"x {value:g}"}.get(what, f"{value:g} D")
+    return f"{what}\n{shown}"

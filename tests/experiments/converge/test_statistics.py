@@ -16,11 +16,12 @@ LOW, HIGH = 0.929, 0.971
 
 def sizes_of(random, counts, truth, scatter, x=(0.1, 1 / 6, 0.25)):
     """Beds at the sizes `x`, so many at each; their scatter goes with `scatter(x)`."""
-    return [Size(at, tuple(truth(at) + scatter(at) * random.standard_normal(n))) for at, n in zip(x, counts, strict=True)]
+    pairs = zip(x, counts, strict=True)
+    return [Size(at, tuple(truth(at) + scatter(at) * random.standard_normal(count))) for at, count in pairs]
 
 
 def held(counts, truth, scatter, *, whole=False):
-    """Share of trials whose interval at the real grain holds the truth: that of chance, or with what the line may miss."""
+    """Share of trials whose interval at the real grain holds the truth: of chance, or with what the line may miss."""
     random = np.random.default_rng(1)
     hits = 0
     for _ in range(TRIALS):
@@ -67,7 +68,14 @@ def test_chance_holds_it_where_the_finest_have_one_bed_with_the_scatter_of_the_o
     assert LOW <= held((1, 5, 5), lambda x: 30 + 90 * x, lambda x: 40 * x) <= HIGH + 0.01
 
 
-@pytest.mark.parametrize("truth", [lambda x: 30 + 90 * x + 250 * x**2, lambda x: 30 + 400 * x**2, lambda x: 30 + 50 * x**0.5])
+BENT = {
+    "a little": lambda x: 30 + 90 * x + 250 * x**2,
+    "with the square": lambda x: 30 + 400 * x**2,
+    "with the root": lambda x: 30 + 50 * x**0.5,
+}
+
+
+@pytest.mark.parametrize("truth", BENT.values(), ids=BENT)
 def test_with_the_error_of_the_line_a_bent_truth_is_held_as_well(truth):
     assert held((5, 5, 5), truth, lambda x: 8 * x, whole=True) >= 0.94
 
