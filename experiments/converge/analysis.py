@@ -18,7 +18,7 @@ from experiments.penetrate.fit import Moments
 from experiments.runs.types import Json
 
 from .design import BASE, Variant
-from .statistics import CONFIDENCE, Extrapolation, Interval, Size, extrapolate, interval_of, paired
+from .statistics import Extrapolation, Interval, Size, apart, extrapolate, interval_of, paired
 
 __all__ = ["QUANTITIES", "REST", "Finding", "findings_of", "numbers_of", "two_finest"]
 
@@ -181,27 +181,14 @@ def two_finest(finding: Finding) -> Json | None:
     if len(finding.sizes) < 2:
         return None
     fine, next_one = finding.sizes[:2]
-    means = [float(np.mean(size.values)) for size in (fine, next_one)]
-    if means[0] == 0:
+    mean, between = abs(float(np.mean(fine.values))), apart(fine.values, next_one.values)
+    if mean == 0:
         return None
-    half = _welch(fine.values, next_one.values)
-    share = (means[1] - means[0]) / abs(means[0])
-    told: Json = {"ratios": [1 / fine.x, 1 / next_one.x], "difference": share, "half": None, "verdict": "open"}
-    if half is None:
-        return told
-    wide = half / abs(means[0])
-    verdict = "yes" if abs(share) + wide <= WANTED else "no" if abs(share) - wide > WANTED else "open"
-    return told | {"half": wide, "verdict": verdict}
-
-
-def _welch(one: Sequence[float], other: Sequence[float]) -> float | None:
-    """Half-width of the interval of the difference of two means of independent beds."""
-    from scipy.stats import ttest_ind
-
-    if len(one) < 2 or len(other) < 2:
-        return None
-    low, high = ttest_ind(other, one, equal_var=False).confidence_interval(CONFIDENCE)
-    return 0.5 * float(high - low)
+    share, half = between.mean / mean, None if between.half is None else between.half / mean
+    verdict = "open"
+    if half is not None:
+        verdict = "yes" if abs(share) + half <= WANTED else "no" if abs(share) - half > WANTED else "open"
+    return {"ratios": [1 / fine.x, 1 / next_one.x], "difference": share, "half": half, "verdict": verdict}
 
 
 def told(finding: Finding) -> Json:

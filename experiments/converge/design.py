@@ -168,10 +168,15 @@ def _base(settings: ConvergeSettings) -> PenetrateSettings:
 def _paced(settings: ConvergeSettings, base: PenetrateSettings, factor: float = 1.0) -> PenetrateSettings:
     """`base` at the speeds that have the sweep's inertial number in its grains, times `factor`."""
     factor *= settings.driven_grain / base.grain
-    speeds = tuple(factor * speed for speed in settings.speeds)
+    speeds = tuple(_typed(factor * speed) for speed in settings.speeds)
     return base.model_copy(
-        update={"speeds": speeds, "other_speeds": speeds, "lowering_speed": factor * settings.lowering_speed}
+        update={"speeds": speeds, "other_speeds": speeds, "lowering_speed": _typed(factor * settings.lowering_speed)}
     )
+
+
+def _typed(number: float) -> float:
+    """As one would type it, so that a setting is the same in two sweeps that come to it by different ways."""
+    return float(f"{number:.10g}")
 
 
 def _changed(settings: ConvergeSettings, base: PenetrateSettings, what: str, value: float) -> PenetrateSettings:
@@ -182,12 +187,12 @@ def _changed(settings: ConvergeSettings, base: PenetrateSettings, what: str, val
     if what == "overlap":
         return base
     if what != "grain":
-        across = value * tip
+        across = _typed(value * tip)
         sides = (across, across, size[2]) if what == "width" else (*size[:2], across)
         return base.model_copy(update={"bed_size": sides})
-    finer = {"grain": tip / value}
+    finer = {"grain": _typed(tip / value)}
     if settings.coarse is not None:  # a graded bed is as much finer everywhere
-        finer["coarse"] = settings.coarse * settings.ratio / value
+        finer["coarse"] = _typed(settings.coarse * settings.ratio / value)
     return _paced(settings, base.model_copy(update=finer))
 
 
@@ -206,7 +211,7 @@ def _varied(settings: ConvergeSettings, base: PenetrateSettings, what: str, valu
     else:  # Hertz: F goes with E overlap^1.5
         ratio = softer**1.5
     return base.model_copy(
-        update={"young": ratio * float(base.young or 0.0), "max_overlap": min(MOST_OVERLAP, ROOM * value)}
+        update={"young": _typed(ratio * float(base.young or 0.0)), "max_overlap": min(MOST_OVERLAP, ROOM * value)}
     )
 
 

@@ -154,7 +154,7 @@ def _errors(entries: Mapping[str, Json]) -> Json:
             continue
         numbers = [entry["value"], *(entry[key] for key in _NAMES)]
         unit, shown = column(numbers, entry["unit"], significant=2)
-        value = quote(entry["value"], entry["total"] or entry["chance"], entry["unit"]).split("±")[0].split("\xa0")[0]
+        value = quote(entry["value"], entry["chance"] or entry["total"], entry["unit"]).split("±")[0].split("\xa0")[0]
         rows.append([name.replace("_", " "), foldable(value), *map(foldable, shown[1:]), "" if unit == "1" else unit])
     head = ["quantity", "at the real grain", *_NAMES.values(), "unit"]
     return {"title": say("errors_title"), "head": head, "rows": rows}

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
-__all__ = ["CONFIDENCE", "Extrapolation", "Interval", "Size", "extrapolate", "interval_of", "paired"]
+__all__ = ["CONFIDENCE", "Extrapolation", "Interval", "Size", "apart", "extrapolate", "interval_of", "paired"]
 
 CONFIDENCE = 0.95
 Array = NDArray[np.float64]
@@ -51,6 +51,17 @@ def interval_of(values: Sequence[float]) -> Interval | None:
 def paired(one: Mapping[int, float], other: Mapping[int, float]) -> Interval | None:
     """`other` less `one`, seed -> value, over the seeds that both have; None where there are none."""
     return interval_of([other[seed] - one[seed] for seed in sorted(one.keys() & other.keys())])
+
+
+def apart(one: Sequence[float], other: Sequence[float]) -> Interval:
+    """Welch's interval of the mean of `other` less that of `one`, of independent beds; none where either has one bed."""
+    samples, shares = (one, other), np.array([-1.0, 1.0])
+    counts = np.array([len(sample) for sample in samples])
+    difference = float(shares @ np.array([np.mean(sample) for sample in samples]))
+    if counts.min() < 2:
+        return Interval(difference, None, int(counts.min()))
+    errors = np.array([np.std(sample, ddof=1) for sample in samples]) / np.sqrt(counts)
+    return Interval(difference, _half(shares, (errors, counts - 1.0)), int(counts.min()))
 
 
 @dataclass(frozen=True)

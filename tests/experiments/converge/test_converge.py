@@ -4,6 +4,7 @@ import json
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from fake_bed import FakeBed
 from golden import golden
@@ -19,7 +20,7 @@ from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.result import SHIPPED_RESULT
 from experiments.runs.folder import RunFolder
-from experiments.runs.result import Result
+from experiments.runs.result import Result, quantity
 from vis.report import write_report
 
 SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
@@ -68,6 +69,49 @@ def fake(monkeypatch):
     monkeypatch.setattr(beds, "find_material", lambda settings: SAND)
     monkeypatch.setattr(beds, "bed_step", lambda settings, young: STEP)
     monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
+    return made
+
+
+def made_up(settings):
+    """What `penetrate` would say of a bed of this K and C, as far as a sweep reads it."""
+    (seed,) = settings.seeds
+    across, apart = settings.grain / TIP, BY_SEED[seed]
+    stiffness, damping, deep = hard(settings, seed), RATE + 0.1 * across * apart, settings.depth
+    slow = min(settings.speeds)
+    runs = []
+    for speed in settings.speeds:
+        z = np.linspace(0.0, deep, 200)
+        force = stiffness * z + damping * speed
+        zz, zf, vf, ff = (float(np.mean(product)) for product in (z * z, z * force, speed * force, force * force))
+        moments = {"zz": zz, "zv": speed * deep / 2, "vv": speed**2, "zf": zf, "vf": vf, "ff": ff}
+        work = {"work_in": {"value": float(np.mean(force)) * deep}}
+        runs.append({"id": f"{seed}-{speed}", "kind": "driven", "speed": speed, "moments": moments, "quantities": work})
+    bands = [{"speed": slow, "bed_force": stiffness * deep * (k + 0.5) / 4} for k in range(4)]
+    told = {
+        "sinkage_dem": 0.4 / stiffness,
+        "packing_fraction": 0.58 + 0.001 * apart,
+        "grain_count": settings.grain_count,
+    }
+    quantities = {
+        name: quantity(value, "1") for name, value in (told | {"max_overlap": 0.03, "time_step": 1e-5}).items()
+    }
+    return Result.make(
+        "penetrate", title="made up", quantities=quantities, runs=runs, departures={"sentences": [], "table": bands}
+    )
+
+
+@pytest.fixture
+def swift(fake, monkeypatch):
+    """Members are made up; the list of those that were."""
+    made = []
+
+    def compute(settings, folder, progress):
+        made.append(folder.path.name)
+        result = made_up(settings)
+        folder.write_result(result)
+        return result
+
+    monkeypatch.setattr(penetrate, "compute", compute)
     return made
 
 
@@ -140,10 +184,10 @@ def test_a_member_is_found_again_by_its_settings_in_another_sweep():
 # What comes out ---------------------------------------------------------------------------------------------------
 
 
-def test_stiffness_is_told_at_the_real_grain_with_three_errors(fake, tmp_path):
+def test_stiffness_is_told_at_the_real_grain_with_three_errors(swift, tmp_path):
     result = sweep(tmp_path / "run")
     assert Result.load(tmp_path / "run") == result and result["status"] == "done"
-    assert len(result["members"]) == len(fake) == 18
+    assert len(result["members"]) == len(swift) == 18
     entry, told = result["quantities"]["stiffness"], result["convergence"]["stiffness"]
     truth = STIFF + SLOPE * 0.00024 / TIP
     assert entry["value"] == pytest.approx(truth, abs=0.05)
@@ -172,17 +216,17 @@ def test_every_member_is_an_ordinary_run_of_penetrate(fake, tmp_path):
         assert penetrate.resume(own.path)["quantities"] == own.read_result()["quantities"]
 
 
-def test_a_sweep_that_is_stopped_has_a_result_and_goes_on_without_repeating(fake, tmp_path, monkeypatch):
-    compute, made = penetrate.compute, []
+def test_a_sweep_that_is_stopped_has_a_result_and_goes_on_without_repeating(swift, tmp_path, monkeypatch):
+    compute, made = penetrate.compute, swift
 
     def until_the_fifth(settings, folder, progress):
-        made.append(folder.path.name)
-        if len(made) == 5:
+        if len(made) == 4:
+            made.append(folder.path.name)
             raise KeyboardInterrupt
         return compute(settings, folder, progress)
 
-    monkeypatch.setattr(penetrate, "compute", until_the_fifth)
-    with pytest.raises(KeyboardInterrupt):
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(penetrate, "compute", until_the_fifth)
         sweep(tmp_path / "run")
     part = Result.load(tmp_path / "run")
     assert (part["status"], len(part["members"])) == ("stopped", 4)
@@ -190,11 +234,12 @@ def test_a_sweep_that_is_stopped_has_a_result_and_goes_on_without_repeating(fake
     whole = converge.resume(tmp_path / "run")
     assert len(made) == 5 + 14 and made[4] == made[5] and len(set(made)) == 18
     assert whole["quantities"] == sweep(tmp_path / "other")["quantities"]
+    assert len(made) == 19 + 18
     converge.resume(tmp_path / "run")
     assert len(made) == 19 + 18
 
 
-def test_fewer_runs_give_wider_errors_and_say_what_is_missing(fake, tmp_path):
+def test_fewer_runs_give_wider_errors_and_say_what_is_missing(swift, tmp_path):
     whole = sweep(tmp_path / "whole")["convergence"]["stiffness"]
     part = sweep(tmp_path / "part", seeds=(1, 3), ratios=(5.0, 8.0))["convergence"]["stiffness"]
     assert part["chance"] > whole["chance"] and part["grain"] > whole["grain"]
@@ -204,7 +249,7 @@ def test_fewer_runs_give_wider_errors_and_say_what_is_missing(fake, tmp_path):
     assert told["unknown"] == ["chance", "grain size", "width", "depth", "overlap", "speed"]
 
 
-def test_a_member_that_fails_is_told_and_the_others_are_made(fake, tmp_path, monkeypatch):
+def test_a_member_that_fails_is_told_and_the_others_are_made(swift, tmp_path, monkeypatch):
     compute = penetrate.compute
 
     def one_fails(settings, folder, progress):
@@ -220,7 +265,7 @@ def test_a_member_that_fails_is_told_and_the_others_are_made(fake, tmp_path, mon
     assert converge.resume(tmp_path / "run")["status"] == "done"  # tried again
 
 
-def test_a_sweep_of_which_every_member_fails_is_no_result(fake, tmp_path, monkeypatch):
+def test_a_sweep_of_which_every_member_fails_is_no_result(swift, tmp_path, monkeypatch):
     def fails(*given):
         raise RuntimeError("not at rest")
 
@@ -229,11 +274,11 @@ def test_a_sweep_of_which_every_member_fails_is_no_result(fake, tmp_path, monkey
         sweep(tmp_path / "run", ratios=(5.0,), widths=(), overlaps=(), paces=(), seeds=(1,))
 
 
-def test_sweeps_that_share_a_folder_of_members_share_their_runs(fake, tmp_path):
+def test_sweeps_that_share_a_folder_of_members_share_their_runs(swift, tmp_path):
     sweep(tmp_path / "few", members=str(tmp_path / "kept"), ratios=(5.0, 10.0), seeds=(1, 2))
-    before = len(fake)
+    before = len(swift)
     sweep(tmp_path / "more", members=str(tmp_path / "kept"), seeds=(1, 2))
-    assert len(fake) - before == 2  # the beds of the one size that is new
+    assert len(swift) - before == 2  # the beds of the one size that is new
 
 
 # What is said -----------------------------------------------------------------------------------------------------
@@ -258,7 +303,7 @@ def test_stiffness_and_damping_are_those_of_penetrate_where_neither_is_at_its_bo
         assert found[name] == pytest.approx(shipped["quantities"][name]["value"], rel=1e-6)
 
 
-def test_what_is_told_before_and_after(fake, tmp_path):
+def test_what_is_told_before_and_after(swift, tmp_path):
     settings = settings_of(seeds=(1, 2))
     members = members_of(settings, variants_of(settings))
     chosen = affordable(members, 0.6 * sum(member.core_hours for member in members))
@@ -275,14 +320,14 @@ def test_what_is_told_before_and_after(fake, tmp_path):
     )
 
 
-def test_the_report_has_a_figure_of_each_quantity(fake, tmp_path):
+def test_the_report_has_a_figure_of_each_quantity(swift, tmp_path):
     result = sweep(tmp_path / "run")
     report = write_report(tmp_path / "run")
     drawn = {path.stem.removeprefix("convergence-") for path in (tmp_path / "run" / "figures").glob("*.png")}
     assert drawn == set(result["convergence"]) and report.stat().st_size > 100_000
 
 
-def test_the_report_of_a_first_bed_alone_is_drawn(fake, tmp_path):
+def test_the_report_of_a_first_bed_alone_is_drawn(swift, tmp_path):
     sweep(tmp_path / "run", seeds=(1,), ratios=(5.0,), widths=(), overlaps=(), paces=())
     assert write_report(tmp_path / "run").is_file()
 

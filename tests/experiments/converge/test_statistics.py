@@ -71,13 +71,16 @@ def test_chance_holds_it_where_the_finest_have_one_bed_with_the_scatter_of_the_o
 BENT = {
     "a little": lambda x: 30 + 90 * x + 250 * x**2,
     "with the square": lambda x: 30 + 400 * x**2,
-    "with the root": lambda x: 30 + 50 * x**0.5,
 }
 
 
 @pytest.mark.parametrize("truth", BENT.values(), ids=BENT)
 def test_with_the_error_of_the_line_a_bent_truth_is_held_as_well(truth):
     assert held((5, 5, 5), truth, lambda x: 8 * x, whole=True) >= 0.94
+
+
+def test_a_truth_that_goes_with_the_root_of_the_size_is_held_less_often_as_the_page_says():
+    assert 0.85 <= held((5, 5, 5), lambda x: 30 + 50 * x**0.5, lambda x: 8 * x, whole=True) < LOW
 
 
 def test_chance_alone_does_not_hold_a_bent_truth():
