@@ -102,7 +102,7 @@ def conclude(
         tables=[_errors(entries), _sizes(settings, variants, values), *_differences(found, variants)],
         convergence={name: told(finding) for name, finding in found.items()},
         life=life / tip,
-        variants=[{"id": v.id} | told_of(v) for v in variants],
+        variants=[{"id": v.id, **told_of(v)} for v in variants],
         members=[
             {"id": m.id, "variant": m.variant.id, "seed": m.seed, "folder": m.folder, "quantities": numbers[m.id]}
             for m in done

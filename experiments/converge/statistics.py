@@ -54,7 +54,7 @@ def paired(one: Mapping[int, float], other: Mapping[int, float]) -> Interval | N
 
 
 def apart(one: Sequence[float], other: Sequence[float]) -> Interval:
-    """Welch's interval of the mean of `other` less that of `one`, of independent beds; none where either has one bed."""
+    """Welch's interval of the mean of `other` less that of `one`, of independent beds; no half-width of one bed."""
     samples, shares = (one, other), np.array([-1.0, 1.0])
     counts = np.array([len(sample) for sample in samples])
     difference = float(shares @ np.array([np.mean(sample) for sample in samples]))

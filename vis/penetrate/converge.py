@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
@@ -62,11 +64,11 @@ def _figure(report: Report, name: str, told: Result) -> Block:
         sizes = drawing.subplots()
     _over_size(sizes, told, report.result["life"], scale)
     sizes.set_title(f"{capital(entry['note'])}{f' [{unit}]' if unit else ''}")
-    handles = [
+    handles: list[Artist] = [
         handle("a bed", BED, marker="o", ms=3.5, ls="", alpha=0.45),
         handle("mean, 95 %", INK, marker="s", ms=4.5, ls=""),
-        handle("line through the means", MODEL, ls=DASHED),
-        handle("at the real grain: chance; all", MODEL, marker="D", ms=5.5, ls=""),
+        handle("line", MODEL, ls=DASHED),
+        handle("real grain (thick: chance, thin: all errors)", MODEL, marker="D", ms=5.5, ls=""),
     ]
     if told["line"]:
         handles.insert(3, Patch(facecolor=MODEL, alpha=0.2, label="its 95 %"))
@@ -86,9 +88,11 @@ def _plain(value: float | None, scale: float, unit: str) -> str:
 
 def _over_size(axis: Axes, told: Result, life: float, scale: float) -> None:
     """Beds, means, the line and the value at the real grain, over d / D."""
+    ends = [size["x"] for size in told["sizes"]]
+    beside = 0.012 * max(ends)
     for size in told["sizes"]:
         values = scale * np.array(size["values"])
-        axis.plot(np.full(len(values), size["x"]), values, color=BED, marker="o", ms=3.5, ls="", alpha=0.45)
+        axis.plot(np.full(len(values), size["x"] - beside), values, color=BED, marker="o", ms=3.5, ls="", alpha=0.45)
         half = None if size["half"] is None else scale * size["half"]
         mean = scale * size["mean"]
         axis.errorbar([size["x"]], [mean], yerr=half, color=INK, marker="s", ms=4.5, capsize=3, zorder=4)
@@ -105,12 +109,14 @@ def _over_size(axis: Axes, told: Result, life: float, scale: float) -> None:
                 axis.errorbar([life], [value], yerr=scale * error, color=MODEL, elinewidth=width, capsize=capped)
         axis.plot([life], [value], color=MODEL, marker="D", ms=5.5, zorder=5)
     axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
-    ends = [size["x"] for size in told["sizes"]]
-    axis.set_xticks(ends, [f"{x:.3g}\nD/d = {1 / x:.3g}" for x in ends])
+    ticks = [(x, f"{x:.3g}\nD/d = {1 / x:.3g}") for x in ends] + (
+        [(life, f"{life:.2g}\nreal grain")] if told["line"] else []
+    )
+    axis.set_xticks(*zip(*ticks, strict=True))
     axis.set(xlim=(0.0, 1.08 * max(ends)), xlabel="grain over tip diameter, d / D [1]")
 
 
-def _changes(axis: Axes, changes: Result, scale: float, unit: str) -> None:
+def _changes(axis: Axes, changes: Sequence[Result], scale: float, unit: str) -> None:
     """Paired differences to the base: bars with their intervals, beds as points."""
     for place, one in enumerate(changes):
         half = None if one["half"] is None else scale * one["half"]
@@ -120,7 +126,8 @@ def _changes(axis: Axes, changes: Result, scale: float, unit: str) -> None:
         axis.plot(np.full(len(values), place + 0.14), values, color=BED, marker="o", ms=3.0, ls="", alpha=0.45)
     axis.axhline(0.0, color=GREY, lw=0.8)
     axis.set_xticks(range(len(changes)), [_label(one) for one in changes])
-    axis.set_title(f"less the base{f' [{unit}]' if unit else ''}")
+    axis.margins(y=0.12)
+    axis.set_title(f"Change from the base{f' [{unit}]' if unit else ''}")
 
 
 def _label(one: Result) -> str:

@@ -309,15 +309,13 @@ def test_what_is_told_before_and_after(swift, tmp_path):
     chosen = affordable(members, 0.6 * sum(member.core_hours for member in members))
     result = sweep(tmp_path / "run", seeds=(1, 2))
     lines = converge_headline(result)
-    golden(
-        "converge/told",
-        {
-            "before": [*plan_told(settings.model_copy(update={"budget": 1.0}), chosen, members[len(chosen) :])],
-            "doubts": [*doubts(settings.model_copy(update={"widths": ()}))],
-            "after": [*result["departures"]["sentences"], *result["warnings"]],
-            "headline": [" | ".join(row) for row in (lines.head, *lines.rows)],
-        },
-    )
+    said = {
+        "before": [*plan_told(settings.model_copy(update={"budget": 1.0}), chosen, members[len(chosen) :])],
+        "doubts": [*doubts(settings.model_copy(update={"widths": ()}))],
+        "after": [*result["departures"]["sentences"], *result["warnings"]],
+        "headline": [" | ".join(row) for row in (lines.head, *lines.rows)],
+    }
+    golden("converge/told", said)
 
 
 def test_the_report_has_a_figure_of_each_quantity(swift, tmp_path):
