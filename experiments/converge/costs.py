@@ -3,6 +3,7 @@
 import math
 
 from experiments.penetrate import beds
+from experiments.penetrate.rest import made_units
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import PREPARATION, RAIN, TAPPED, expected_time, plan_units
 
@@ -18,11 +19,13 @@ def step_count(settings: PenetrateSettings, *, bed: bool = True) -> float:
     Raises ValueError for a material that is not there, or whose real grains are too soft.
     """
     step = beds.bed_step(settings, beds.choose_softness(settings).young)
-    stiffness, first = beds.expected_stiffness(settings), settings.seeds[0]
-    time = sum(expected_time(settings, unit, stiffness) for unit in plan_units(settings) if unit.seed == first)
+    stiffness, held = beds.expected_stiffness(settings), beds.expected_bearing(settings).held
+    units = [unit for unit in made_units(settings, plan_units(settings)) if unit.seed == settings.seeds[0]]
+    time = sum(expected_time(settings, unit, stiffness, held=held) for unit in units)
     if bed:
-        fall = math.sqrt(2 * RAIN * settings.bed_size[2] / settings.gravity)
-        time += PREPARATION * (TAPPED if settings.packing is not None else 1.0) * fall
+        fall = math.sqrt(2 * RAIN * settings.bed_size[2] / beds.first_gravity(settings))
+        tapped = settings.packing is not None or any("compact" in stage for stage in beds.stages_of(settings) or ())
+        time += PREPARATION * (TAPPED if tapped else 1.0) * fall
     return time / step
 
 

@@ -7,7 +7,7 @@ All members but those of other overlaps have one modulus, so that grains of ever
 mean diameter d are driven at `driven_grain` / d times the speeds of the case: the inertial number is then the same,
     I = v d / (D sqrt(phi g D)),
 the rate v / D of shear under a tip of diameter D, times d sqrt(rho / P) (GDR MiDi 2004), at the pressure of grains one
-tip deep, P = phi rho g D with phi = `PACKING`.
+tip deep, P = phi rho g D with phi = 0.6 (`experiments.grains.similarity`).
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from experiments.grains.softening import PACKING
+from experiments.grains import similarity
 from experiments.penetrate import beds
 from experiments.penetrate.settings import PenetrateSettings
 
@@ -43,8 +43,9 @@ _SAME_NUMBERS = ("seeds", "threads", "checkpoint_interval", "frame_count", "cach
 
 def inertial_number(settings: PenetrateSettings, speed: float) -> float:
     """Of a spike driven at `speed` [m/s] into these grains [1]; see the module."""
-    tip = settings.tip_diameter
-    return speed * settings.grain / (tip * math.sqrt(PACKING * settings.gravity * tip))
+    return similarity.inertial_number(
+        speed, gravity=settings.gravity, diameter=settings.tip_diameter, grain=settings.grain
+    )
 
 
 @dataclass(frozen=True)

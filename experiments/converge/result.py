@@ -1,6 +1,5 @@
 """The result of a sweep in numbers, tables and sentences; and what is told before its work."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean
 from typing import Any
@@ -152,7 +151,8 @@ def _errors(entries: Mapping[str, Json]) -> Json:
     for name, entry in entries.items():
         if "chance" not in entry:
             continue
-        numbers = [entry["value"], *(entry[key] for key in _NAMES)]
+        size = abs(entry["value"])
+        numbers = [entry["value"], *(_without_round_off(entry[key], size) for key in _NAMES)]
         unit, shown = column(numbers, entry["unit"], significant=2)
         value = quote(entry["value"], entry["chance"] or entry["total"], entry["unit"]).split("±")[0].split("\xa0")[0]
         rows.append([name.replace("_", " "), foldable(value), *map(foldable, shown[1:]), "" if unit == "1" else unit])
@@ -235,5 +235,5 @@ def _listed(speeds: Sequence[float]) -> str:
     return ", ".join(f"{speed:.3g}" for speed in speeds) + " m/s"
 
 
-def _finite(value: float | None) -> bool:
-    return value is not None and math.isfinite(value)
+def _without_round_off(error: float | None, size: float) -> float | None:
+    return error if error is None or error > 1e-9 * size else 0.0

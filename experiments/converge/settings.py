@@ -1,6 +1,5 @@
 """Settings of `hedgebed converge`: those of the penetration case that is the base, and what is varied about it."""
 
-from collections.abc import Mapping
 from typing import Self
 
 from pydantic import Field, model_validator
@@ -78,28 +77,6 @@ class ConvergeSettings(PenetrateSettings):
         if self.life_grain > self.finest:
             raise ValueError(say("life_grain", s=self, finest=self.finest))
         return self
-
-    def _spike(self) -> str | None:
-        found = super()._spike()
-        fewer = self.tip_diameter / self.grain < 0.9998 * FEWEST_ACROSS and not self.allow_coarse
-        return self._with_cost(found, {"grain": self.tip_diameter / FEWEST_ACROSS}) if found and fewer else found
-
-    def _bed(self) -> str | None:
-        found, narrow = super()._bed(), LEAST_WIDTH * self.tip_diameter
-        if found and min(self.bed_size[:2]) < narrow * (1 - 1e-9):
-            wide = (max(narrow, self.bed_size[0]), max(narrow, self.bed_size[1]), self.bed_size[2])
-            return self._with_cost(found, {"bed_size": wide})
-        return found
-
-    def _with_cost(self, found: str, would_do: Mapping[str, object]) -> str:
-        """What was found to be wrong, and what a base that would do costs, over all seeds."""
-        from .costs import core_hours
-
-        try:
-            mended = self.model_copy(update=dict(would_do))
-            return say("mended", found=found, grains=mended.grain_count, hours=len(self.seeds) * core_hours(mended))
-        except ValueError:  # another fault is told first
-            return found
 
     @property
     def ratio(self) -> float:

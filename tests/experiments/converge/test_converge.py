@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from fake_bed import FakeBed
 from golden import golden
 from pydantic import ValidationError
 
+from dem.grains.materials import material
 from experiments.converge import experiment as converge
 from experiments.converge.analysis import numbers_of, two_finest
 from experiments.converge.design import affordable, inertial_number, members_of, variants_of
@@ -23,7 +25,7 @@ from experiments.runs.folder import RunFolder
 from experiments.runs.result import Result, quantity
 from vis.report import write_report
 
-SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
+GRAINS = replace(material("sand"), name="made-up", friction=0.5, rolling_friction=0.2)
 TIP, STEP = 0.012, 5e-5
 QUICK = {
     "tip_diameter": TIP,
@@ -66,7 +68,7 @@ def fake(monkeypatch):
         )  # fmt: skip
 
     monkeypatch.setattr(beds, "prepare_bed", prepare)
-    monkeypatch.setattr(beds, "find_material", lambda settings: SAND)
+    monkeypatch.setattr(beds, "find_material", lambda settings: GRAINS)
     monkeypatch.setattr(beds, "bed_step", lambda settings, young: STEP)
     monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
     return made
@@ -350,8 +352,8 @@ def test_a_list_that_holds_what_cannot_be_is_refused_with_what_would_do_and_its_
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"bed_size": (0.04, 0.06, 0.04)}, "bed_size.*too narrow.*h of one core"),
-        ({"grain": 0.003}, "4 grains across.*h of one core"),
+        ({"bed_size": (0.04, 0.06, 0.04)}, "bed_size.*too narrow.*would do.*times"),
+        ({"grain": 0.003}, "4 grains across.*would do.*times"),
         ({"ratios": (5.0, 5.0)}, "ratios.*twice"),
         ({"reference": "shipped"}, "reference"),
         ({"time_step": 1e-6}, "time_step"),
