@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .engine.sleep import Sleep
     from .engine.values import BedFailure, Grains
     from .grains.graded import Graded
-    from .grains.materials import MATERIALS, SAND, Facing, Material, material
+    from .grains.materials import MATERIALS, SAND, SAND_WEAK, Facing, Material, material
     from .grains.sizes import LogNormal, Normal, Sieve, Uniform
     from .measure.grading import measure_grading
     from .prepare.report import Prepared, StageReport
@@ -32,7 +32,7 @@ _MODULES = {
     "engine.sleep": ("Sleep",),
     "engine.values": ("BedFailure", "Grains"),
     "grains.graded": ("Graded",),
-    "grains.materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
+    "grains.materials": ("Facing", "MATERIALS", "Material", "SAND", "SAND_WEAK", "material"),
     "grains.sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),
     "measure.grading": ("measure_grading",),
     "prepare.report": ("Prepared", "StageReport"),

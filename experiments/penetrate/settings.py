@@ -21,7 +21,7 @@ __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
 
 say = Sentences(__package__)
 
-_MATERIALS = "sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml"
+_MATERIALS = "sand, sand-weak, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml"
 _SOFTENED = "Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
 _STEP = "Step of the grains [s]; from the contact time if not given."
 GrainMaterial = Annotated[str, Field(description=f"Grain material: {_MATERIALS}.")]

@@ -14,7 +14,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from experiments.runs.folder import RUN_FORMAT, settings_in
+from experiments.runs.folder import RUN_FORMATS, settings_in
 from experiments.runs.strict import may_be_empty
 from experiments.runs.units import find_unit, in_both
 
@@ -81,7 +81,7 @@ def read_case(path: Path) -> Layer:
         raise ValueError(f"case = {str(path)!r} cannot be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"case = {str(path)!r} is not TOML: {error}") from None
-    if table.get("format") == RUN_FORMAT and isinstance(table.get("settings"), dict):
+    if table.get("format") in RUN_FORMATS and isinstance(table.get("settings"), dict):
         table = settings_in(table)
     return Layer(str(path), table)
 

@@ -19,7 +19,7 @@ from vis.pictures.frames import frame_names
 
 __all__ = ["summarise"]
 
-_REAL_GRAINS = {"sand": 2e-4}
+_REAL_GRAINS = {"sand": 2e-4, "sand-weak": 2e-4}
 """Diameter of real grains [m]: 0.2 mm is where fine sand ends and medium sand begins (ISO 14688-1)."""
 
 

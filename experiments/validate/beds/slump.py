@@ -28,7 +28,7 @@ __all__ = ["CASES", "Heap", "in_lammps", "slumped"]
 
 GRAIN, SPREAD, GRAVITY, SEED = 0.004, 0.15, 9.80665, 1
 BLOCK, LENGTH = (28.0, 6.0, 10.0), 72.0  # of the block, and of the box along x [mean diameters]
-ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand-calibrated
+ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand
 TIME = 15.0  # of the slump [times in which a grain falls the block's height]
 BAND, CREST_BAND = 2.0, 0.1  # [degrees], [1]: slopes of one heap differ by 1 to 2 degrees
 ROUGH = 10.0  # friction and rolling friction of the floor [1], as in ``dem.measure.shearing``

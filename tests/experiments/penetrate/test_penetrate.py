@@ -319,9 +319,10 @@ def test_the_shipped_cases_are_settings():
     assert full.tip_diameter / full.grain >= 9.999 and full.max_overlap <= 0.01 and min(full.speeds) < 0.1
     speeds = {"speeds", "other_speeds", "drop_speeds", "other_drop_speeds"}
     finer = {"grain", "max_overlap", "reference", "bed_size", "young"} | speeds
-    # Its modulus is its own: softer than what softening asks for, and within the bound as run (docs/results).
+    # Its modulus is its own: softer than what softening asks for. That of the weaker sand was within the bound as run
+    # (docs/results), and sand bears 1.65 to 1.77 times as much (docs/materials.md).
     kept = json.loads((cases.parents[1] / "docs/results/penetrate-full/result.json").read_text())["quantities"]
-    assert full.young == kept["young"]["value"] and kept["max_overlap"]["value"] < full.max_overlap
+    assert 1.65 < full.young / kept["young"]["value"] < 1.77 and kept["max_overlap"]["value"] < full.max_overlap
     # Four tips wide: what that alone does is in docs/results/README.md, by the shipped grains in a bed of this size.
     assert min(full.bed_size[:2]) > 4 * full.tip_diameter and full.bed_size[2] > full.depth + 1.8 * full.tip_diameter
     assert {name for name, value in full if value != getattr(short, name)} == finer
