@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from dem import Bed, Facing
-from dem.grains.materials import SAND, Material
+from dem.grains.materials import SAND_WEAK, Material
 from dem.measure.repose import measure_flanks, thickness_profile
 from experiments.bed.tests import stiff_enough
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, tracked, within
@@ -124,11 +124,11 @@ def in_lammps(stuff: Material, block: tuple[Any, ...]) -> Heap:
 def _compute(tell: Tell) -> Outcome:
     if PEERS["lammps"].find() is None:
         return PEERS["lammps"].skipped()
-    block = _block(replace(SAND, name="slump"))
+    block = _block(replace(SAND_WEAK, name="slump"))
     tell(0.3)
     rows, curves, words = [], [], []
     for k, rolling in enumerate(ROLLING):
-        stuff = replace(SAND, name="slump", friction=0.5, rolling_friction=rolling)
+        stuff = replace(SAND_WEAK, name="slump", friction=0.5, rolling_friction=rolling)
         begin = 0.3 + 0.35 * k
         here = slumped(stuff, block, within(tell, begin, begin + 0.2))
         there = in_lammps(stuff, block)
