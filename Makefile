@@ -103,13 +103,13 @@ endef
 
 # Stamps: installed again only when pyproject.toml has changed. The package itself is installed in place (-e).
 $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
-	@echo "installing hedgebed and what it needs into $(VENV) (the first time about 1.3 GB)"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@echo "installing hedgebed and what it needs into $(VENV) (the first time about 1.4 GB)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[quadrants]'
 	$(WITH_X11)
 	@touch $@
 
 $(VENV)/.installed-test: pyproject.toml | $(VENV)/bin/python
-	@echo "installing hedgebed, what it needs and what tests it into $(VENV) (the first time about 1.3 GB)"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	@echo "installing hedgebed, what it needs and what tests it into $(VENV) (the first time about 1.4 GB)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[quadrants,test]'
 	$(WITH_X11)
 	@touch $(VENV)/.installed $@

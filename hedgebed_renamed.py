@@ -1,4 +1,4 @@
-"""Modules and names as they were called in earlier versions: an import from there warns and gives what is there today.
+"""Modules, names and materials as earlier versions called them: they warn, and give what is called otherwise today.
 
 Imports nothing of ours. The packages import this file, so that the old names work as soon as one of them is loaded.
 """
@@ -14,7 +14,14 @@ from operator import attrgetter
 from types import ModuleType
 from typing import Any, TypeVar, cast
 
-__all__ = ["MOVED", "RENAMED", "renamed", "renamed_keywords", "renamed_names"]
+__all__ = [
+    "BEFORE_RUN_2", "MOVED", "RENAMED", "material_of_today", "renamed", "renamed_keywords", "renamed_names",
+]  # fmt: skip
+
+_MATERIALS = {"sand-calibrated": "sand"}
+"""Materials and surfaces: a name that is still taken -> the name of today."""
+BEFORE_RUN_2 = {"sand": "sand-weak"} | _MATERIALS
+"""Names as runs and beds of before 2026-11-26 have them -> the names of today: `sand` was the weak one."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -160,14 +167,15 @@ _MODULES = {
     "experiments.validate": {
         "experiments.validate": "document=experiment",
         "experiments.validate.base": "case cloud drops energy kept=drops parts=drops peers spheres",
-        "experiments.validate.beds": "dosta friction_angle impact intrusion low_gravity silo slump",
+        "experiments.validate.beds": "dosta friction_angle intrusion low_gravity silo slump",
+        "experiments.validate.measured": "impact",
         "experiments.validate.contacts": (
             "books=balances cohesion collisions integrator large_body laws=other_codes microslip=law_alone "
             "oblique=impacts one_grain restitution=collisions sliding=other_codes spinning=impacts"
         ),
     },
     "experiments.validate.base": {"experiments.validate.base": "parts=drops"},
-    "experiments.validate.beds": {"experiments.validate": "words=beds"},
+    "experiments.validate.beds": {"experiments.validate": "words=beds", "experiments.validate.measured": "impact"},
     "experiments.validate.contacts": {
         "experiments.validate": "words=contacts",
         "experiments.validate.contacts": (
@@ -343,6 +351,14 @@ RENAMED = {
 
 MOVED = {module: _listed(places) for module, places in _NAMES.items()}
 """Module of today -> name that it had, or that the module had which is now found there -> module and name of today."""
+
+
+def material_of_today(name: str) -> str:
+    """The name of today of a material or a surface, with a FutureWarning, which users see, where it is another."""
+    today = _MATERIALS.get(name, name)
+    if today != name:
+        warnings.warn(f"{name!r} is called {today!r} since 2026-11-26", FutureWarning, stacklevel=3)
+    return today
 
 
 def renamed(old: str, new: str) -> Any:

@@ -1,15 +1,18 @@
 """The one module of ours that imports Taichi; all others write ``from hedgebed_taichi import ti``.
 
-The variable HEDGEBED_TAICHI chooses what `ti` is: ``taichi`` (where it is not set), or ``quadrants``, a fork of it
+The variable HEDGEBED_TAICHI chooses what `ti` is: ``taichi``, or ``quadrants``, a fork of it. Where it is not set, `ti`
+is Taichi, or the fork where Taichi's compiler does not know the processor and the fork is installed
 (``pip install quadrants``). docs/performance.md compares the two. Nothing is imported before `ti` is asked for.
 
 Imports nothing of ours.
 """
 
+import atexit
 import contextlib
 import functools
 import io
 import os
+import re
 import sys
 import textwrap
 import warnings
@@ -21,24 +24,40 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import taichi as ti
 
-__all__ = ["chosen", "is_running", "kernel_cache", "ti", "version"]
+__all__ = ["chosen", "is_running", "kernel_cache", "ti", "unknown_processor", "version"]
 
 VARIABLE = "HEDGEBED_TAICHI"
 CHOICES = ("taichi", "quadrants")
 
+# The newest family of AMD processors that LLVM 15, Taichi's compiler, has a name for (Zen 3 and 4). For a later one it
+# computes two numbers at a time where the processor can do eight. An Intel that it does not know it judges by features.
+NEWEST_AMD_OF_LLVM_15 = 25
+_PROCESSOR = Path("/proc/cpuinfo")
+
+
+def unknown_processor() -> bool:
+    """Whether Taichi's compiler does not know this processor; False too where the system does not tell which it is."""
+    try:
+        said = _PROCESSOR.read_text()
+    except OSError:
+        return False
+    family = re.search(r"^cpu family\s*: (\d+)$", said, re.MULTILINE)
+    return "AuthenticAMD" in said and family is not None and int(family[1]) > NEWEST_AMD_OF_LLVM_15
+
 
 @functools.cache
 def chosen() -> str:
-    """The package that HEDGEBED_TAICHI chooses; imports nothing.
+    """The package that `ti` is; imports nothing.
 
-    Raises ValueError: it names another package, or one that is not installed.
+    Raises ValueError: HEDGEBED_TAICHI names an unknown package, or one that is not installed.
     """
     given = os.environ.get(VARIABLE)
     if given and given not in CHOICES:
         raise ValueError(f"{VARIABLE} = {given!r} is unknown; use one of {', '.join(CHOICES)}")
     if given and find_spec(given) is None:
         raise ValueError(f"{VARIABLE} = {given!r}, and that package is not installed: pip install {given}")
-    return given or "taichi"
+    faster = "quadrants" if unknown_processor() and find_spec("quadrants") else "taichi"
+    return given or faster
 
 
 def version() -> str:
@@ -80,7 +99,14 @@ def _load() -> Any:
     with contextlib.redirect_stdout(io.StringIO()):
         taichi = import_module(chosen())
     _read_sources_once(chosen())
+    atexit.register(_end)
     return taichi
+
+
+def _end() -> None:
+    """Write compiled kernels into the cache. Left to the interpreter, it depends on the order in which modules go."""
+    if is_running():
+        _load().reset()
 
 
 def _read_sources_once(name: str) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .bed import Bed
     from .engine.values import BedFailure, Grains, Sleep
     from .grains.graded import Graded
-    from .grains.materials import MATERIALS, SAND, Facing, Material, material
+    from .grains.materials import MATERIALS, SAND, SAND_WEAK, Facing, Material, material
     from .grains.sizes import LogNormal, Normal, Sieve, Uniform
     from .measure.grading import measure_grading
     from .prepare.report import Prepared, StageReport
@@ -30,7 +30,7 @@ _MODULES = {
     "bed": ("Bed",),
     "engine.values": ("BedFailure", "Grains", "Sleep"),
     "grains.graded": ("Graded",),
-    "grains.materials": ("Facing", "MATERIALS", "Material", "SAND", "material"),
+    "grains.materials": ("Facing", "MATERIALS", "Material", "SAND", "SAND_WEAK", "material"),
     "grains.sizes": ("LogNormal", "Normal", "Sieve", "Uniform"),
     "measure.grading": ("measure_grading",),
     "prepare.report": ("Prepared", "StageReport"),

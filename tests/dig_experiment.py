@@ -2,15 +2,14 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from experiments.runs.folder import RunFolder
+from experiments.runs.strict import StrictSettings
 
 
-class DigSettings(BaseModel):
+class DigSettings(StrictSettings):
     """Stand-in settings with every kind of value that real ones have."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     grain: Literal["sand", "glass"] = Field("sand", description="Material of the grains.")
     spike_diameter: float = Field(0.02, gt=0, description="Diameter of the spike [m].")

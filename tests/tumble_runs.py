@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from dem import SAND, Bed
+from dem import SAND_WEAK, Bed
 from experiments.grains import following
 
 __all__ = ["SMALL", "prepare_small", "small_bed", "stop_at"]
 
 SMALL: dict[str, Any] = {
-    "surface": "sand", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
+    "surface": "sand-weak", "ground": "bed", "mass": 0.3, "inertia": 2e-4, "spike_length": 0.04, "wheel_inertia": 1e-5,
     "rig": 0.03, "torque": 0.01, "duration": 0.06, "bed_size": (0.2, 0.036, 0.03), "grain": 0.006, "frame_count": 3,
     "spike_diameter": 0.008, "spike_clear": 0.015, "substeps": 8, "lowering_speed": 0.04, "stiffness": 500.0,
     "damping": 2.0, "threads": 1,
@@ -25,7 +25,7 @@ def prepare_small(on_bed, *_):
     return small_bed(on_bed.settings)
 
 
-def small_bed(settings, stuff=SAND):
+def small_bed(settings, stuff=SAND_WEAK):
     """Two layers of large grains, almost at rest."""
     d, rows, columns = 6e-3, 32 // settings.bed_repeats, 6
     low = [((i + 0.5) * d, (j + 0.5) * d, 0.5 * d) for i in range(rows) for j in range(columns)]

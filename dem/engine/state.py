@@ -15,7 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from dem.grains.materials import Material
+from dem.grains.materials import Material, of_before
 
 from .bodies import BedBodies
 from .engine import Engine
@@ -263,8 +263,13 @@ def read_file(path: Path) -> tuple[BedSettings, State, str]:
     seed = int(stored["seed"])
     (x, y, z), (gx, gy, gz) = map(float, stored["size"]), map(float, state["reals"][2:5])
     settings = BedSettings(
-        material=Material(
-            str(stored["material"]), cohesion=str(stored["cohesion"]), tangential=str(stored["tangential"]), **numbers
+        material=of_before(
+            Material(
+                str(stored["material"]),
+                cohesion=str(stored["cohesion"]),
+                tangential=str(stored["tangential"]),
+                **numbers,
+            )
         ),
         size=(x, y, z),
         gravity=(gx, gy, gz),

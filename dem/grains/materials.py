@@ -30,13 +30,17 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from hedgebed_renamed import BEFORE_RUN_2, material_of_today
+
 __all__ = [
     "MATERIALS",
     "MATERIAL_FORMAT",
     "Material",
     "SAND",
+    "SAND_WEAK",
     "caveat",
     "material",
+    "of_before",
     "read_material",
 ]
 
@@ -173,25 +177,6 @@ class Facing:
             )
 
 
-SAND = Material(
-    name="sand",
-    density=2650.0,
-    young=70e9,
-    poisson=0.25,
-    friction=0.5,
-    restitution=0.5,
-    rolling_friction=0.1,
-    sources={
-        "density": "quartz; Toyoura and F-75 Ottawa sand",
-        "young": "quartz, lower end of 70 to 90 GPa; runs soften it and say by how much",
-        "poisson": "within the usual 0.2 to 0.3",
-        "friction": "Bhattacharya & Lee 2021 use 0.5 for Toyoura sand",
-        "restitution": "a guess, lower end of the usual 0.5 to 0.8",
-        "rolling_friction": "a guess within the usual 0.05 to 0.3, not calibrated to a friction angle yet",
-    },
-)
-"""Fine silica sand. Its rolling friction and restitution are guesses within the field's usual range."""
-
 PRESETS = Path(__file__).parents[1] / "presets"
 
 
@@ -248,14 +233,15 @@ def _of_its_kind(path: Path, key: str, value: Any) -> Any:
     return value if key in kinds else float(value)
 
 
-MATERIALS = {SAND.name: SAND} | {
-    stuff.name: stuff for stuff in map(_read, sorted(PRESETS.glob("*.toml") if PRESETS.is_dir() else ()))
-}
-"""The materials that ship: ``SAND``, and the calibrated ones of dem/presets (docs/materials.md)."""
+MATERIALS = {stuff.name: stuff for stuff in map(_read, sorted(PRESETS.glob("*.toml")))}
+"""The materials that ship, those of dem/presets (docs/materials.md)."""
+
+SAND, SAND_WEAK = MATERIALS["sand"], MATERIALS["sand-weak"]
+"""Fine silica sand, calibrated to its friction angle; and ``sand`` of before 2026-11-26, six degrees weaker."""
 
 CAVEATS = {
-    "sand": "its rolling friction is a guess: 24 to 25 degrees of triaxial friction, where fine sand has 30 to 33; "
-    "'sand-calibrated' has 31, and a spike meets 1.7 times the force in it",
+    "sand-weak": "its rolling friction is a guess: 24 to 25 degrees of triaxial friction, where fine sand has 30 to "
+    "33; 'sand' has 31, and a spike meets 1.7 times the force in it",
     "jsc-1a-loose": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand seven times as high as "
     "JSC-1A's; 'jsc-1a-loose-heights' is the one to take",
     "jsc-1a-dense": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand ten times as high as "
@@ -271,7 +257,8 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
     """The material of that name or in that file, or the material itself.
 
     Args:
-        name: of a material that ships, or the path of a file: what ends in .toml or has a slash in it.
+        name: of a material that ships, or the path of a file: what ends in .toml or has a slash in it. An earlier name
+            of one that ships is taken too, with a FutureWarning.
         grain: mean diameter of its grains [m], see ``Material.for_grain``.
 
     Raises ValueError: no material of that name, with those there are; a file that will not do (``read_material``).
@@ -279,8 +266,8 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
     word = str(name)
     if isinstance(name, Material):
         stuff = name
-    elif word.lower() in MATERIALS:
-        stuff = MATERIALS[word.lower()]
+    elif (known := material_of_today(word.lower())) in MATERIALS:
+        stuff = MATERIALS[known]
     elif isinstance(name, Path) or word.endswith(".toml") or "/" in word:
         stuff = read_material(name)
     else:
@@ -289,6 +276,12 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
         there = ", ".join(sorted(MATERIALS))
         raise ValueError(f"material = {name!r} is not known; there is {there}, and files that end in .toml{hint}")
     return stuff if grain is None else stuff.for_grain(grain)
+
+
+def of_before(stuff: Material) -> Material:
+    """A material that a file of before 2026-11-26 may hold, by today's name where its numbers are those of that one."""
+    today = MATERIALS.get(BEFORE_RUN_2.get(stuff.name, ""))
+    return replace(stuff, name=today.name) if today and today.rolling_friction == stuff.rolling_friction else stuff
 
 
 def caveat(stuff: Material) -> str | None:

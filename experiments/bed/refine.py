@@ -6,7 +6,7 @@ Its stages are those of the bed, then the packing fraction that the bed had; a c
 from dataclasses import replace
 
 from dem.grains.graded import Graded
-from dem.grains.materials import Facing, Material
+from dem.grains.materials import Facing, Material, of_before
 from dem.grains.sizes import LogNormal, Normal, Sieve, Sizes, Uniform
 from dem.prepare.bedfile import find_bed, read_preparation
 from dem.prepare.prepare import check_options
@@ -41,7 +41,7 @@ def refined_options(settings: BedRefineSettings) -> tuple[Json, Prepared]:
     if not grain < sizes.mean:
         raise ValueError(f"grain = {grain:g} m is not smaller than the bed's own, {sizes.mean:.6g} m: less would do")
     share = grain / sizes.mean
-    stuff = Material(**recipe["material"])
+    stuff = of_before(Material(**recipe["material"]))
     if stuff.cohesion != "none":
         stuff = in_grains_of(stuff, grain, keep=settings.keep, own=sizes.mean)
     last = [stage for stage in recipe["stages"] if stage.partition(":")[0] in ("cut", "tilt")]

@@ -92,15 +92,16 @@ class _Work:
         return figures_of(targets, runs)
 
     def explore(self, values: np.ndarray) -> None:
-        """One more point."""
+        """One more point, by as many samples as the settings say."""
         at = {key: float(f"{value:.6g}") for key, value in zip(self.settings.free, values, strict=True)}
         fitted = [target for target in self.targets if target.fit]
-        k = len(self.done.points)
-        seed = self.settings.seed + _SEEDS * k
-        found = self.simulate(f"point-{k + 1:02d}", at, fitted, seed=seed, begin=float(k))
-        self.done.points.append(at)
-        self.done.figures.append(found)
-        self.progress.message(f"{_said(at)}: " + ", ".join(f"{n} {v:.3g}" for n, (v, _) in found.items()))
+        point, first = self.explored, self.settings.seed + _SEEDS * self.explored
+        for seed in range(first, first + self.settings.samples):
+            begin = float(len(self.done.points))
+            found = self.simulate(f"point-{point + 1:02d}", at, fitted, seed=seed, begin=begin)
+            self.done.points.append(at)
+            self.done.figures.append(found)
+            self.progress.message(f"{_said(at)}: " + ", ".join(f"{n} {v:.3g}" for n, (v, _) in found.items()))
 
     def check(self, turn: int, values: dict[str, float], targets: list[Target]) -> dict[str, tuple[float, float]]:
         """The parameters found, with the seeds of the check, whose tests the surfaces learn from as well."""
@@ -113,6 +114,11 @@ class _Work:
             self.done.points.append(values)
             self.done.figures.append({target.name: found[target.name] for target in self.targets if target.fit})
         return {target.name: _mean([found[target.name] for found in checked]) for target in targets}
+
+    @property
+    def explored(self) -> int:
+        """How many points were explored, before the check."""
+        return len(self.done.points) // self.settings.samples
 
     @property
     def x(self) -> np.ndarray:
@@ -144,13 +150,17 @@ def _carry_out(settings: CalibrateSettings, folder: RunFolder, progress: Progres
         each = len(tests_for(settings, [t for t in targets if t.fit], seed=0))
         checks = settings.checks * len(settings.check_seeds) * len(tests_for(settings, simulated, seed=0))
         progress.plan(
-            {"explore": each * settings.most_points, "check": checks, **{t.name: 10.0 for t in beds}},
+            {
+                "explore": each * settings.most_points * settings.samples,
+                "check": checks,
+                **{t.name: 10.0 for t in beds},
+            },
             seconds={"report": 10.0},
         )
-        progress.stage("explore", total=float(settings.most_points))
+        progress.stage("explore", total=float(settings.most_points * settings.samples))
         for values in design(settings.free, settings.points, seed=settings.seed):
             work.explore(values)
-        while len(work.done.points) < settings.most_points:
+        while work.explored < settings.most_points:
             further = next_point(work.responses(), wanted, settings.free, work.x, enough=settings.enough)
             if further is None:
                 break

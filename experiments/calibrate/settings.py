@@ -123,8 +123,9 @@ class CalibrateSettings(StrictSettings):
     most_points: int = Field(10, ge=3, le=500, description="Points simulated at most, before the check [1].")
     enough: float = Field(0.5, gt=0, le=10)
     """No further points once the surface is known to this share of every tolerance [1]."""
+    samples: int = Field(1, ge=1, le=100, description="Samples of each point, of seeds that follow one another [1].")
     seed: SeedNumber = 1
-    """Seed of the design and of the first sample explored; the others have this and thousands more."""
+    """Seed of the design and of the first sample explored; those of the other points have this and thousands more."""
     check_seeds: tuple[SeedNumber, ...] = Field((2, 3), min_length=1)
     """Seeds of the samples with which the parameters found are checked."""
     checks: int = Field(2, ge=1, le=10)
@@ -153,8 +154,8 @@ class CalibrateSettings(StrictSettings):
             raise ValueError(say("not_sticking", lost=lost[0]))
         if len(set(self.pressures)) < len(self.pressures) or len(set(self.check_seeds)) < len(self.check_seeds):
             raise ValueError("pressures and check_seeds hold each value once")
-        if self.seed in self.check_seeds:
-            raise ValueError(f"check_seeds holds {self.seed}, the seed of exploring: other seeds would check it")
+        if known := set(range(self.seed, self.seed + self.samples)) & set(self.check_seeds):
+            raise ValueError(f"check_seeds holds {min(known)}, a seed of exploring: other seeds would check it")
         if self.points < len(self.free) + 2 or self.most_points < self.points:
             raise ValueError(say("few_points", s=self, least=len(self.free) + 2, wanted=len(self.free)))
         if min(self.size) < 6:

@@ -18,6 +18,7 @@ from rich.table import Table
 from experiments.cli import probes
 from experiments.runs.memory import cores_there, memory_there
 from experiments.runs.version import __version__
+from hedgebed_taichi import chosen, unknown_processor
 
 __all__ = ["Finding", "cache_folder", "examine", "show"]
 
@@ -81,6 +82,12 @@ def _taichi(arch: str, answer: dict[str, Any]) -> Finding:
     return Finding(f"backend {arch}", answer["ok"], detail, remedies[arch], required=arch == "cpu")
 
 
+def _processor() -> Finding:
+    known, taken = not unknown_processor(), chosen()
+    detail = f"{'known' if known else 'not known'} to Taichi's compiler; computed by {taken}"
+    return Finding("processor", known or taken == "quadrants", detail, "pip install quadrants, which is faster here")
+
+
 def _memory() -> Finding:
     memory = memory_there()
     limited = f", limited to {memory.limit / GIB:.1f} GiB" if memory.limit is not None else ""
@@ -124,13 +131,16 @@ def examine() -> list[Finding]:
             Finding("hedgebed", True, __version__),
             _python(),
             *taichi,
+            _processor(),
             Finding("threads", True, f"{cores_there()} usable of {os.cpu_count()}"),
             _memory(),
             _cache(),
             _opengl(opengl.result()),
             _peer("LIGGGHTS", ["liggghts"], "liggghts"),
             _peer("LAMMPS", ["lmp", "lammps"], "lammps"),
+            _peer("YADE", ["yade"], "yade"),
             _peer("MPI", ["mpirun"], "openmpi-bin"),
+            _peer("C compiler", ["cc"], "gcc"),
         ]
 
 

@@ -21,7 +21,7 @@ from experiments.cli.runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, re
 from experiments.runs import registry
 from experiments.runs.folder import RunFolder, fresh_path, write_json
 from experiments.runs.progress import Progress, make_progress
-from experiments.runs.reading import Layer, find_case, option, read_case, settings_from
+from experiments.runs.reading import Layer, find_case, gravities_told, option, read_case, settings_from
 from experiments.runs.registry import Experiment, find_experiment
 from experiments.runs.result import Result
 from experiments.runs.streams import (
@@ -97,6 +97,8 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
                 experiment.check(settings)
                 code = experiment.code()
             folder = RunFolder.create(out or fresh_path(experiment.name), experiment.name, settings, code=code)
+            for text in gravities_told(settings, [*layers, typed]):
+                say(text)
 
         def work(progress: Progress) -> Result:
             return experiment.run(settings, folder.path, progress=progress)
@@ -289,7 +291,8 @@ def build_app() -> App:
     app = App(
         name="hedgebed",
         help="Robots that hop and tumble on asteroids: their spikes in beds of grains, the spring-damper that stands "
-        "in for those, the platform's tumbles and hops, and what measured trials lack. SI units throughout.",
+        "in for those, the platform's tumbles and hops, and what measured trials lack. SI units throughout; a number "
+        "may have another unit behind it, as 16mm and 1e-3g.",
         help_format="plaintext",
         version=__version__,
         result_action="return_value",

@@ -6,11 +6,12 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from cyclopts import Parameter
+from cyclopts import CoercionError, Parameter
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from experiments.runs.strict import may_be_empty, plain_kinds
+from experiments.runs.units import find_unit, has_unit
 
 __all__ = ["as_typed", "option_of", "reserved_option"]
 
@@ -30,19 +31,33 @@ def _shown(value: Any) -> str:
     return str(value)
 
 
-def _bare(hint: Any) -> Any:
+def _as_typed(_: Any, tokens: tuple[Any, ...]) -> float | str:
+    """A number; with a unit behind it, or ``none``, the text, which the settings class reads."""
+    word = tokens[0].value
+    try:
+        return word if has_unit(word) or word == "none" else float(word)
+    except ValueError:
+        raise CoercionError(token=tokens[0], target_type=float) from None
+
+
+_WITH_UNIT = Annotated[float | str, Parameter(converter=_as_typed, metavar="FLOAT")]
+
+
+def _bare(hint: Any, *, with_unit: bool) -> Any:
     """`hint` without its bounds: pydantic checks these, and its faults become sentences in
-    `experiments.runs.reading`."""
+    `experiments.runs.reading`. `with_unit`: a unit may stand behind its numbers."""
     origin, inside = get_origin(hint), get_args(hint)
     if origin is Annotated:
-        return _bare(inside[0])
+        return _bare(inside[0], with_unit=with_unit)
+    if hint is float and with_unit:
+        return _WITH_UNIT
     if hint is int:  # cyclopts would round 1.5 to 2; `as_typed` makes whole numbers of it again
         return Annotated[float, Parameter(metavar="INT")]
     if not inside or origin is Literal:
         return hint
     if origin in (Union, UnionType):
-        return Union[tuple(_bare(item) for item in inside)]
-    return origin[tuple(_bare(item) for item in inside)]
+        return Union[tuple(_bare(item, with_unit=with_unit) for item in inside)]
+    return origin[tuple(_bare(item, with_unit=with_unit) for item in inside)]
 
 
 def as_typed(given: dict[str, Any], fields: dict[str, FieldInfo]) -> dict[str, Any]:
@@ -57,7 +72,7 @@ def as_typed(given: dict[str, Any], fields: dict[str, FieldInfo]) -> dict[str, A
     for name, value in given.items():
         field = fields.get(name)
         if field is not None:
-            value = () if may_be_empty(field) and value == (None,) else value
+            value = () if may_be_empty(field) and value in ((None,), ("none",)) else value
             kinds = plain_kinds(field.annotation)
             value = whole(value) if int in kinds and float not in kinds else value
         found[name] = value
@@ -71,7 +86,7 @@ def option_of(name: str, field: FieldInfo) -> inspect.Parameter:
     default = None if field.is_required() else field.get_default(call_default_factory=True)
     shown: bool | Callable[[Any], str] = False if default is None or default is PydanticUndefined else _shown
     is_flag = field.annotation is bool
-    hint = _bare(field.annotation)
+    hint = _bare(field.annotation, with_unit=find_unit(field.description) is not None)
     if may_be_empty(field):
         hint = tuple[get_args(hint)[0] | None, ...]  # type: ignore[misc]
     more = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}

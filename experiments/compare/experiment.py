@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.grains.settings import OF_THE_MASTER, GrainsSettings, TumbleBedSettings
-from experiments.runs.folder import RunFolder, read_json, read_series
+from experiments.runs.folder import RunFolder, read_series
 from experiments.runs.kept_results import PATH_AND_MOTION, require_files
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantities_of
@@ -54,7 +54,7 @@ def check(settings: CompareSettings) -> None:
         raise ValueError(say("two_kinds", runs=settings.runs, first=first, second=second))
     if first.command == IN_SPACE:  # an older folder lacks series: said before anything is written
         for one in (first, second):
-            compare_spatial.read_moved(one.path, read_json(one.path / "result.json"))
+            compare_spatial.read_moved(one.path, one.read_result())
 
 
 def _finished(path: str) -> RunFolder:
@@ -71,7 +71,7 @@ def _finished(path: str) -> RunFolder:
 
 def _compute(settings: CompareSettings, folder: RunFolder, progress: Progress) -> Result:
     first, second = (_finished(path) for path in settings.runs)
-    results = [read_json(one.path / "result.json") for one in (first, second)]
+    results = [one.read_result() for one in (first, second)]
     labels = _labels((first, second), results)
     result: Json = {
         "kind": first.command, "title": f"{labels[0]} and {labels[1]}", "status": "done",

@@ -16,10 +16,11 @@ def keep_material(name: str, folder: Path, *, copy: str = MATERIAL_COPY) -> str:
     Raises ValueError for a name that is none and a file that will not do, unless the copy is there.
     """
     from dem.grains.materials import MATERIALS, material
+    from hedgebed_renamed import material_of_today
 
     kept = folder / copy
-    if name.lower() in MATERIALS:
-        return name
+    if (today := material_of_today(name.lower())) in MATERIALS:
+        return today
     if not kept.exists():
         material(name)
         write_text(kept, Path(name).read_text(encoding="utf-8"))

@@ -34,7 +34,7 @@ from dem.contact.timestep import CHAIN
 from . import say
 
 __all__ = [
-    "PACKING", "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit",
+    "INERTIA", "PACKING", "PUSHED", "Softening", "bearing_gradient", "chain", "check_young", "drop_depth", "run_limit",
     "soften_material", "stable_overlap",
 ]  # fmt: skip
 
@@ -154,14 +154,18 @@ def soften_material(
     pressure: float = 0.0,
     fall: float = 0.0,
     fastest: str = "speed",
+    strength: float = 1.0,
+    resistance: float = 0.0,
 ) -> Softening:
     """Young's modulus of the grains of a material that keeps overlaps below `max_overlap` (see the module). All SI.
 
     Diameters are uniform around `grain` within 1 +- `spread`: where that is wide, the mean grain is held to less than
     `max_overlap`, so that the smallest keep it (`dem.prepare.prepare.bound_of_mean`). `depth` is the deepest the tip
     goes, `speed` its fastest, `pressure` of the load alone, `fall` how deep a grain fell when the bed was made;
-    `fastest` is the key that set the speed. Where `young` [Pa] is set, the result has that, with the pressure and the
-    speed. Raises ValueError for an overlap that is no share of a diameter, and where the real grains are too soft.
+    `fastest` is the key that set the speed, `strength` the bed's over that of 3D-RFT (`bearing.strength`) [1],
+    `resistance` what a tip meets for the cohesion of grains that stick [Pa]. Where `young` [Pa] is set, the result has
+    that, with the pressure and the speed. Raises ValueError for an overlap that is no share of a diameter, and where
+    the real grains are too soft.
     """
     from dem.grains.sizes import Uniform
     from dem.prepare.prepare import bound_of_mean
@@ -171,7 +175,8 @@ def soften_material(
         raise ValueError(f"max_overlap is {max_overlap}: it must be above 0 and at most 0.2 of a diameter")
     poisson, real = material.poisson, material.young
     bulk = PACKING * material.density
-    under_tip = bearing_gradient(bulk, gravity, material.friction) * depth + INERTIA * bulk * speed**2
+    static_part = strength * bearing_gradient(bulk, gravity, material.friction) * depth + resistance
+    under_tip = static_part + INERTIA * bulk * speed**2
     highest = max(under_tip, pressure) + bulk * gravity * bed_height
     pulled = 2 * math.pi * material.surface_energy / grain
     pair = 1.5 * (chain(max_overlap) * highest + pulled) / max_overlap**1.5

@@ -59,13 +59,20 @@ class _OneStage(Stages):
 
 
 def staged_bed(
-    material: Material, stages: Sequence[str], *, progress: Progress, asked_to_stop: Callable[[], bool], **options: Any
+    material: Material,
+    stages: Sequence[str],
+    *,
+    progress: Progress,
+    asked_to_stop: Callable[[], bool],
+    name: str = "bed",
+    **options: Any,
 ) -> Bed:
     """The bed that `hedgebed bed make` with these stages would make; kept under ``HEDGEBED_CACHE``, as rained ones are.
 
-    `options` of `dem.prepare.prepare.prepare_as`. Raises RuntimeError where the bed cannot be made, and what that does.
+    `name`: how it shows in the progress; `options` of `dem.prepare.prepare.prepare_as`. Raises RuntimeError where the
+    bed cannot be made, and what that does.
     """
-    shown = _OneStage(progress, "bed", len(stages), asked_to_stop)
+    shown = _OneStage(progress, name, len(stages), asked_to_stop)
     try:
         prepared = prepare_as(material, make=Bed, stages=stages, **options, progress=shown)
     except ValueError as error:  # found while it was prepared, as a packing that cannot be reached

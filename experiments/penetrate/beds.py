@@ -8,15 +8,29 @@ from dem.contact.timestep import time_step_for
 from dem.grains.materials import material
 from dem.prepare import prepare
 from dem.prepare.bedfile import find_bed
+from experiments.grains.bearing import Bearing, bearing_of, strength
 from experiments.grains.bed_progress import BedProgress
+from experiments.grains.recipes import recipe_of
 from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material
+from experiments.grains.staged import staged_bed
 from experiments.runs.progress import Progress
 from experiments.runs.stopping import held_back
+from experiments.runs.types import Json
+from rigid.platform.rig import STANDARD_GRAVITY
 
 from .settings import PenetrateSettings
+from .similarity import pace_of
 from .units import RAIN, deepest
 
-__all__ = ["bed_step", "choose_softness", "expected_stiffness", "find_material", "fingerprint", "prepare_bed"]
+__all__ = [
+    "bed_step", "choose_softness", "expected_bearing", "expected_stiffness", "find_material", "fingerprint",
+    "first_gravity", "prepare_bed", "stages_of", "stiffened",
+]  # fmt: skip
+
+_SPELL, _MOST_SPELLS = 4.0, 40
+"""How long grains are left to come to rest at a time [sqrt(d / g)], and how often at most."""
+_DRAG = 0.3  # Time of the drag at first [sqrt(d / g)]
+_STILL = 1e-5  # Mean kinetic energy at rest [m g d]
 
 
 def find_material(settings: PenetrateSettings) -> Any:
@@ -43,37 +57,102 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
     """The bed of one seed: the one that is given, or prepared, or from the cache."""
     if settings.bed is not None:
         return Bed.load(find_bed(settings.bed), arch=settings.arch, threads=settings.threads)
-    graded = settings.graded
+    graded, stages, first = settings.graded, stages_of(settings), first_gravity(settings)
+    options: Json = {
+        "size": settings.bed_size, "grain": settings.grain if graded is None else graded,
+        "spread": settings.spread if graded is None else None, "gravity": first, "seed": seed, "young": young,
+        "max_overlap": settings.max_overlap, "time_step": settings.time_step, "precision": settings.precision,
+        "arch": settings.arch, "threads": settings.threads, "cache": settings.cache,
+    }  # fmt: skip
+    name = f"bed of seed {seed}"
     with held_back() as asked_to_stop:
-        return Bed.prepare(
-            find_material(settings), size=settings.bed_size, grain=settings.grain if graded is None else graded,
-            spread=settings.spread if graded is None else None,
-            packing=settings.packing, gravity=settings.gravity, seed=seed, young=young,
-            max_overlap=settings.max_overlap, time_step=settings.time_step, precision=settings.precision,
-            arch=settings.arch, threads=settings.threads, cache=settings.cache,
-            progress=BedProgress(progress, f"bed of seed {seed}", asked_to_stop, tapped=settings.packing is not None),
-        )  # fmt: skip
+        if stages is None:
+            return Bed.prepare(
+                find_material(settings), packing=settings.packing, **options,
+                progress=BedProgress(progress, name, asked_to_stop, tapped=settings.packing is not None),
+            )  # fmt: skip
+        stuff, ending = find_material(settings), asked_to_stop
+        bed = staged_bed(stuff, stages, progress=progress, asked_to_stop=ending, name=name, **options)
+    if first != settings.gravity:
+        bed.set_gravity(settings.gravity)
+        _come_to_rest(bed, unit=math.sqrt(settings.grain / first))
+    return bed
+
+
+def stages_of(settings: PenetrateSettings) -> tuple[str, ...] | None:
+    """How a bed is prepared: the stages that are given, or the material's own; None: rained and levelled."""
+    if settings.bed_stages is not None:
+        return settings.bed_stages
+    own = recipe_of(find_material(settings)).stages
+    if own is None or settings.packing is None:
+        return own
+    return ("rain:dry", f"compact:{settings.packing:g}", "stick", "level")
+
+
+def first_gravity(settings: PenetrateSettings) -> float:
+    """Gravity under which a bed is prepared [m/s2]: that of the run; in stages, as in a laboratory, at least 1 g."""
+    return settings.gravity if stages_of(settings) is None else max(settings.gravity, STANDARD_GRAVITY)
+
+
+def stiffened(bed: Any, young: float, settings: PenetrateSettings) -> Any:
+    """The same bed of stiffer grains, `young` [Pa]: same places, contacts and histories, at rest anew."""
+    made = bed.successor(
+        bed.state(), material=bed.material.softened(young), time_step=bed_step(settings, young),
+        max_overlap=bed.overlap_limit,
+    )  # fmt: skip
+    made.material, made.recipe = bed.material.softened(young), bed.recipe
+    _come_to_rest(made, unit=math.sqrt(settings.grain / STANDARD_GRAVITY) * pace_of(settings))
+    return made
+
+
+def _come_to_rest(bed: Any, *, unit: float) -> None:
+    """Let grains that have sprung apart come to rest, in a drag first; `unit`: sqrt(d / g) [s]. Then time is 0 again.
+
+    At rest as a bed is when it is prepared: their mean kinetic energy is below 1e-5 m g d. Raises RuntimeError where
+    they do not come to rest.
+    """
+    steps, drag = math.ceil(_SPELL * unit / bed.time_step), max(_DRAG * unit, 4 * bed.time_step)
+    for spell in range(_MOST_SPELLS):
+        bed.advance(steps, drag_time=drag if spell < 2 else math.inf)
+        if spell >= 2 and bed.kinetic_energy < _STILL * bed.weight * bed.mean_diameter:
+            break
+    else:
+        raise RuntimeError("the bed did not come to rest after gravity or its modulus was changed")
+    bed.measure_surface()
+    bed.mark_origin()
+    bed.max_overlap, bed.steps = 0.0, 0
 
 
 def choose_softness(settings: PenetrateSettings) -> Softening:
     """The modulus of the grains for these runs (see `experiments.grains.softening`), or the one that is set."""
-    material, stiffness = find_material(settings), expected_stiffness(settings)
+    material, stiffness, bears = find_material(settings), expected_stiffness(settings), expected_bearing(settings)
     area = math.pi * settings.tip_diameter**2 / 4
     fastest, speed = settings.fastest
+    floor = deepest(settings)
     drops = [
-        drop_depth(speed, settings.mass, settings.weight, stiffness)
-        for speed in (*settings.drop_speeds, *settings.other_drop_speeds)
+        drop_depth(speed, settings.mass, settings.weight - bears.held, stiffness) for speed in settings.dropped_speeds
     ]
+    heavier = first_gravity(settings) / settings.gravity  # while it is prepared
+    # No bed presses on a tip with more than it bears.
+    pressure = min(settings.weight, stiffness * floor + bears.held) / area
     return soften_material(
         material, young=settings.young, max_overlap=settings.max_overlap, grain=settings.grain, spread=settings.spread,
-        gravity=settings.gravity, bed_height=settings.bed_size[2],
-        depth=min(deepest(settings), max(settings.depth, *drops) if drops else settings.depth), speed=speed,
-        fastest=fastest, fall=RAIN * settings.bed_size[2], pressure=settings.weight / area,
+        gravity=settings.gravity, bed_height=heavier * settings.bed_size[2],
+        depth=min(floor, max(settings.depth, *drops) if drops else settings.depth), speed=speed,
+        fastest=fastest, fall=heavier * RAIN * settings.bed_size[2], pressure=pressure,
+        strength=strength(material), resistance=bears.resistance,
     )  # fmt: skip
 
 
 def expected_stiffness(settings: PenetrateSettings) -> float:
-    """A guess at the bed's stiffness under the tip [N/m], for progress and frames."""
+    """The stiffness under a flat plate of the tip's size by 3D-RFT [N/m], for progress and for what grains bear."""
     material = find_material(settings)
     area = math.pi * settings.tip_diameter**2 / 4
-    return bearing_gradient(0.6 * material.density, settings.gravity, material.friction) * area
+    plate = bearing_gradient(0.6 * material.density, settings.gravity, material.friction) * area
+    return plate * strength(material)
+
+
+def expected_bearing(settings: PenetrateSettings) -> Bearing:
+    """What the bed may well bear on the tip: weight and cohesion of the grains (`experiments.grains.bearing`)."""
+    area = math.pi * settings.tip_diameter**2 / 4
+    return bearing_of(find_material(settings), grain=settings.grain, gravity=settings.gravity, area=area)

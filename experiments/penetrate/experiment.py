@@ -6,16 +6,20 @@ contacts included, so that a run that was stopped or killed continues bitwise. T
 the same runs are made on it, and the two are compared.
 """
 
+import math
+import re
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from coupling import BedGround, Run
 from experiments.campaign.files import keep_model, place_campaign
+from experiments.grains.advice import resolution_advice
 from experiments.grains.bed_progress import show_bed
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.grains.softening import Softening
@@ -23,6 +27,7 @@ from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
+from experiments.runs.types import Json
 from experiments.runs.whole_runs import PictureCosts, draw_report, whole_run
 
 from . import beds
@@ -31,26 +36,59 @@ from .beds import fingerprint
 from .findings import BedFacts
 from .recorded import campaign_of, sensors_of
 from .refusals import check
-from .result import conclude, softening_note
+from .rest import made_units, sinks_away
+from .result import conclude, softening_note, staged_note, stiffer_note
 from .settings import PenetrateSettings, say
+from .similarity import fast_for_gravity, similarity_of
 from .units import PenetratePlan, Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
 
-__all__ = ["Frames", "check", "fingerprint", "resume", "run"]
+__all__ = ["Frames", "check", "compute", "fingerprint", "resume", "run"]
+
+ROOM = 0.8
+"""Share of `max_overlap` that is aimed at where grains were too soft [1]."""
+LEAST_STIFFER = 1.25
+"""By which grains become stiffer at least [1]."""
 
 
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     if settings.ground == "spring-damper":
         return run_without_bed(settings, folder, progress)
+    with folder.lock():
+        result = compute(settings, folder, progress)
+        draw_report(folder, progress, _picture_costs(folder.path, result))
+    return result
+
+
+def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
+    """All runs on beds that are not finished yet, and the result in the folder, without a report.
+
+    Raises RuntimeError where a bed cannot be prepared or a run cannot go on.
+    """
     settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
     softening = beds.choose_softness(settings)
-    units = plan_units(settings)
+    units = made_units(settings, plan_units(settings))
     with folder.lock():
         keep_model(settings.model, folder.path)
+        progress.message(similarity_of(settings)["sentence"])
+        for text in fast_for_gravity(settings, beds.find_material(settings).friction):
+            progress.message(f"warning: {text}")
+        if note := staged_note(settings):
+            progress.message(note)
         progress.message(softening_note(settings, softening))
-        dropped = f", a dropped spike moves {settings.mass:.4g} kg" if settings.drop_speeds else ""
+        any_drops = any(unit.kind == "drop" for unit in units)
+        dropped = f", a dropped spike moves {settings.mass:.4g} kg" if any_drops else ""
         progress.message(f"the load is {settings.weight:.4g} N{dropped}")
-        step, stiffness = beds.bed_step(settings, softening.young), beds.expected_stiffness(settings)
-        plan = PenetratePlan(settings, units, folder, progress, step=step, stiffness=stiffness)
+        if sinks_away(settings):
+            rests = beds.expected_bearing(settings).depth(settings.weight)
+            progress.message(say("only_driven", s=settings, rests=rests))
+        plan = PenetratePlan(
+            settings, units, folder, progress, step=beds.bed_step(settings, softening.young),
+            stiffness=beds.expected_stiffness(settings), held=beds.expected_bearing(settings).held,
+            stages=beds.stages_of(settings), gravity=beds.first_gravity(settings),
+        )  # fmt: skip
+        size = {"tip": settings.tip_diameter, "grain": settings.grain, "depth": settings.depth}
+        for text in resolution_advice(**size, size=settings.bed_size, seconds=plan.seconds or None):
+            progress.message(text)
         work = _Work(settings, units, softening, folder, progress, plan)
         for seed in settings.seeds:
             work.run_seed(seed)
@@ -60,7 +98,6 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
             campaign = campaign_of(settings, result, folder, sensors_of(settings))
             target = place_campaign(settings.campaign, campaign, keep_out=folder.path)
             progress.message(f"campaign {target}: `hedgebed diagnose {target}` says what the spring-damper lacks")
-        draw_report(folder, progress, _picture_costs(folder.path, result))
     return result
 
 
@@ -91,26 +128,76 @@ class _Work:
         todo = [unit for unit in self.units if unit.seed == seed and not self.folder.is_done(unit.id)]
         if not todo and self.folder.is_done(f"bed-{seed}"):
             return
-        try:
-            bed = beds.prepare_bed(self.settings, seed, self.softening.young, self.progress)
-        except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
-            raise RuntimeError(f"the bed of seed {seed}: {error}") from error
-        except RuntimeError as error:
-            raise RuntimeError(f"the bed of seed {seed} could not be prepared: {error}; {_remedy(error)}") from error
+        bed = self._prepared(seed)
         self.plan.bed_is_there()
-        facts = BedFacts.of(bed, seed, self.softening, self.settings.graded)
-        ground = BedGround(bed, make_spike(self.settings))
-        start = ground.state()
+        softening = replace(self.softening, young=self._young(seed, prepared=True))
+        facts = BedFacts.of(bed, seed, softening, self.settings.graded)
         self.folder.mark_done(f"bed-{seed}", asdict(facts))
         self.progress.message(say("bed_made", facts=facts))
+        if (young := self._young(seed)) != softening.young:
+            bed = beds.stiffened(bed, young, self.settings)
+        ground = BedGround(bed, make_spike(self.settings))
+        start = ground.state()
         for unit in todo:
             ground.restore(start)
             bed.max_overlap = 0.0
             bed.mark_origin()
-            self.run_unit(unit, ground)
+            while not self.run_unit(unit, ground):
+                bed = beds.stiffened(self._prepared(seed), self._young(seed), self.settings)
+                ground = BedGround(bed, make_spike(self.settings))
+                start = ground.state()
 
-    def run_unit(self, unit: Unit, ground: BedGround) -> None:
-        """One run to its end, from its checkpoint where there is one."""
+    def _prepared(self, seed: int) -> Any:
+        """The bed of a seed as it is prepared, of stiffer grains where it overlapped too far in its preparation.
+
+        Raises RuntimeError where it cannot be prepared.
+        """
+        while True:
+            young = self._young(seed, prepared=True)
+            try:
+                return beds.prepare_bed(self.settings, seed, young, self.progress)
+            except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
+                raise RuntimeError(f"the bed of seed {seed}: {error}") from error
+            except RuntimeError as error:
+                if not self._made_stiffer(error, seed):
+                    failed = f"the bed of seed {seed} could not be prepared: {error}; {_remedy(error)}"
+                    raise RuntimeError(failed) from error
+
+    def _notes(self, seed: int) -> list[Json]:
+        """Where grains of a seed were made stiffer, and by how much, so far."""
+        name = f"stiffer-{seed}"
+        return list(self.folder.done_data(name)) if self.folder.is_done(name) else []
+
+    def _young(self, seed: int, *, prepared: bool = False) -> float:
+        """The modulus of the grains of a seed as it is now [Pa], or the one its bed is `prepared` with."""
+        made = [note["young"] for note in self._notes(seed) if not (prepared and note["unit"])]
+        return float(made[-1]) if made else self.softening.young
+
+    def _made_stiffer(self, error: RuntimeError, seed: int, unit: Unit | None = None) -> bool:
+        """Whether it is done again with stiffer grains, after an overlap past its bound: that is kept, and told.
+
+        Not where it was another failure, where modulus or step are set, or where the grains have no more.
+        """
+        found, settings = re.search(r"an overlap of ([0-9.e+-]+) % of a diameter went past", str(error)), self.settings
+        if found is None or settings.young is not None or settings.time_step is not None:
+            return False
+        overlap, young = float(found[1]) / 100, self._young(seed, prepared=unit is None)
+        now = replace(self.softening, young=young)
+        stiffer = max(now.stiffer(overlap, ROOM * settings.max_overlap), LEAST_STIFFER * young)
+        if not math.isfinite(stiffer) or stiffer > self.softening.real:
+            return False
+        note = {"seed": seed, "unit": unit.id if unit else "", "overlap": overlap, "before": young, "young": stiffer}
+        if unit is not None:
+            self.folder.drop_checkpoint(unit.id)
+        self.folder.mark_done(f"stiffer-{seed}", [*self._notes(seed), note])
+        self.progress.message(stiffer_note(note))
+        return True
+
+    def run_unit(self, unit: Unit, ground: BedGround) -> bool:
+        """One run, from its checkpoint where there is one; whether it came to its end.
+
+        If not, it is to be done again with the modulus that `_made_stiffer` has chosen.
+        """
         settings, folder, bed = self.settings, self.folder, ground.bed
         stepper = make_run(settings, unit, ground)
         expected, sure = self.plan.expected_time(unit), False
@@ -145,6 +232,8 @@ class _Work:
                 on_frame, interval = (frames.write, frames.interval) if frames else (None, None)
                 series = stepper.run(on_step=on_step, on_frame=on_frame, frame_interval=interval)
         except RuntimeError as error:  # the bed's: a NaN, a grain lost, an overlap past its bound
+            if self._made_stiffer(error, unit.seed, unit):
+                return False
             folder.save_checkpoint(f"{unit.id}.failed", stepper.state())
             raise RuntimeError(say("failed", unit=unit, error=error, remedy=_remedy(error))) from error
         self.plan.is_over(unit, stepper.time)
@@ -156,6 +245,7 @@ class _Work:
         }  # fmt: skip
         folder.mark_done(unit.id, series.facts() | kept_of_bed)
         folder.drop_checkpoint(unit.id)
+        return True
 
 
 def _remedy(error: RuntimeError) -> str:

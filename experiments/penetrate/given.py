@@ -1,13 +1,19 @@
-"""The settings of `penetrate` that a file decides: that of a bed, or, without a bed, that of a model."""
+"""The settings of `penetrate` that gravity decides, and those that a file does: of a bed, or without one of a model."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic.fields import FieldInfo
+
 from experiments.campaign import PenetrationModel, read_model
 from experiments.runs.types import Json
+from experiments.runs.units import find_unit
 
-__all__ = ["settings_of_bed", "settings_of_model"]
+from .following import following, pace, sticking_of
+
+__all__ = ["settings_of_bed", "settings_of_gravity", "settings_of_model"]
 
 
 def settings_of_bed(given: Json) -> Json:
@@ -56,6 +62,30 @@ def settings_of_bed(given: Json) -> Json:
             both = f"{key} = {given[key]!r} beside bed = {name!r}"
             raise ValueError(f"{both}, whose own is {value!r}: leave {key} out, or the bed")
     return given | said
+
+
+def settings_of_gravity(given: Json, fields: Mapping[str, FieldInfo]) -> Json:
+    """`given` with the speeds, times and rig that follow its ``gravity``, where it has none; ``fields``: of the class.
+
+    What will not do is refused later.
+    """
+    defaults = {name: field.default for name, field in fields.items()}
+    numbers = {}
+    for name in ("gravity", "grain", "tip_diameter"):
+        value, unit = given.get(name, defaults[name]), find_unit(fields[name].description)
+        try:
+            value = unit.value_of(value) if isinstance(value, str) and unit is not None else float(value)
+        except (TypeError, ValueError):
+            return given
+        if not 0 < value < math.inf:
+            return given
+        numbers[name] = value
+    try:
+        stuff = str(given.get("material", defaults["material"]))
+        sticking = sticking_of(stuff, grain=numbers["grain"], diameter=numbers["tip_diameter"])
+    except ValueError:
+        return given
+    return following(pace(numbers["gravity"], sticking=sticking), defaults) | given
 
 
 def settings_of_model(given: Json) -> Json:

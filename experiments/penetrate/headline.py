@@ -24,6 +24,8 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
         return None
     load = f" under {quote(numbers['load']['value'], unit='N')}" if "load" in numbers else ""
     rows = [(f"sinkage at rest{load}", *(_quoted(numbers[f"sinkage_{side}"]) for side in ("dem", "spring_damper")))]
+    if "depth_to_rest" in numbers:
+        rows[0] = (f"would rest{load}, about at", _quoted(numbers["depth_to_rest"]), rows[0][2])
     rows += _drag(result.get("departures", {}).get("table", []))
     rows += _fastest_drop(result.get("runs", []))
     given, back = (numbers.get(f"work_returned_{side}") for side in ("dem", "spring_damper"))
@@ -34,6 +36,7 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     if "drag_gap" in numbers:
         rows.append(("its drag is off by (rms, way in)", "", _quoted(numbers["drag_gap"], "%")))
     warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
+    rest = list(result.get("rest", {}).get("sentences", []))
     changes = result.get("reference", {}).get("moved", {})
     parts = [
         f"{words} {100 * changes[name]['change']:+.0f} %"
@@ -44,9 +47,11 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     # Of a finding that goes on, as to how far beds differ, the first sentence.
     own = [re.split(r"(?<=\.)\s+(?=[A-Z])", text)[0] for text in said if not text.startswith("Against the reference")]
     shown = [*own[: max(_OF_FINDINGS, _SAID - len(warnings)) - len(moved)], *moved]
+    left = len(said) - len(shown)
+    shown = [*rest, *shown]
     return Headline(
         ("", "bed", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
-        tuple(map(foldable, warnings)), tuple(map(foldable, shown)), len(said) - len(shown),
+        tuple(map(foldable, warnings)), tuple(map(foldable, shown)), left,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from experiments.runs.folder import RunFolder
 from experiments.runs.types import Json
 from rigid.series import RESULT_FORMAT
 from vis.page.numbers import foldable, quote
@@ -31,6 +32,8 @@ def read_reference(reference: str | Path) -> Json:
     """The result.json to compare with. Raises ValueError where it is not the result of a penetrate run."""
     try:
         other = json.loads(Path(reference).read_text(encoding="utf-8"))
+        if isinstance(other, dict) and (Path(reference).parent / "run.toml").is_file():
+            other = RunFolder.open(Path(reference).parent).of_today(other)  # what its materials are called
     except (OSError, ValueError) as error:
         raise ValueError(f"reference = {str(reference)!r} is no result.json that can be read: {error}") from None
     kind = (other.get("format"), other.get("experiment")) if isinstance(other, dict) else (None, None)

@@ -4,12 +4,15 @@ import math
 
 from dem.engine.values import refuse_sleep
 from experiments.campaign.files import check_target
+from experiments.grains.bearing import UNSURE
 from experiments.grains.softening import check_young, drop_depth
+from experiments.grains.staged import check_bed_stages
 from experiments.grains.where import check_memory, check_where
 
 from . import beds
 from .amended import read_law
 from .reference import read_reference
+from .rest import made_units, resting_load, sinks_away
 from .settings import PenetrateSettings, say
 from .units import deepest, expected_time, plan_units
 
@@ -29,7 +32,10 @@ def check(settings: PenetrateSettings) -> None:
         check_target(settings.campaign)
     if settings.ground == "spring-damper":
         return
-    beds.find_material(settings)
+    stuff = beds.find_material(settings)
+    if settings.bed_stages is not None:
+        size, grain, spread = settings.bed_size, settings.grain, settings.spread
+        check_bed_stages(settings.bed_stages, stuff, size=size, grain=grain, spread=spread)
     for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
         if seeds and not speeds:
             raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
@@ -58,29 +64,33 @@ def check(settings: PenetrateSettings) -> None:
 
 
 def _check_reach(settings: PenetrateSettings) -> None:
-    """Refuse what would end near the floor."""
-    stiffness, floor = beds.expected_stiffness(settings), deepest(settings)
+    """Refuse what would end near the floor, but for a load that no depth of the foot bears: that is an answer."""
+    if sinks_away(settings):
+        return
+    bears, floor = beds.expected_bearing(settings), deepest(settings)
     deeper = f"{floor:.3g} m, one tip's diameter above the floor"
-    rests = settings.weight / stiffness
-    if rests > floor:
+    rests = bears.depth(settings.weight)
+    if settings.weight > resting_load(settings, sure=UNSURE):
         key = "load" if settings.load is not None else "platform_mass"
         value = f"{settings.load:g} N" if settings.load is not None else f"{settings.platform_mass:g} kg"
         on = "" if settings.load is not None else f", {settings.weight:.3g} N on a spike,"
-        most = settings.weight * floor / rests
+        most = resting_load(settings, sure=1 / UNSURE)
         raise ValueError(say("rests_deep", key=key, value=value, on=on, rests=rests, deeper=deeper, most=most))
+    stiffness, load = UNSURE * bears.stiffness, settings.weight - bears.held
     for key in ("drop_speeds", "other_drop_speeds"):
-        for speed in getattr(settings, key):
-            depth = drop_depth(speed, settings.mass, settings.weight, stiffness)
+        for speed in settings.used(key):
+            depth = drop_depth(speed, settings.mass, load, stiffness)
             if depth > floor:
-                room = stiffness * floor**2 - 2 * settings.weight * floor
+                room = stiffness * floor**2 - 2 * load * floor
                 slower = f"at most {math.sqrt(room / settings.mass):.2g} m/s" if room > 0 else "a smaller load"
                 how = {"key": key, "speed": speed, "depth": depth}
                 raise ValueError(say("drops_deep", **how, s=settings, deeper=deeper, slower=slower))
 
 
 def _check_step_count(settings: PenetrateSettings, step: float) -> None:
-    stiffness = beds.expected_stiffness(settings)
-    times = {unit: expected_time(settings, unit, stiffness) for unit in plan_units(settings)}
+    stiffness, held = beds.expected_stiffness(settings), beds.expected_bearing(settings).held
+    units = made_units(settings, plan_units(settings))
+    times = {unit: expected_time(settings, unit, stiffness, held=held) for unit in units}
     count = sum(times.values()) / step
     if count <= MOST_STEPS:
         return

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from coupling import Penetration, overdamped_below
 from dem.grains.materials import caveat
+from experiments.grains.advice import resolution_advice
 from experiments.grains.graded import grading_warning
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
@@ -19,10 +20,15 @@ from .amended import kept_law, run_beside
 from .departures import departures
 from .findings import BedFacts, Findings, bed_entry, bed_quantities, drop_note
 from .reference import compare_with, read_reference
+from .rest import answer
 from .settings import PenetrateSettings, say
+from .similarity import fast_for_gravity, pace_of, similarity_of
 from .units import Unit, make_spike
 
-__all__ = ["SHIPPED_RESULT", "conclude", "departures_in_words", "overlap_warning", "softening_note", "warnings_of"]
+__all__ = [
+    "SHIPPED_RESULT", "conclude", "departures_in_words", "overlap_warning", "softening_note", "staged_note",
+    "stiffer_note", "warnings_of",
+]  # fmt: skip
 
 SHIPPED_RESULT = Path(__file__).parents[2] / "docs" / "results" / "penetrate" / "result.json"
 """The result of the case that ships, in a checkout."""
@@ -41,7 +47,10 @@ def conclude(
     for name, series in findings.models.items():
         folder.write_series(f"{name}.model", series.columns())
     overlap = max((note["max_overlap"] for note in notes.values() if note.get("max_overlap") is not None), default=None)
-    quantities = findings.quantities() | bed_quantities(facts, overlap)
+    names = [f"stiffer-{seed}" for seed in settings.seeds]
+    stiffened: list[Json] = [note for name in names if folder.is_done(name) for note in folder.done_data(name)]
+    rest = answer(findings, material)
+    quantities = findings.quantities() | bed_quantities(facts, overlap) | _depth_needed(rest)
     codes = ({note.get("code") for note in notes.values()} | {folder.code}) - {None, ""}
     doubts = {
         "fewer than three seeds: the spread between beds is not known well": len(settings.seeds) < 3,
@@ -49,7 +58,9 @@ def conclude(
             len(codes) > 1,
     }  # fmt: skip
     found = [
-        overlap_warning(overlap, settings, softening),
+        *fast_for_gravity(settings, material.friction),
+        *map(stiffer_note, stiffened),
+        None if stiffened else overlap_warning(overlap, settings, softening),
         *(grading_warning(entry.grading) for entry in facts if entry.grading is not None),
         caveat(material),
         *(text for text in doubts if doubts[text]),
@@ -74,14 +85,27 @@ def conclude(
         "runs": entries,
         "fits": findings.fit_entries(),
         "departures": departures,
-        "bed": bed_entry(facts, settings, softening) | {"material": material.name},
+        "bed": bed_entry(facts, settings, softening) | {
+            "material": material.name, "rolling_friction": material.rolling_friction, "stiffened": stiffened,
+        },
         "spike": asdict(make_spike(settings)) | {"load": settings.weight},
         "warnings": warnings,
-    }
+        "similarity": similarity_of(settings),
+        **({} if rest is None else {"rest": rest}),
+    }  # fmt: skip
     if law is not None:
         result["model"] = {"file": settings.model, "effects": list(law.effects)}
     _compare(settings, result)
     return Result.make("penetrate", **result)
+
+
+def _depth_needed(rest: Json | None) -> Json:
+    """The quantity "depth_to_rest" where the foot does not come to rest."""
+    if rest is None:
+        return {}
+    low, high = rest["depth_range"]
+    note = f"where the load would rest, reckoned from the driven runs: {low:.2g} to {high:.2g} m"
+    return {"depth_to_rest": {"value": rest["depth"], "std": None, "unit": "m", "note": note}}
 
 
 def _compare(settings: PenetrateSettings, result: Json) -> None:
@@ -107,8 +131,8 @@ LEAST_CONDITIONS = 3
 """Kinds and speeds that a fit of two numbers needs."""
 MOST_CORRELATED = 0.85
 """Of K and C: runs at one constant speed alone give 0.87, sqrt(3) / 2."""
-ENOUGH_TIPS = 6.0
-"""Width of the bed that ships, in tips."""
+LEAST_ACROSS = 5.0
+"""Grains across a tip below which a result warns."""
 
 
 def departures_in_words(findings: Findings) -> Json:
@@ -141,15 +165,15 @@ def warnings_of(findings: Findings) -> Iterator[str]:
     if bobbing := list(ends.values()).count("stopped"):
         yield say("bobbing", count=bobbing, of=len(findings.of("drop")), s=settings)
     sunk, grain = numbers["sinkage_dem"], settings.grain
-    if sunk["value"] is None:
+    if sunk["value"] is None and findings.of("set_down"):
         yield "no set-down came to rest: there is no sinkage_dem"
-    if numbers["sinkage_spring_damper"]["value"] is None:
+    if numbers["sinkage_spring_damper"]["value"] is None and findings.of("set_down"):
         yield "the spring-damper did not come to rest: there is no sinkage_spring_damper"
     if sunk["value"] is not None and sunk["value"] < 2 * grain:  # hardly more than a grain
         several = sum(value is not None for value in findings.sinkages(findings.beds)) > 1
         so = "its spread between seeds is part of the answer" if several else "another seed will give another"
         yield say("shallow", shown=_words(sunk), grains=sunk["value"] / grain, so=so)
-    bound = overdamped_below(settings.weight, settings.lowering_speed)
+    bound = overdamped_below(settings.weight, settings.lowering_speed) / pace_of(settings)
     if findings.of("set_down") and fit.stiffness > bound:
         yield say("overdamped", fit=fit, bound=bound)
     conditions = {unit.condition for unit in findings.units if unit.id in fit.runs}
@@ -160,9 +184,10 @@ def warnings_of(findings: Findings) -> Iterator[str]:
     own = [one.correlation for one in findings.seed_fits.values() if one.correlation is not None]
     if len(own) >= 2 and min(own) < -MOST_CORRELATED:  # the spreads of K and C go together
         yield say("traded", least=min(own))
-    width, tip = min(settings.bed_size[:2]), settings.tip_diameter
-    if width < ENOUGH_TIPS * tip * (1 - 1e-9):  # the spike meets its own images
-        yield say("narrow", tips=width / tip, enough=ENOUGH_TIPS * tip, enough_tips=ENOUGH_TIPS)
+    yield from resolution_advice(
+        tip=settings.tip_diameter, grain=settings.grain, size=settings.bed_size, depth=settings.depth,
+        across=LEAST_ACROSS,
+    )  # fmt: skip
     if fit.damping == 0:
         yield say("damping_zero")
     if fit.stiffness == 0:
@@ -179,6 +204,22 @@ def softening_note(settings: PenetrateSettings, softening: Softening) -> str:
     }
     whose = next((name for name, speeds in fastest.items() if softening.speed in speeds), "the fastest run")
     return say("softened", softening=softening, percent=100 * settings.max_overlap, whose=whose)
+
+
+def staged_note(settings: PenetrateSettings) -> str | None:
+    """How the bed is prepared, where it goes through stages."""
+    stages, first = beds.stages_of(settings), beds.first_gravity(settings)
+    if stages is None or settings.bed is not None:
+        return None
+    of = "bed_stages" if settings.bed_stages is not None else f"the recipe of {beds.find_material(settings).name}"
+    lowered = "" if first == settings.gravity else f"; at {first:.3g} m/s2, gravity is lowered when it is at rest"
+    return say("staged", of=of, stages=" ".join(stages), lowered=lowered)
+
+
+def stiffer_note(note: Json) -> str:
+    """That grains were made stiffer by the run itself: `note` as the entry "stiffened" of result.json has it."""
+    where = note["unit"] or "the preparation of the bed"
+    return say("stiffer", note=note, where=where, percent=100 * note["overlap"])
 
 
 def overlap_warning(overlap: float | None, settings: PenetrateSettings, softening: Softening) -> str | None:

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from experiments.grains.advice import costs, times_as_long
 from experiments.runs.strict import NotNegative, Positive, SeedNumber, StrictSettings, Threads
+from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.sentences import Sentences
 
 if TYPE_CHECKING:
@@ -19,10 +21,7 @@ __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
 
 say = Sentences(__package__)
 
-STANDARD_GRAVITY = 9.80665
-"""Unit of `rig` [m/s2]."""
-
-_MATERIALS = "sand, sand-calibrated, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml"
+_MATERIALS = "sand, sand-weak, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml"
 _SOFTENED = "Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
 _STEP = "Step of the grains [s]; from the contact time if not given."
 GrainMaterial = Annotated[str, Field(description=f"Grain material: {_MATERIALS}.")]
@@ -61,7 +60,12 @@ class PenetrateSettings(StrictSettings):
     not given."""
     packing: float | None = Field(None, gt=0.5, le=0.64)
     """Packing fraction to prepare the bed to [1]; as it settles if not given."""
-    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2]; 1 g even in the rig.")
+    bed_stages: tuple[str, ...] | None = None
+    """How the bed is prepared, as `hedgebed bed make --stages` takes it, `level` last. If not given, rained and
+    levelled, and where grains stick by their material's recipe: poured dry, brought to its packing, then they stick."""
+    gravity: Positive = STANDARD_GRAVITY
+    """Gravity of the grains [m/s2]; 1 g even in the rig. Speeds go with its root and times with the inverse, and there
+    is no rig but on Earth, where they are not given."""
     seeds: Seeds = (1, 2, 3)
 
     # The spike
@@ -137,8 +141,11 @@ class PenetrateSettings(StrictSettings):
     @model_validator(mode="before")
     @classmethod
     def _files_decide(cls, given: Any) -> Any:
-        """Fill in what the file of a bed decides, or without a bed that of a model; no drops are none on every seed."""
-        from .given import settings_of_bed, settings_of_model
+        """Fill in what the file of a bed decides, or without a bed that of a model, then what follows gravity.
+
+        No drops are none on every seed.
+        """
+        from .given import settings_of_bed, settings_of_gravity, settings_of_model
 
         if not isinstance(given, dict):
             return given
@@ -146,7 +153,8 @@ class PenetrateSettings(StrictSettings):
             given = {"other_drop_speeds": ()} | given
         if given.get("ground") == "spring-damper" and given.get("model"):
             given = settings_of_model(given)
-        return settings_of_bed(given) if isinstance(given.get("bed"), str) and given["bed"] else given
+        given = settings_of_bed(given) if isinstance(given.get("bed"), str) and given["bed"] else given
+        return given if given.get("ground") == "spring-damper" else settings_of_gravity(given, cls.model_fields)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -170,7 +178,9 @@ class PenetrateSettings(StrictSettings):
         if on_grains and across < 1:
             return say("tip_thin", s=self, least=5 * self.grain, most=self.tip_diameter / 5)
         if on_grains and across < 4.999 and not self.allow_coarse:
-            return say("tip_coarse", s=self, across=across, least=5 * self.grain, most=self.tip_diameter / 5)
+            finer = self.tip_diameter / 5
+            cost = costs(times_as_long(self.bed_size, self.grain, wanted=self.bed_size, wanted_grain=finer))
+            return say("tip_coarse", s=self, across=across, least=5 * self.grain, most=finer, cost=cost)
         if shaft is not None and (shaft > self.tip_diameter or (self.tip == "flat" and shaft != self.tip_diameter)):
             bound = "equal" if self.tip == "flat" else "be at most"
             return f"shaft_diameter = {shaft:g} m must {bound} tip_diameter, {self.tip_diameter:g} m"
@@ -185,7 +195,7 @@ class PenetrateSettings(StrictSettings):
                 return say("cone_thin", s=self, there=there, least=least)
         # A drop or a set-down is ended one tip's diameter above the floor.
         reach = max(self.depth, self.bed_size[2] - self.tip_diameter)
-        if self.tip_height + self.shaft_length < reach * (1 - 1e-9):
+        if self.foot < reach * (1 - 1e-9):
             return say("shaft_short", s=self, reach=reach, least=reach - self.tip_height)
         return None
 
@@ -195,11 +205,16 @@ class PenetrateSettings(StrictSettings):
         width, height = min(self.bed_size[:2]), self.bed_size[2]
         wide, deep = 4 * self.tip_diameter, self.depth + self.tip_diameter
         if width < wide * (1 - 1e-9):
-            return say("bed_narrow", size=_plain(self.bed_size), s=self, wide=wide)
+            wanted = (*(max(width, wide) for width in self.bed_size[:2]), height)
+            cost = costs(times_as_long(self.bed_size, self.grain, wanted=wanted, wanted_grain=self.grain))
+            return say("bed_narrow", size=_plain(self.bed_size), s=self, wide=wide, cost=cost)
         if self.depth < self.grain:
             return say("depth_of_grain", s=self)
         if height < deep * (1 - 1e-9):
             return say("bed_shallow", size=_plain(self.bed_size), s=self, deep=deep)
+        if self.bed_stages is not None and (self.bed is not None or self.packing is not None):
+            other = "bed" if self.bed is not None else "packing"
+            return say("stages_and", key=other, value=getattr(self, other), stages=" ".join(self.bed_stages))
         if min(self.bed_size) < 5 * self.grain:
             return say("bed_of_few_grains", size=_plain(self.bed_size), s=self, least=5 * self.grain)
         return self._grading()
@@ -285,11 +300,30 @@ class PenetrateSettings(StrictSettings):
 
     @property
     def fastest(self) -> tuple[str, float]:
-        """The key and the value of the largest speed that is set [m/s]."""
+        """The key and the value of the largest speed of these runs [m/s]."""
         keys = ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds")
-        every = [(key, speed) for key in keys for speed in getattr(self, key)]
+        every = [(key, speed) for key in keys for speed in self.used(key)]
         every += [("retreat_speed", self.retreat_speed), ("lowering_speed", self.lowering_speed)]
         return max(every, key=lambda pair: pair[1])
+
+    def used(self, key: str) -> Any:
+        """A setting as these runs have it: with one seed those of other seeds are none."""
+        return () if key in ("other_speeds", "other_drop_speeds") and len(self.seeds) == 1 else getattr(self, key)
+
+    @property
+    def driven_speeds(self) -> tuple[float, ...]:
+        """Speeds of all driven runs [m/s]."""
+        return (*self.speeds, *self.used("other_speeds"))
+
+    @property
+    def dropped_speeds(self) -> tuple[float, ...]:
+        """Speeds of all drops [m/s]."""
+        return (*self.drop_speeds, *self.used("other_drop_speeds"))
+
+    @property
+    def foot(self) -> float:
+        """Length of the spike, tip and shaft [m]."""
+        return self.tip_height + self.shaft_length
 
     @property
     def tip_height(self) -> float:

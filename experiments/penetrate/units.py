@@ -11,6 +11,7 @@ from statistics import fmean
 from typing import Any, Literal
 
 from coupling import Drive, Drop, Run, SetDown
+from coupling.planar_body import PLACEMENT_TIME
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress, as_expected
 from experiments.runs.types import Json
@@ -18,6 +19,7 @@ from experiments.runs.whole_runs import PictureCosts
 from rigid import Spike
 
 from .settings import PenetrateSettings
+from .similarity import pace_of
 
 __all__ = ["RAIN", "PenetratePlan", "Unit", "deepest", "expected_time", "make_run", "make_spike", "plan_units"]
 
@@ -104,7 +106,10 @@ def make_run(
             after_stop=settings.after_stop if drop_time is None else math.inf,
             max_time=settings.drop_time if drop_time is None else drop_time, **common,
         )  # fmt: skip
-    return SetDown(spike, ground, lowering_speed=unit.speed, max_time=_set_down_time(settings, unit), **common)
+    # The mass that counts is c times 2 ms on Earth, and as small beside the ground under any gravity.
+    mass = settings.weight / unit.speed * PLACEMENT_TIME * pace_of(settings)
+    longest = _set_down_time(settings, unit)
+    return SetDown(spike, ground, lowering_speed=unit.speed, mass=mass, max_time=longest, **common)
 
 
 def _set_down_time(settings: PenetrateSettings, unit: Unit) -> float:
@@ -117,8 +122,10 @@ def deepest(settings: PenetrateSettings) -> float:
     return settings.bed_size[2] - settings.tip_diameter
 
 
-def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float) -> float:
+def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float, *, held: float = 0.0) -> float:
     """About how long a run lasts on the bed's clock [s], `stiffness` [N/m] being a flat plate's in 3D-RFT.
+
+    `held`: what grains that stick bear of the load at the surface [N].
 
     A drop: to the first stop of m z'' = W - K z with the speed v, at w t = pi - atan(v K / (W w)), w^2 = K / m, and
     what follows. A set-down: of first order, with the placement's time constant c / K = W / (lowering_speed K).
@@ -130,7 +137,8 @@ def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float) -> 
         rate = math.sqrt(own / settings.mass)
         stop = (math.pi - math.atan(unit.speed * own / (settings.weight * rate))) / rate
         return min(settings.drop_time, stop + settings.after_stop)
-    return _TIMES_TO_REST * settings.weight / own / unit.speed + settings.rest_time
+    sunk = min(max(settings.weight - held, 0.0) / own, deepest(settings))
+    return _TIMES_TO_REST * sunk / unit.speed + settings.rest_time
 
 
 def share_done(run: Run, expected: float, *, sure: bool = False) -> float:
@@ -156,12 +164,17 @@ SPRING_DAMPER = 1.0
 
 
 class PenetratePlan:
-    """The plan of one run; `bed_is_there` and `is_over` mend it. `step` is that of the grains [s]."""
+    """The plan of one run; `bed_is_there` and `is_over` mend it. `step` is that of the grains [s].
+
+    `stages`, `gravity`: how a bed is prepared, and under which gravity [m/s2]; `held`: as for `expected_time`.
+    """
 
     def __init__(
         self, settings: PenetrateSettings, units: Sequence[Unit], folder: RunFolder, progress: Progress,
-        *, step: float, stiffness: float,
+        *, step: float, stiffness: float, held: float = 0.0, stages: Sequence[str] | None = None,
+        gravity: float | None = None,
     ) -> None:  # fmt: skip
+        self._held, self._stages, self._gravity = held, stages, gravity or settings.gravity
         self._settings, self._units, self._progress = settings, list(units), progress
         self._step, self._stiffness, self._shown = step, stiffness, shown_units(units)
         self._lasted: dict[tuple[str, float], list[float]] = {}
@@ -177,13 +190,15 @@ class PenetratePlan:
         frames = {unit.id: count for unit in units if unit.id in self._shown} if settings.frame_count else {}
         report = PictureCosts(frames, grains).seconds
         unit = GRAIN_STEP * grains * 2 / min(settings.threads or os.cpu_count() or 2, 8)
+        self.seconds = unit * sum(costs.values())
+        """What beds and runs are expected to take on CPUs [s]."""
         seconds = {"spring-damper": SPRING_DAMPER, "report": report}
         progress.plan(costs, seconds=seconds, unit=unit if settings.arch == "cpu" else None)
 
     def expected_time(self, unit: Unit) -> float:
         """About how long the run of `unit` lasts on the bed's clock [s]: as on other seeds, where it was made."""
         known = self._lasted.get(unit.condition)
-        return fmean(known) if known else expected_time(self._settings, unit, self._stiffness)
+        return fmean(known) if known else expected_time(self._settings, unit, self._stiffness, held=self._held)
 
     def bed_is_there(self) -> None:
         """A bed was prepared, or found prepared: the next will be as well."""
@@ -200,8 +215,9 @@ class PenetratePlan:
         settings = self._settings
         if settings.bed is not None:
             return 0.0
-        fall = math.sqrt(2 * RAIN * settings.bed_size[2] / settings.gravity)
-        return PREPARATION * (TAPPED if settings.packing is not None else 1.0) * fall / self._step
+        fall = math.sqrt(2 * RAIN * settings.bed_size[2] / self._gravity)
+        tapped = settings.packing is not None or any("compact" in stage for stage in self._stages or ())
+        return PREPARATION * (TAPPED if tapped else 1.0) * fall / self._step
 
     def _cost(self, unit: Unit) -> float:
         frames = self._settings.frame_count + 3 if unit.id in self._shown and self._settings.frame_count else 0

@@ -19,7 +19,7 @@ class PlatformSettings(StrictSettings):
 
     # The surface
     surface: str | None = None
-    """Material: steel, brick, sand, sand-calibrated or jsc1a; brick if not given."""
+    """Material: steel, brick, sand, sand-weak or jsc1a; brick if not given."""
     stiffness: Positive | None = None
     """K of a row of spikes [N/m]; the surface's if not given (brick: 1.5e4)."""
     damping: NotNegative | None = None

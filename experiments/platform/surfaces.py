@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from experiments.runs.reading import nearest
+from hedgebed_renamed import material_of_today
 
 __all__ = ["DEFAULT_SURFACE", "Surface", "find_surface", "surface_names"]
 
@@ -46,8 +47,8 @@ def surface_names() -> list[str]:
 
 
 def find_surface(name: str) -> Surface:
-    """The surface called `name`. Raises ValueError naming those there are."""
-    surfaces = _surfaces()
+    """The surface called `name`, by an earlier name with a FutureWarning. Raises ValueError naming those there are."""
+    surfaces, name = _surfaces(), material_of_today(name)
     if name not in surfaces:
         raise ValueError(f"surface = {name!r} is not known; {nearest(name, surfaces)}")
     return surfaces[name]

@@ -27,6 +27,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 from pydantic import BaseModel
 
+from hedgebed_renamed import BEFORE_RUN_2
 from rigid.result import plain, read_json, toml_value, write_json, write_text
 from rigid.series import read_series, replacing, write_series
 from rigid.version import __version__
@@ -48,7 +49,9 @@ __all__ = [
 
 Status = Literal["running", "stopped", "failed", "done"]
 
-RUN_FORMAT = "hedgebed-run/1"
+RUN_FORMAT = "hedgebed-run/2"
+RUN_FORMATS = ("hedgebed-run/1", RUN_FORMAT)  # what can be read; the first has materials and surfaces by other names
+_NAMED = ("material", "surface", "surfaces")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 
 
@@ -74,8 +77,20 @@ def settings_toml(command: str, settings: BaseModel, version: str, code: str = "
 
 
 def settings_in(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings in `table`, a run.toml read: name -> value, None for what is not set."""
-    return {**dict.fromkeys(table.get("not_set", [])), **table["settings"]}
+    """The settings in `table`, a run.toml read: name -> value, None for what is not set; materials by today's names."""
+    found = {**dict.fromkeys(table.get("not_set", [])), **table["settings"]}
+    return _of_today(found) if table["format"] == RUN_FORMATS[0] else found
+
+
+def _of_today(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings or results of before 2026-11-26 with materials and surfaces by the names that they have since."""
+
+    def renamed(value: Any) -> Any:
+        if isinstance(value, list):
+            return [renamed(item) for item in value]
+        return BEFORE_RUN_2.get(value, value) if isinstance(value, str) else value
+
+    return {key: renamed(value) if key in _NAMED else value for key, value in table.items()}
 
 
 def _what_else(path: Path) -> str:
@@ -122,6 +137,7 @@ class RunFolder:
         self.version = version
         self.code = code  # digest of the code that computes, where the experiment has one
         self.settings = settings  # as run.toml has them: name -> value, None for what is not set
+        self.format = RUN_FORMAT  # that of its run.toml
         spent = self._kept_status().get("processor_time")
         self._spent_before = float(spent) if isinstance(spent, int | float) else 0.0
         self._began = _processor_time()
@@ -172,10 +188,12 @@ class RunFolder:
             raise ValueError(f"{str(path)!r} is not a run folder: it has no run.toml") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
-        if table.get("format") != RUN_FORMAT or not isinstance(table.get("settings"), dict):
+        if table.get("format") not in RUN_FORMATS or not isinstance(table.get("settings"), dict):
             raise ValueError(f"{str(path / 'run.toml')!r} is not of the format {RUN_FORMAT}")
         command, version, code = (str(table.get(key, "")) for key in ("command", "version", "code"))
-        return cls(path, command, version, settings_in(table), code)
+        folder = cls(path, command, version, settings_in(table), code)
+        folder.format = table["format"]
+        return folder
 
     @classmethod
     def ensure(
@@ -256,8 +274,15 @@ class RunFolder:
         write_json(self.path / "result.json", result)
 
     def read_result(self) -> dict[str, Any]:
-        """The contents of result.json."""
-        return read_json(self.path / "result.json")
+        """The contents of result.json, material and surface by today's names."""
+        return self.of_today(read_json(self.path / "result.json"))
+
+    def of_today(self, result: dict[str, Any]) -> dict[str, Any]:
+        """A result of this run; where it is of before 2026-11-26, material and surface by the names since."""
+        if self.format != RUN_FORMATS[0]:
+            return result
+        bed = result.get("bed")
+        return _of_today(result) | ({"bed": _of_today(bed)} if isinstance(bed, dict) else {})
 
     def write_series(self, name: str, columns: Mapping[str, Any]) -> str:
         """Write series/<name>.csv (see `write_series`); return its path relative to the folder."""

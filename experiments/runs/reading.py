@@ -5,7 +5,7 @@ the command line. Every fault is a ValueError whose text names the key, the valu
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -14,10 +14,11 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from experiments.runs.folder import RUN_FORMAT, settings_in
+from experiments.runs.folder import RUN_FORMATS, settings_in
 from experiments.runs.strict import may_be_empty
+from experiments.runs.units import find_unit, in_both
 
-__all__ = ["Layer", "find_case", "nearest", "option", "read_case", "settings_from"]
+__all__ = ["Layer", "find_case", "gravities_told", "nearest", "option", "read_case", "settings_from"]
 
 Settings = TypeVar("Settings", bound=BaseModel)
 
@@ -80,7 +81,7 @@ def read_case(path: Path) -> Layer:
         raise ValueError(f"case = {str(path)!r} cannot be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"case = {str(path)!r} is not TOML: {error}") from None
-    if table.get("format") == RUN_FORMAT and isinstance(table.get("settings"), dict):
+    if table.get("format") in RUN_FORMATS and isinstance(table.get("settings"), dict):
         table = settings_in(table)
     return Layer(str(path), table)
 
@@ -88,7 +89,8 @@ def read_case(path: Path) -> Layer:
 def settings_from(settings_class: type[Settings], layers: Iterable[Layer]) -> Settings:
     """The settings that the `layers` give, later ones over earlier ones, over the defaults.
 
-    Raises ValueError, one sentence a line, for a name there is not (with the nearest there is) and for a value that
+    A number may be text with a unit (`experiments.runs.units`). Raises ValueError, one sentence a line, for a name
+    there is not (with the nearest there is) and for a value that
     will not do (with what would). TOML has no null: "none" unsets a setting that need not be set.
     """
     names = list(settings_class.model_fields)
@@ -109,6 +111,14 @@ def settings_from(settings_class: type[Settings], layers: Iterable[Layer]) -> Se
     except ValidationError as error:
         sentences = [_sentence(settings_class, detail, origin) for detail in error.errors() if not _follows(detail)]
         raise ValueError("\n".join(dict.fromkeys(sentences))) from None
+
+
+def gravities_told(settings: BaseModel, layers: Iterable[Layer]) -> Iterator[str]:
+    """What the gravities that the `layers` give mean in m/s2 and in g, a sentence each: their units differ."""
+    given = {name for layer in layers for name in layer.values}
+    for name, described in type(settings).model_fields.items():
+        if name in given:
+            yield from in_both(name, getattr(settings, name), find_unit(described.description))
 
 
 def _unset(settings_class: type[BaseModel], name: str) -> Any:

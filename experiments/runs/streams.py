@@ -35,8 +35,7 @@ def fault_words(error: Exception) -> str:
     if isinstance(error, CoercionError) and error.target_type is float and error.token and error.argument:
         unit = re.findall(r"\[([^\[\]]+)\]", error.argument.parameter.help or "")[-1:]
         if unit and unit[0] != "1":
-            named = _UNIT_NAMES.get(unit[0], unit[0])
-            text = f"{text.rstrip('.')}: give a plain number in {named}{_in_metres(error.token.value, unit[0])}"
+            text = f"{text.rstrip('.')}: give a number in {unit[0]}"
     return text
 
 
@@ -47,21 +46,6 @@ def is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-_UNIT_NAMES = {"m": "metres", "N": "newtons", "kg": "kilograms", "s": "seconds"}
-_LENGTHS = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "m": 1.0}
-
-
-def _in_metres(typed: str, unit: str) -> str:
-    """``, e.g. 0.016`` for ``16mm``; nothing where it is no length with a unit."""
-    found = re.fullmatch(r"\s*([0-9.]+(?:e-?[0-9]+)?)\s*([a-zµ]+)\s*", typed)
-    if unit != "m" or not found or found[2] not in _LENGTHS:
-        return ""
-    try:
-        return f", e.g. {float(found[1]) * _LENGTHS[found[2]]:.6g}"
-    except ValueError:
-        return ""
 
 
 @contextmanager

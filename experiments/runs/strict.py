@@ -7,6 +7,8 @@ from annotated_types import MinLen
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
+from .units import find_unit
+
 __all__ = ["NotNegative", "Positive", "SeedNumber", "StrictSettings", "Threads", "may_be_empty", "plain_kinds"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -16,9 +18,10 @@ Threads = Annotated[int | None, Field(ge=1, le=1024, description="CPU threads; a
 
 
 class StrictSettings(BaseModel):
-    """Settings of an experiment: frozen, no unknown keys, text is no number, true is not 1.
+    """Settings of an experiment: frozen, no unknown keys, text is no number but one with a unit, true is not 1.
 
-    A setting's description is the docstring below it, or the one given to `Field`.
+    A setting's description is the docstring below it, or the one given to `Field`. It states the unit, and another unit
+    of the same kind may stand behind a number (`experiments.runs.units`).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
@@ -31,8 +34,9 @@ class StrictSettings(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _of_its_kind(cls, value: Any, info: ValidationInfo) -> Any:
-        """Text is no number, true is not 1, and one number is no list of them."""
-        hint = cls.model_fields[str(info.field_name)].annotation
+        """Text is no number but one with a unit, true is not 1, and one number is no list of them."""
+        field = cls.model_fields[str(info.field_name)]
+        hint = field.annotation
         kinds = plain_kinds(hint)
         if bool in kinds:
             if not isinstance(value, bool):
@@ -44,10 +48,19 @@ class StrictSettings(BaseModel):
                 raise ValueError(f"it must be a list such as [{value if _is_number(value) else 0.1}]")
             if not several and isinstance(value, list | tuple):
                 raise ValueError("it must be one number, not a list")
-            for item in value if several else (value,):
-                if isinstance(item, bool | str):
-                    raise ValueError(f"{item!r} is not a valid number")
+            items = [_number(item, field) for item in (value if several else (value,))]
+            return type(value)(items) if several else items[0]
         return value
+
+
+def _number(item: Any, field: FieldInfo) -> Any:
+    """`item`; text with a unit as the number that it means in the field's own. Raises ValueError for other text."""
+    unit = find_unit(field.description) if isinstance(item, str) else None
+    if unit is not None:
+        return unit.value_of(item)
+    if isinstance(item, bool | str):
+        raise ValueError(f"{item!r} is not a valid number")
+    return item
 
 
 def may_be_empty(field: FieldInfo) -> bool:

@@ -26,7 +26,7 @@ class SpatialSettings(GrainsSettings):
 
     # The surface
     surface: str | None = None
-    """Material: steel, brick, sand, sand-calibrated or jsc1a; brick if not given."""
+    """Material: steel, brick, sand, sand-weak or jsc1a; brick if not given."""
     ground: Literal["spring-damper", "bed"] = "spring-damper"
     """What computes the surface's force: the spring-damper, or a bed of grains."""
     stiffness: Positive | None = None

@@ -21,6 +21,7 @@ from experiments.runs.folder import RunFolder, read_series
 from experiments.runs.kept_results import PATH_AND_MOTION, require_files
 from experiments.runs.strict import StrictSettings
 from experiments.runs.version import __version__
+from hedgebed_renamed import material_of_today
 from rigid.sensors import Measured, Motion, SensorSet, measure, sensor_times
 
 from . import say
@@ -165,8 +166,7 @@ def _law(first: Mapping[str, Any], fitted: str | None) -> tuple[float, float, di
     folder = RunFolder.open(Path(fitted))
     if folder.command != "penetrate" or not (folder.path / "result.json").exists():
         raise ValueError(f"fitted = {fitted!r} is no finished run of penetrate")
-    if folder.settings.get("material") != first["surface"]:
-        material = folder.settings.get("material")
+    if (material := material_of_today(str(folder.settings.get("material")))) != first["surface"]:
         raise ValueError(say("other_grains", fitted=fitted, material=material, surface=first["surface"]))
     quantities = folder.read_result()["quantities"]
     values, sigmas = [], {}

@@ -29,7 +29,7 @@ class TrialSettings(PlatformSettings):
 
     # The surface
     surface: str | None = None
-    """Material: steel, brick, sand, sand-calibrated or jsc1a; of the model, else brick, if not given."""
+    """Material: steel, brick, sand, sand-weak or jsc1a; of the model, else brick, if not given."""
     ground: str = Field(
         "spring-damper",
         description="Law that computes the surface's force: "

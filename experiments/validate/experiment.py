@@ -7,6 +7,7 @@ leaves the others as they are.
 
 import json
 import math
+import shutil
 import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,13 +46,17 @@ def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
 
 def check(settings: ValidateSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for an unknown case or a file that cannot be written."""
-    chosen(settings.only, quick=settings.quick)
+    _wanted(settings)
     if settings.document is not None and not Path(settings.document).resolve().parent.is_dir():
         raise ValueError(f"document = {settings.document!r} lies in a folder that does not exist: make it first")
     if settings.keep and settings.document is not None:
         raise ValueError("keep = True is for a checkout's own table: leave document out")
     if settings.keep and not _is_checkout():
         raise ValueError(f"keep = True needs a checkout, with docs/ and pyproject.toml: {_ROOT} is none")
+
+
+def _wanted(settings: ValidateSettings) -> list[Case]:
+    return chosen(settings.only, quick=settings.quick, held=settings.measured)
 
 
 def run_case(case: Case, tell: Any = None) -> tuple[Outcome, float]:
@@ -67,7 +72,7 @@ def run_case(case: Case, tell: Any = None) -> tuple[Outcome, float]:
 
 
 def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress) -> Result:
-    wanted = chosen(settings.only, quick=settings.quick)
+    wanted = _wanted(settings)
     with folder.lock():
         done = {case: folder.done_data(case.id) for case in wanted if case.compute and folder.is_done(case.id)}
         records = {case.id: record for case, record in done.items() if record["code"] == fingerprint_of(case)}
@@ -78,23 +83,40 @@ def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress
             record = _record(folder, case, progress)
             progress.message(": ".join(filter(None, (f"{record['status']:>7}  {case.id}", _line(record)))))
             records[case.id] = record
-        entire = not settings.only and not settings.quick
+        entire = not (settings.only or settings.quick or settings.measured)
         result = _result([_row(case, records.get(case.id)) for case in SUITE], entire)
         folder.write_result(result)
         text = markdown(result, command=_command(settings))
         write_text(folder.path / "validation.md", text)
-        if settings.document is not None:
-            write_text(Path(settings.document), text)
-        elif entire and _is_checkout():
-            write_text(_ROOT / "docs" / "validation.md", text)
-            _keep_result(plain(result))
-        elif settings.keep:
-            keep(result["cases"], command=_command(settings))
         progress.stage("report", total=1.0)
         from vis.bed.validation import write_validation_report
 
         write_validation_report(folder.path, progress=progress.update)
+        if settings.document is not None:
+            write_text(Path(settings.document), text)
+        elif entire and _is_checkout():
+            kept: Json = plain(result)
+            kept["cases"] = [_illustrated(row, folder.path) for row in kept["cases"]]
+            write_text(_ROOT / "docs" / "validation.md", markdown(kept, command=_command(settings)))
+            _keep_result(kept)
+        elif settings.keep:
+            keep([_illustrated(row, folder.path) for row in result["cases"]], command=_command(settings))
         return result
+
+
+def _illustrated(row: Json, folder: Path) -> Json:
+    """The row with the titles of its figures, where it is of an experiment: they are copied beside the table."""
+    if not (row.get("measured") and row.get("plots")):
+        return row
+    (_ROOT / "docs" / "images").mkdir(exist_ok=True)
+    for k in range(1, len(row["plots"]) + 1):
+        shutil.copyfile(folder / "figures" / f"{row['id']}-{k}.png", _ROOT / "docs" / _image(row["id"], k))
+    return row | {"images": [plot["title"] for plot in row["plots"]]}
+
+
+def _image(case: str, number: int) -> str:
+    """Of a figure of a case, from docs/ on."""
+    return f"images/validate-{case}-{number}.png"
 
 
 def _record(folder: RunFolder, case: Case, progress: Progress) -> Json:
@@ -138,11 +160,13 @@ def worst_of(comparisons: Sequence[Json]) -> Json | None:
 def _row(case: Case, record: Json | None) -> Json:
     if record is None:
         return case.head()
-    reason = case.reason if record["status"] == "fail" else ""
-    return case.about() | record | {"reason": reason, "worst": worst_of(record["comparisons"])}
+    status = case.counted(record["status"])
+    reason = case.reason if status in _OUTSIDE else ""
+    return case.about() | record | {"status": status, "reason": reason, "worst": worst_of(record["comparisons"])}
 
 
-STATUSES = ("pass", "fail", "skipped", "not run", "not yet")
+STATUSES = ("pass", "fail", "informational", "skipped", "not run", "not yet")
+_OUTSIDE = ("fail", "informational")
 
 
 def _result(rows: list[Json], entire: bool) -> Result:
@@ -184,9 +208,12 @@ def keep(cases: Sequence[Json], *, command: str) -> None:
     before = dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
     now = [dict(row) | {"command": command} for row in cases]
     known = {row["id"]: row for row in [*(before["cases"] if before else ()), *now] if row["status"] in _RAN}
-    rows = [case.about() | known[case.id] if case.id in known else case.head() for case in SUITE]
+    rows = [
+        case.about() | known[case.id] | {"family": case.family} if case.id in known else case.head() for case in SUITE
+    ]
     for case, row in zip(SUITE, rows, strict=True):
-        if row["status"] == "fail":
+        row["status"] = case.counted(row["status"])
+        if row["status"] in _OUTSIDE:
             row["reason"] = case.reason or row.get("reason", "")
     result: Json = plain(_result(rows, before is not None))
     if before is not None:
@@ -203,15 +230,16 @@ def _keep_result(result: Json) -> None:
     write_text(_ROOT / _KEPT, json.dumps(slim, indent=0) + "\n")
 
 
-_RAN = ("pass", "fail")
+_RAN = ("pass", "fail", "informational")
 
 
 def _command(settings: ValidateSettings) -> str:
     only = ["--only", *settings.only] if settings.only else []
-    return " ".join(["hedgebed validate", *only, *["--quick"] * settings.quick])
+    given = [f"--{word}" for word, on in (("quick", settings.quick), ("measured", settings.measured)) if on]
+    return " ".join(["hedgebed validate", *only, *given])
 
 
-MARKS = {"fail": "**FAIL**"}
+MARKS = {"fail": "**FAIL**", "informational": "outside, informational"}
 
 
 def _cells(row: Mapping[str, Any]) -> str:
@@ -248,7 +276,7 @@ def _lines_of(result: Mapping[str, Any], command: str) -> Iterator[str]:
     for row in result["cases"]:
         yield _overview(row)
     yield from _failing(result)
-    ran = (row for row in result["cases"] if row["status"] in ("pass", "fail"))
+    ran = (row for row in result["cases"] if row["status"] in _RAN)
     for family, rows in groupby(ran, key=lambda row: row["family"]):
         yield from ("", f"## {family}")
         for row in rows:
@@ -263,10 +291,11 @@ def _overview(row: Mapping[str, Any]) -> str:
 
 
 def _failing(result: Mapping[str, Any]) -> Iterator[str]:
-    failing = [row for row in result["cases"] if row["status"] == "fail"]
-    if failing:
-        yield from ("", "## What fails, and why", "")
-        for row in failing:
+    for status, title in zip(_OUTSIDE, ("What fails, and why", "Outside, and not counted"), strict=True):
+        rows = [row for row in result["cases"] if row["status"] == status]
+        if rows:
+            yield from ("", f"## {title}", "")
+        for row in rows:
             beyond = sum(not one["passes"] for one in row["comparisons"])
             why = row["reason"] or "not looked into yet"
             yield f"- **{row['id']}** ({beyond} of {len(row['comparisons'])} numbers): {why}."
@@ -278,6 +307,8 @@ def _details(row: Mapping[str, Any]) -> Iterator[str]:
     yield f"{row['reference']} ({row['source']}). Run on {row['date']}{by}, {row['seconds']:.0f} s."
     for remark in row["remarks"]:
         yield from ("", remark)
+    for k, title in enumerate(row.get("images", ()), 1):
+        yield from ("", f"![{title}]({_image(row['id'], k)})")
     if len(row["comparisons"]) > 1:
         yield from ("", "| number | wanted | ours | difference | band | |", "|---|---|---|---|---|---|")
         for one in row["comparisons"]:

@@ -12,6 +12,7 @@ class ValidateSettings(StrictSettings):
 
     only: tuple[str, ...] = Field((), description="Cases to run, by their ids; all of them if none is given.")
     quick: bool = Field(False, description="Leave out the slow cases.")
+    measured: bool = Field(False, description="Only the cases that hold the bed against measured experiments.")
     keep: bool = False
     """In a checkout, put the cases that are run into docs/validation.md, whose other rows stay as they are; what it is
     made of is in docs/results/validate/result.json."""

@@ -12,7 +12,7 @@ from importlib import import_module
 from importlib.util import resolve_name
 from pathlib import Path
 
-from . import base, beds, contacts
+from . import base, beds, contacts, measured
 from .base.case import Case, Compute
 
 __all__ = ["SUITE", "chosen", "fingerprint", "fingerprint_of"]
@@ -23,7 +23,7 @@ _FOLDER = Path(__file__).parent
 def _found() -> Iterator[Case]:
     """The cases of cases.toml, in its order, each with what computes it: the entry of a module's ``CASES``."""
     computed: dict[str, Compute] = {}
-    for package in (base, beds, contacts):
+    for package in (base, beds, contacts, measured):
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
             computed |= vars(import_module(module.name)).get("CASES", {})
     for id, row in tomllib.loads((_FOLDER / "cases.toml").read_text(encoding="utf-8")).items():
@@ -35,10 +35,11 @@ def _found() -> Iterator[Case]:
 SUITE: tuple[Case, ...] = tuple(_found())
 
 
-def chosen(only: Sequence[str] = (), *, quick: bool = False) -> list[Case]:
-    """The cases that are to be run, in order: all, those named, or those that are not slow.
+def chosen(only: Sequence[str] = (), *, quick: bool = False, held: bool = False) -> list[Case]:
+    """The cases that are to be run, in order: all, those named, those that are not slow, or (``held``) those that are
+    held against measured experiments.
 
-    Raises ValueError for a name that no case has, with the nearest.
+    Raises ValueError for a name that no case has, with the nearest, or that is left out by the others.
     """
     known = {case.id: case for case in SUITE}
     for name in only:
@@ -46,7 +47,12 @@ def chosen(only: Sequence[str] = (), *, quick: bool = False) -> list[Case]:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
             raise ValueError(f"only = {name!r} is no case of the suite; {hint}")
-    return [case for case in SUITE if (not only or case.id in only) and not (quick and case.slow)]
+    found = [case for case in SUITE if (not only or case.id in only) and not (quick and case.slow)]
+    found = [case for case in found if case.measured or not held]
+    if not found:
+        asked = [word for word, on in (("only", only), ("quick", quick), ("measured", held)) if on]
+        raise ValueError(f"{' and '.join(asked)} together leave no case to run; leave one of them out")
+    return found
 
 
 def fingerprint() -> str:

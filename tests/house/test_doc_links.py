@@ -13,11 +13,11 @@ PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("experiments
 
 
 def anchors(page: Path) -> set[str]:
-    """Of the headings, as GitHub makes them."""
-    heads = [
-        line.lstrip("#").strip().lower() for line in page.read_text(encoding="utf-8").split("\n") if line[:1] == "#"
-    ]
-    return {re.sub(r"[^\w\- ]", "", head).replace(" ", "-") for head in heads}
+    """Of the headings, as GitHub makes them, and those set by hand, under which a heading was before."""
+    text = page.read_text(encoding="utf-8")
+    heads = [line.lstrip("#").strip().lower() for line in text.split("\n") if line[:1] == "#"]
+    made = {re.sub(r"[^\w\- ]", "", head).replace(" ", "-") for head in heads}
+    return made | set(re.findall(r'<a id="([\w-]+)"></a>', text))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tumble_runs import SMALL, small_bed
 
-from dem import SAND, Bed
+from dem import SAND_WEAK, Bed
 from dem.measure.shearing import shear_bed
 from experiments.tumble.on_grains import PlanarOnBed
 from experiments.tumble.settings import TumbleSettings
@@ -27,7 +27,8 @@ def sheared(tangential):
     rng = np.random.default_rng(1)
     lattice = np.stack(np.meshgrid(*map(np.arange, (5, 5, 8)), indexing="ij"), -1).reshape(-1, 3)
     bed = Bed.from_grains(
-        replace(SAND, tangential=tangential), positions=(lattice + 0.5) * 3.1e-3 + rng.uniform(-1e-4, 1e-4, (200, 3)),
+        replace(SAND_WEAK, tangential=tangential),
+        positions=(lattice + 0.5) * 3.1e-3 + rng.uniform(-1e-4, 1e-4, (200, 3)),
         radii=0.5 * GRAIN * rng.uniform(0.9, 1.1, 200), velocities=rng.normal(0, 0.2, (200, 3)), young=1e7,
         size=(0.0155, 0.0155, 0.03), height=0.1, max_overlap=0.1, threads=1,
     )  # fmt: skip
@@ -41,7 +42,7 @@ def sheared(tangential):
 def tumbled(tangential):
     """A platform of a few hundred grams tumbles on 384 grains for 0.06 s."""
     run = PlanarOnBed(TumbleSettings(**SMALL)).stepper(
-        small_bed(TumbleSettings(**SMALL), replace(SAND, tangential=tangential))
+        small_bed(TumbleSettings(**SMALL), replace(SAND_WEAK, tangential=tangential))
     )
     run.run()
     return made(run.ground.bed)

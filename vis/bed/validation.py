@@ -87,7 +87,7 @@ def _cells(row: Result) -> tuple[str, ...]:
 
 
 def _run(cases: Sequence[Result]) -> list[Result]:
-    return [case for case in cases if case["status"] in ("pass", "fail")]
+    return [case for case in cases if case["status"] in ("pass", "fail", "informational")]
 
 
 def _tiles(cases: Sequence[Result]) -> list[Tile]:
@@ -104,9 +104,10 @@ def _tiles(cases: Sequence[Result]) -> list[Tile]:
 def _sections(cases: Sequence[Result], blocks: Mapping[str, Sequence[Block]]) -> list[Section]:
     run = _run(cases)
     sections = [_overview(run)]
-    if failing := [case for case in run if case["status"] == "fail"]:
-        reasons = [f"{case['id']}: {case['reason'] or 'not looked into yet'}." for case in failing]
-        sections.append(Section("What fails, and why", [listing(reasons)]))
+    for status, title in (("fail", "What fails, and why"), ("informational", "Outside, and not counted")):
+        if outside := [case for case in run if case["status"] == status]:
+            reasons = [f"{case['id']}: {case['reason'] or 'not looked into yet'}." for case in outside]
+            sections.append(Section(title, [listing(reasons)]))
     for family in dict.fromkeys(case["family"] for case in run):
         own = [block for case in run if case["family"] == family for block in _case(case, blocks)]
         sections.append(Section(family, own))
@@ -119,7 +120,7 @@ def _overview(run: Sequence[Result]) -> Section:
         worst = case["worst"]
         cells = _cells(worst)[:-1] if worst else ("–",) * 4
         wanted = f"{case['reference']} ({case['source']})"
-        verdict = "pass" if case["status"] == "pass" else "FAIL"
+        verdict = "FAIL" if case["status"] == "fail" else case["status"]
         rows.append((f"{case['id']}: {case['title']}", *cells, verdict, wanted))
     lead = "A row shows the number of its case that takes the largest share of its band; all numbers follow below."
     head = ("case", *_HEAD, "closed form or figure (source)")
@@ -142,6 +143,6 @@ def _absent(cases: Sequence[Result]) -> list[str]:
         why = case.get("waits_for") or case.get("skipped")
         if why:
             reasons.append(f"{case['id']} ({case['title']}): {case['status']}, {why}")
-        elif case["status"] not in ("pass", "fail"):
+        elif case["status"] not in ("pass", "fail", "informational"):
             left.append(case["id"])
     return [*reasons, f"left out of this run: {', '.join(left)}"] if left else reasons

@@ -19,16 +19,16 @@ from vis.pictures.frames import frame_names
 
 __all__ = ["summarise"]
 
-_REAL_GRAINS = {"sand": 2e-4}
+_REAL_GRAINS = {"sand": 2e-4, "sand-weak": 2e-4}
 """Diameter of real grains [m]: 0.2 mm is where fine sand ends and medium sand begins (ISO 14688-1)."""
 
 
 def summarise(run: RunFolder) -> dict[str, Any]:
     """The whole content of the report but its images.
 
-    Returns a dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "fit",
-    "departures", "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing", "frames" and
-    "reproduce"; "caveat" is what to know before any number.
+    Returns a dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "rest" (what a
+    foot that does not come to rest needs), "similarity", "fit", "departures", "reference", "bed", "spike", "runs",
+    "numbers", "settings", "warnings", "missing", "frames" and "reproduce"; "caveat" is what to know before any number.
     """
     result = run.result
     quantities, spike = words.mapping_of(result.get("quantities")), dict(words.mapping_of(result.get("spike")))
@@ -45,6 +45,8 @@ def summarise(run: RunFolder) -> dict[str, Any]:
         "tiles": _tiles(run, quantities),
         "caveat": _caveat(result, quantities),
         "answers": _answers(run, quantities),
+        "rest": words.rest_part(result),
+        "similarity": words.sentence(str(words.mapping_of(result.get("similarity")).get("sentence") or "")),
         "fit": words.fit_part(result, quantities),
         "departures": words.departures_part(result),
         "reference": words.reference_part(result),
@@ -82,7 +84,10 @@ def _lead(run: RunFolder, experiment: str) -> list[str]:
 def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
     tiles = []
     model = quantity(quantities.get("sinkage_spring_damper"))
-    if _restless(run, quantities):
+    if (needed := words.value_of(quantities, "depth_to_rest")) is not None:
+        under = f"under {quantity(quantities['load'])}; " if words.value_of(quantities, "load") is not None else ""
+        tiles.append(("Sinks to rest", "not in this bed", f"{under}it would need about {quote(needed, None, 'm')}"))
+    elif _restless(run, quantities):
         note = f"no set-down came to rest in time; the spring-damper says {model}"
         tiles.append(("Sinks to rest at", "unknown", note))
     if words.value_of(quantities, "sinkage_dem") is not None:
@@ -195,6 +200,8 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
         if law is not None:
             text += model + (f", {_deeper(law / sunk)}." if sunk > 0 else ".")
         return text + more
+    if (rest := words.rest_part(run.result)) is not None:
+        return " ".join(rest["sentences"])
     if not _restless(run, quantities):
         return ""
     text = "Not known: set down under its load, the spike did not come to rest in the time that was followed."

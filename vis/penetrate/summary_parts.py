@@ -18,7 +18,8 @@ from vis.page.sentences import Sentences
 __all__ = [
     "Departure", "NBSP", "SHARES", "Table", "bed_part", "cell_text", "departure_rows", "departures_part",
     "facts_table", "fit_error", "fit_part", "fitted", "joined", "label_of", "list_of", "mapping_of", "more_or_less",
-    "numbers_table", "percent", "plain_value", "reference_part", "reproduce_part", "run_words", "runs_table",
+    "numbers_table", "percent", "plain_value", "reference_part", "reproduce_part", "rest_part",
+    "run_words", "runs_table",
     "sentence", "setting_of", "settings_table", "signed_percent", "std_of", "value_of",
 ]  # fmt: skip
 
@@ -223,6 +224,29 @@ def fit_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[s
         notes = [say("fit_errors", errors=joined(errors))] if errors else []
         notes += [say("fit_spread")] if known else []
     return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": " ".join(notes)}
+
+
+def rest_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
+    """What is said where the foot does not come to rest, and a table: depth at rest with some cohesion; else None."""
+    rest = mapping_of(result.get("rest"))
+    rows = [mapping_of(row) for row in list_of(rest.get("cohesions"))]
+    if rest.get("comes_to_rest") is not False or not rows:
+        return None
+    none = [quote(0.0, 0.0, "Pa"), quote(0.0, 0.0, "N"), quote(plain_value(rest.get("depth")), None, "m")]
+    cells = [
+        [
+            quote(plain_value(row.get("cohesion")), 0.0, "Pa"),
+            quote(plain_value(row.get("carries")), None, "N"),
+            "at the surface" if row.get("depth") == 0 else quote(plain_value(row.get("depth")), None, "m"),
+        ]
+        for row in rows
+    ]
+    head = ["cohesion", "carries by itself", "rests"]
+    return {
+        "sentences": [sentence(str(text)) for text in list_of(rest.get("sentences"))],
+        "table": {"head": head, "rows": [none, *cells]},
+        "source": sentence(str(rest.get("source") or "")),
+    }
 
 
 def departures_part(result: Mapping[str, Any]) -> dict[str, Any]:

@@ -148,6 +148,8 @@ class Case:
     source: str  # where that is from
     compute: Compute | None = None  # None where the bed cannot do it yet
     slow: bool = False  # left out by ``--quick``
+    measured: bool = False  # held against an experiment: what ``--measured`` runs
+    informational: bool = False  # it is shown and not counted: what it is held against is known to be something else
     seconds: float = 2.0  # expected time, for the progress [s]
     reason: str = ""  # why it fails, where it is known to; shown only while it does
     waits_for: str = ""  # what is missing in the bed, where ``compute`` is None
@@ -158,7 +160,11 @@ class Case:
 
     def about(self) -> Json:
         """What result.json says of it whatever comes out."""
-        return {key: getattr(self, key) for key in ("id", "family", "title", "reference", "source", "slow")}
+        return {key: getattr(self, key) for key in ("id", "family", "title", "reference", "source", "slow", "measured")}
+
+    def counted(self, status: str) -> str:
+        """How a status counts: a failure of one that is informational does not."""
+        return "informational" if status == "fail" and self.informational else status
 
     def head(self) -> Json:
         """What result.json says of it before it has run."""

@@ -54,7 +54,7 @@ GRAIN, PRESSURE, SIZE = 0.004, 1000.0, (10.0, 8.0, 10.0)  # [m], [Pa], [mean dia
 SPREAD, INERTIAL, STRAIN = 0.15, 0.01, 2.0
 # One sample of LAMMPS scatters by 1.5 degrees on the plane of shear (0.8 of ours): three say too little.
 SEEDS, SEEDS_AS_PUBLISHED = range(1, 13), (1, 2, 3)
-ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand-calibrated
+ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand
 BAND = 1.5  # [degrees]
 PUBLISHED = {0.1: (0.268, 0.613), 0.5: (0.382, 0.587)}
 """Friction: tau / p and packing fraction of slow simple shear, without rolling friction [1]. The paper's table was not

@@ -1,4 +1,4 @@
-"""One ball in like beds from 9.81 down to 1e-5 m/s2: sunk from rest, at one Froude number, dropped as in Murdoch.
+"""One ball in like beds from 9.81 down to 1e-5 m/s2: sunk from rest, at one Froude number, dropped as in experiments.
 
 Without cohesion nothing but g gives hard grains a time or a stress, so depth over the ball's diameter D is a function
 of v / sqrt(g D) and of ratios of lengths and densities alone; Slonaker & Kamrin 2017 say the same of any body where
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, near_zero, tracked
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, near_zero, tracked
 from experiments.validate.base.drops import BEADS, Drop
 
 from . import say
@@ -25,9 +25,12 @@ STEEL, ALUMINIUM = 8065.0, 2700.0  # density of the ball: Katsuragi & Durian's; 
 PLACES = ((0.25, 0.25), (0.75, 0.75), (0.25, 0.75), (0.75, 0.25))  # where it comes down, over the bed's sides
 SWEEP = ((9.81, 1), (1e-5, 6))  # gravity [m/s2], seed: the ends of what a bed is for
 FROUDE = 2.0
-LARGER, LARGER_AT = 1.4, (0.1, 7)  # another ball over the first; its bed grows with it, the grains do not
+ACROSS, ACROSS_AT = (10, 14), ((9.81, 8), (0.1, 7))  # grains across a ball, its bed grows with it; gravity and seed
 MURDOCH_GRAVITIES = ((1.0, 3), (0.2, 4))
 MURDOCH_SPEEDS = (0.05, 0.1, 0.2, 0.4)
+SUNDAY_GRAIN, SUNDAY_FROUDE = 0.01, (0.5, 1.0, 2.0, 4.0)  # beads of 1 cm: ten across the ball
+SUNDAY_GRAVITIES = ((9.81, 11), (1e-3, 12))  # the ends of the published range [m/s2], seed
+SUNDAY_BOX = (2.5, 2.5, 2.1)  # of the bed, over D + d
 BAND = 0.1
 LONGEST = 8.0  # over sqrt(D / g); one that still creeps then has come as far as it is taken to
 MOSTLY = 0.9  # of its depth, for the time it takes
@@ -107,27 +110,25 @@ def _sink(tell: Tell) -> Outcome:
     return Outcome(rows, [plot], [remark])
 
 
-def _one_froude(tell: Tell, others: Sequence[Drop] = (), names: Sequence[str] = ()) -> Outcome:
-    """The sweep at one Froude number and beside it other beds; held to the mean curve of the sweep are the others, or
-    its own beds where there are none."""
-    settings = [*_sweep(FROUDE), *others]
+def _one_froude(tell: Tell) -> Outcome:
+    settings = _sweep(FROUDE)
     runs = [one.run() for one in tracked(settings, tell)]
     lengths = [one.ball + GRAIN for one in settings]
     units = [math.sqrt(length / one.gravity) for length, one in zip(lengths, settings, strict=True)]
     grid, depths = collapsed(runs, lengths, units)
     beds = depths.reshape(-1, len(PLACES), len(grid)).mean(axis=1)
-    mean = beds[: len(SWEEP)].mean(axis=0)
+    mean = beds.mean(axis=0)
     final = float(mean[-1])
-    labels = [*(_name(*bed) for bed in SWEEP), *names]
+    names = [_name(*bed) for bed in SWEEP]
     rows = []
-    for name, curve in list(zip(labels, beds, strict=True))[len(SWEEP) if others else 0 :]:
+    for name, curve in zip(names, beds, strict=True):
         off = np.abs(curve - mean).max() / final
         rows.append(Comparison(f"final depth over D + d, {name}", "1", final, float(curve[-1]), BAND))
         rows.append(near_zero(f"largest difference over the final depth, {name}", off, BAND))
     curves = [Curve("mean of the sweep", grid, mean, False)]
-    curves += [Curve(name, grid, curve) for name, curve in zip(labels, beds, strict=True)]
+    curves += [Curve(name, grid, curve) for name, curve in zip(names, beds, strict=True)]
     plot = Plot("One Froude number", "t sqrt(g / (D + d)) [1]", "depth over D + d [1]", curves)
-    ends = depths[: len(SWEEP) * len(PLACES), -1]
+    ends = depths[:, -1]
     remark = say(
         "at_one_froude", about=_ABOUT, froude=FROUDE, beds=len(SWEEP),
         scatter=100 * float(np.std(ends, ddof=1)) / final,
@@ -137,13 +138,33 @@ def _one_froude(tell: Tell, others: Sequence[Drop] = (), names: Sequence[str] = 
 
 def _size(tell: Tell) -> Outcome:
     # The ball as grains' centres see it, D + d, is what scales (Kumar et al. 2017), and its mass with the cube of that.
-    large = LARGER * (BALL + GRAIN) - GRAIN
-    density = STEEL * (LARGER * BALL / large) ** 3
-    speed = FROUDE * math.sqrt(LARGER_AT[0] * LARGER * BALL)
-    others = [setting(*LARGER_AT, at, density, speed, ball=large) for at in PLACES]
-    found = _one_froude(tell, others, [f"{LARGER_AT[0]:g} m/s2, ball {LARGER:g} times larger"])
-    remark = say("larger_ball", larger=LARGER)
-    return Outcome(found.comparisons, found.plots, [*found.remarks, remark])
+    balls = [across * GRAIN for across in ACROSS]
+    lengths = [ball + GRAIN for ball in balls]
+    density = [
+        STEEL * (length / lengths[0] * balls[0] / ball) ** 3 for ball, length in zip(balls, lengths, strict=True)
+    ]
+    settings = [
+        setting(gravity, seed, at, one, FROUDE * math.sqrt(gravity * length * balls[0] / lengths[0]), ball=ball)
+        for (gravity, seed), ball, length, one in zip(ACROSS_AT, balls, lengths, density, strict=True) for at in PLACES
+    ]  # fmt: skip
+    runs = [one.run() for one in tracked(settings, tell)]
+    each = [length for length in lengths for _ in PLACES]
+    units = [math.sqrt(length / one.gravity) for length, one in zip(each, settings, strict=True)]
+    grid, depths = collapsed(runs, each, units)
+    beds = depths.reshape(-1, len(PLACES), len(grid)).mean(axis=1)
+    names = [f"{across:g} grains across, {g:g} m/s2" for across, (g, _) in zip(ACROSS, ACROSS_AT, strict=True)]
+    (smaller, larger), final = beds, float(beds[0][-1])
+    rows = [
+        Comparison(f"final depth over D + d, {names[1]}", "1", final, float(larger[-1]), BAND),
+        near_zero("largest difference over the final depth", np.abs(larger - smaller).max() / final, BAND),
+    ]
+    curves = [Curve(names[0], grid, smaller, False), Curve(names[1], grid, larger)]
+    spread = [100 * float(one[:, -1].std(ddof=1)) / 2 / float(one[:, -1].mean()) for one in depths.reshape(2, 4, -1)]
+    remark = say("larger_ball", beads=BEADS, froude=FROUDE, across=ACROSS, spread=listed(spread, ".0f"),
+                 counts=listed((float(run["count"]) for run in runs[:: len(PLACES)]), ".0f"))  # fmt: skip
+    return Outcome(
+        rows, [Plot("One Froude number", "t sqrt(g / (D + d)) [1]", "depth over D + d [1]", curves)], [remark]
+    )
 
 
 def _murdoch(tell: Tell) -> Outcome:
@@ -175,4 +196,40 @@ def _murdoch(tell: Tell) -> Outcome:
     return Outcome(rows, [plot], [remark])
 
 
-CASES = {"sink-from-rest": _sink, "gravity-sweep": _one_froude, "size-collapse": _size, "murdoch": _murdoch}
+def _sunday(tell: Tell) -> Outcome:
+    # Ten grains across: drops of two places and two beds scatter by less than the coarser ones above.
+    size = tuple(share * (BALL + SUNDAY_GRAIN) for share in SUNDAY_BOX)
+    settings = [
+        Drop(
+            SUNDAY_GRAIN, BALL, ALUMINIUM, size, g, seed, at, froude * math.sqrt(g * BALL),  # type: ignore[arg-type]
+            LONGEST * math.sqrt(BALL / g),
+        )
+        for froude in SUNDAY_FROUDE for g, seed in SUNDAY_GRAVITIES for at in PLACES[:2]
+    ]  # fmt: skip
+    runs = [one.run() for one in tracked(settings, tell)]
+    shape = (len(SUNDAY_FROUDE), len(SUNDAY_GRAVITIES), 2)
+    depths = np.array([run["depth"][-1] / BALL for run in runs]).reshape(shape).mean(axis=2)
+    times = [_time_down(run) * math.sqrt(one.gravity / BALL) for run, one in zip(runs, settings, strict=True)]
+    lasts = np.array(times).reshape(shape).mean(axis=2)
+    rows = []
+    for what, found in (("depth over D", depths), ("duration sqrt(g / D)", lasts)):
+        about = f"{what} at {SUNDAY_GRAVITIES[1][0]:g} over {SUNDAY_GRAVITIES[0][0]:g} m/s2, Fr"
+        rows += [
+            Comparison(f"{about} {froude:g}", "1", 1.0, float(low / high), BAND)
+            for froude, (high, low) in zip(SUNDAY_FROUDE, found, strict=True)
+        ]
+    plots = []
+    for what, found in (("depth over D [1]", depths), ("duration sqrt(g / D) [1]", lasts)):
+        curves = [Curve("mean", SUNDAY_FROUDE, found.mean(axis=1), False)]
+        curves += [Curve(f"bed, {g:g} m/s2", SUNDAY_FROUDE, found[:, k]) for k, (g, _) in enumerate(SUNDAY_GRAVITIES)]
+        plots.append(Plot("A ball of 10 cm in beads of 1 cm", "v / sqrt(g D) [1]", what, curves))
+    growth = [power_of(SUNDAY_FROUDE[a:b], depths.mean(axis=1)[a:b]) for a, b in ((0, 2), (2, 4))]
+    remark = say(
+        "sunday", grain=1e3 * SUNDAY_GRAIN, count=int(runs[0]["count"]), box=" x ".join(map("{:g}".format, SUNDAY_BOX)),
+        aluminium=ALUMINIUM, beads=BEADS, slow=growth[0], fast=growth[1], many=len(runs),
+    )  # fmt: skip
+    return Outcome(rows, plots, [remark])
+
+
+CASES = {"sink-from-rest": _sink, "gravity-sweep": _one_froude, "size-collapse": _size, "murdoch": _murdoch,
+         "sunday": _sunday}  # fmt: skip

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from dem import Bed, Facing
-from dem.grains.materials import SAND, Material
+from dem.grains.materials import SAND_WEAK, Material
 from dem.measure.repose import measure_flanks, thickness_profile
 from experiments.bed.tests import stiff_enough
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, tracked, within
@@ -28,7 +28,7 @@ __all__ = ["CASES", "Heap", "in_lammps", "slumped"]
 
 GRAIN, SPREAD, GRAVITY, SEED = 0.004, 0.15, 9.80665, 1
 BLOCK, LENGTH = (28.0, 6.0, 10.0), 72.0  # of the block, and of the box along x [mean diameters]
-ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand-calibrated
+ROLLING = (0.0, 0.356)  # friction is 0.5; the second is that of sand
 TIME = 15.0  # of the slump [times in which a grain falls the block's height]
 BAND, CREST_BAND = 2.0, 0.1  # [degrees], [1]: slopes of one heap differ by 1 to 2 degrees
 ROUGH = 10.0  # friction and rolling friction of the floor [1], as in ``dem.measure.shearing``
@@ -124,11 +124,11 @@ def in_lammps(stuff: Material, block: tuple[Any, ...]) -> Heap:
 def _compute(tell: Tell) -> Outcome:
     if PEERS["lammps"].find() is None:
         return PEERS["lammps"].skipped()
-    block = _block(replace(SAND, name="slump"))
+    block = _block(replace(SAND_WEAK, name="slump"))
     tell(0.3)
     rows, curves, words = [], [], []
     for k, rolling in enumerate(ROLLING):
-        stuff = replace(SAND, name="slump", friction=0.5, rolling_friction=rolling)
+        stuff = replace(SAND_WEAK, name="slump", friction=0.5, rolling_friction=rolling)
         begin = 0.3 + 0.35 * k
         here = slumped(stuff, block, within(tell, begin, begin + 0.2))
         there = in_lammps(stuff, block)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dem import SAND, Bed
+from dem import SAND, SAND_WEAK, Bed
 from dem.engine.stress import find_contacts, stress_profile
 from dem.prepare.laboratory import Laboratory
 from dem.prepare.recipe import parse_stage
@@ -21,7 +21,7 @@ BED = {"stages": ["rain", "fluff", "packing:0.545"], "size": SIZE, "grain": GRAI
 @pytest.fixture(scope="module")
 def made():
     """Rained, fluffed, tapped to 0.545; and the state in which that left it."""
-    prepared = Bed.prepare_as(SAND, **BED)
+    prepared = Bed.prepare_as(SAND_WEAK, **BED)
     return prepared, prepared.bed.state()
 
 

@@ -10,7 +10,7 @@ import pytest
 import dem.prepare.laboratory
 import dem.prepare.prepare
 import dem.prepare.stages
-from dem import SAND, Bed, Facing, LogNormal, Normal, Uniform
+from dem import SAND_WEAK, Bed, Facing, LogNormal, Normal, Uniform
 from dem.prepare.laboratory import Laboratory
 from dem.prepare.prepare import check_options, prepare_bed
 from dem.prepare.recipe import Stage, check_stages, parse_stage
@@ -28,7 +28,7 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HEDGEBED_CACHE", str(folder))
-        bed = Bed.prepare(SAND, **BED)
+        bed = Bed.prepare(SAND_WEAK, **BED)
     return bed, bed.state(), folder
 
 
@@ -59,7 +59,7 @@ def test_a_prepared_bed_is_at_rest_and_level(bed):
     assert 3.5 < bed.coordination_number < 6.5
     assert 0 < bed.max_overlap < 0.01  # at rest, far below the bound
     assert (np.abs(grains.radius * 2 / GRAIN - 1) <= 0.15).all()
-    assert bed.material.young < SAND.young and bed.seed == 3
+    assert bed.material.young < SAND_WEAK.young and bed.seed == 3
 
 
 @pytest.mark.long
@@ -69,7 +69,8 @@ def test_rain_may_land_harder_than_the_bound_of_the_bed_it_makes(monkeypatch):
     level = Laboratory._level
     look = lambda work, stage: landed.append(work.bed.max_overlap) or level(work, stage)  # noqa: E731
     monkeypatch.setattr(Laboratory, "_level", look)
-    bed = prepare_bed("sand", size=(0.02, 0.02, 0.012), grain=0.003, seed=1, max_overlap=0.01, young=2e7, cache=False)
+    given = {"size": (0.02, 0.02, 0.012), "grain": 0.003, "seed": 1, "max_overlap": 0.01, "young": 2e7}
+    bed = prepare_bed("sand-weak", **given, cache=False)
     assert 0.01 < landed[0] < 0.05
     assert bed.overlap_limit == 0.01 and bed.max_overlap == 0
 
@@ -100,7 +101,7 @@ def stop(*_):
 
 def test_the_same_seed_gives_the_same_bits_and_progress_is_told(made):
     progress = Progress()
-    again = prepare_bed("sand", **BED, cache=False, progress=progress)
+    again = prepare_bed("sand-weak", **BED, cache=False, progress=progress)
     assert same(again.state(), made[1])
     assert progress.stages == ["rain", "settle"]
     assert len(progress.shares) > 4 and all(0 <= share <= 1 for share in progress.shares)
@@ -112,7 +113,7 @@ def test_another_seed_rains_other_grains(monkeypatch):
     monkeypatch.setattr(Laboratory, "run", lambda work: rained.append(work.bed.grains().as_dict()) or stop())
     for seed in (3, 4):
         with pytest.raises(Stop):
-            prepare_bed("sand", **BED | {"seed": seed}, cache=False)
+            prepare_bed("sand-weak", **BED | {"seed": seed}, cache=False)
     for name in ("radius", "position"):
         assert not np.isclose(rained[0][name], rained[1][name], rtol=1e-9).any()
 
@@ -120,11 +121,11 @@ def test_another_seed_rains_other_grains(monkeypatch):
 def test_a_cached_bed_is_the_bed_to_the_bit_and_needs_no_making(made, monkeypatch):
     monkeypatch.setenv("HEDGEBED_CACHE", str(made[2]))
     monkeypatch.setattr(Specification, "rain", lambda *_: pytest.fail("it was made anew"))
-    bed = prepare_bed(SAND, **BED)
+    bed = prepare_bed(SAND_WEAK, **BED)
     assert same(bed.state(), made[1])
     for name in ("surface", "packing_fraction", "size", "gravity", "time_step", "seed", "material", "overlap_limit"):
         assert getattr(bed, name) == getattr(made[0], name), name
-    assert bed.material.sources == SAND.sources
+    assert bed.material.sources == SAND_WEAK.sources
     (kept,) = (made[2] / "beds").glob("*.json")
     assert json.loads(kept.read_text())["grain"] == GRAIN
 
@@ -138,7 +139,7 @@ def test_a_damaged_file_in_the_cache_is_said_and_made_anew(made, monkeypatch, tm
     here.write_bytes(whole[: len(whole) // 3] if damage is None else damage)
     monkeypatch.setattr(Specification, "rain", stop)
     with pytest.warns(UserWarning, match="cannot be read and is made anew"), pytest.raises(Stop):
-        prepare_bed(SAND, **BED)
+        prepare_bed(SAND_WEAK, **BED)
 
 
 def test_the_key_of_the_cache_holds_every_option(monkeypatch):
@@ -164,17 +165,18 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
     monkeypatch.setattr(Laboratory, "run", lambda work: work.bed)
     monkeypatch.setattr(dem.prepare.prepare.runtime, "start", lambda **_: None)
 
-    def name_of(material=SAND, **options):
+    def name_of(material=SAND_WEAK, **options):
         prepare_bed(material, **BED | {"young": 1e7} | options)
         return asked[-1]
 
     plain = name_of()
-    assert name_of() == plain and name_of("SAND") == plain
+    assert name_of() == plain and name_of("SAND-WEAK") == plain
     assert name_of(threads=1) == plain
     numbers = {"density": 2600, "poisson": 0.2, "friction": 0.4, "restitution": 0.6, "rolling_friction": 0.2}
-    others = [name_of(replace(SAND, **{key: value})) for key, value in numbers.items()]
+    others = [name_of(replace(SAND_WEAK, **{key: value})) for key, value in numbers.items()]
     others += [
-        name_of(replace(SAND, cohesion=law, surface_energy=g)) for law, g in (("dmt", 1.0), ("jkr", 1.0), ("jkr", 2.0))
+        name_of(replace(SAND_WEAK, cohesion=law, surface_energy=g))
+        for law, g in (("dmt", 1.0), ("jkr", 1.0), ("jkr", 2.0))
     ]
     others += [name_of(grain=grain) for grain in (Normal(GRAIN, 0.1), Normal(GRAIN, 0.2), LogNormal(GRAIN, 0.1))]
     others += [
@@ -196,7 +198,7 @@ def test_the_key_of_the_cache_holds_every_option(monkeypatch):
     ]
     assert len({plain, *others}) == 1 + len(others)
     before = len(asked)
-    prepare_bed(SAND, **BED, cache=False)
+    prepare_bed(SAND_WEAK, **BED, cache=False)
     assert len(asked) == before
 
 
@@ -211,7 +213,7 @@ def already_rained(bed, monkeypatch):
 
 def test_a_bed_is_tapped_to_the_packing_asked_for(already_rained):
     wanted = already_rained + 0.004
-    bed = prepare_bed(SAND, **BED, packing=wanted, cache=False)
+    bed = prepare_bed(SAND_WEAK, **BED, packing=wanted, cache=False)
     assert wanted - 0.0005 <= bed.packing_fraction < wanted + 0.01
     assert bed.floor_force == pytest.approx(bed.weight, rel=0.01)
     assert bed.time == 0 and bed.gravity == (0.0, 0.0, -9.81)
@@ -225,7 +227,7 @@ def test_a_packing_out_of_reach_is_refused(already_rained, monkeypatch, packing,
     """Looser than the rain, and denser than tapping makes it."""
     monkeypatch.setattr(dem.prepare.stages, "_MOST_TAPS", 1)
     with pytest.raises(ValueError, match=rf"packing = {packing} cannot be reached: .*{words}"):
-        prepare_bed(SAND, **BED, packing=packing, cache=False)
+        prepare_bed(SAND_WEAK, **BED, packing=packing, cache=False)
 
 
 def test_a_bed_that_does_not_come_to_rest_says_so(bed, monkeypatch):
@@ -257,11 +259,11 @@ def test_a_preparation_that_was_stopped_goes_on_to_the_same_bits(made, monkeypat
     for at in (6, 8, 9, 10):
         interrupted = Interrupted(at)
         with pytest.raises(KeyboardInterrupt):
-            prepare_bed(SAND, **BED, progress=interrupted)
+            prepare_bed(SAND_WEAK, **BED, progress=interrupted)
         stages.append(interrupted.name)
         assert len(list((tmp_path / "unfinished").iterdir())) == 2
     assert {"rain", "settle"} <= set(stages)
-    bed = prepare_bed(SAND, **BED)
+    bed = prepare_bed(SAND_WEAK, **BED)
     assert same(bed.state(), made[1])
     assert not list((tmp_path / "unfinished").iterdir())
 
@@ -280,15 +282,15 @@ def test_a_preparation_is_kept_every_minute(made, monkeypatch, tmp_path):
 
     monkeypatch.setattr(Laboratory, "keep", keep_and_stop)
     with pytest.raises(Stop):  # as kill -9 would end it
-        prepare_bed(SAND, **BED)
+        prepare_bed(SAND_WEAK, **BED)
     monkeypatch.setattr(Laboratory, "keep", lambda work: None)
-    bed = prepare_bed(SAND, **BED)
+    bed = prepare_bed(SAND_WEAK, **BED)
     assert same(bed.state(), made[1])
 
 
 @pytest.mark.parametrize("damage", ["other steps", "no notes", "no bed"])
 def test_what_was_kept_by_halves_is_not_gone_on_with(made, monkeypatch, tmp_path, damage):
-    bed = dem.Bed.from_grains(SAND, positions=[[0.012, 0.012, 0.01]], radii=[0.002], size=(0.024, 0.024, 0.03))
+    bed = dem.Bed.from_grains(SAND_WEAK, positions=[[0.012, 0.012, 0.01]], radii=[0.002], size=(0.024, 0.024, 0.03))
     plan = [Stage("rain", by="rough"), Stage("level")]
     work = Laboratory(bed, stages=plan, grain=GRAIN, progress=None, path=tmp_path / "a.npz")
     work.done, work.notes = 1, {"began": 0.0, "drag": 1.0, "first": 2.0}
@@ -356,12 +358,12 @@ def test_levelling_keeps_the_contacts_of_what_stays(bed):
 )
 def test_what_cannot_be_made_is_refused_by_name(options, words):
     with pytest.raises(ValueError, match=words):
-        prepare_bed(SAND, **BED | options)
+        prepare_bed(SAND_WEAK, **BED | options)
 
 
 def test_a_misspelt_option_raises():
     with pytest.raises(TypeError):
-        Bed.prepare(SAND, **BED, graine=0.004)
+        Bed.prepare(SAND_WEAK, **BED, graine=0.004)
 
 
 @pytest.mark.parametrize("grain", [0.006, 0.0019, 0.0007])

@@ -100,12 +100,13 @@ def test_none_unsets_what_need_not_be_set(dig):
         (["--seeds", "1.5"], ["--seeds[0] = 1.5", "fractional part"]),
         (["--steps", "10.7"], ["--steps = 10.7", "fractional part"]),
         (["--seeds"], ["--seeds is empty: give at least one (Seeds [1])"]),
-        (["--spike-diameter", "16mm"], ["16mm", "give a plain number in metres, e.g. 0.016"]),
-        (["--load", "3N"], ["3N", "give a plain number in newtons"]),
+        (["--spike-diameter", "16kg"], ["--spike-diameter = '16kg'", "a unit of mass", "give length in m, cm, mm"]),
+        (["--load", "3newton"], ["--load = '3newton'", "'newton' is no unit", "give force in N, mN"]),
+        (["unit.toml"], ["unit.toml: drive_speeds = [0.1, '2 mm']", "a unit of length", "give speed in m/s"]),
         (["misspelt.toml"], ["misspelt.toml", "deep"]),
         (["key.toml"], ["key.toml: spike_diametre = 0.1", "did you mean 'spike_diameter'"]),
         (["hyphen.toml"], ["hyphen.toml: spike-diameter", "did you mean 'spike_diameter'"]),
-        (["value.toml"], ["value.toml: drive_speeds[1] = 'fast'", "valid number"]),
+        (["value.toml"], ["value.toml: drive_speeds = [0.1, 'fast']", "'fast' is not a valid number"]),
         (["broken.toml"], ["broken.toml", "TOML"]),
         (["--out", "key.toml"], ["key.toml", "file"]),
         (["--out", "cases"], ["cases", "in use", "deep.toml"]),
@@ -116,6 +117,7 @@ def test_bad_input_is_refused_in_a_sentence_that_names_it(dig, capsys, tokens, s
     Path("key.toml").write_text("spike_diametre = 0.1\n")
     Path("hyphen.toml").write_text("spike-diameter = 0.1\n")
     Path("value.toml").write_text('drive_speeds = [0.1, "fast"]\n')
+    Path("unit.toml").write_text('drive_speeds = [0.1, "2 mm"]\n')
     Path("broken.toml").write_text("steps = \n")
     assert main(["dig", *tokens]) == 2
     text = capsys.readouterr().err

@@ -132,7 +132,7 @@ def test_the_loads_on_the_rows_are_the_force_that_lifts_the_platform(runs):
         moved = read_moved(runs / name, json.loads((runs / name / "result.json").read_text()))
         assert np.abs(moved.load.sum(axis=1) - moved.lift)[1:].max() < 1e-6 * moved.weight
         deepest = moved.sinkage.max()
-        assert deepest == pytest.approx({"sand": 0.009, "brick": 1.4e-4}[name], rel=0.2)
+        assert deepest == pytest.approx({"sand": 0.0067, "brick": 1.4e-4}[name], rel=0.2)
 
 
 @pytest.mark.parametrize(

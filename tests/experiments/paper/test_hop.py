@@ -128,8 +128,8 @@ def test_springy_ground_throws_tips_that_hold_up_more_steeply(tmp_path, capsys):
 
 
 def test_soft_ground_has_no_wheel_speed_for_what_it_cannot_throw(result_of):
-    """On the sand's 82 N/m it turns in place before it leaves: 2 m at most, whatever the wheel, so none is named."""
-    result = result_of("--surface", "sand", "--distance", "5")
+    """On 82 N/m (sand-weak) it turns in place before it leaves: 2 m at most, whatever the wheel, so none is named."""
+    result = result_of("--surface", "sand-weak", "--distance", "5")
     assert result["quantities"]["distance_factor"]["value"] < 0.4
     assert result["quantities"]["model_wheel_speed"]["value"] is None
     golden("hop/soft_ground", [result["title"], *result["departures"]["sentences"]])
@@ -212,7 +212,7 @@ def test_the_wheel_speeds_of_both_grounds_stand_side_by_side_and_say_which_is_wh
     assert list(result["quantities"])[:2] == ["wheel_speed", "model_wheel_speed"]
     assert "rigid ground" in rigid["note"] and "on brick" in gives["note"]
     assert all(f"{speed['value']:.4g}" in result["title"] for speed in (rigid, gives))
-    soft = result_of("--surface", "sand", "--distance", "5")
+    soft = result_of("--surface", "sand-weak", "--distance", "5")
     golden("hop/titles", [result["title"], soft["title"]])
 
 

@@ -1,13 +1,13 @@
 """`hedgebed penetrate --model`: the law with what it lacked, against closed forms, and beside a bed that is known."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from fake_bed import FakeBed
 from golden import golden
 
+from dem.grains.materials import Material
 from experiments.campaign import read_campaign
 from experiments.cli.main import main
 from experiments.penetrate import beds
@@ -163,7 +163,7 @@ def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
 
 
 def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(tmp_path, monkeypatch):
-    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
+    sand = Material("sand", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1)
     unload = K / 0.1  # the stand-in's elastic line is that of a crater of nine tenths
     monkeypatch.setattr(
         beds, "prepare_bed",

@@ -1,18 +1,17 @@
 """What is said of a run: forces above depth 0, which stiffness holds when, one bed, fits that cannot tell K from C."""
 
-from types import SimpleNamespace
-
 import pytest
 from fake_bed import FakeBed
 from golden import golden
 
+from dem.grains.materials import Material
 from experiments.grains.softening import Softening
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.result import overlap_warning, softening_note
 from experiments.penetrate.settings import PenetrateSettings
 
-SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
+SAND = Material("sand", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1)
 QUICK = {
     "speeds": (0.2, 0.4), "other_speeds": (0.4,), "drop_speeds": (0.1,), "other_drop_speeds": (0.1,), "drop_time": 0.5,
     "depth": 0.01, "frame_count": 0, "mass": 0.3, "load": 0.4, "lowering_speed": 0.1, "substeps": 20, "seeds": (1,),
@@ -93,7 +92,7 @@ def test_a_bed_less_than_six_tips_wide_is_said(tmp_path):
         [text for text in penetrate.run(case, tmp_path / name)["warnings"] if "tips wide" in text]
         for name, case in (("wide", wide), ("narrow", narrow))
     ]
-    assert told[0] == [] and "4.5 tips wide" in told[1][0] and "of 0.096 m" in told[1][0]
+    assert told[0] == [] and "4.5 tips wide" in told[1][0] and "0.096 m" in told[1][0]
 
 
 def test_drops_can_be_left_out(tmp_path):

@@ -16,6 +16,7 @@ from fake_bed import FakeBed
 from golden import golden
 from pydantic import ValidationError
 
+from dem.grains.materials import Material
 from experiments.grains.sizes import expected_grain_count
 from experiments.penetrate import beds, units
 from experiments.penetrate import experiment as penetrate
@@ -26,7 +27,7 @@ from experiments.penetrate.units import plan_units, shown_units
 from experiments.runs import memory
 from vis.pictures.frames import frame_names, read_frames
 
-SAND = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
+SAND = Material("sand", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1)
 QUICK = {
     "seeds": (1, 2, 3),
     "speeds": (0.2, 0.4),
@@ -318,9 +319,10 @@ def test_the_shipped_cases_are_settings():
     assert full.tip_diameter / full.grain >= 9.999 and full.max_overlap <= 0.01 and min(full.speeds) < 0.1
     speeds = {"speeds", "other_speeds", "drop_speeds", "other_drop_speeds"}
     finer = {"grain", "max_overlap", "reference", "bed_size", "young"} | speeds
-    # Its modulus is its own: softer than what softening asks for, and within the bound as run (docs/results).
+    # Its modulus is its own: softer than what softening asks for. That of the weaker sand was within the bound as run
+    # (docs/results), and sand bears 1.65 to 1.77 times as much (docs/materials.md).
     kept = json.loads((cases.parents[1] / "docs/results/penetrate-full/result.json").read_text())["quantities"]
-    assert full.young == kept["young"]["value"] and kept["max_overlap"]["value"] < full.max_overlap
+    assert 1.65 < full.young / kept["young"]["value"] < 1.77 and kept["max_overlap"]["value"] < full.max_overlap
     # Four tips wide: what that alone does is in docs/results/README.md, by the shipped grains in a bed of this size.
     assert min(full.bed_size[:2]) > 4 * full.tip_diameter and full.bed_size[2] > full.depth + 1.8 * full.tip_diameter
     assert {name for name, value in full if value != getattr(short, name)} == finer
@@ -441,7 +443,7 @@ def test_coarse_tips_can_be_asked_for():
         ({"young": 1e12}, r"young = 1e.12 Pa is more than sand itself has: at most 7e.10 Pa would do"),
         ({"young": 1e4}, "young = 10000 Pa is so soft"),
         ({"threads": 1024}, r"threads = 1024 is more than the cores there are: at most \d+ would do"),
-        ({"load": 10.0}, "load = 10 N puts .* would do"),
+        ({"load": 4.0}, "load = 4 N puts .* a load of at most 0.73 N,"),
         ({"drop_speeds": (2.0,)}, r"drop_speeds = 2 m/s with mass = 0.1 kg would go about .* at most .* m/s"),
         ({"speeds": (1e-9,)}, r"speeds = 1e-09 m/s asks for .* at most 1e.09 in all"),
         ({"other_speeds": ()}, "other_speeds is empty"),

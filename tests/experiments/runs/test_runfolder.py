@@ -25,6 +25,7 @@ from experiments.runs.folder import (
     write_series,
     write_text,
 )
+from experiments.runs.reading import read_case
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -113,8 +114,38 @@ def test_ensure_takes_up_the_same_run_and_refuses_another(folder):
 
 def test_open_refuses_another_format(folder):
     write_text(folder.path / "run.toml", 'format = "other"\n')
-    with pytest.raises(ValueError, match="hedgebed-run/1"):
+    with pytest.raises(ValueError, match="hedgebed-run/2"):
         RunFolder.open(folder.path)
+
+
+def test_a_run_of_before_keeps_its_material(tmp_path):
+    """`sand` of a run.toml of version 1 is what `sand-weak` is: settings, result, and the case that repeats it."""
+    text = 'format = "hedgebed-run/{}"\ncommand = "dig"\nnot_set = ["surface"]\n[settings]\nmaterial = "sand"\n'
+    text += 'surfaces = ["brick", "sand", "sand-calibrated"]\ntitle = "sand"\n'
+    was = {"surface": None, "material": "sand", "surfaces": ["brick", "sand", "sand-calibrated"], "title": "sand"}
+    today = was | {"material": "sand-weak", "surfaces": ["brick", "sand-weak", "sand"]}
+    for number, settings in ((1, today), (2, was)):
+        write_text(tmp_path / "run.toml", text.format(number))
+        write_json(tmp_path / "result.json", {"surface": "sand", "bed": {"material": "sand"}, "title": "in sand"})
+        folder = RunFolder.open(tmp_path)
+        assert folder.settings == settings == dict(read_case(tmp_path / "run.toml").values)
+        name = settings["material"]
+        assert folder.read_result() == {"surface": name, "bed": {"material": name}, "title": "in sand"}
+
+
+def test_a_case_whose_result_is_kept_has_the_material_of_that_result():
+    """But for the cases that are of the default material: their kept results are of `sand-weak`, which it was."""
+    of_the_default = {"penetrate", "penetrate-full", "bed-test-cone", "bed-test-repose"}
+    cases = {path.stem: path for path in ROOT.glob("experiments/cases/**/*.toml")}
+    same = 0
+    for path in sorted(ROOT.glob("docs/results/*/run.toml")):
+        name = path.parent.name
+        today = read_case(cases[name]).values if name in cases else {}
+        kept = RunFolder.open(path.parent).settings
+        for key in {"material", "surface"} & today.keys():
+            assert kept[key] == ("sand-weak" if name in of_the_default else today[key]), (name, key)
+            same += 1
+    assert same > 50
 
 
 def test_fresh_path_never_names_what_is_there(tmp_path):

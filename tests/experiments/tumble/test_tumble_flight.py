@@ -68,7 +68,7 @@ def test_one_that_sinks_in_to_its_middle_is_refused():
 
 def in_flight(**more):
     given = {
-        "surface": "sand", "ground": "bed", "grain": 0.0048, "bed_size": (0.5, 0.036, 0.096), "gravity": 0.0980665,
+        "surface": "sand-weak", "ground": "bed", "grain": 0.0048, "bed_size": (0.5, 0.036, 0.096), "gravity": 0.0980665,
         "settle_gravity": 0.4903325, "max_overlap": 0.1, "duration": 1.2,
     }  # fmt: skip
     return TumbleSettings(**(given | more))

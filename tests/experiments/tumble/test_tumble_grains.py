@@ -13,7 +13,7 @@ from golden import golden
 from tumble_runs import SMALL, prepare_small, small_bed, stop_at
 
 from coupling import CoupledTumble, LawGround, LeftTheBedError
-from dem import SAND, BedFailure
+from dem import SAND_WEAK, BedFailure
 from experiments.cli.main import main
 from experiments.grains import following
 from experiments.grains.softening import Softening, run_limit
@@ -34,7 +34,7 @@ from rigid.planar.simulate import simulate
 
 
 def on_bed(**more):
-    return TumbleSettings(**({"surface": "sand", "ground": "bed", "duration": 0.9} | more))
+    return TumbleSettings(**({"surface": "sand-weak", "ground": "bed", "duration": 0.9} | more))
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def on_bed(**more):
             {"coarse": 0.007, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
             r"coarse = 0.007 m makes grains of .* coarse = 0.006 m would do",
         ),
-        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, sand-calibrated, jsc1a would do"),
+        ({"surface": "steel"}, r"surface = 'steel' has no grains .* sand, sand-weak, jsc1a would do"),
         ({"spike_clear": 0.01}, r"spike_diameter = 0.012 m, spike_clear = 0.01 m"),
         ({"bed_stages": ("rain:dry", "stick", "level")}, r"bed_stages: .* these grains do not stick anyway"),
         ({"bed_stages": ("rain", "compact:0.6")}, r"bed_stages ends with 'compact:0.6': 'level' last"),
@@ -404,7 +404,7 @@ def test_the_result_dates_the_wheels_limit_and_warns_of_energy_made_and_of_overl
     footing = LawGround.of_trial(plan.trial)
     footing.bed = SimpleNamespace(
         grain_count=1, packing_fraction=0.6, surface=0.0, time_step=1e-4, max_overlap=0.2 if false else 0.0,
-        material=SAND,
+        material=SAND_WEAK,
     )  # fmt: skip
     run = CoupledTumble(plan.trial, footing, duration=0.1, max_wheel_speed=plan.max_wheel_speed)
     if false:

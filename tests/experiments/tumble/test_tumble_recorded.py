@@ -48,7 +48,7 @@ def test_a_tumble_is_recorded_as_its_own_model_would_be(runs, tmp_path):
                 # The torque begins at once: around t = 0 a step of 0.4 ms and the IMU's window see it differently.
                 assert away[np.abs(found["t_s"]) > 5e-3].max() < most, channel
     surface = campaign.tables.surface
-    assert (surface.stiffness, surface.mu_d, surface.granular) == (82.2, 0.3, False)
+    assert (surface.stiffness, surface.mu_d, surface.granular) == (140.0, 0.3, False)
     assert main(["campaign", "check", str(into), "--out", str(tmp_path / "checked"), "--quiet"]) == 0
 
 
@@ -58,7 +58,7 @@ def test_k_and_c_of_a_row_are_twice_those_fitted_to_a_spike_in_the_same_grains(r
     quantities = {"stiffness": (40.0, 3.0), "stiffness_error": (4.0, None), "damping": (0.5, 0.0)}
     result = {"quantities": {name: {"value": value, "std": std} for name, (value, std) in quantities.items()}}
     (fitted / "result.json").write_text(json.dumps(result))
-    text = 'format = "hedgebed-run/1"\ncommand = "penetrate"\n[settings]\nmaterial = "{}"\n'
+    text = 'format = "hedgebed-run/2"\ncommand = "penetrate"\n[settings]\nmaterial = "{}"\n'
     (fitted / "run.toml").write_text(text.format("sand"))
     ask = ["campaign", "from-run", str(runs / "strong"), str(tmp_path / "made"), "--fitted", str(fitted)]
     assert main(ask) == 0
@@ -75,7 +75,7 @@ def test_k_and_c_of_a_row_are_twice_those_fitted_to_a_spike_in_the_same_grains(r
     [
         (
             ("--also", "brick"),
-            "has stiffness = 15000.* and .* 82.2: .* runs that differ in gravity, torque or seed alone would do",
+            "has stiffness = 15000.* and .* 140.0: .* runs that differ in gravity, torque or seed alone would do",
         ),
         (("--depth-std", "1e-4"), "--depth-std is given, and .* is a run of a tumble"),
     ],

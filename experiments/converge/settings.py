@@ -1,0 +1,104 @@
+"""Settings of `hedgebed converge`: those of the penetration case that is the base, and what is varied about it."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from experiments.penetrate.settings import MaxOverlap, PenetrateSettings, Seeds
+from experiments.runs.strict import Positive
+from vis.page.sentences import Sentences
+
+__all__ = ["FEWEST_ACROSS", "LEAST_WIDTH", "ConvergeSettings", "say"]
+
+say = Sentences(__package__)
+
+FEWEST_ACROSS = 5.0
+"""Grains across the tip that `penetrate` asks for [1]."""
+LEAST_WIDTH = 4.0
+"""Width of a bed that `penetrate` asks for [tips]."""
+_NOT_HERE = ("bed", "model", "campaign", "reference", "time_step")
+"""Settings of `penetrate` that one case has and a sweep has not."""
+
+
+class ConvergeSettings(PenetrateSettings):
+    """A penetration case made again with finer grains, wider and deeper beds, stiffer grains and other speeds.
+
+    The settings of `penetrate` describe the base case. One thing at a time is varied about it.
+    """
+
+    # The base, where it is not as in `penetrate`
+    seeds: Seeds = (1, 2, 3, 4, 5)
+    max_overlap: MaxOverlap = 0.04
+    """Largest overlap of grains that the modulus of the base is chosen for [of a diameter]. A run ends where it is
+    passed by more than half."""
+    other_speeds: tuple[Positive, ...] = ()
+    """Not used: every bed is driven at all of speeds [m/s]."""
+    other_drop_speeds: tuple[Positive, ...] = ()
+    """Not used: every bed has all drops of drop_speeds [m/s]."""
+    frame_count: int = Field(0, ge=0, le=2000, description="Frames of each shown run of each member [1]; 0 for none.")
+
+    # What is varied, one thing at a time
+    ratios: tuple[Positive, ...] = (5.0, 7.0, 10.0)
+    """Grain sizes: tip diameters over mean grain diameters [1]. That of the base is tip_diameter / grain."""
+    widths: tuple[Positive, ...] = (6.0, 9.0)
+    """Widths of the bed, both ways [tip diameters]. That of the base is the smaller width of bed_size."""
+    bed_depths: tuple[Positive, ...] = (6.0,)
+    """Depths of the bed [tip diameters]. That of the base is the third of bed_size."""
+    overlaps: tuple[MaxOverlap, ...] = (0.02,)
+    """Overlaps that the modulus is chosen for [of a diameter]. That of the base is max_overlap."""
+    paces: tuple[Positive, ...] = (0.5,)
+    """Factors on speeds and lowering_speed [1]. That of the base is 1; the speeds of drops stay."""
+
+    # Speeds and sizes
+    speed_grain: Positive | None = None
+    """Mean grain diameter that speeds and lowering_speed are meant for [m]: grains of diameter d are driven at
+    speed_grain / d times these, which is the same inertial number; the finest of the sweep if not given."""
+    life_grain: Positive = 0.0002
+    """Mean diameter of the real grains [m]: the line through the sizes is followed to it."""
+
+    # The work
+    budget: Positive | None = None
+    """Time of one core that the sweep may take by its estimate [h]: runs that go beyond are left out, and told; all are
+    made if not given."""
+    members: str | None = Field(None, min_length=1)
+    """Folder where member runs are kept, each found again by its settings, so that sweeps share them; 'members' in the
+    run's folder if not given."""
+
+    @model_validator(mode="after")
+    def _varied(self) -> Self:
+        for key in ("ratios", "widths", "bed_depths", "overlaps", "paces"):
+            if len(set(getattr(self, key))) < len(getattr(self, key)):
+                raise ValueError(f"{key} = {list(getattr(self, key))} holds a value twice: each once would do")
+        for key in _NOT_HERE:
+            if getattr(self, key) is not None:
+                raise ValueError(say("not_here", key=key, value=getattr(self, key)))
+        if self.ground != "bed":
+            raise ValueError(f"ground = {self.ground!r} has no grains to be made finer: ground = 'bed' would do")
+        if self.life_grain > self.finest:
+            raise ValueError(say("life_grain", s=self, finest=self.finest))
+        return self
+
+    @property
+    def ratio(self) -> float:
+        """Grains across the tip of the base [1]."""
+        return self.tip_diameter / self.grain
+
+    @property
+    def width(self) -> float:
+        """Width of the base's bed [tip diameters]."""
+        return min(self.bed_size[:2]) / self.tip_diameter
+
+    @property
+    def bed_depth(self) -> float:
+        """Depth of the base's bed [tip diameters]."""
+        return self.bed_size[2] / self.tip_diameter
+
+    @property
+    def finest(self) -> float:
+        """Mean diameter of the finest grains of the sweep [m]."""
+        return self.tip_diameter / max(self.ratio, *self.ratios, 0.0)
+
+    @property
+    def driven_grain(self) -> float:
+        """The grain that the speeds are meant for [m]."""
+        return self.speed_grain or self.finest

@@ -1,0 +1,75 @@
+"""Before a run: what a bed too narrow, too shallow or too coarse does to its numbers, what would do, and its cost.
+
+K of a 12 mm spike in `sand-weak` was 54, 48, 36 and 33 N/m with 3, 4, 5 and 10 grains across the tip (docs/results:
+penetrate-coarse, -3mm, penetrate, -full), which is what `COARSE` holds, over the last. A run takes time with the number
+of grains and, as a step of the grains goes with their size, with its fourth power: 16 times for half the grain.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from . import say
+
+__all__ = ["ENOUGH_ACROSS", "ENOUGH_TIPS", "LEAST_BELOW", "costs", "resolution_advice", "times_as_long"]
+
+ENOUGH_TIPS = 6.0
+"""Width of a bed, in tips, from which on nothing is said: that of the bed that ships."""
+ENOUGH_ACROSS = 10.0
+"""Grains across a tip from which on nothing is said."""
+LEAST_BELOW = 2.0
+"""Tips between the deepest point and the floor from which on nothing is said."""
+COARSE = ((3.0, 1.64), (4.0, 1.45), (5.0, 1.09), (10.0, 1.0))
+"""Grains across a tip -> K over that of ten across [1] (see the module)."""
+
+
+def times_as_long(size: Sequence[float], grain: float, *, wanted: Sequence[float], wanted_grain: float) -> float:
+    """How many times as long runs take in a bed of another size [m] and of other grains [m]."""
+    return math.prod(wanted) / math.prod(size) * (grain / wanted_grain) ** 4
+
+
+def costs(times: float, seconds: float | None = None) -> str:
+    """What a change that takes `times` as long costs, in words; `seconds`: what the run takes without it, if known."""
+    many = f"{times:.2g} times the time"
+    return many if seconds is None else f"{many}, about {_clock(times * seconds)} in place of {_clock(seconds)}"
+
+
+def resolution_advice(
+    *,
+    tip: float,
+    grain: float,
+    size: Sequence[float],
+    depth: float,
+    seconds: float | None = None,
+    across: float = ENOUGH_ACROSS,
+) -> Iterator[str]:
+    """A sentence for each way in which a bed is too small or too coarse; nothing where it is not. Lengths in m.
+
+    `tip`: its diameter; `size`: both widths and the depth of the bed; `depth`: how deep the tip is driven; `seconds`:
+    what the runs are expected to take; `across`: grains across the tip from which on nothing is said of them.
+    """
+    width, height = min(size[:2]), size[2]
+    if width < ENOUGH_TIPS * tip * (1 - 1e-9):
+        wide = ENOUGH_TIPS * tip
+        wanted = (max(size[0], wide), max(size[1], wide), height)
+        cost = costs(times_as_long(size, grain, wanted=wanted, wanted_grain=grain), seconds)
+        yield say("narrow_bed", tips=width / tip, wide=wide, enough=ENOUGH_TIPS, cost=cost)
+    if height - depth < LEAST_BELOW * tip * (1 - 1e-9):
+        high = depth + LEAST_BELOW * tip
+        cost = costs(times_as_long(size, grain, wanted=(*size[:2], high), wanted_grain=grain), seconds)
+        yield say("shallow_bed", below=(height - depth) / tip, high=high, cost=cost)
+    if tip / grain < across * (1 - 1e-3):
+        found, finer = tip / grain, tip / ENOUGH_ACROSS
+        cost = costs(times_as_long(size, grain, wanted=size, wanted_grain=finer), seconds)
+        counts, ratios = zip(*COARSE, strict=True)
+        percent = 100 * (float(np.interp(found, counts, ratios)) - 1)
+        yield say("coarse_bed", across=found, percent=percent, finer=finer, enough=ENOUGH_ACROSS, cost=cost)
+
+
+def _clock(seconds: float) -> str:
+    """A time in two digits and the unit that suits it."""
+    for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * size:
+            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    return f"{float(f'{seconds:.2g}'):g} s"

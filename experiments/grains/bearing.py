@@ -1,0 +1,99 @@
+"""What a bed bears before it is made: the friction angle of its grains, their cohesion, and how deep a load goes.
+
+The force on a tip of area A at the depth z is taken as F = K z + A q. K, of the weight of the grains, is 3D-RFT's for a
+flat plate (`softening.bearing_gradient`), which stands for grains of any rolling friction, times 0.41 as fitted to
+`sand-weak` (38 of 92 N/m, docs/results/penetrate) and times `strength`. q is what grains that stick add; it is known by
+measurement for the materials of recipes.toml, and for others `RESISTANCE` times their cohesion.
+
+What another cohesion would change is Terzaghi's bearing capacity of a circular foot (1943, general shear),
+q = 1.3 c N_c, with N_c = (N_q - 1) cot phi and N_q = exp(pi tan phi) tan^2(45 + phi / 2) (Prandtl 1921, Reissner 1924),
+phi of the grains. A cone in `jsc-1a-loose` met some eight times that (docs/bed.md), so it is a lower bound here.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dem.grains.materials import Material
+
+from .recipes import recipe_of
+from .softening import PACKING, bearing_gradient
+
+__all__ = [
+    "COHESIONS", "UNSURE", "Bearing", "bearing_capacity", "bearing_of", "cohesion_of", "friction_angle", "strength",
+]  # fmt: skip
+
+COHESIONS = (10.0, 30.0, 100.0, 300.0, 1000.0)
+"""Cohesions of regolith for which an answer is given [Pa]."""
+_ANGLES = ((0.0, 21.4), (0.1, 25.0), (0.3, 28.9), (0.356, 30.8), (0.8, 36.4), (1.2, 39.9))
+"""Rolling friction -> friction angle at large strain of grains with a friction of 0.5 [degrees] (docs/materials.md:
+triaxial; the last one of a ring shear)."""
+_WEAK = 25.0
+"""The angle of the grains that K was first fitted to, `sand-weak` [degrees]."""
+_PER_DEGREE = 0.092
+"""Growth of ln K with the angle: 1.7 times from 25.0 to 30.8 degrees [1/degree] (docs/materials.md); beyond that it is
+an extrapolation."""
+_PLATE = 0.41
+"""K of `sand-weak` over that of a flat plate in 3D-RFT: 38 of 92 N/m [1]."""
+_RESISTANCE = 450.0
+"""What a tip meets for their cohesion in grains that stick, over it [1]: 70 of 79 kPa for 150 Pa (docs/bed.md)."""
+_OF_ADHESION = 1.2
+"""Cohesion over surface energy per diameter [1]: 1.0 to 1.5 in the four materials of JSC-1A (docs/materials.md)."""
+UNSURE = 2.0
+"""Factor either way by which the K of a bed may differ from what is taken here [1]."""
+
+
+def friction_angle(material: Material) -> float:
+    """The friction angle of the grains of a material at large strain [degrees], by their rolling friction."""
+    rolling, angles = zip(*_ANGLES, strict=True)
+    return float(np.interp(material.rolling_friction, rolling, angles))
+
+
+def strength(material: Material) -> float:
+    """K of a spike in these grains over that in `sand-weak` [1]."""
+    return math.exp(_PER_DEGREE * (friction_angle(material) - _WEAK))
+
+
+def cohesion_of(material: Material, grain: float) -> float:
+    """Cohesion of a bed of these grains of a mean diameter [Pa]: as measured, or by their surface energy; 0 without."""
+    if material.cohesion == "none":
+        return 0.0
+    known = recipe_of(material).cohesion
+    return known if known is not None else _OF_ADHESION * material.surface_energy / grain
+
+
+def bearing_capacity(cohesion: float, angle: float) -> float:
+    """What a cohesion [Pa] lets a circular foot bear at the surface [Pa] (see the module); `angle` in degrees."""
+    phi = math.radians(angle)
+    if phi < 1e-6:
+        return 1.3 * cohesion * (math.pi + 2)
+    passive = math.tan(math.pi / 4 + phi / 2) ** 2
+    return 1.3 * cohesion * (math.exp(math.pi * math.tan(phi)) * passive - 1) / math.tan(phi)
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """F = stiffness z + held, as it is expected."""
+
+    stiffness: float  # K [N/m]
+    held: float  # What grains that stick bear at the surface [N]
+    resistance: float  # The same as a pressure [Pa]
+
+    def depth(self, load: float) -> float:
+        """Where a load comes to rest [m]."""
+        return max(0.0, load - self.held) / self.stiffness
+
+    def load(self, depth: float) -> float:
+        """What comes to rest at a depth [N]."""
+        return self.held + self.stiffness * depth
+
+
+def bearing_of(material: Material, *, grain: float, gravity: float, area: float) -> Bearing:
+    """What a bed of grains of this mean diameter [m] bears on a tip of an area [m2] under a gravity [m/s2]."""
+    plate = bearing_gradient(PACKING * material.density, gravity, material.friction) * area
+    resistance = 0.0
+    if material.cohesion != "none":
+        known = recipe_of(material).resistance
+        resistance = known if known is not None else _RESISTANCE * cohesion_of(material, grain)
+    return Bearing(_PLATE * strength(material) * plate, resistance * area, resistance)

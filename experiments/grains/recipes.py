@@ -1,0 +1,36 @@
+"""How a bed of a material is prepared where no stages are given, and what is known of its strength: recipes.toml."""
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from dem.grains.materials import Material
+
+__all__ = ["POURED_DRY", "Recipe", "recipe_of"]
+
+_FILE = Path(__file__).with_suffix(".toml")
+POURED_DRY = ("rain:dry", "stick", "level")
+"""Stages of any other material whose grains stick: enlarged grains that stick rain into a gauze (docs/bed.md)."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """The preparation and the strength of a bed of one material."""
+
+    stages: tuple[str, ...] | None = None  # None: rained and levelled
+    cohesion: float | None = None  # [Pa]; None: not known
+    resistance: float | None = None  # What a tip meets for the cohesion alone [Pa]; None: not known
+    source: str = ""
+
+
+@cache
+def _recipes() -> dict[str, Recipe]:
+    tables = tomllib.loads(_FILE.read_text(encoding="utf-8"))
+    return {name: Recipe(**table | {"stages": tuple(table["stages"])}) for name, table in tables.items()}
+
+
+def recipe_of(material: Material) -> Recipe:
+    """The recipe of a material: its own where it has one, poured dry where its grains stick, else none."""
+    other = Recipe() if material.cohesion == "none" else Recipe(stages=POURED_DRY)
+    return _recipes().get(material.name, other)

@@ -1,0 +1,399 @@
+"""A spike in low gravity: what follows gravity, what never rests and what would carry it; grains made stiffer."""
+
+import json
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from fake_bed import FakeBed
+from golden import golden
+
+from coupling import Drive
+from dem.contact.timestep import time_step_for
+from dem.grains.materials import MATERIALS, Material
+from experiments.grains.bearing import bearing_capacity, bearing_of, friction_angle, strength
+from experiments.grains.recipes import POURED_DRY, recipe_of
+from experiments.grains.similarity import FAR, froude, inertia_share, inertial_number, quasi_static_speed
+from experiments.grains.staged import check_bed_stages
+from experiments.penetrate import beds
+from experiments.penetrate import experiment as penetrate
+from experiments.penetrate.following import SPEEDS, TIMES
+from experiments.penetrate.rest import power_law, sinks_away
+from experiments.penetrate.settings import PenetrateSettings
+from experiments.penetrate.similarity import fast_for_gravity, similarity_of
+from experiments.penetrate.units import make_run, plan_units
+from rigid import SpringDamper
+from vis.page.folder import read_folder
+from vis.penetrate.summary import summarise
+
+G = 9.80665
+WEAK = Material("weak", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1)
+STICKY = Material("stuff", 2900.0, 7e10, 0.25, 0.5, 0.5, 0.7, cohesion="dmt", surface_energy=0.5)
+FOOT = {"tip": "flat", "tip_diameter": 0.016, "load": 0.5, "bed_size": (0.08, 0.08, 0.06), "grain": 0.0032}
+DEFAULTS = {name: PenetrateSettings.model_fields[name].default for name in (*SPEEDS, *TIMES)}
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    """Beds in closed form, F = K z + C v, which tell what young they are made with; `law` changes K and C."""
+    law = {"hardness": 0.1, "rate": 0.02, "unload": 4.0}
+    made = []
+
+    def prepare(settings, seed, young, progress):
+        made.append(young)
+        return FakeBed(size=settings.bed_size, seed=seed, gravity=settings.gravity, time_step=6e-4, **law)
+
+    monkeypatch.setattr(beds, "prepare_bed", prepare)
+    monkeypatch.setattr(beds, "find_material", lambda name: WEAK)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
+    monkeypatch.setattr(beds, "bed_step", lambda settings, young: 6e-4)
+    return law, made
+
+
+# What follows gravity
+
+
+@pytest.mark.parametrize("gravity", [G, 9.81, 9.78, 9.83, "1g"])
+def test_on_earth_the_defaults_are_the_same_numbers(gravity):
+    own = PenetrateSettings(gravity=gravity)
+    assert own.model_dump(exclude={"gravity"}) == PenetrateSettings().model_dump(exclude={"gravity"})
+    assert own.rig == 0.0085
+
+
+def test_the_modulus_of_the_case_that_ships_is_what_it_was():
+    """docs/results/penetrate: 10.93 MPa at 1 g, of grains whose rolling friction is 0.1."""
+    kept = json.loads((penetrate_results() / "result.json").read_text())["quantities"]["young"]["value"]
+    settings = PenetrateSettings()
+    stuff = Material("weak", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(beds, "find_material", lambda settings: stuff)
+        assert beds.choose_softness(settings).young == kept
+
+
+def penetrate_results():
+    from experiments.penetrate.result import SHIPPED_RESULT
+
+    return SHIPPED_RESULT.parent
+
+
+@pytest.mark.parametrize("share", [1e-4, 1e-3, 0.165, 3.0])
+def test_froude_and_inertial_number_and_steps_are_those_of_earth(share, monkeypatch):
+    """Fr = v / sqrt(g D); the modulus goes with g and the grains' step with 1 / sqrt(g), so that steps stay as many."""
+    monkeypatch.setattr(beds, "find_material", lambda settings: WEAK)
+    earth, own = PenetrateSettings(rig=0, load=0.2), PenetrateSettings(gravity=share * G, load=0.2 * share)
+    for name in SPEEDS:
+        mine, theirs = (np.atleast_1d(getattr(s, name)) / math.sqrt(s.gravity * s.tip_diameter) for s in (own, earth))
+        assert mine == pytest.approx(theirs, rel=6e-3), name  # three digits
+    for name in TIMES:
+        assert getattr(own, name) * math.sqrt(share) == pytest.approx(getattr(earth, name), rel=6e-3), name
+    assert beds.choose_softness(own).young == pytest.approx(share * beds.choose_softness(earth).young, rel=0.01)
+    grains = [WEAK.softened(beds.choose_softness(s).young) for s in (own, earth)]
+    steps = [
+        s.depth / s.speeds[0] / time_step_for(stuff, diameter=0.002, max_overlap=0.05)
+        for s, stuff in zip((own, earth), grains, strict=True)
+    ]
+    assert steps[0] == pytest.approx(steps[1], rel=0.01)
+    told, on_earth = similarity_of(own), similarity_of(earth)
+    for name in ("froude_numbers", "inertial_numbers"):
+        assert told[name] == pytest.approx(on_earth[name], rel=6e-3)
+    assert told["given"] == []
+
+
+def test_numbers_of_a_motion_are_their_definitions():
+    """Fr = v / sqrt(g D), I = v / D d sqrt(rho / P) with P = phi rho g D, phi = 0.6."""
+    v, g, d, grain = 0.2, 3.7, 0.012, 0.002
+    assert froude(v, gravity=g, diameter=d) == pytest.approx(v / math.sqrt(g * d))
+    pressure = 0.6 * 2650 * g * d
+    assert inertial_number(v, gravity=g, diameter=d, grain=grain) == pytest.approx(
+        v / d * grain * math.sqrt(2650 / pressure)
+    )
+    fast = quasi_static_speed(gravity=g, diameter=d, friction=0.5)
+    assert inertia_share(fast, gravity=g, diameter=d, friction=0.5) == pytest.approx(FAR)
+
+
+def test_what_is_given_is_kept_and_said():
+    own = PenetrateSettings(gravity="1e-3g", speeds=(0.1,), hold=0.0, rig=0.0085, seeds=(1,))
+    assert own.speeds == (0.1,)
+    assert own.hold == 0.0
+    assert own.rig == 0.0085
+    assert own.lowering_speed == pytest.approx(0.1 * math.sqrt(1e-3), rel=6e-3)
+    told = similarity_of(own)
+    assert told["given"] == ["speeds", "hold"]
+    assert "lowering_speed" in told["follow_gravity"]
+    assert "other_speeds" not in told["follow_gravity"]  # one seed
+    golden("penetrate/follows_gravity", [told["sentence"], similarity_of(PenetrateSettings())["sentence"]])
+
+
+def test_a_run_toml_gives_the_same_settings_again(tmp_path):
+    from experiments.runs.folder import settings_in, settings_toml
+
+    own = PenetrateSettings(gravity="1e-3g", load="0.5N", tip_diameter="16mm", grain=0.0032)
+    assert PenetrateSettings(**settings_in(tomllib.loads(settings_toml("penetrate", own, "1")))) == own
+
+
+def test_only_given_speeds_far_from_quasi_static_warn():
+    """0.1 m/s at 1e-3 g is Froude 9; the defaults on Earth, up to 1.2, and what follows gravity say nothing."""
+    assert not list(fast_for_gravity(PenetrateSettings(), 0.5))
+    assert not list(fast_for_gravity(PenetrateSettings(gravity="1e-3g"), 0.5))
+    fast = PenetrateSettings(gravity="1e-3g", speeds=(0.1,), seeds=(1,))
+    (text,) = fast_for_gravity(fast, 0.5)
+    least = quasi_static_speed(gravity=fast.gravity, diameter=0.012, friction=0.5)
+    assert f"at most {least:.2g} m/s" in text
+    assert not list(fast_for_gravity(PenetrateSettings(gravity="1e-3g", speeds=(least,), seeds=(1,)), 0.5))
+
+
+def test_with_one_seed_no_setting_of_other_seeds_counts():
+    own = PenetrateSettings(seeds=(1,), other_speeds=(3.0,), other_drop_speeds=(2.0,))
+    assert own.fastest == ("speeds", 0.4)
+    assert own.driven_speeds == own.speeds
+    assert beds.choose_softness(own) == beds.choose_softness(PenetrateSettings(seeds=(1,)))
+    assert PenetrateSettings(seeds=(1, 2), other_speeds=(3.0,)).fastest == ("other_speeds", 3.0)
+    assert similarity_of(own)["froude_numbers"] == similarity_of(PenetrateSettings(seeds=(1,)))["froude_numbers"]
+
+
+def test_grains_that_stick_are_driven_at_the_inertial_number_that_counts_their_cohesion():
+    """g + c / (rho_b D) takes the place of g, so that at 1e-3 g speeds fall by much less than sqrt(1e-3)."""
+    stuff, earth = {"material": "jsc-1a-loose-heights", "tip_diameter": 0.016, "grain": 0.0032}, DEFAULTS["speeds"][0]
+    own = PenetrateSettings(gravity="1e-3g", **stuff)
+    held = 53.0 / (0.6 * 2900 * 0.016)
+    assert own.speeds[0] == pytest.approx(earth * math.sqrt((1e-3 * G + held) / (G + held)), rel=6e-3)
+    on_earth = similarity_of(PenetrateSettings(**stuff))
+    assert similarity_of(own)["inertial_numbers"] == pytest.approx(on_earth["inertial_numbers"], rel=6e-3)
+
+
+def test_a_set_down_is_as_much_overdamped_under_any_gravity():
+    """m = c T, T = 2 ms on Earth. K goes with g and c with sqrt(g): K m / c^2 stays where T goes with 1 / sqrt(g)."""
+    ratios = []
+    for share in (1.0, 1e-3):
+        settings = PenetrateSettings(gravity=share * G, rig=0, load=0.2 * share)
+        (unit,) = (unit for unit in plan_units(settings) if unit.kind == "set_down" and unit.seed == 1)
+        run = make_run(settings, unit, SpringDamper(stiffness=40 * share, damping=0.0, time_step=1e-5))
+        ratios.append(40 * share * run.mass / run.drag**2)
+    assert ratios[0] == pytest.approx(ratios[1], rel=0.01)
+
+
+# What does not come to rest
+
+
+def test_bearing_capacity_is_terzaghis():
+    """1.3 c N_c; N_c = 5.14 without friction, 30.14 at 30 degrees, 75.3 at 40 (Terzaghi's form, N_c of Prandtl)."""
+    for angle, factor in ((0.0, 5.14), (30.0, 30.14), (40.0, 75.31)):
+        assert bearing_capacity(100.0, angle) == pytest.approx(1.3 * 100 * factor, rel=2e-3)
+
+
+def test_stronger_grains_are_expected_to_bear_as_was_measured():
+    """1.7 times from a rolling friction of 0.1 to 0.356, 25 to 30.8 degrees (docs/materials.md)."""
+    from dataclasses import replace
+
+    strong = replace(WEAK, rolling_friction=0.356)
+    assert strength(WEAK) == 1.0
+    assert strength(strong) == pytest.approx(1.7, rel=0.03)
+    assert friction_angle(strong) == pytest.approx(30.8)
+    of = {"grain": 0.0024, "gravity": G, "area": math.pi * 0.006**2}
+    assert bearing_of(WEAK, **of).stiffness == pytest.approx(38, rel=0.03)  # docs/results/penetrate: 36.3 +- 3
+    assert bearing_of(WEAK, **of | {"gravity": G / 1000}).stiffness == pytest.approx(0.038, rel=0.03)
+    assert bearing_of(STICKY, **of).held > 0 == bearing_of(WEAK, **of).held
+
+
+def test_a_load_that_no_depth_of_the_foot_bears_is_answered(fake, tmp_path):
+    """K = 0.1 N/m: 0.5 N would rest at 5 m. Only drives are made; there is no sinkage, and no set-down or drop."""
+    settings = PenetrateSettings(**FOOT, gravity="1e-3g", seeds=(1,), frame_count=0)
+    assert sinks_away(settings)
+    result = penetrate.run(settings, tmp_path / "run")
+    assert {run["kind"] for run in result["runs"]} == {"driven"}
+    rest, numbers = result["rest"], result["quantities"]
+    assert rest["comes_to_rest"] is False
+    assert rest["at_any_depth_of_the_foot"] is False
+    assert rest["depth"] == pytest.approx(0.5 / numbers["stiffness"]["value"])
+    assert numbers["depth_to_rest"]["value"] == pytest.approx(5.0, rel=0.05)
+    assert rest["power_law"]["exponent"] == pytest.approx(1.0, abs=0.1)
+    assert numbers["sinkage_dem"]["value"] is None
+    assert numbers["sinkage_spring_damper"]["value"] is None
+    area = math.pi * 0.008**2
+    for row in rest["cohesions"]:
+        carries = bearing_capacity(row["cohesion"], friction_angle(WEAK)) * area
+        assert row["carries"] == pytest.approx(carries)
+        assert row["depth"] == pytest.approx(max(0.0, 0.5 - carries) / numbers["stiffness"]["value"])
+    assert [row["cohesion"] for row in rest["cohesions"]] == [10, 30, 100, 300, 1000]
+    assert rest["cohesions"][0]["depth"] > 0 == rest["cohesions"][-1]["depth"]
+    assert bearing_capacity(rest["cohesion_enough"], friction_angle(WEAK)) * area == pytest.approx(0.5)
+    said = summarise(read_folder(tmp_path / "run"))
+    assert said["rest"]["table"]["rows"][-1][-1] == "at the surface"
+    golden("penetrate/never_rests_in_low_gravity", [*rest["sentences"], rest["source"], said["similarity"]])
+
+
+def test_what_goes_to_the_floor_after_all_is_answered_too(fake, tmp_path):
+    """It was expected to rest in the bed, and K is a third of that: it ends at the floor, and would rest below it."""
+    law, _ = fake
+    settings = PenetrateSettings(
+        gravity="1e-3g", load=6e-4, seeds=(1,), frame_count=0, drop_speeds=(), speeds=(0.003, 0.006)
+    )
+    law["hardness"], law["rate"] = 0.0125, 1e-3
+    assert not sinks_away(settings)
+    result = penetrate.run(settings, tmp_path / "run")
+    (stood,) = (run for run in result["runs"] if run["kind"] == "set_down")
+    assert stood["ended"] == "max_depth"
+    assert result["rest"]["at_any_depth_of_the_foot"] is True  # 48 mm of 66
+    assert result["rest"]["depth"] == pytest.approx(6e-4 / 0.0125, rel=0.1)
+
+
+def test_what_rests_has_no_such_answer(fake, tmp_path):
+    law, _ = fake
+    law["hardness"] = 1.0
+    settings = PenetrateSettings(gravity="1e-3g", load=2e-3, seeds=(1,), frame_count=0, drop_speeds=())
+    result = penetrate.run(settings, tmp_path / "run")
+    assert "rest" not in result
+    assert result["quantities"]["sinkage_dem"]["value"] == pytest.approx(2e-3, rel=0.02)
+    assert "depth_to_rest" not in result["quantities"]
+
+
+def test_a_law_that_creeps_in_its_damper_is_not_at_rest(fake, tmp_path):
+    """K = 0 and a large C: F = C v carries the load at a creep; W = K z nowhere, so there is no sinkage of the law."""
+    law, _ = fake
+    law["hardness"], law["rate"] = 1e-7, 2000.0
+    settings = PenetrateSettings(gravity="1e-3g", load=6e-4, seeds=(1,), frame_count=0, drop_speeds=())
+    result = penetrate.run(settings, tmp_path / "run")
+    assert result["quantities"]["sinkage_spring_damper"]["value"] is None
+
+
+def test_the_load_that_a_refusal_proposes_is_not_refused_and_rests(monkeypatch):
+    from experiments.penetrate.refusals import check
+
+    monkeypatch.setattr(beds, "find_material", lambda settings: WEAK)
+    with pytest.raises(ValueError, match="load = 4 N puts") as refused:
+        check(PenetrateSettings(load=4.0, threads=1))
+    most = float(str(refused.value).split("a load of at most ")[1].split(" N")[0])
+    own = PenetrateSettings(load=most, threads=1)
+    check(own)
+    # Within the bed even where it bears only half of what is expected of it.
+    assert most / (0.5 * beds.expected_bearing(own).stiffness) <= own.bed_size[2] - own.tip_diameter
+
+
+def test_a_power_law_is_found_where_there_is_one():
+    """F = 3 z^1.5 [N]."""
+    bed = FakeBed(hardness=3.0, power=1.5)
+    run = Drive(penetrate.make_spike(PenetrateSettings()), bed, speed=0.1, depth=0.02).run()
+    coefficient, exponent = power_law(run, above=0.002)
+    assert exponent == pytest.approx(1.5, rel=1e-2)
+    assert coefficient == pytest.approx(3.0, rel=0.05)
+    assert power_law(run, above=0.0199) is None
+
+
+# Grains that stick
+
+
+@pytest.mark.parametrize("name", sorted(name for name, stuff in MATERIALS.items() if stuff.cohesion != "none"))
+def test_every_material_that_sticks_has_a_recipe_and_is_poured_dry(name):
+    own = recipe_of(MATERIALS[name])
+    assert own.stages[0].startswith("rain:")
+    assert "stick" in own.stages
+    check_bed_stages(own.stages, MATERIALS[name], size=(0.04, 0.04, 0.03), grain=0.004, spread=0.15)
+    assert own.cohesion > 0 and own.resistance > own.cohesion
+    settings = PenetrateSettings(material=name, gravity="1e-3g")
+    assert beds.stages_of(settings) == own.stages
+    assert beds.first_gravity(settings) == G
+    assert beds.choose_softness(settings).young <= MATERIALS[name].young
+    with_packing = beds.stages_of(PenetrateSettings(material=name, packing=0.55))
+    assert with_packing == ("rain:dry", "compact:0.55", "stick", "level")
+
+
+def test_others_are_poured_dry_where_they_stick_and_rained_where_they_do_not():
+    assert recipe_of(STICKY).stages == POURED_DRY
+    assert recipe_of(WEAK).stages is None
+    assert beds.first_gravity(PenetrateSettings(gravity=0.01)) == 0.01
+    given = PenetrateSettings(bed_stages=("rain", "fluff", "level"))
+    assert beds.stages_of(given) == ("rain", "fluff", "level")
+
+
+@pytest.mark.parametrize("other", [{"packing": 0.58}])
+def test_stages_beside_a_packing_are_refused(other):
+    with pytest.raises(ValueError, match="bed_stages = 'rain level' beside packing"):
+        PenetrateSettings(bed_stages=("rain", "level"), **other)
+
+
+# Grains that were too soft
+
+
+class Soft(FakeBed):
+    """Overlaps by 5.12 % in the way in below 5 mm, until it is stiff enough."""
+
+    enough = 1.2e5
+    young_now = 0.0
+
+    def advance(self, steps, *, drag_time=np.inf):
+        super().advance(steps, drag_time=drag_time)
+        depth = self.surface - self._pose[2]
+        if self.bodies and depth > 5e-3 and self.young_now < self.enough:
+            raise RuntimeError("an overlap of 5.12 % of a diameter went past its bound of 5 % at t = 0.1 s; make")
+
+
+@pytest.fixture
+def soft(fake, monkeypatch):
+    law, made = fake
+
+    def prepare(settings, seed, young, progress):
+        made.append(young)
+        bed = Soft(size=settings.bed_size, seed=seed, time_step=6e-4, **law)
+        bed.young_now = young
+        return bed
+
+    def stiffened(bed, young, settings):
+        made.append(young)
+        bed.young_now = young
+        return bed
+
+    monkeypatch.setattr(beds, "prepare_bed", prepare)
+    monkeypatch.setattr(beds, "stiffened", stiffened)
+    return law, made
+
+
+def test_a_run_past_its_overlap_is_done_again_with_stiffer_grains_and_says_so(soft, tmp_path):
+    """E (5.12 / 4)^1.5 = 1.448 E each time, until it is enough; other seeds begin as soft as the first."""
+    law, _ = soft
+    law["hardness"] = 1.0
+    given = {"gravity": "1e-3g", "load": 1e-3, "frame_count": 0, "drop_speeds": (), "other_speeds": (0.006,)}
+    settings = PenetrateSettings(**given, seeds=(1, 2))
+    chosen = beds.choose_softness(settings).young
+    result = penetrate.run(settings, tmp_path / "run")
+    notes = result["bed"]["stiffened"]
+    assert {note["seed"] for note in notes} == {1, 2}
+    own = [note for note in notes if note["seed"] == 1]
+    assert own[0]["before"] == chosen
+    assert own[0]["young"] == pytest.approx(chosen * (0.0512 / 0.04) ** 1.5)
+    assert own[0]["unit"] == "seed1-driven-0.00316"
+    assert own[-1]["young"] >= Soft.enough > own[-1]["before"]
+    assert sum("went" in text or "overlapped" in text for text in result["warnings"]) == len(notes)
+    assert all(run["ended"] in ("done", "rest") for run in result["runs"])
+    golden("penetrate/made_stiffer", [text for text in result["warnings"] if "overlapped" in text][:1])
+
+
+def test_a_modulus_that_is_set_is_not_changed(soft, tmp_path):
+    settings = PenetrateSettings(gravity="1e-3g", load=1e-3, frame_count=0, seeds=(1,), young=4e4)
+    with pytest.raises(RuntimeError, match=r"seed 1: drive at .* went past its bound .* change young"):
+        penetrate.run(settings, tmp_path / "run")
+
+
+def test_a_run_that_was_made_stiffer_goes_on_as_stiff(soft, tmp_path, monkeypatch):
+    law, made = soft
+    law["hardness"] = 1.0
+    given = {"gravity": "1e-3g", "load": 1e-3, "frame_count": 0, "drop_speeds": (), "speeds": (0.003, 0.006)}
+    settings = PenetrateSettings(**given, seeds=(1,))
+    whole = penetrate.run(settings, tmp_path / "whole")
+    unit_run, calls = penetrate._Work.run_unit, []
+
+    def stop(work, unit, ground):
+        if unit.kind == "set_down":
+            calls.append(unit)
+            if len(calls) == 1:
+                raise KeyboardInterrupt
+        return unit_run(work, unit, ground)
+
+    monkeypatch.setattr(penetrate._Work, "run_unit", stop)
+    with pytest.raises(KeyboardInterrupt):
+        penetrate.run(settings, tmp_path / "run")
+    made.clear()
+    again = penetrate.resume(tmp_path / "run")
+    assert made[-1] == whole["bed"]["stiffened"][-1]["young"]
+    assert again["quantities"] == whole["quantities"]
+    assert again["bed"]["stiffened"] == whole["bed"]["stiffened"]

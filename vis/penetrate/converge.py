@@ -1,0 +1,136 @@
+"""Plots and report of a sweep over grain size, width, depth, overlap and speed: reads result.json of its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+
+from vis.page.numbers import quote
+from vis.page.page import Block, Section, Tile, listing
+from vis.page.plots import BED, DASHED, GREY, INK, MODEL, handle, legend_above, new_figure
+from vis.page.report import Report, Result, capital, report_of, tables
+
+__all__ = ["write_converge_report"]
+
+_SHOWN = {"m": (1e3, "mm"), "J": (1e3, "mJ"), "1": (1.0, "")}
+"""SI unit -> how many of the unit shown it has, and that unit."""
+_TILES = ("stiffness", "damping", "sinkage", "stiffness_standing")
+
+
+@report_of()
+def write_converge_report(report: Report) -> Path:
+    """Make figures/ and report.html of the folder of a sweep, and return the report."""
+    result = report.result
+    first, *others = tables(result)
+    drawn = [_figure(report, name, told) for name, told in result["convergence"].items()]
+    sections = [
+        Section("", [listing(result["departures"]["sentences"]), first]),
+        Section("Quantity by quantity", drawn),
+        Section("What was made, and what each change changes", others),
+        report.numbers(std=True),
+        report.again("hedgebed converge run.toml", "bits"),
+    ]
+    counted = f"{result['quantities']['members']['value']} runs"
+    return report.write(sections, lead=["converge", counted], tiles=list(_tiles(result)))
+
+
+def _tiles(result: Result) -> list[Tile]:
+    """The numbers that a reader wants first, each with all of its known errors."""
+    tiles = []
+    for name in _TILES:
+        entry = result["quantities"].get(name)
+        if entry is not None:
+            error = entry["total"] or entry["chance"]
+            of = "all errors, 95 %" if entry["total"] else "chance alone, 95 %"
+            tiles.append(Tile(capital(name.replace("_", " ")), quote(entry["value"], error, entry["unit"]), of))
+    return tiles
+
+
+def _figure(report: Report, name: str, told: Result) -> Block:
+    """One quantity over grain size, and beside it what the other changes change."""
+    entry = report.result["quantities"][name]
+    scale, unit = _SHOWN.get(told["unit"], (1.0, told["unit"]))
+    changes = told["differences"]
+    drawing = new_figure(3.6)
+    if changes:
+        sizes, rest = drawing.subplots(1, 2, width_ratios=(1.7, 1.0))
+        _changes(rest, changes, scale, unit)
+    else:
+        sizes = drawing.subplots()
+    _over_size(sizes, told, report.result["life"], scale)
+    sizes.set_title(f"{capital(entry['note'])}{f' [{unit}]' if unit else ''}")
+    handles: list[Artist] = [
+        handle("a bed", BED, marker="o", ms=3.5, ls="", alpha=0.45),
+        handle("mean, 95 %", INK, marker="s", ms=4.5, ls=""),
+        handle("line", MODEL, ls=DASHED),
+        handle("real grain (thick: chance, thin: all errors)", MODEL, marker="D", ms=5.5, ls=""),
+    ]
+    if told["line"]:
+        handles.insert(3, Patch(facecolor=MODEL, alpha=0.2, label="its 95 %"))
+    legend_above(drawing, handles)
+    missing = f" In no error, for it was not measured: {', '.join(told['unknown'])}." if told["unknown"] else ""
+    shown = {key: _plain(told[key], scale, unit) for key in ("chance", "grain", "rest")}
+    value = quote(told["value"], told["total"] or told["chance"], told["unit"])
+    return report.draw(
+        "convergence", drawing, name=f"convergence-{name}", quantity=capital(name.replace("_", " ")), value=value,
+        missing=missing, **shown,
+    )  # fmt: skip
+
+
+def _plain(value: float | None, scale: float, unit: str) -> str:
+    return "unknown" if value is None else f"{scale * value:.2g} {unit}".strip()
+
+
+def _over_size(axis: Axes, told: Result, life: float, scale: float) -> None:
+    """Beds, means, the line and the value at the real grain, over d / D."""
+    ends = [size["x"] for size in told["sizes"]]
+    beside = 0.012 * max(ends)
+    for size in told["sizes"]:
+        values = scale * np.array(size["values"])
+        axis.plot(np.full(len(values), size["x"] - beside), values, color=BED, marker="o", ms=3.5, ls="", alpha=0.45)
+        half = None if size["half"] is None else scale * size["half"]
+        mean = scale * size["mean"]
+        axis.errorbar([size["x"]], [mean], yerr=half, color=INK, marker="s", ms=4.5, capsize=3, zorder=4)
+    if told["line"]:
+        x, y = (np.array([point[k] for point in told["line"]], dtype=float) for k in (0, 1))
+        axis.plot(x, scale * y, color=MODEL, ls=DASHED, lw=1.4)
+        if all(point[2] is not None for point in told["line"]):
+            half = np.array([point[2] for point in told["line"]], dtype=float)
+            axis.fill_between(x, scale * (y - half), scale * (y + half), color=MODEL, alpha=0.2, lw=0)
+        value = scale * told["value"]
+        for error, width in ((told["total"], 1.0), (told["chance"], 3.0)):
+            if error is not None:
+                capped = 3 if width == 1.0 else 0
+                axis.errorbar([life], [value], yerr=scale * error, color=MODEL, elinewidth=width, capsize=capped)
+        axis.plot([life], [value], color=MODEL, marker="D", ms=5.5, zorder=5)
+    axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
+    ticks = [(x, f"{x:.3g}\nD/d = {1 / x:.3g}") for x in ends] + (
+        [(life, f"{life:.2g}\nreal grain")] if told["line"] else []
+    )
+    axis.set_xticks(*zip(*ticks, strict=True))
+    axis.set(xlim=(0.0, 1.08 * max(ends)), xlabel="grain over tip diameter, d / D [1]")
+
+
+def _changes(axis: Axes, changes: Sequence[Result], scale: float, unit: str) -> None:
+    """Paired differences to the base: bars with their intervals, beds as points."""
+    for place, one in enumerate(changes):
+        half = None if one["half"] is None else scale * one["half"]
+        axis.bar([place], [scale * one["mean"]], width=0.55, color=BED, alpha=0.3)
+        axis.errorbar([place], [scale * one["mean"]], yerr=half, color=INK, ls="", capsize=3)
+        values = scale * np.array(list(one["values"].values()))
+        axis.plot(np.full(len(values), place + 0.14), values, color=BED, marker="o", ms=3.0, ls="", alpha=0.45)
+    axis.axhline(0.0, color=GREY, lw=0.8)
+    axis.set_xticks(range(len(changes)), [_label(one) for one in changes])
+    axis.margins(y=0.12)
+    axis.set_title(f"Change from the base{f' [{unit}]' if unit else ''}")
+
+
+def _label(one: Result) -> str:
+    what, value = one["what"], one["value"]
+    shown = {"overlap": f"{100 * value:g} %", "speed": f"x {value:g}"}.get(what, f"{value:g} D")
+    return f"{what}\n{shown}"
