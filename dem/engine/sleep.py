@@ -1,18 +1,19 @@
 """Grains that are slow, and grains that sleep: what is quiet is computed less often, what rests not at all.
 
-A **slow** grain takes a step every ``pace`` steps of the bed, of that many times the length, as if its mass and inertia
-counted the square of it times: the step stays as far from stability. Forces are those of the true contacts and the true
-weight. So what moves slowly against its weight and its neighbours gives way as it would, for there forces decide; only
-its inertia is wrong. A **sleeper** stands still, an unmovable grain to those awake; its contacts with other sleepers
-keep their springs. All others are **fast**.
+A **slow** grain takes a step every ``pace`` steps of the bed, of that many times the length. Its weight, its contacts
+and, with the defaults, its mass are its own: quiet contacts are soft enough for so long a step. What spins is nearer
+to the limit of stability, so its moment of inertia counts (pace / spin_stretch)^2 times; its mass (pace / stretch)^2
+times, where that is more than once. A **sleeper** stands still, an unmovable grain to those awake; its contacts with
+other sleepers keep their springs. All others are **fast**.
 
 The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g gravity, all of the bed:
 
 * A fast grain becomes slow when its speed and its surface's turning have been below ``speed`` sqrt(g d) at every look
-  for ``calm`` sqrt(d / g), no fast grain that it touches moves faster, and no body but the floor is within ``reach`` d.
-* A slow grain is fast again when a body comes within ``reach`` d, when it moves faster than ``own`` sqrt(g d), or when
-  the force on it is out of balance: more than ``unbalanced`` of the mean force of its contacts, or of m g where that is
-  more. Those that it touches come with it.
+  for ``calm`` sqrt(d / g), no fast grain that it touches moves faster, no body but the floor is within ``reach`` d,
+  and no other grain overlaps it by more than a long step bears (``Sleeper.firm``).
+* A slow grain is fast again when a body comes within ``reach`` d, when another overlaps it by more than that, when it
+  moves faster than ``own`` sqrt(g d), or when the force on it is out of balance: more than ``unbalanced`` of the mean
+  force of its contacts, or of m g where that is more. Those that it touches come with it.
 * A slow grain falls asleep when it has moved below ``still`` sqrt(g d) for as long, and so have those that it touches,
   none of them fast.
 * A sleeper wakes, and is slow, when the sum of the forces on it has changed by ``change`` of its contacts' mean force
@@ -24,9 +25,9 @@ chunk has no slow grains, and its fast ones fall asleep by the first rule.
 
 What fast grains do to a slow one over its step is summed and given to it whole, so that action is reaction. What is
 left is the floor's: ``Bed.reaction`` of the floor has the sleepers' weight, the force of those awake on them, and the
-momentum that a change of pace takes or gives; ``Bed.momentum`` counts slow grains with the mass that they move with. A
-grain that becomes slow keeps its energy, and one that becomes fast its speed; the energy that the latter and falling
-asleep lose is booked with the dashpots' (``Bed.contact_work``).
+momentum that a change of pace takes or gives; ``Bed.momentum`` counts slow grains with the mass that they move with.
+Who changes its pace keeps its speed; what energy that takes or gives, and what falling asleep takes, is booked with
+the dashpots' (``Bed.contact_work``).
 
 In memory the fast come first, then the slow, then the sleepers, the first two in chunks of their own; that is all that
 the step knows of them. Who is what changes when lists are made, on steps that do not depend on how a run is cut, by

@@ -54,8 +54,8 @@ class GrainsSettings(StrictSettings):
     """On a bed: whether quiet grains are computed every so many steps only, and those at rest not at all
     (docs/bed.md)."""
     sleep_pace: int = Field(Sleep.pace, ge=1, le=64)
-    """Of sleep: steps of the bed for one of a quiet grain, whose mass counts the square of it times; 1: there are none
-    [1]."""
+    """Of sleep: steps of the bed for one of a quiet grain; above 4 its mass counts (pace / 4)^2 times, and sand bears
+    too much (docs/bed.md); 1: there are no such grains [1]."""
     sleep_force: Positive = 1.0
     """Of the rules of sleep before 2026-11-26; no longer used [1]."""
     sleep_share: Positive = Field(0.5, description="Likewise [1].")
