@@ -47,7 +47,7 @@ __all__ = ["Frames", "check", "compute", "fingerprint", "resume", "run"]
 ROOM = 0.8
 """Share of `max_overlap` that is aimed at where grains were too soft [1]."""
 LEAST_STIFFER = 1.25
-"""By which grains become stiffer at least [1]."""
+"""By which grains become stiffer at least, and by how much more each time it happens again on a seed [1]."""
 
 
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -183,7 +183,9 @@ class _Work:
             return False
         overlap, young = float(found[1]) / 100, self._young(seed, prepared=unit is None)
         now = replace(self.softening, young=young)
-        stiffer = max(now.stiffer(overlap, ROOM * settings.max_overlap), LEAST_STIFFER * young)
+        # It was stopped as it passed the bound: how far it would have gone shows only in that it happens again.
+        more = LEAST_STIFFER ** len(self._notes(seed))
+        stiffer = more * max(now.stiffer(overlap, ROOM * settings.max_overlap), LEAST_STIFFER * young)
         if not math.isfinite(stiffer) or stiffer > self.softening.real:
             return False
         note = {"seed": seed, "unit": unit.id if unit else "", "overlap": overlap, "before": young, "young": stiffer}
