@@ -136,16 +136,20 @@ class _Work:
         self.progress.message(say("bed_made", facts=facts))
         if (young := self._young(seed)) != softening.young:
             bed = beds.stiffened(bed, young, self.settings)
-        ground = BedGround(bed, make_spike(self.settings))
+        ground = self._ground(bed)
         start = ground.state()
         for unit in todo:
             ground.restore(start)
-            bed.max_overlap = 0.0
-            bed.mark_origin()
+            ground.bed.max_overlap = 0.0
+            ground.bed.mark_origin()
             while not self.run_unit(unit, ground):
-                bed = beds.stiffened(self._prepared(seed), self._young(seed), self.settings)
-                ground = BedGround(bed, make_spike(self.settings))
+                ground = self._ground(beds.stiffened(self._prepared(seed), self._young(seed), self.settings))
                 start = ground.state()
+
+    def _ground(self, bed: Any) -> BedGround:
+        """The spike over a bed, whose overlaps end a run past `beds.overlap_bound`."""
+        bed.overlap_limit = beds.overlap_bound(self.settings)
+        return BedGround(bed, make_spike(self.settings))
 
     def _prepared(self, seed: int) -> Any:
         """The bed of a seed as it is prepared, of stiffer grains where it overlapped too far in its preparation.
