@@ -27,7 +27,7 @@ __all__ = [
     "first_gravity", "overlap_bound", "prepare_bed", "stages_of", "stiffened",
 ]  # fmt: skip
 
-_SPELL, _MOST_SPELLS = 4.0, 40
+_SPELL, _MOST_SPELLS = 1.5, 60
 """How long grains are left to come to rest at a time [sqrt(d / g)], and how often at most."""
 _DRAG = 0.3  # Time of the drag at first [sqrt(d / g)]
 _STILL = 1e-5  # Mean kinetic energy at rest [m g d]
