@@ -130,7 +130,7 @@ class Group:
     @property
     def words(self) -> str:
         """What the ground is."""
-        return say(f"groups.{self.name}")
+        return say(f"groups_{self.name}")
 
     @property
     def brakes_above(self) -> int:
@@ -239,8 +239,8 @@ def _mu_d(trials: Trials) -> Claim:
     """The rule for sliding friction that the trials take over."""
     ratios = {place[0]: trials.trials[place].sliding_friction / trials.trials[place].mu_s for place in trials.places}
     return Claim(
-        quote=say("mu_d.quote"), compared=say("mu_d.compared"), stated="0.5",
-        ours=", ".join(f"{name} {ratio:g}" for name, ratio in ratios.items()), met=None, judged_by=say("mu_d.judged"),
+        quote=say("mu_d_quote"), compared=say("mu_d_compared"), stated="0.5",
+        ours=", ".join(f"{name} {ratio:g}" for name, ratio in ratios.items()), met=None, judged_by=say("mu_d_judged"),
     )  # fmt: skip
 
 
@@ -249,17 +249,17 @@ def _about_60(trials: Trials, place: Place) -> Claim:
     stated, trial, ours = 60.0, trials.trials[place], trials.angle(place)
     heavy = (trial.mass + trial.counterweight) * math.tan(math.radians(stated))
     note = say(
-        "about_60.note", leaves=math.degrees(sliding_angle(trial)), mu_d=trial.sliding_friction, stated=stated,
+        "about_60_note", leaves=math.degrees(sliding_angle(trial)), mu_d=trial.sliding_friction, stated=stated,
         asked=trial.mass / heavy, mu_s=trial.mu_s,
     )  # fmt: skip
     others = [(case["varied"]["ratio"], _degrees(case["trajectory_angle"])) for case in trials.varied(place, "sliding")]
     listed = ", ".join(f"{angle:.1f} at {ratio:g}" for ratio, angle in others if angle is not None)
-    note += say("about_60.varied", listed=listed) if listed else ""
+    note += say("about_60_varied", listed=listed) if listed else ""
     band = trials.band(place, "trajectory_angle")
     if len(band) > 1:
         note = say("band", low=min(band), high=max(band)) + "; " + note
     return Claim(
-        quote=say("about_60.quote"), compared=say("about_60.compared", where=_where(place)),
+        quote=say("about_60_quote"), compared=say("about_60_compared", where=_where(place)),
         stated=f"{stated:g} degrees",
         ours=say("never_away") if ours is None else f"{ours:.1f} degrees",
         met=ours is not None and abs(ours - stated) <= AGREEMENT, judged_by=say("within", degrees=AGREEMENT),
@@ -273,9 +273,9 @@ def _grows(trials: Trials) -> Claim:
     known = [angle for angle in angles if angle is not None]
     listed = ", ".join(f"{torque:g}" for torque in torques)
     return Claim(
-        quote=say("grows.quote"), compared=say("grows.compared", torques=listed, rig=trials.rig), stated="rising",
+        quote=say("grows_quote"), compared=say("grows_compared", torques=listed, rig=trials.rig), stated="rising",
         ours=", ".join(map(_angle_text, angles)) + " degrees",
-        met=len(known) == len(angles) and known == sorted(known), judged_by=say("grows.judged"),
+        met=len(known) == len(angles) and known == sorted(known), judged_by=say("grows_judged"),
     )  # fmt: skip
 
 
@@ -284,11 +284,11 @@ def _most(trials: Trials, group: Group) -> Claim:
     low = {place: angle for place, angle in group.angles.items() if not trials.is_brake(place)}
     near = [angle for angle in low.values() if angle is not None and abs(angle - STATED_ANGLE) <= AGREEMENT]
     listed = "; ".join(f"{_where(place)}: {_angle_text(angle)}" for place, angle in low.items())
-    compared = say("most.compared", degrees=AGREEMENT, count=len(low), group=group.words)
+    compared = say("most_compared", degrees=AGREEMENT, count=len(low), group=group.words)
     return Claim(
-        quote=say("most.quote"), compared=compared, stated="most", ours=f"{len(near)} of {len(low)}",
-        judged_by=say("most.judged"), met=2 * len(near) > len(low) if group.whole else None,
-        note=say("most.note", listed=listed) + group.lacks,
+        quote=say("most_quote"), compared=compared, stated="most", ours=f"{len(near)} of {len(low)}",
+        judged_by=say("most_judged"), met=2 * len(near) > len(low) if group.whole else None,
+        note=say("most_note", listed=listed) + group.lacks,
     )  # fmt: skip
 
 
@@ -298,10 +298,10 @@ def _exceeding(trials: Trials, group: Group) -> Claim:
     brakes = sum(trials.is_brake(place) for place in above)
     motors, wanted = len(above) - brakes, group.brakes_above
     return Claim(
-        quote=say("five.quote"), compared=say("five.compared", degrees=AGREEMENT, group=group.words),
-        stated=say("five.counted", brakes=wanted, motors="at most 1"),
-        ours=say("five.counted", brakes=brakes, motors=motors),
-        met=brakes == wanted and motors <= 1 if group.whole else None, judged_by=say(f"five.{group.judged}"),
+        quote=say("five_quote"), compared=say("five_compared", degrees=AGREEMENT, group=group.words),
+        stated=say("five_counted", brakes=wanted, motors="at most 1"),
+        ours=say("five_counted", brakes=brakes, motors=motors),
+        met=brakes == wanted and motors <= 1 if group.whole else None, judged_by=say(f"five_{group.judged}"),
         note="; ".join(f"{_where(place)}: {group.angles[place]:.1f}" for place in above) + group.lacks,
     )  # fmt: skip
 
@@ -310,13 +310,13 @@ def _negative(trials: Trials, group: Group) -> Claim:
     """Which experiments on granular ground leave downwards."""
     below = [place for place, angle in group.angles.items() if angle is not None and angle < 0]
     brakes = sum(trials.is_brake(place) for place in below)
-    note = say("negative.listed", listed="; ".join(f"{_where(p)}: {group.angles[p]:+.1f}" for p in below) or "none")
+    note = say("negative_listed", listed="; ".join(f"{_where(p)}: {group.angles[p]:+.1f}" for p in below) or "none")
     wanted = [place for place in group.angles if trials.is_brake(place)]
-    note += _of_grounds(trials, wanted) if group.name == "springs" else say("negative.sand")
+    note += _of_grounds(trials, wanted) if group.name == "springs" else say("negative_sand")
     return Claim(
-        quote=say("negative.quote"), compared=say("negative.compared", group=group.words),
-        stated=say("five.counted", brakes=4, motors=0), judged_by=say("negative.judged"),
-        ours=say("five.counted", brakes=brakes, motors=len(below) - brakes),
+        quote=say("negative_quote"), compared=say("negative_compared", group=group.words),
+        stated=say("five_counted", brakes=4, motors=0), judged_by=say("negative_judged"),
+        ours=say("five_counted", brakes=brakes, motors=len(below) - brakes),
         met=set(below) == set(wanted) if group.whole else None, note=note + group.lacks,
     )  # fmt: skip
 
@@ -328,11 +328,11 @@ def _of_grounds(trials: Trials, places: Sequence[Place]) -> str:
         known = [(case["varied"], _degrees(case["trajectory_angle"])) for case in trials.varied(place, "grains")]
         here = [(varied, angle) for varied, angle in known if angle is not None]
         if here:
-            note += say("negative.as_stiff", own=here[0][0], angle=here[0][1], where=_where(place))
+            note += say("negative_as_stiff", own=here[0][0], angle=here[0][1], where=_where(place))
         told += here
     if len(told) <= len(places):
         return note
-    return note + say("negative.grounds", below=sum(angle < 0 for _, angle in told), count=len(told))
+    return note + say("negative_grounds", below=sum(angle < 0 for _, angle in told), count=len(told))
 
 
 def _hops(trials: Trials) -> Iterator[Claim]:
@@ -340,15 +340,15 @@ def _hops(trials: Trials) -> Iterator[Claim]:
     places = list(product(trials.hard, [trials.rig], trials.torques))
     cases = [trials.case(place) for place in places]
     count, surfaces = sum(case["transition_angle_hop"] is not None for case in cases), " and ".join(trials.hard)
-    ours, note = f"{count} of {len(cases)}", say("hops.note", listed="; ".join(map(hop_words, cases)))
+    ours, note = f"{count} of {len(cases)}", say("hops_note", listed="; ".join(map(hop_words, cases)))
     yield Claim(
-        quote=say("hops.quote"), compared=say("hops.compared", count=len(cases), surfaces=surfaces, rig=trials.rig),
-        stated=say("hops.stated"), ours=ours, met=count == len(cases), judged_by=say("hops.judged"), note=note,
+        quote=say("hops_quote"), compared=say("hops_compared", count=len(cases), surfaces=surfaces, rig=trials.rig),
+        stated=say("hops_stated"), ours=ours, met=count == len(cases), judged_by=say("hops_judged"), note=note,
     )  # fmt: skip
     yield Claim(
-        quote=say("filmed.quote"), compared=say("filmed.compared"), stated="5 of 6", ours=ours,
-        met=count == 5 if len(cases) == 6 else None, judged_by=say("filmed.judged"), difference=f"{count - 5:+d}",
-        note=say("filmed.note"),
+        quote=say("filmed_quote"), compared=say("filmed_compared"), stated="5 of 6", ours=ours,
+        met=count == 5 if len(cases) == 6 else None, judged_by=say("filmed_judged"), difference=f"{count - 5:+d}",
+        note=say("filmed_note"),
     )  # fmt: skip
 
 
@@ -360,11 +360,11 @@ def _at_once(trials: Trials, torque: float) -> Claim:
     late = [name for name, theta in first.items() if theta is None]
     worst = max((theta for theta in first.values() if theta is not None), default=math.inf)
     return Claim(
-        quote=say("at_once.quote"),
-        compared=say("at_once.compared", surfaces=" and ".join(trials.hard), rig=trials.rig),
-        stated=say("at_once.stated"), met=not late and worst <= AGREEMENT,
-        ours=say("at_once.never", late=", ".join(late)) if late else f"{worst:.1f} degrees",
-        judged_by=say("at_once.judged", degrees=AGREEMENT),
+        quote=say("at_once_quote"),
+        compared=say("at_once_compared", surfaces=" and ".join(trials.hard), rig=trials.rig),
+        stated=say("at_once_stated"), met=not late and worst <= AGREEMENT,
+        ours=say("at_once_never", late=", ".join(late)) if late else f"{worst:.1f} degrees",
+        judged_by=say("at_once_judged", degrees=AGREEMENT),
     )  # fmt: skip
 
 
@@ -373,11 +373,11 @@ def _pivots(trials: Trials) -> Claim:
     lasting, trial = first_lasting(trials.case(place)), trials.trials[place]
     others = trials.varied(place, "sliding")
     listed = ", ".join(f"{first_lasting(case)} at {case['varied']['ratio']:g}" for case in others)
-    note = say("pivots.note", asked=friction_of_a_rigid_pivot(trial), trial=trial)
-    note += say("pivots.varied", listed=listed) if listed else ""
+    note = say("pivots_note", asked=friction_of_a_rigid_pivot(trial), trial=trial)
+    note += say("pivots_varied", listed=listed) if listed else ""
     return Claim(
-        quote=say("pivots.quote"), compared=say("pivots.compared", time=LASTING, rig=place[1], torque=place[2]),
-        stated="pivot", ours=lasting, met=lasting == "pivot", judged_by=say("pivots.judged"), note=note,
+        quote=say("pivots_quote"), compared=say("pivots_compared", time=LASTING, rig=place[1], torque=place[2]),
+        stated="pivot", ours=lasting, met=lasting == "pivot", judged_by=say("pivots_judged"), note=note,
     )  # fmt: skip
 
 
@@ -407,12 +407,12 @@ def _transitions(trials: Trials) -> Claim:
             near.append(ours is not None and abs(ours - stated) <= AGREEMENT)
             words += f", measured {stated:g}"
         told.append(words)
-    share = say("transitions.near", near=sum(near), count=len(near), degrees=AGREEMENT)
+    share = say("transitions_near", near=sum(near), count=len(near), degrees=AGREEMENT)
     return Claim(
-        quote=say("transitions.quote"),
-        compared=say("transitions.compared", surfaces=" and ".join(surfaces), rig=rig), stated=f"{AGREEMENT:g} degrees",
-        ours=share if near else say("transitions.moved", most=max(moved, default=0.0)),
+        quote=say("transitions_quote"),
+        compared=say("transitions_compared", surfaces=" and ".join(surfaces), rig=rig), stated=f"{AGREEMENT:g} degrees",
+        ours=share if near else say("transitions_moved", most=max(moved, default=0.0)),
         met=2 * sum(near) > len(near) if near else None,
-        judged_by=say("transitions.judged") if near else say("transitions.figure_6"),
-        note=say("transitions.note", listed="; ".join(told)),
+        judged_by=say("transitions_judged") if near else say("transitions_figure_6"),
+        note=say("transitions_note", listed="; ".join(told)),
     )  # fmt: skip

@@ -132,7 +132,7 @@ def _row(id: str, told: list[Json]) -> Json:
     """A rival over all of its values."""
     best = max(told, key=lambda entry: float(entry["nats"]))
     return {
-        "id": id, "words": say(f"rivals.{id}"), "nats": _mean([entry["nats"] for entry in told]),
+        "id": id, "words": say(f"rivals_{id}"), "nats": _mean([entry["nats"] for entry in told]),
         "apart": _mean([entry["nats"] - entry["parts"]["mu_s"] - entry["parts"]["mu_d"] for entry in told]),
         "best": best, "values": told,
     }  # fmt: skip

@@ -46,7 +46,7 @@ def hop_words(case: Mapping[str, Any]) -> str:
         return f"{where} none"
     least = "" if launch["landed"] else "at least "
     height = 1e3 * launch["height"]
-    return say("hops.hop", where=where, least=least, lasts=launch["lasts"], time=launch["time"], height=height)
+    return say("hops_hop", where=where, least=least, lasts=launch["lasts"], time=launch["time"], height=height)
 
 
 def measured_angles(
@@ -64,15 +64,15 @@ def measured_angles(
         try:
             torque, degrees = float(torque_text), float(value)
         except ValueError:
-            raise ValueError(say("angles.form", entry=entry)) from None
+            raise ValueError(say("angles_form", entry=entry)) from None
         known = {"surface": (surface, surfaces), "torque": (torque, torques), "state": (state, TRANSITIONS)}
         for key, (given, allowed) in known.items():
             if given not in allowed:
                 there = ", ".join(map(str, allowed))
-                raise ValueError(say("angles.of_none", entry=entry, key=key, given=given, allowed=there))
+                raise ValueError(say("angles_of_none", entry=entry, key=key, given=given, allowed=there))
         if not math.isfinite(degrees):
-            raise ValueError(say("angles.not_finite", entry=entry))
+            raise ValueError(say("angles_not_finite", entry=entry))
         if (surface, torque, state) in found:
-            raise ValueError(say("angles.twice", name=name))
+            raise ValueError(say("angles_twice", name=name))
         found[surface, torque, state] = degrees
     return found

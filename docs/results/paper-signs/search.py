@@ -95,14 +95,12 @@ class OnBed(PlanarOnBed):
         return self.laid_out(prepared.bed)
 
     def run_on(self, ground: Any) -> CoupledTumble:
-        """Placed as always, under more weight, or let go where the tips are at the surface."""
+        """Placed as always, under more weight, or let go where the tips are just clear of the surface."""
         start = self.lever.get("start")
         options = dict(self.stepping())
         tip = 0.5 * self.spikes.diameter
-        if start == "surface":
+        if start == "surface":  # just clear of the grains
             options["lowering_speed"] = None
-            level = (self.trial.spike_length - tip) * math.cos(math.pi / self.trial.spike_count) + tip
-            options["height"] = level + ground.clearance
         run = CoupledTumble(self.trial, ground, tip_radius=tip, max_wheel_speed=self.plan.max_wheel_speed, **options)
         if isinstance(start, float):
             run.body.trial = replace(self.trial, gravity_sim=start * self.trial.gravity_sim)
