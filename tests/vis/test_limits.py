@@ -18,7 +18,7 @@ def test_the_page_shows_the_table_of_the_file(tmp_path):
     copy = tmp_path / "limits.md"
     copy.write_text(PAGE.read_text())
     put_table(copy)
-    assert copy.read_text() == PAGE.read_text(), "python -m vis.page.limits docs/limits.md writes it anew"
+    assert copy.read_text() == PAGE.read_text()  # python -m vis.page.limits docs/limits.md writes it anew
 
 
 def test_failures_come_first_and_every_limit_has_a_size_in_numbers_or_says_that_there_is_none():
@@ -29,9 +29,9 @@ def test_failures_come_first_and_every_limit_has_a_size_in_numbers_or_says_that_
         assert re.search(r"\d|not (modelled|measured)", limit.size), limit.what
 
 
-def test_the_cases_of_the_verification_that_fail_are_all_among_the_failures():
+def test_the_cases_of_the_verification_that_fail_or_are_outside_are_all_among_the_failures():
     cases = json.loads((ROOT / "docs" / "results" / "validate" / "result.json").read_text())["cases"]
-    failing = {case["id"] for case in cases if case["status"] == "fail"}
+    failing = {case["id"] for case in cases if case["status"] in ("fail", "informational")}
     told = [id for limit in all_limits() if limit.fails for id in limit.case]
     assert sorted(told) == sorted(failing)
 
