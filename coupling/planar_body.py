@@ -21,7 +21,9 @@ from numpy.typing import NDArray
 
 from hedgebed_renamed import renamed
 from rigid.ground.reaction import Contact, Reaction, State
+from rigid.model.model import State as MotionState
 from rigid.model.trial import Trial
+from rigid.terms import EFFECTS, STATE_FIELDS
 
 from .poses import Pose, Twist, Vector, Wrench
 
@@ -66,16 +68,19 @@ class PlacedBody:
 class PlanarBody(PlacedBody):
     """The platform of `trial`, at rest at (`x`, `z`) [m] and `theta` [rad]; a `coupling.Body`.
 
-    Raises ValueError for a trial with effects: the master has the base model only.
+    Raises ValueError for a trial with effects on anything but the torque: the master has the base model only.
     """
 
     _ARRAYS = ("place", "rates", "acceleration", "inertia", "_drag")
     _NUMBERS = ("wheel_speed", "time", "torque_work", "touching", "in_placement", "_at_limit")
 
     def __init__(self, trial: Trial, *, z: float, x: float = 0.0, theta: float = 0.0) -> None:
-        if trial.effects:
-            named = ", ".join(effect.id for effect in trial.effects)
-            raise ValueError(f"effects = {named}: on grains the base model alone is computed; leave them out")
+        other = [effect.id for effect in trial.effects if not effect.term.on_torque_alone]
+        if other:
+            raise ValueError(
+                f"effects = {', '.join(other)}: on grains there is the base model with effects on the torque alone "
+                f"({', '.join(id for id, term in EFFECTS.items() if term.on_torque_alone)}); leave the others out"
+            )
         self.trial = trial
         self.place = np.array([x, z, theta], dtype=float)  # x, z [m], theta [rad]
         self.rates = np.zeros(3)  # Their rates, at a time lag / 2 later
@@ -229,19 +234,41 @@ class PlanarBody(PlacedBody):
     def _applied(self) -> Vector:
         return np.array([0.0, -self.trial.weight, self._torque])
 
+    def _torque_factor(self, dt: float) -> float:
+        """What the trial's effects make of the torque [1] in the middle of the next step of `dt` [s]."""
+        state, factor, sign = MotionState(), 1.0, 1.0 if self.trial.actuator == "motor" else -1.0
+        for name in STATE_FIELDS:
+            setattr(state, name, 0.0)
+        state.torque = self.trial.torque
+        state.x, state.y, state.theta = (float(value) for value in self.place)
+        state.vx, state.vy, state.omega = (float(value) for value in self.rates)
+        for half in (0.0, 0.5 * dt):  # at the start first, for the wheel's speed in the middle
+            state.time = self.time + half
+            state.wheel_speed = self.wheel_speed + sign * half * factor * self.trial.torque / self.trial.wheel_inertia
+            factor = 1.0
+            for effect in self.trial.effects:
+                own = [effect.values[name] for name in effect.term.arguments("torque_factor")]
+                factor *= effect.term.hooks["torque_factor"](state, *own)
+        return factor
+
     def _mean_torque(self, dt: float) -> float:
         """Mean torque of the next step [N m]: it acts while anything touches, until its end or the wheel's."""
         trial = self.trial
         self._until_limit = math.inf
         if self.in_placement or not self.touching or trial.torque == 0:
             return 0.0
+        torque = trial.torque
+        if trial.effects:
+            torque *= self._torque_factor(dt)
+            if torque == 0:
+                return 0.0
         left = trial.torque_until - self.time
         room = self.wheel_speed if trial.actuator == "brake" else self.max_wheel_speed - self.wheel_speed
-        until = room * trial.wheel_inertia / trial.torque
+        until = room * trial.wheel_inertia / torque
         if trial.actuator == "motor" and until <= left:
             self._until_limit = until
         left = min(left, until)
-        return trial.torque * min(1.0, max(0.0, left / dt))
+        return torque * min(1.0, max(0.0, left / dt))
 
 
 def placement_time(step: float, pace: float = 1.0) -> float:

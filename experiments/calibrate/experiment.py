@@ -31,23 +31,29 @@ from experiments.runs.whole_runs import publish, whole_run
 
 from .fit import Response, Wanted, design, find_best, next_point
 from .result import Simulated, calibration_result, material_toml
-from .settings import CalibrateSettings, Target, material_at
+from .settings import CalibrateSettings, Target, material_at, say
 from .tests import SampleTest, figures_of, laboratory_figure, run_test, tests_for
 
 __all__ = ["check", "fingerprint", "resume", "run"]
 
+_LEAST_HEAP = 20.0
+"""Depth of a drained bed to which parameters are fitted, at least [mean diameters]: on its rough plate one of eight
+stands 6 degrees steeper than the friction angle of its grains (docs/materials.md)."""
 _SEEDS = 1000
 """Between the seeds of two points: samples of one seed would be strong, or weak, all alike."""
 
 
 def check(settings: CalibrateSettings) -> None:
-    """Raise ValueError for ranges with which no material can be, and a bed too narrow for an angle of repose."""
-    if any(target.state == "drained" for target in settings.wanted.values()):
+    """Raise ValueError for ranges with which no material can be, and a bed that tells no angle of repose."""
+    drained = [target for target in settings.wanted.values() if target.state == "drained"]
+    if drained:
         length, _, depth = (settings.grain * side for side in settings.repose_size)
         try:
             check_width(length, slot=None, grain=settings.grain, depth=depth)
         except ValueError as error:
             raise ValueError(f"repose_size, times grain: {error}") from None
+    if any(target.fit for target in drained) and settings.repose_size[2] < _LEAST_HEAP:
+        raise ValueError(say("shallow_heap", s=settings, name=drained[0].name, least=_LEAST_HEAP))
     for end in (0, 1):
         material_at(settings, {key: pair[end] for key, pair in settings.free.items()})
 

@@ -132,9 +132,9 @@ class CalibrateSettings(StrictSettings):
     """Checks at most: another one where a figure is off by more than half its tolerance [1]."""
     bed_size: tuple[Positive, Positive, Positive] = (0.04, 0.04, 0.035)
     """Laboratory beds, for packing fractions: widths and depth [m]."""
-    repose_size: tuple[Positive, Positive, Positive] = (32.0, 6.0, 8.0)
+    repose_size: tuple[Positive, Positive, Positive] = (92.0, 6.0, 20.0)
     """Bed that is drained for an angle of repose: widths (periodic; slopes along the first) and depth [mean
-    diameters]."""
+    diameters]. Parameters are fitted to one at least 20 deep."""
     threads: Threads = None
 
     @model_validator(mode="after")

@@ -32,7 +32,7 @@ __all__ = ["AXES", "BASE", "Member", "Variant", "affordable", "inertial_number",
 BASE = "base"
 AXES = {"grain": "ratios", "width": "widths", "depth": "bed_depths", "overlap": "overlaps", "speed": "paces"}
 """What is varied, and the setting that lists its values."""
-ROOM = 1.5
+ROOM = 2.0
 """Overlap at which a member ends, over the one its modulus is chosen for [1]: the choice is an estimate made
 beforehand."""
 MOST_OVERLAP = 0.1

@@ -29,8 +29,8 @@ class ConvergeSettings(PenetrateSettings):
     # The base, where it is not as in `penetrate`
     seeds: Seeds = (1, 2, 3, 4, 5)
     max_overlap: MaxOverlap = 0.04
-    """Largest overlap of grains that the modulus of the base is chosen for [of a diameter]. A run ends where it is
-    passed by more than half."""
+    """Largest overlap of grains that the modulus of the base is chosen for [of a diameter]. A run ends
+    at twice that."""
     other_speeds: tuple[Positive, ...] = ()
     """Not used: every bed is driven at all of speeds [m/s]."""
     other_drop_speeds: tuple[Positive, ...] = ()

@@ -1,8 +1,9 @@
 """`hedgebed paper`: the trials of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) with our model.
 
 Every gravity, torque and surface, with friction as it is and at both ends of its band, by the located integrator and by
-the paper's fixed step; then `variants` of what the paper does not give. `experiments.paper.claims` compares them with
-what the paper's text states.
+the paper's fixed step; then `variants`: a torque that rises, rivals to it, and what the paper does not give.
+`experiments.paper.claims` compares them with what the paper's text states, `experiments.paper.evidence` weighs the
+rivals.
 """
 
 import math
@@ -31,11 +32,13 @@ from rigid.ground.laws import find_law
 from rigid.model.trial import Effect, Ground, Trial
 from rigid.planar.simulate import simulate
 
-from .claims import claims, first_lasting
+from .claims import GRANULAR, Trials, claims, first_lasting
+from .evidence import BRAKE_DURATION, DURATION, evidence, rival_trials
+from .grains import kept_angles
 from .settings import PaperSettings
-from .transitions import HARD
+from .transitions import HARD, say
 
-__all__ = ["FACTORS", "GRAINS", "Job", "SLIDING", "SWEPT", "Variant", "check", "plan_jobs", "resume", "run", "variants"]
+__all__ = ["FACTORS", "Job", "SLIDING", "SWEPT", "Variant", "check", "plan_jobs", "resume", "run", "variants"]
 
 SAMPLE_INTERVAL = 5e-3
 """Between the rows that are kept [s]; numbers come from the integration itself."""
@@ -60,6 +63,11 @@ class Job:
     varied: Mapping[str, Any] = field(default_factory=dict)  # as `variants` has them
 
     @property
+    def lean(self) -> float | None:
+        """How far it starts leaning on its leading row [rad]; None: it stands."""
+        return float(self.varied["value"]) if self.varied.get("rival") == "pivot-start" else None
+
+    @property
     def method(self) -> Any:
         """Of the integrator."""
         return "paper" if self.variant == "paper" else "located"
@@ -70,6 +78,11 @@ def check(settings: PaperSettings) -> None:
     for job in plan_jobs(settings):
         if job.variant == "paper":  # a step too long for the ground
             simulate(job.trial, duration=1e-3, method="paper")
+        elif job.kind == "rivals":  # a platform that a rival does not let stand
+            try:
+                simulate(job.trial, duration=1e-6, lean=job.lean)
+            except ValueError as error:
+                raise ValueError(say("rival_falls", id=job.id, error=error)) from error
 
 
 def plan_jobs(settings: PaperSettings, platform_file: Path | None = None) -> list[Job]:
@@ -90,13 +103,15 @@ def _case_jobs(
     )
     trial, torque = plan.trial, turn["torque"]
     name = f"{surface}-{rig:g}g-{torque:g}Nm"
-    duration = settings.duration if turn["actuator"] == "motor" else settings.brake_duration
+    brake = turn["actuator"] == "brake"
+    duration = settings.brake_duration if brake else settings.duration
+    short = min(duration, BRAKE_DURATION if brake else DURATION)
 
     def job(variant: str, changed: Trial, kind: str = "", varied: Mapping[str, Any] | None = None) -> Job:
         limit = plan.max_wheel_speed if changed.wheel_inertia == trial.wheel_inertia else math.inf
         return Job(
-            f"{name}-{variant.replace(' ', '-')}", rig, torque, surface, variant, changed, duration, settings.trusted,
-            limit, kind, varied or {},
+            f"{name}-{variant.replace(' ', '-')}", rig, torque, surface, variant, changed,
+            short if kind == "rivals" else duration, settings.trusted, limit, kind, varied or {},
         )  # fmt: skip
 
     yield job("nominal", trial)
@@ -112,7 +127,9 @@ def _integrate(job: Job) -> Json:
     trial, full = torque_within_limit(
         job.trial, max_wheel_speed=job.max_wheel_speed, duration=job.duration, method=job.method
     )
-    trajectory = simulate(trial, duration=job.duration, method=job.method, sample_interval=SAMPLE_INTERVAL)
+    trajectory = simulate(
+        trial, duration=job.duration, method=job.method, sample_interval=SAMPLE_INTERVAL, lean=job.lean
+    )
     away = np.hypot(trajectory.x - trajectory.x[0], trajectory.y - trajectory.y[0])
     beyond = np.flatnonzero(away >= job.trusted)
     end = int(beyond[0]) + 1 if len(beyond) else len(away)
@@ -126,6 +143,7 @@ def _integrate(job: Job) -> Json:
         "transition_angle_slip": trajectory.transition_angle("slip"),
         "transition_angle_hop": trajectory.transition_angle("hop"), "energy_residual": trajectory.energy_residual,
         "wheel_at_limit": full, "transitions": states,
+        "friction": [job.trial.mu_s, job.trial.sliding_friction],
         "launch": _launch(trajectory, states),
         "rows": trajectory_columns(trajectory) if job.variant in ("nominal", "low", "high", "paper") else None,
     }  # fmt: skip
@@ -191,22 +209,25 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
             for entry in kept
         ]
 
-    stated = claims(settings, found, jobs)
-    met = [claim for claim in stated if claim["met"] is not None]
+    stated = claims(Trials.of(settings, found, jobs, kept_angles()))
     inside = {True: "yes", False: "no", None: "-"}
-    rows = [[claim["statement"], claim["ours"], inside[claim["met"]]] for claim in stated]
+    rows = [[claim["quote"], claim["compared"], claim["ours"], inside[claim["met"]]] for claim in stated]
+    weighed = evidence(settings, found)
     guesses = sorted({job.surface for job in jobs if find_surface(job.surface).guess})
     warnings = [f"the numbers of {name} are a guess until they are calibrated" for name in guesses]
     platform = jobs[0].trial
     return Result.make(
         "paper",
         title="The paper's Figures 5 to 8 with our model",
-        quantities=_quantities(cases, stated, met),
+        quantities=_quantities(cases, stated, weighed),
         platform={key: getattr(platform, key) for key in ("mass", "inertia", "spike_length", "wheel_inertia")},
         brake_wheel_speed=settings.brake_wheel_speed,
         surfaces={name: asdict(find_surface(name)) for name in settings.surfaces},
         claims=stated,
-        tables=[{"title": "What the paper's text states", "head": ["statement", "ours", "inside"], "rows": rows}],
+        tables=[
+            {"title": "What the paper's text states", "head": ["in its words", "compared", "ours", "met"], "rows": rows}
+        ],
+        evidence=weighed,
         integrations=len(jobs),
         cases=cases,
         **{kind: of_kind(kind) for kind in ("sweep", "sliding", "grains")},
@@ -214,8 +235,10 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
     )
 
 
-def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
+def _quantities(cases: list[Json], stated: list[Json], weighed: Json) -> Json:
     """The numbers that a person would quote."""
+    judged = [claim for claim in stated if claim["met"] is not None]
+    risen = [claim["risen"] for claim in judged if claim.get("risen")]
 
     nominal = {entry["id"].removesuffix("-nominal"): entry for entry in cases if entry["variant"] == "nominal"}
     fixed = {entry["id"].removesuffix("-paper"): entry for entry in cases if entry["variant"] == "paper"}
@@ -229,11 +252,12 @@ def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
     return quantities_of(
         {
             "claims_met": (
-                sum(bool(claim["met"]) for claim in met),
+                sum(bool(claim["met"]) for claim in judged),
                 "1",
-                f"of {len(met)} statements of the text that can be compared",
+                f"of {len(judged)} statements of the text that can be compared",
             ),
-            "claims_compared": (len(met), "1", f"{len(stated) - len(met)} more cannot be"),
+            "claims_compared": (len(judged), "1", f"{len(stated) - len(judged)} more cannot be, or are not judged"),
+            **_of_a_rise(risen, weighed),
             "case_count": (len(nominal), "1", "gravities x torques x surfaces"),
             "step_angle_gap": (apart("trajectory_angle"), "rad", f"largest change of a trajectory angle {gap}"),
             "step_speed_gap": (apart("max_speed"), "m/s", f"largest change of a largest speed {gap}"),
@@ -242,14 +266,33 @@ def _quantities(cases: list[Json], stated: list[Json], met: list[Json]) -> Json:
     )
 
 
-GRAINS = ("sand", "jsc1a")
+def _of_a_rise(risen: Sequence[Json], weighed: Json) -> Json:
+    """What a torque that rises does to the claims, and what there is for it; {} where that was not asked for."""
+    found: Json = {}
+    if risen:
+        count = sum(bool(claim["met"]) for claim in risen)
+        found["claims_met_risen"] = (count, "1", "of the same, the motors' torque rising")
+    if weighed:
+        step = weighed["rivals"][0]["nats"]
+        told = {row["id"]: row for row in weighed["rivals"]}
+        rise, others = told["torque-rise"], [row for id, row in told.items() if id != "torque-rise"]
+        found["rise_evidence"] = (rise["nats"] - step, "1", "ln of the odds of a torque that rises against a step")
+        lead, apart = (rise[key] - max(row[key] for row in others) for key in ("nats", "apart"))
+        found["rise_lead"] = (lead, "1", "the same against the best of its rivals")
+        found["rise_lead_apart"] = (
+            apart,
+            "1",
+            "the same where the platform's friction need not be what the paper states",
+        )
+        found["rise_best"] = (rise["best"]["value"], "s", "time constant that is likeliest, of those tried")
+    return found
+
+
 SWEPT = ("inertia", "wheel_inertia", "stiffness", "damping", "wheel_speed_0")
 """Numbers that the paper does not give, halved and doubled."""
 FACTORS = (0.5, 2.0)
 SLIDING = (0.6, 0.8, 1.0)
-"""mu_d / mu_s [1]; the paper gives no mu_d, and 0.5 stands where nothing is measured."""
-TORQUE_RISE, RISE = Path(__file__).parents[1] / "terms" / "torque_rise.py", 0.1
-"""A term, and its time constant [s]: what a step of the torque hides."""
+"""mu_d / mu_s [1] beside the half to which the paper fixed it: what hangs on that."""
 MEMORY_LAW, LITTLE = "katsuragi-durian", 0.05
 """A law whose stiffness and rebound can be set apart, and its own rebound [1]: it returns next to nothing."""
 HALF = 0.5
@@ -259,18 +302,23 @@ OTHER_LAWS = ("bekker", "rft")
 
 
 Variant = tuple[str, Trial, str, Mapping[str, Any]]
-"""A trial beside the nominal one: name; trial; its list in result.json, "sweep", "sliding" or "grains" ("": of a claim
-only); what was varied: key and factor; ratio; or law, stiffness (of a row, N/m) and rebound."""
+"""A trial beside the nominal one: name; trial; what it is for, "risen" (claims), "rivals" (evidence), or its list in
+result.json, "sweep", "sliding" or "grains"; what was varied: rise; rival and value; key and factor; ratio; or law,
+stiffness (of a row, N/m) and rebound."""
 
 
 def variants(settings: PaperSettings, trial: Trial, *, surface: str, first_rig: bool) -> Iterator[Variant]:
     """Those of one gravity, torque and surface. `first_rig`: whether the gravity is that of Figures 5 and 6."""
     brake = trial.actuator == "brake"
-    if surface in GRAINS and brake:
+    if surface in GRANULAR and brake:
         yield from _grains(trial, whole=settings.sweep)
-    if surface == "steel" and first_rig and trial.torque == min(settings.motor_torques):
-        rising = Effect(id="torque-rise", parameters={"rise": RISE}, file=TORQUE_RISE)
-        yield f"torque rise {RISE:g} s", replace(trial, effects=(rising,)), "", {}
+    if settings.torque_rise and not brake:
+        rise = settings.torque_rise
+        rising = replace(trial, effects=(Effect(id="torque-rise", parameters={"rise": rise}),))
+        yield f"torque rise {rise:g} s", rising, "risen", {"rise": rise}
+    if settings.weighs and surface in HARD:
+        for name, other, of_rival in rival_trials(trial):
+            yield f"rival {name}", other, "rivals", of_rival
     if not settings.sweep:
         return
     if surface in HARD and first_rig:
@@ -279,7 +327,7 @@ def variants(settings: PaperSettings, trial: Trial, *, surface: str, first_rig: 
             for factor in FACTORS if value else ():
                 varied = replace(trial, **{key: factor * value})
                 yield f"{key} x{factor:g}", varied, "sweep", {"key": key, "factor": factor}
-    if (surface in HARD and first_rig) or (surface in GRAINS and brake):
+    if (surface in HARD and first_rig) or (surface in GRANULAR and brake):
         for ratio in SLIDING:
             yield f"mu_d {ratio:g} mu_s", replace(trial, mu_d=ratio * trial.mu_s), "sliding", {"ratio": ratio}
 
@@ -300,7 +348,7 @@ def _grains(trial: Trial, *, whole: bool) -> Iterator[Variant]:
     yield remembers(own, LITTLE)
     if not whole:
         return
-    for stiffness in sorted({default, own, *(find_surface(name).stiffness for name in GRAINS)}):
+    for stiffness in sorted({default, own, *(find_surface(name).stiffness for name in GRANULAR)}):
         # No damper: it gives back all that it took.
         spring = replace(trial, stiffness=stiffness, damping=0.0)
         varied = {"law": "spring-damper", "stiffness": stiffness, "rebound": 1.0}

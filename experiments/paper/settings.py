@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.platform.settings import Positive
+from experiments.platform.settings import NotNegative, Positive
 from experiments.runs.strict import StrictSettings
 
 from .transitions import HARD, measured_angles
@@ -29,12 +29,17 @@ class PaperSettings(StrictSettings):
     rig_reading: Literal["pair", "weight"] = Field("pair", description="What rig means; see tumble.")
 
     # What the paper does not give
+    torque_rise: NotNegative = 0.25
+    """Time constant [s] of a motor's torque in a second column beside every statement; 0: no such column."""
+    evidence: bool = True
+    """Weigh what may explain what the text states of hard surfaces: a torque that rises, and its rivals; where there
+    are both surfaces, two rigs and two motors."""
     platform: str = Field("hedgehog", description="Platform: one that ships, or its TOML file.")
     brake_wheel_speed: Positive = 300.0
     """Speed of the wheel at the start of a brake trial [rad/s]; ours, the paper gives none."""
     sweep: bool = True
-    """Halve and double the numbers that the paper does not give, one at a time, vary mu_d / mu_s, and put other grounds
-    under the brake trials on grains."""
+    """Halve and double the numbers that the paper does not give, one at a time, vary mu_d / mu_s too, and put other
+    grounds under the brake trials on grains."""
 
     # How it is computed
     duration: Positive = Field(5.0, le=60, description="How long a motor trial lasts [s].")
@@ -42,6 +47,12 @@ class PaperSettings(StrictSettings):
     trusted: Positive = 0.04
     """Speeds are the largest before the centre is this far away [m]; the paper trusts 40 mm."""
     workers: int | None = Field(None, ge=1, le=256, description="Processes; as many as there are cores if not given.")
+
+    @property
+    def weighs(self) -> bool:
+        """Whether there are the trials that the rivals are weighed by, and they are to be."""
+        several = min(len(self.rigs), len(self.motor_torques)) >= 2
+        return self.evidence and several and set(HARD) <= set(self.surfaces)
 
     @model_validator(mode="after")
     def _each_once(self) -> Self:

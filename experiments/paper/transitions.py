@@ -10,7 +10,7 @@ from typing import Any
 
 from vis.page.sentences import Sentences
 
-__all__ = ["HARD", "TRANSITIONS", "hop_words", "is_brief", "measured_angles", "slip_before_hop", "transition_angle"]
+__all__ = ["HARD", "TRANSITIONS", "hop_words", "measured_angles", "slip_before_hop", "transition_angle"]
 
 say = Sentences(__package__)
 
@@ -39,12 +39,6 @@ def transition_angle(case: Mapping[str, Any], state: str) -> float | None:
     return None if angle is None else math.degrees(angle)
 
 
-def is_brief(case: Mapping[str, Any]) -> bool:
-    """Whether there is a hop, it ends within the trial, and it is shorter than the contact before it."""
-    launch = case["launch"]
-    return bool(launch and launch["landed"] and launch["lasts"] < launch["time"])
-
-
 def hop_words(case: Mapping[str, Any]) -> str:
     """Surface, torque, and how long and how high the first hop is, for a reader."""
     where, launch = f"{case['surface']} {case['torque']:g} N m", case["launch"]
@@ -52,7 +46,7 @@ def hop_words(case: Mapping[str, Any]) -> str:
         return f"{where} none"
     least = "" if launch["landed"] else "at least "
     height = 1e3 * launch["height"]
-    return say("hop", where=where, least=least, lasts=launch["lasts"], time=launch["time"], height=height)
+    return say("hops_hop", where=where, least=least, lasts=launch["lasts"], time=launch["time"], height=height)
 
 
 def measured_angles(
@@ -70,15 +64,15 @@ def measured_angles(
         try:
             torque, degrees = float(torque_text), float(value)
         except ValueError:
-            raise ValueError(say("angle_form", entry=entry)) from None
+            raise ValueError(say("angles_form", entry=entry)) from None
         known = {"surface": (surface, surfaces), "torque": (torque, torques), "state": (state, TRANSITIONS)}
         for key, (given, allowed) in known.items():
             if given not in allowed:
                 there = ", ".join(map(str, allowed))
-                raise ValueError(say("angle_of_none", entry=entry, key=key, given=given, allowed=there))
+                raise ValueError(say("angles_of_none", entry=entry, key=key, given=given, allowed=there))
         if not math.isfinite(degrees):
-            raise ValueError(say("angle_not_finite", entry=entry))
+            raise ValueError(say("angles_not_finite", entry=entry))
         if (surface, torque, state) in found:
-            raise ValueError(say("angle_twice", name=name))
+            raise ValueError(say("angles_twice", name=name))
         found[surface, torque, state] = degrees
     return found

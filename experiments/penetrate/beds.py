@@ -11,7 +11,7 @@ from dem.prepare.bedfile import find_bed
 from experiments.grains.bearing import Bearing, bearing_of, strength
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.recipes import recipe_of
-from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material
+from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material, stable_overlap
 from experiments.grains.staged import staged_bed
 from experiments.runs.progress import Progress
 from experiments.runs.stopping import held_back
@@ -24,10 +24,10 @@ from .units import RAIN, deepest
 
 __all__ = [
     "bed_step", "choose_softness", "expected_bearing", "expected_stiffness", "find_material", "fingerprint",
-    "first_gravity", "prepare_bed", "stages_of", "stiffened",
+    "first_gravity", "overlap_bound", "prepare_bed", "stages_of", "stiffened",
 ]  # fmt: skip
 
-_SPELL, _MOST_SPELLS = 4.0, 40
+_SPELL, _MOST_SPELLS = 1.5, 60
 """How long grains are left to come to rest at a time [sqrt(d / g)], and how often at most."""
 _DRAG = 0.3  # Time of the drag at first [sqrt(d / g)]
 _STILL = 1e-5  # Mean kinetic energy at rest [m g d]
@@ -96,13 +96,24 @@ def first_gravity(settings: PenetrateSettings) -> float:
 
 def stiffened(bed: Any, young: float, settings: PenetrateSettings) -> Any:
     """The same bed of stiffer grains, `young` [Pa]: same places, contacts and histories, at rest anew."""
+    step = bed.time_step * math.sqrt(bed.material.young / young)  # a contact's time goes with 1 / sqrt(E)
     made = bed.successor(
-        bed.state(), material=bed.material.softened(young), time_step=bed_step(settings, young),
-        max_overlap=bed.overlap_limit,
-    )  # fmt: skip
+        bed.state(), material=bed.material.softened(young), time_step=step, max_overlap=bed.overlap_limit
+    )
     made.material, made.recipe = bed.material.softened(young), bed.recipe
     _come_to_rest(made, unit=math.sqrt(settings.grain / STANDARD_GRAVITY) * pace_of(settings))
     return made
+
+
+def overlap_bound(settings: PenetrateSettings) -> float:
+    """Overlap past which a run is stopped [of a diameter]: that up to which the step is stable for a whole lattice.
+
+    Some 1.2 times `max_overlap`, for which the modulus is chosen (`experiments.grains.softening.stable_overlap`); where
+    step or modulus are set, `max_overlap` itself.
+    """
+    if settings.young is not None or settings.time_step is not None:
+        return settings.max_overlap
+    return stable_overlap(find_material(settings), settings.max_overlap)
 
 
 def _come_to_rest(bed: Any, *, unit: float) -> None:

@@ -47,7 +47,7 @@ __all__ = ["Frames", "check", "compute", "fingerprint", "resume", "run"]
 ROOM = 0.8
 """Share of `max_overlap` that is aimed at where grains were too soft [1]."""
 LEAST_STIFFER = 1.25
-"""By which grains become stiffer at least [1]."""
+"""By which grains become stiffer at least, and by how much more each time it happens again on a seed [1]."""
 
 
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -136,16 +136,20 @@ class _Work:
         self.progress.message(say("bed_made", facts=facts))
         if (young := self._young(seed)) != softening.young:
             bed = beds.stiffened(bed, young, self.settings)
-        ground = BedGround(bed, make_spike(self.settings))
+        ground = self._ground(bed)
         start = ground.state()
         for unit in todo:
             ground.restore(start)
-            bed.max_overlap = 0.0
-            bed.mark_origin()
+            ground.bed.max_overlap = 0.0
+            ground.bed.mark_origin()
             while not self.run_unit(unit, ground):
-                bed = beds.stiffened(self._prepared(seed), self._young(seed), self.settings)
-                ground = BedGround(bed, make_spike(self.settings))
+                ground = self._ground(beds.stiffened(self._prepared(seed), self._young(seed), self.settings))
                 start = ground.state()
+
+    def _ground(self, bed: Any) -> BedGround:
+        """The spike over a bed, whose overlaps end a run past `beds.overlap_bound`."""
+        bed.overlap_limit = beds.overlap_bound(self.settings)
+        return BedGround(bed, make_spike(self.settings))
 
     def _prepared(self, seed: int) -> Any:
         """The bed of a seed as it is prepared, of stiffer grains where it overlapped too far in its preparation.
@@ -183,7 +187,9 @@ class _Work:
             return False
         overlap, young = float(found[1]) / 100, self._young(seed, prepared=unit is None)
         now = replace(self.softening, young=young)
-        stiffer = max(now.stiffer(overlap, ROOM * settings.max_overlap), LEAST_STIFFER * young)
+        # It was stopped as it passed the bound: how far it would have gone shows only in that it happens again.
+        more = LEAST_STIFFER ** len(self._notes(seed))
+        stiffer = more * max(now.stiffer(overlap, ROOM * settings.max_overlap), LEAST_STIFFER * young)
         if not math.isfinite(stiffer) or stiffer > self.softening.real:
             return False
         note = {"seed": seed, "unit": unit.id if unit else "", "overlap": overlap, "before": young, "young": stiffer}

@@ -1,18 +1,17 @@
 """Where a foot comes to rest, and whether it does: before the runs by what a bed bears, after them by what it bore.
 
-Grains without cohesion bear in proportion to gravity: what a spike is driven with grows as K z, so that a load W would
-rest at W / K, which in low gravity may be far below any foot. That is an answer: the runs that would only go to the
-floor are left out, and the depth is reckoned from the bed's own force, once as W / K with the fitted K, once by the
-power law F = a z^n of the slowest drive, (W / a)^(1/n). Both go far beyond what was driven, hence both are told.
+Grains without cohesion bear in proportion to gravity and to depth (Kang et al. 2018, Nat. Commun. 9:1101): a load W
+rests at W / K, which in low gravity may be far below any foot. That is an answer: the runs that would only go to the
+floor are left out, and the depth is reckoned from the bed's own force, as W / K with the fitted K, beside that of a
+flat plate in 3D-RFT (`experiments.grains.softening`). Both go far beyond what was driven, hence both are told. A power
+law fitted to a drive does not serve: a flat tip is carried at depth 0 already, which lowers its exponent (0.54 was
+found) and made metres hundreds of metres.
 """
 
 import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from coupling import Penetration
 from experiments.grains.bearing import COHESIONS, UNSURE, bearing_capacity, friction_angle
 from experiments.runs.types import Json
 
@@ -23,9 +22,6 @@ from .units import Unit, deepest
 
 __all__ = ["answer", "made_units", "resting_load", "sinks_away"]
 
-_LEAST_ROWS = 8
-"""Rows that a power law needs."""
-_POWERS = (0.3, 3.0)  # Within which a power is believed [1]
 _BESIDE = "jsc-1a-loose-heights"
 """The material to try where grains without cohesion do not bear."""
 
@@ -59,9 +55,8 @@ def answer(findings: Findings, material: Any) -> Json | None:
     load, area = settings.weight, math.pi * settings.tip_diameter**2 / 4
     expected = beds.expected_bearing(settings)
     stiffness = findings.fit.stiffness if findings.fit.stiffness > 0 else expected.stiffness
-    slowest = min(findings.of("driven"), key=lambda run: run.settings["speed"])
-    law = power_law(slowest, above=settings.grain)
-    depths = [load / stiffness] + ([] if law is None else [(load / law[0]) ** (1 / law[1])])
+    plate = beds.expected_stiffness(settings)
+    depths = [load / stiffness, max(0.0, load - expected.held) / plate]
     low, high = min(depths), max(depths)
     never = low > settings.foot
     angle = friction_angle(material)
@@ -71,10 +66,9 @@ def answer(findings: Findings, material: Any) -> Json | None:
     enough = load / per_pascal
     told: Json = {
         "s": settings, "depth": _length(depths[0]), "foot": 1e3 * settings.foot, "floor": 1e3 * settings.bed_size[2],
-        "other": f" ({_length(depths[1])} by the power law F = a z^{law[1]:.2f} of the slowest drive)" if law else "",
+        "plate": _length(depths[1]),
         "angle": angle, "enough": f"{enough:.2g}", "g": settings.gravity / 9.80665, "beside": _BESIDE,
         "driven": 1e3 * settings.depth, "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the K expected",
-        "share": 1e2 * settings.depth / depths[0],
     }  # fmt: skip
     cohesionless = material.cohesion == "none"
     sentences = [say("rests_never" if never else "rests_below_the_bed", **told)]
@@ -83,20 +77,10 @@ def answer(findings: Findings, material: Any) -> Json | None:
     return {
         "comes_to_rest": False, "at_any_depth_of_the_foot": not never, "load": load, "foot": settings.foot,
         "depth": depths[0], "depth_range": [low, high], "stiffness": stiffness,
-        "power_law": None if law is None else {"coefficient": law[0], "exponent": law[1]},
+        "stiffness_plate": plate,
         "friction_angle": angle, "cohesion_enough": enough, "cohesions": rows, "sentences": sentences,
         "source": say("terzaghi"),
     }  # fmt: skip
-
-
-def power_law(run: Penetration, *, above: float) -> tuple[float, float] | None:
-    """a [N/m^n] and n of F = a z^n, least squares of the logarithms on the way in below a depth [m]; None where there
-    are too few rows, or the force does not grow as such a law."""
-    rows = (run.phase == "in") & (run.velocity > 0) & (run.depth > above) & (run.force > 0)
-    if np.count_nonzero(rows) < _LEAST_ROWS:
-        return None
-    slope, start = np.polyfit(np.log(run.depth[rows]), np.log(run.force[rows]), 1)
-    return (math.exp(start), float(slope)) if _POWERS[0] <= slope <= _POWERS[1] else None
 
 
 def _length(depth: float) -> str:

@@ -1,4 +1,4 @@
-"""Effects of one's own, each in a file: examples, and what `hedgebed paper` adds to the model.
+"""Effects of one's own, each in a file: examples to start from.
 
 Imports `rigid`.
 """

@@ -31,8 +31,8 @@ def check_coupled(settings: TumbleSettings, plan: TumblePlan) -> None:
     """Raise ValueError, naming key, value and what would do, for a trial that the master cannot step."""
     if settings.ground != "spring-damper":
         raise ValueError(say("master_takes", s=settings))
-    if plan.trial.effects:
-        raise ValueError(say("no_effects", named=", ".join(effect.id for effect in plan.trial.effects)))
+    if other := [effect.id for effect in plan.trial.effects if not effect.term.on_torque_alone]:
+        raise ValueError(say("no_effects", named=", ".join(other)))
     step = settings.substeps * STEP
     if step > 1e-3 * (1 + 1e-9):
         raise ValueError(say("long_step", s=settings, step=1e3 * step, most=int(1e-3 / STEP + 1e-9)))

@@ -12,6 +12,7 @@ from experiments.grains.settings import OF_THE_MASTER, TumbleBedSettings
 from experiments.platform.settings import NotNegative, PlatformSettings, Positive
 from experiments.runs.reading import nearest
 from rigid.ground.laws import GROUNDS
+from rigid.terms import EFFECTS
 from vis.page.sentences import Sentences
 
 from .sweep_ranges import parse_sweep
@@ -163,7 +164,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
             return fault
         if coupled and not on_bed:
             given = [name for name in given if name not in OF_THE_MASTER]
-            if key := self._first_given("effects", "sweep", "campaign"):
+            if key := self._beyond_the_torque() or self._first_given("sweep", "campaign"):
                 return say("not_coupled", key=key)
         if not on_bed:
             if not given:
@@ -172,11 +173,16 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
             return say("of_a_bed", key=given[0], value=getattr(self, given[0]), both=both)
         if self.campaign is not None:
             return say("campaign_on_bed", s=self)
-        if key := self._first_given("effects", "sweep", "model"):
+        if key := self._beyond_the_torque() or self._first_given("sweep", "model"):
             return say("not_on_bed", key=key)
         if fault := self.sleep_fault() or self._settled_under():
             return fault
         return say("method_on_bed", s=self) if self.method == "paper" else None
+
+    def _beyond_the_torque(self) -> str | None:
+        """The first effect that grains, and the master, do not have."""
+        ids = [text.partition("=")[0].partition(".")[0].strip() for text in self.effects]
+        return next((f"effects = {id}" for id in ids if id not in EFFECTS or not EFFECTS[id].on_torque_alone), None)
 
     def _first_given(self, *keys: str) -> str | None:
         return next((key for key in keys if getattr(self, key)), None)

@@ -16,7 +16,7 @@ from .dynamics import LOST, OMEGA, VX, VY, WORK, Modes, System, X, Y
 from .located import integrate
 from .methods import Interpolant
 from .paper import integrate_fixed
-from .statics import inner_slopes, standing, stiffness_at_rest
+from .statics import inner_slopes, leaning, standing, stiffness_at_rest
 from .trajectory import LAUNCH_DISTANCE, STATES, Tally, Trajectory
 
 __all__ = ["Method", "check_step", "longest_step", "simulate", "step_bound"]
@@ -34,6 +34,7 @@ def simulate(
     times: ArrayLike | None = None,
     tolerance: float = 1e-8,
     time_step: float = PAPER_STEP,
+    lean: float | None = None,
 ) -> Trajectory:
     """Integrate one trial from static equilibrium, the torque starting at t = 0.
 
@@ -45,6 +46,7 @@ def simulate(
         times: sample times [s] instead, rising, within 0 to `duration`.
         tolerance: relative error of a step, method "located".
         time_step: of method "paper" [s].
+        lean: instead it is held on its leading row until then, turned by this [rad] (`rigid.planar.statics.leaning`).
 
     Raises ValueError: a number that cannot be, named; a platform that cannot stand; a time step too long for the
     ground. RuntimeError: the motion is no longer finite.
@@ -58,7 +60,7 @@ def simulate(
     if method == "paper":
         check_step(trial, time_step)
     system = System(trial)
-    start = standing(system)
+    start = standing(system) if lean is None else leaning(system, lean)
     recorder = _Recorder(system, samples, *start)
     if method == "paper":
         steps = math.ceil(duration / time_step * (1 - 1e-12))

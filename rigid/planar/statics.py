@@ -19,7 +19,7 @@ from rigid.model.trial import Trial
 
 from .dynamics import INNER, INNER_SPEED, LOST, OMEGA, THETA, VX, VY, WHEEL, Modes, System, X, Y
 
-__all__ = ["at_rest", "comes_to_rest", "inner_slopes", "resting", "standing", "stiffness_at_rest"]
+__all__ = ["at_rest", "comes_to_rest", "inner_slopes", "leaning", "resting", "standing", "stiffness_at_rest"]
 
 _CLOSE = 1e-13  # of the weight, and of weight x length
 _EPS = 2.0**-52
@@ -86,6 +86,26 @@ def standing(system: System) -> tuple[list[float], Modes]:
     modes.top = [max(system.depth(n, z), 0.0) if n in modes.touching else 0.0 for n in range(trial.spike_count)]
     modes.held = list(modes.top)
     modes.torque_over = False
+    return z, modes
+
+
+def leaning(system: System, lean: float) -> tuple[list[float], Modes]:
+    """State vector and modes of a platform held at rest, turned by `lean` [rad] onto its leading row, when the torque
+    begins: that row carries the whole weight, no other touches. Raises ValueError for a lean at which another does."""
+    z, modes = standing(system)
+    front = system.trial.spike_count - 1
+    z[THETA] = lean
+    z[Y] = system.arms(front, z)[0] - _sinkage(system, system.trial.weight)
+    depths = [system.depth(n, z) for n in range(front)]
+    if not (lean > 0 and max(depths) < 0):
+        deeper = max(depths) * 1e6
+        raise ValueError(
+            f"lean = {lean:g} rad does not lift the other rows: one would be {deeper:.3g} um deep; more would do, up "
+            f"to pi / {system.trial.spike_count}"
+        )
+    modes.touching = [front]
+    modes.top = [*([0.0] * front), system.depth(front, z)]
+    modes.held = list(modes.top)
     return z, modes
 
 

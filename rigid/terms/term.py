@@ -127,6 +127,11 @@ class Term:
         if inner and len(inner) < len(INNER_HOOKS):
             raise ValueError(f"{self.id}: {', '.join(inner)} without the others of {', '.join(INNER_HOOKS)}")
 
+    @property
+    def on_torque_alone(self) -> bool:
+        """Whether it acts on the flywheel's torque and on nothing else."""
+        return set(self.hooks) == {"torque_factor"}
+
     def arguments(self, hook: str) -> tuple[str, ...]:
         """Names of the parameters that `hook` takes, in its order."""
         return tuple(inspect.signature(self.hooks[hook]).parameters)[len(FIXED_ARGUMENTS[hook]) :]

@@ -222,6 +222,24 @@ def test_a_run_taken_up_again_gives_the_same_bits(steps, tmp_path):
     assert np.array_equal(other.feet, whole.feet)
 
 
+@pytest.mark.parametrize(
+    "effect",
+    [Effect(id="torque-rise", parameters={"rise": 0.2}), Effect(id="torque-fade", parameters={"speed_loss": 4e-3})],
+    ids=lambda effect: effect.id,
+)
+def test_an_effect_on_the_torque_alone_acts_as_in_the_planar_model(effect):
+    """Motion within the tolerance of docs/planar.md; the wheel has the impulse that the platform got."""
+    trial = Trial(**RIG, **CASES["sand"], effects=(effect,))
+    _, found = coupled(trial, 4e-4, 0.5)
+    expected = simulate(trial, duration=0.501, times=found.time)
+    for name, tolerance in TOLERANCE.items():
+        assert np.abs(getattr(found, name) - getattr(expected, name)).max() < tolerance, name
+    step = simulate(replace(trial, effects=()), duration=0.501, times=found.time)
+    assert np.abs(step.omega - expected.omega).max() > 5 * TOLERANCE["omega"]
+    assert found.wheel_speed[-1] == pytest.approx(expected.wheel_speed[-1], rel=1e-4)
+    assert found.energy_residual < 1e-5
+
+
 def test_what_cannot_be_is_refused_by_name():
     trial = Trial(**RIG, **CASES["brick"])
     footing = LawGround.of_trial(trial)

@@ -71,6 +71,7 @@ class Page:
     tiles: Sequence[Tile] = ()
     warnings: Sequence[str] = ()
     missing: Sequence[str] = ()
+    limits: Sequence[str] = ()  # Known biases of this kind of run
 
 
 def text(words: str, *, small: bool = False) -> Block:

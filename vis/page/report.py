@@ -11,6 +11,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from vis.page.folder import read_columns
+from vis.page.limits import limits_words
 from vis.page.page import Block, Page, Section, Tile, code, figure, table, text, write_page
 from vis.page.plots import Array, styled
 from vis.page.sentences import Sentences
@@ -105,7 +106,8 @@ class Report:
         result = self.result
         warned = [capital(str(warning)) for warning in result["warnings"]] if warnings is None else warnings
         top = [f"hedgebed {result['version']}", *lead] if version else lead
-        page = Page(str(result["title"]) if title is None else title, top, sections, tiles, warned, missing)
+        words = str(result["title"]) if title is None else title
+        page = Page(words, top, sections, tiles, warned, missing, limits_words(result))
         report = write_page(self.folder / "report.html", page)
         self.tell(1.0)
         return report

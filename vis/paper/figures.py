@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from vis.page.folder import read_columns
 from vis.page.page import Block
-from vis.page.plots import GREY, INK, STATES, Array, handle, legend_above, sheet
+from vis.page.plots import BED, GREY, INK, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result
 from vis.page.states import States, state_runs
 
@@ -329,5 +329,37 @@ def _diamond(ratio: float, ratios: Sequence[float]) -> float:
     return 3.0 + 3.5 * ratios.index(ratio) / max(len(ratios) - 1, 1)
 
 
-FIGURES = {"figure5": figure_5, "figure6": figure_6, "figure7": figure_7, "figure8": figure_8, "sweep": figure_sweep}
+def figure_evidence(paper: PaperRun) -> Block | None:
+    """Low-torque angles under a step and under a torque that rises, and the odds of every rival."""
+    weighed = paper.result.get("evidence")
+    if not weighed:
+        return None
+    rows = weighed["rivals"]
+    step = rows[0]
+    rise = next(row for row in rows if row["id"] == "torque-rise")
+    drawing, ((left, right),) = sheet(1, 2, 3.4, width_ratios=(1.0, 1.25))
+    left.axhspan(17.5, 27.5, color=GREY, alpha=0.2, lw=0)
+    left.axhline(22.5, color=GREY, lw=0.9, ls=_DASHED)
+    times = [0.0 if entry["value"] is None else entry["value"] for entry in (step["best"], *rise["values"])]
+    told = [step["best"], *rise["values"]]
+    for k in range(len(step["best"]["low_torque_angles"])):
+        angles = [entry["low_torque_angles"][k] for entry in told]
+        left.plot(times, [math.nan if angle is None else angle for angle in angles], "o-", color=BED, ms=3.5, lw=0.8)
+    left.set(xlabel="time constant of the torque [s]", ylabel="trajectory angle [degrees]", ylim=(0, 70))
+    left.set_title("low torque, steel and brick")
+    shown = sorted(rows[1:], key=lambda row: row["nats"])
+    for place, row in enumerate(shown):
+        colour = BED if row["id"] == "torque-rise" else GREY
+        right.barh(place, row["nats"] - step["nats"], color=colour, height=0.62)
+    right.axvline(0.0, color=INK, lw=0.8)
+    right.set_yticks(range(len(shown)), [row["id"] for row in shown])
+    right.set_xlabel("ln odds against a step of the torque")
+    right.grid(False, axis="y")
+    return paper.draw("evidence", drawing)
+
+
+FIGURES = {
+    "evidence": figure_evidence, "figure5": figure_5, "figure6": figure_6, "figure7": figure_7, "figure8": figure_8,
+    "sweep": figure_sweep,
+}  # fmt: skip
 """Name -> what draws it, in the report's order; None where there is nothing to draw."""

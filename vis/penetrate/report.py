@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
+from vis.page.limits import limits_words
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, figure, table, text, write_template
 from vis.page.plots import BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled
@@ -64,7 +65,7 @@ def write_penetration_report(folder: str | Path, *, pictures: bool = True, progr
     context["plots"] = {plot.name: figure(path, title=plot.title, caption=plot.caption) for plot, path in plots}
     context["pictures"] = [_picture(picture) for picture in drawn.stills if picture.file.exists()]
     context["animation"] = _picture(drawn.animation) if drawn.animation and drawn.animation.file.exists() else None
-    context |= {"method": drawn.method, "picture_notes": drawn.notes}
+    context |= {"method": drawn.method, "picture_notes": drawn.notes, "limits": limits_words(run.result)}
     report = write_template(run.path / "report.html", "report.html", **context)
     tell(1.0)
     return report

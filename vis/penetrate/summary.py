@@ -86,7 +86,13 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
     model = quantity(quantities.get("sinkage_spring_damper"))
     if (needed := words.value_of(quantities, "depth_to_rest")) is not None:
         under = f"under {quantity(quantities['load'])}; " if words.value_of(quantities, "load") is not None else ""
-        tiles.append(("Sinks to rest", "not in this bed", f"{under}it would need about {quote(needed, None, 'm')}"))
+        tiles.append(
+            (
+                "Sinks to rest",
+                "not in this bed",
+                f"{under}it would need about {quote(needed, None, 'm', significant=2)}",
+            )
+        )
     elif _restless(run, quantities):
         note = f"no set-down came to rest in time; the spring-damper says {model}"
         tiles.append(("Sinks to rest at", "unknown", note))

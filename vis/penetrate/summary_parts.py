@@ -232,12 +232,18 @@ def rest_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
     rows = [mapping_of(row) for row in list_of(rest.get("cohesions"))]
     if rest.get("comes_to_rest") is not False or not rows:
         return None
-    none = [quote(0.0, 0.0, "Pa"), quote(0.0, 0.0, "N"), quote(plain_value(rest.get("depth")), None, "m")]
+    none = [
+        quote(0.0, 0.0, "Pa"),
+        quote(0.0, 0.0, "N"),
+        quote(plain_value(rest.get("depth")), None, "m", significant=2),
+    ]
     cells = [
         [
             quote(plain_value(row.get("cohesion")), 0.0, "Pa"),
-            quote(plain_value(row.get("carries")), None, "N"),
-            "at the surface" if row.get("depth") == 0 else quote(plain_value(row.get("depth")), None, "m"),
+            quote(plain_value(row.get("carries")), None, "N", significant=2),
+            "at the surface"
+            if row.get("depth") == 0
+            else quote(plain_value(row.get("depth")), None, "m", significant=2),
         ]
         for row in rows
     ]

@@ -126,6 +126,11 @@ def test_an_angle_of_repose_needs_one_bed_and_no_pressures():
     assert found["angle_of_repose"] == pytest.approx((33.0, 0.7))
     with pytest.raises(ValueError, match=r"repose_size, times grain: size: x = 0\.08 m is too narrow"):
         calibrate.check(settings.model_copy(update={"repose_size": (20.0, 6.0, 8.0)}))
+    calibrate.check(settings)
+    shallow = settings.model_copy(update={"repose_size": (92.0, 6.0, 19.0)})
+    with pytest.raises(ValueError, match=r"repose_size = 92 6 19: .* targets.angle_of_repose.fit = false"):
+        calibrate.check(shallow)
+    calibrate.check(shallow.model_copy(update={"targets": {"angle_of_repose": ANGLE | {"fit": False}}}))
 
 
 def test_the_triaxial_angle_of_triaxial_compression_is_its_own():

@@ -1,7 +1,6 @@
 """`hedgebed campaign new`, `check` and `from-run`: templates that hold, faults all said at once, odd data found."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from fake_bed import FakeBed
 from golden import golden
 from penetration_campaigns import campaign_of, driven_trial, drop_trial
 
+from dem import Material
 from experiments.campaign import Campaign, Recording, read_campaign, write_campaign
 from experiments.campaign import tables as known
 from experiments.campaign.files import new_campaign
@@ -197,7 +197,7 @@ def grains(tmp_path_factory):
         seeds=(1, 2, 3), speeds=(0.2, 0.4), other_speeds=(0.4,), drop_speeds=(0.1,), other_drop_speeds=(0.1,),
         drop_time=0.5, depth=0.01, frame_count=0, mass=MASS, load=LOAD, lowering_speed=0.1, substeps=20,
     )  # fmt: skip
-    sand = SimpleNamespace(name="sand", density=2650.0, young=7e10, poisson=0.25, friction=0.5, surface_energy=0.0)
+    sand = Material("sand", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             beds, "prepare_bed",

@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import slow_drive
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, saved
 
-import experiments
 from experiments.campaign import read_model
 from experiments.cli.main import main
 from experiments.diagnose.fit.forms import load_own, own_starts, parameters_of
 from experiments.diagnose.push.law import SLOTS, fall, push, slot_table
 from experiments.diagnose.push.problem import make_problem
 
-GUIDE = Path(experiments.__file__).parents[1] / "docs" / "diagnose.md"
-RISES = Path(experiments.__file__).parent / "terms" / "torque_rise.py"
+GUIDE = Path(slow_drive.__file__).parents[1] / "docs" / "diagnose.md"
+SLOW = Path(slow_drive.__file__)
 FORCE, SPEED = 1.5, 0.03
 
 
@@ -73,11 +73,11 @@ def test_the_command_names_an_effect_from_a_file_and_the_model_brings_the_file_a
 
 
 def test_amplitudes_are_counted_from_what_changes_nothing():
-    own = load_own(RISES)
+    own = load_own(SLOW)
     (rise,) = parameters_of(own.id, own.form.numbers)
     assert rise.value == 0.0 and own.neutral("rise") == 1e-4
     assert rise.lowest == 0.0
-    assert [start["torque-rise.rise"] for start in own_starts(own, (rise,))] == [0.0125, 0.05, 0.2]
+    assert [start["slow-drive.rise"] for start in own_starts(own, (rise,))] == [0.0125, 0.05, 0.2]
 
 
 @pytest.mark.parametrize(

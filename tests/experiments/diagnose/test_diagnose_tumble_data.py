@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import slow_drive
 from tumble_campaigns import CONDITIONS, NOMINAL, campaign
 
-import experiments
 from experiments.campaign import Campaign, Recording
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
 from experiments.diagnose.fit.forms import load_own
@@ -18,7 +18,7 @@ from experiments.diagnose.tumble.forward import Forward
 from experiments.diagnose.tumble.problem import TumbleProblem
 from rigid import Effect
 
-RISES = Path(experiments.__file__).parent / "terms" / "torque_rise.py"
+SLOW = Path(slow_drive.__file__)
 
 
 def changed(made: Campaign, sensor: str, columns: dict) -> Campaign:
@@ -166,13 +166,13 @@ def test_the_first_share_of_a_motion_is_what_the_whole_motion_begins_with(share)
 
 def test_an_effect_from_a_file_moves_the_batch_as_it_moves_the_accurate_integrator():
     """Mean square of the difference over the noise below a hundredth, as for the effects of the library."""
-    rise = Effect(id="torque-rise", parameters={"rise": 0.08}, file=RISES)
+    rise = Effect(id="slow-drive", parameters={"rise": 0.16}, file=SLOW)
     data = tumble_data(campaign(effects=(rise,), conditions=CONDITIONS[:1], duration=0.8))
-    forward = Forward(data, own=[load_own(RISES)])
+    forward = Forward(data, own=[load_own(SLOW)])
     trial = data.trials[0]
     gaps = {}
-    for value in (0.08, forward.neutral["torque-rise.rise"]):
-        (found,) = forward.predict({"torque-rise.rise": np.array([value])})
+    for value in (0.16, forward.neutral["slow-drive.rise"]):
+        (found,) = forward.predict({"slow-drive.rise": np.array([value])})
         gap = (found.value[0] - trial.value) / trial.std
         gaps[value] = max(np.mean(gap[trial.of(name)] ** 2) for name in CHANNELS)
-    assert gaps[0.08] < 0.01 < 1 < gaps[1e-4]
+    assert gaps[0.16] < 0.01 < 1 < gaps[1e-4]

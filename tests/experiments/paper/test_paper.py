@@ -10,14 +10,19 @@ import numpy as np
 import pytest
 from golden import golden
 
+import experiments
 from experiments.cli.main import main
-from experiments.paper.claims import friction_of_a_rigid_pivot
+from experiments.paper.claims import Trials, claims, friction_of_a_rigid_pivot
+from experiments.paper.evidence import RIVALS, evidence, nats, rival_trials
 from experiments.paper.experiment import plan_jobs, run
+from experiments.paper.grains import kept_angles
 from experiments.paper.settings import PaperSettings
 from experiments.paper.transitions import slip_before_hop
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
 from rigid.planar.simulate import simulate
+
+RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
 
 
 @pytest.fixture(scope="module")
@@ -101,30 +106,110 @@ def test_low_torque_on_brick_starts_at_about_22_degrees_and_the_brake_slips_at_o
     assert math.degrees(cases["brick", 6.0, "nominal"]["transition_angle_slip"]) == pytest.approx(0.0, abs=0.1)
 
 
-def test_claims_say_what_is_stated_what_came_out_and_whether_it_is_inside(small):
-    claims = {claim["statement"]: claim for claim in result_of(small)["claims"]}
-    low = claims["starts at about 22.5 degrees (brick, 0.0085 g, 0.125 N m)"]
-    assert low["met"] is True and low["ours"].endswith("degrees") and low["difference"].startswith("-1.")
-    negative = claims["on grains a brake trial sinks and leaves at a negative angle (sand, 0.0085 g, 6 N m)"]
-    assert negative["met"] is False  # a spring-damper does not do what grains do, and the report says so
-    about_60 = claims["the angle grows to about 60 degrees (brick, 0.0085 g, 6 N m)"]
-    assert about_60["met"] is True
-    golden("paper/notes", {"on grains": negative["note"], "about 60 degrees": about_60["note"]})
-    compared = [claim for claim in claims.values() if claim["met"] is not None]
+def test_claims_say_what_is_stated_what_came_out_and_whether_it_is_met(small):
+    claims = result_of(small)["claims"]
+    assert all(claim["quote"] and claim["compared"] and claim["ours"] and claim["judged_by"] for claim in claims)
+    (at_once,) = [claim for claim in claims if claim["quote"].startswith("begins")]
+    assert at_once["met"] is True and at_once["ours"].startswith("0.0 ")
+    # mu_d is the paper's, an input; counts are of all 24 experiments, which these are not
+    assert [claim["met"] for claim in claims if claim["stated"] == "0.5"] == [None]
+    counted = ("Most of", "Five experiments", "Four experiments")
+    assert all(claim["met"] is None for claim in claims if claim["quote"].startswith(counted))
+    judged = [claim for claim in claims if claim["met"] is not None]
     quantities = result_of(small)["quantities"]
-    assert quantities["claims_compared"]["value"] == len(compared)
-    assert quantities["claims_met"]["value"] == sum(claim["met"] for claim in compared)
+    assert quantities["claims_compared"]["value"] == len(judged)
+    assert quantities["claims_met"]["value"] == sum(claim["met"] for claim in judged)
+    golden("paper/quotes", [f"{claim['quote']}: {claim['compared']}" for claim in claims])
 
 
-def test_a_hop_counts_as_brief_by_the_contact_before_it_and_brakes_do_not_count(small):
-    hop = next(c for c in result_of(small)["claims"] if c["statement"].startswith("even a short tumble ends"))
-    golden("paper/brief_hops", [hop["ours"], hop["judged_by"]])
+def test_each_claim_is_told_under_a_torque_that_rises_too(small):
+    claims = result_of(small)["claims"]
+    assert all(set(claim["risen"]) == {"ours", "difference", "met"} for claim in claims)
+    assert not any(case["variant"].startswith("torque") for case in result_of(small)["cases"])  # no case of the figures
+    jobs = [job for job in plan_jobs(PaperSettings()) if job.kind == "risen"]
+    assert len(jobs) == 16 and all(job.trial.effects[0].values["rise"] == 0.25 for job in jobs)
+    assert not any(job.trial.actuator == "brake" for job in jobs)
+
+
+def test_of_the_hops_the_count_is_compared_and_not_how_brief_they_are(small):
+    claims = [claim for claim in result_of(small)["claims"] if "hop" in claim["quote"] or "video" in claim["quote"]]
+    hops, filmed = claims
+    assert hops["ours"] == "2 of 2" and hops["met"] is True
+    assert filmed["met"] is None  # of the six cases there are two
     cases = {(c["surface"], c["torque"], c["variant"]): c for c in result_of(small)["cases"]}
     motor, brake = (cases["brick", torque, "nominal"]["launch"] for torque in (0.125, 6.0))
-    assert motor["landed"] and motor["lasts"] == pytest.approx(0.65, abs=0.01) and motor["lasts"] < motor["time"]
+    assert motor["landed"] and motor["lasts"] == pytest.approx(0.65, abs=0.01)
     assert motor["height"] == pytest.approx(motor["vy"] ** 2 / (2 * 0.0085 * 9.80665), rel=1e-9)
     assert not brake["landed"] and brake["lasts"] > brake["time"]
-    assert f"{brake['lasts']:.2f} s after {brake['time']:.2f} s of contact" in hop["note"]
+    assert f"{brake['lasts']:.2f} s after {brake['time']:.2f} s of contact" in hops["note"]
+
+
+def test_angles_on_grains_are_those_of_the_kept_results():
+    kept = kept_angles()
+    assert {(entry.surface, entry.rig, entry.torque) for entry in kept} == {
+        (surface, rig, torque)
+        for surface in ("sand", "jsc1a")
+        for rig in (0.0085, 0.015)
+        for torque in (0.125, 0.22, 6.0)
+    }  # fmt: skip
+    for entry in kept:
+        result = json.loads((RESULTS / entry.case / "result.json").read_text())
+        angle = math.degrees(result["quantities"]["trajectory_angle"]["value"])
+        assert angle == pytest.approx(entry.angle, abs=0.05), entry.case
+        assert (result["surface"], result["trial"]["torque"]["value"]) == (entry.surface, entry.torque)
+
+
+def trials_of(*, kept=(), **angles):
+    """All 24 experiments with made-up angles [degrees], by surface: of its motors, and of its brakes."""
+    settings = PaperSettings()
+    cases, trials = {}, {}
+    trial = plan_tumble(TumbleSettings(rig=0.0085, torque=0.125)).trial
+    for surface in settings.surfaces:
+        for rig in settings.rigs:
+            for torque in (*settings.motor_torques, *settings.brake_torques):
+                motor, brake = angles.get(surface, angles["others"])
+                angle = math.radians(brake if torque in settings.brake_torques else motor)
+                case = {
+                    "kind": "", "trajectory_angle": angle, "transition_angle_hop": 0.3, "transition_angle_slip": 0.0,
+                    "transitions": [(0.0, "slip", 0.0), (1.0, "hop", 0.3)], "launch": None, "surface": surface,
+                    "torque": torque,
+                }  # fmt: skip
+                for variant in ("low", "nominal", "high"):
+                    cases[surface, rig, torque, variant] = case
+                trials[surface, rig, torque] = trial
+    return Trials(settings, cases, trials, kept)
+
+
+def met(trials):
+    """Whether the claims that count are met: by the first word of the quote, for hard ground, springs and grains."""
+    found = {}
+    for claim in claims(trials):
+        found.setdefault(claim["quote"].split()[0], []).append(claim["met"])
+    return found["Most"], found["Five"], found["Four"]
+
+
+AS_THE_PAPER = {"others": (21.0, 60.0), "sand": (21.0, -3.0), "jsc1a": (20.0, -2.0)}
+
+
+def test_experiments_as_the_paper_has_them_meet_its_counts_and_one_more_above_does_not():
+    """Sixteen near 22.5 but one above; four brakes at 60 on hard ground, four below zero on grains."""
+    trials = trials_of(**AS_THE_PAPER)
+    place = ("steel", 0.0085, 0.22)
+    trials.table[(*place, "nominal")] = trials.table[(*place, "nominal")] | {"trajectory_angle": math.radians(47.0)}
+    assert met(trials) == ([True, True, None], [True, True, None], [True, None])  # on grains no case is kept
+    place = ("brick", 0.015, 0.22)
+    trials.table[(*place, "nominal")] = trials.table[(*place, "nominal")] | {"trajectory_angle": math.radians(30.0)}
+    assert met(trials) == ([True, True, None], [False, True, None], [True, None])
+
+
+def test_one_motor_that_leaves_downwards_contradicts_the_papers_four_negative_angles():
+    kept = kept_angles()
+    # Our sand's motors are downwards, JSC-1A's brakes are not; and no motor of either is within 5 degrees of 22.5.
+    assert met(trials_of(kept=kept, **AS_THE_PAPER)) == ([True, True, False], [True, True, True], [True, False])
+    right = [replace(entry, angle=-2.0 if entry.torque == 6.0 else 20.0) for entry in kept]
+    assert met(trials_of(kept=right, **AS_THE_PAPER)) == ([True] * 3, [True] * 3, [True] * 2)
+    one = [replace(entry, angle=-1.0) if entry.case == "grains1-sand-0.015-0.22" else entry for entry in right]
+    assert met(trials_of(kept=one, **AS_THE_PAPER))[2] == [True, False]
 
 
 def test_transition_angles_are_shown_with_bands_and_judged_once_measured_ones_are_given(tmp_path):
@@ -134,6 +219,7 @@ def test_transition_angles_are_shown_with_bands_and_judged_once_measured_ones_ar
     )  # fmt: skip
     run(settings, tmp_path / "a")
     claim = result_of(tmp_path / "a")["claims"][-1]
+    assert "majority" in claim["quote"]
     # 15.35, 0 and 8.06 degrees: two of three within five.
     assert claim["met"] is True
     golden("paper/measured_angles", [claim["ours"], claim["note"]])
@@ -161,10 +247,68 @@ def test_steel_slips_at_once_under_a_step_of_the_torque_and_pivots_under_one_tha
     jobs = [job for job in plan_jobs(PaperSettings(sweep=False)) if (job.surface, job.rig) == ("steel", 0.0085)]
     first = {}
     for job in jobs:
-        if job.torque == 0.125 and job.variant in ("nominal", "torque rise 0.1 s"):
+        if job.torque == 0.125 and job.kind in ("", "risen") and job.variant not in ("low", "high", "paper"):
             transitions = simulate(job.trial, duration=0.5).transitions
-            first[job.variant] = next(state for _, state, _ in transitions if state != "stand")
-    assert first == {"nominal": "slip", "torque rise 0.1 s": "pivot"}
+            first[job.kind] = next(state for _, state, _ in transitions if state != "stand")
+    assert first == {"": "slip", "risen": "pivot"}
+
+
+def test_the_likelihood_of_the_text_is_largest_for_experiments_as_it_has_them():
+    as_it_has = {
+        "low": [22.5] * 8, "brakes": [60.0] * 4, "largest": 60.0, "at_once": [True] * 2, "hops": [True] * 6,
+        "pivots": True, "mu_s": True, "mu_d": True,
+    }  # fmt: skip
+    best = nats(**as_it_has)
+    for changed in (
+        {"low": [40.0] * 5 + [22.5] * 3}, {"low": [22.5] * 4 + [10.0] * 4}, {"brakes": [22.5] * 4}, {"largest": 76.0},
+        {"at_once": [True, False]}, {"hops": [True] * 3 + [False] * 3}, {"pivots": False}, {"low": [None] * 8},
+        {"mu_s": False}, {"mu_d": False},
+    ):  # fmt: skip
+        (key,) = changed
+        other = nats(**(as_it_has | changed))
+        assert sum(other.values()) < sum(best.values()), changed
+        assert [name for name in best if other[name] != best[name]] == [
+            {"low": "low torque", "at_once": "at once"}.get(key, key)
+        ]
+    # One of the sixteen exceeds, on hard ground or on grains, so that one costs little and a second much.
+    one, two = (nats(**(as_it_has | {"low": [47.0] * n + [22.5] * (8 - n)}))["low torque"] for n in (1, 2))
+    assert best["low torque"] - 1 < one and two < one - 2
+    # By hand: two experiments that slip at once, each read right with 0.95; five of six hops of six that hop.
+    assert best["at once"] == pytest.approx(2 * math.log(0.95))
+    assert best["hops"] == pytest.approx(math.log(6 * 0.95**5 * 0.05))
+    inside = math.erf(1 / math.sqrt(2))
+    assert best["largest"] == pytest.approx(math.log(0.95 * inside + 0.05 / 3))
+
+
+def test_every_rival_changes_what_it_names_and_a_number_that_must_be_just_right_pays():
+    trial = plan_tumble(TumbleSettings(rig=0.0085, torque=0.125, surface="steel")).trial
+    made = {name: other for name, other, _ in rival_trials(trial)}
+    assert len(made) == sum(len(rival.values) for rival in RIVALS)
+    same = [name for name, other in made.items() if other == trial]
+    assert same == ["pivot-start 0.001"]  # the same platform, started otherwise
+    brake = plan_tumble(TumbleSettings(rig=0.0085, torque=6.0, actuator="brake", wheel_speed_0=300.0)).trial
+    assert not any(name.startswith("torque-rise") for name, _, _ in rival_trials(brake))
+    assert evidence(PaperSettings(evidence=False), []) == evidence(PaperSettings(rigs=(0.0085,)), []) == {}
+
+
+@pytest.mark.long
+def test_a_torque_that_rises_explains_the_hard_surfaces_as_more_friction_does_and_a_step_does_not(tmp_path):
+    """docs/tumble.md, What is missing: seven of eight low torques near 22.5 degrees, one beyond, a pivot first."""
+    result = run(PaperSettings(sweep=False, workers=1, surfaces=("steel", "brick")), tmp_path / "a")
+    rows = {row["id"]: row for row in result["evidence"]["rivals"]}
+    step, rise = rows["step"]["best"], rows["torque-rise"]["best"]
+    assert (step["near"], step["above"], step["pivots"]) == (4, 4, False)
+    assert (rise["near"], rise["above"], rise["pivots"]) == (7, 1, True)
+    assert rows["torque-rise"]["nats"] > rows["step"]["nats"] + 8
+    assert max(rows, key=lambda id: rows[id]["nats"]) == "torque-rise"
+    # Two frictions that the paper does not state do as much; were friction free, they would lead.
+    for id, value in (("sliding-friction", 1.0), ("friction", 1.5)):
+        best = max(rows[id]["values"], key=lambda entry: entry["nats"])
+        assert (best["value"], best["near"], best["above"], best["pivots"]) == (value, 7, 1, True)
+        assert rows[id]["apart"] > rows["torque-rise"]["apart"]
+    others = [row["nats"] for id, row in rows.items() if id not in ("torque-rise", "sliding-friction", "friction")]
+    assert max(others) < rows["torque-rise"]["nats"] - 3
+    assert (tmp_path / "a" / "figures" / "evidence.png").exists()
 
 
 def test_a_hop_is_extrapolated_from_where_and_how_it_begins(small):
@@ -183,8 +327,8 @@ def test_a_hop_is_extrapolated_from_where_and_how_it_begins(small):
 def test_the_report_shows_the_figures_there_are_trials_for(small):
     page = (small / "report.html").read_text()
     count = result_of(small)["integrations"]
-    words_of_it = (f"{count} integrations", "no friction of a tip that slides", "all friction of sand: they are ours")
-    for words in ("Figure 6", "Figure 7", "Figure 8", "not comparable", "What the text states", *words_of_it):
+    words_of_it = (f"{count} integrations", "all friction of sand: they are ours", "as the paper fixed it")
+    for words in ("Figure 6", "Figure 7", "Figure 8", "not judged", "What the text states", *words_of_it):
         assert words in page
     assert not (small / "figures" / "figure5.png").exists()  # that one is of steel
     assert "http://" not in page and "https://" not in page
@@ -231,5 +375,5 @@ def test_the_whole_paper_takes_less_than_a_minute_of_processor_time(tmp_path):
     assert processor_time() - start < 60
     assert result["quantities"]["case_count"]["value"] == 24
     assert result["quantities"]["energy_residual"]["value"] < 1e-6
-    for name in ("figure5", "figure6", "figure7", "figure8", "sweep"):
+    for name in ("evidence", "figure5", "figure6", "figure7", "figure8", "sweep"):
         assert (tmp_path / "a" / "figures" / f"{name}.png").exists()

@@ -568,7 +568,7 @@ def test_the_spring_damper_through_the_master_is_the_planar_model_to_its_toleran
     ("given", "said"),
     [
         (("--ground", "bekker"), "ground = 'bekker': the master takes the spring-damper"),
-        (("--effects", "pendulum.length=2.2"), "effects is given with method = 'coupled'"),
+        (("--effects", "pendulum.length=2.2"), "effects = pendulum is given with method = 'coupled'"),
         (("--substeps", "30"), "substeps = 30 makes a step of 1.2 ms.* 25 or less would do"),
         (("--grain", "0.004"), "grain = 0.004 belongs to ground = 'bed'"),
         (("--drop-spin", "1"), "drop_spin = 1 is of a landing: give drop_speed"),

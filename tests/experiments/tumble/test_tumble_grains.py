@@ -95,7 +95,7 @@ def test_a_bed_that_will_not_do_is_refused_before_any_work(given, said):
 @pytest.mark.parametrize(
     "given",
     [
-        {"effects": ("pendulum.length=2.2",)},
+        {"effects": ("torque-rise.rise=0.25", "pendulum.length=2.2")},
         {"method": "paper"},
         {"campaign": "made"},
         {"ground_parameters": ("stiffness=3",)},

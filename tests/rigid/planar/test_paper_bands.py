@@ -5,15 +5,17 @@ import math
 import pytest
 from rigid_trials import LENGTH, MASS, G, in_rig
 
-from rigid import simulate
+from rigid import Effect, simulate
 from rigid.planar.dynamics import Modes, System
 
 STEEL, BRICK = 0.25, 0.5
 LEVELS = pytest.mark.parametrize("level", [0.0085, 0.015])
 
 
-def tumble(torque, mu_s, level=0.0085, duration=2.0, mu_d=None):
+def tumble(torque, mu_s, level=0.0085, duration=2.0, mu_d=None, rise=None):
     spinning = {"actuator": "brake", "wheel_speed_0": 300.0} if torque == 6.0 else {}
+    if rise is not None:
+        spinning["effects"] = (Effect(id="torque-rise", parameters={"rise": rise}),)
     trial = in_rig(torque, mu_s=mu_s, mu_d=mu_d, level=level, **spinning)
     return simulate(trial, duration=duration, sample_interval=5e-3)
 
@@ -44,35 +46,58 @@ def sliding(mu_d):
     return math.degrees(math.atan2(MASS, (MASS + counterweight) * mu_d))
 
 
-def test_at_6_nm_on_brick_the_angle_is_the_papers_60_degrees_within_five():
-    assert degrees(tumble(6.0, BRICK)) == pytest.approx(60, abs=5)
-
-
 def test_at_6_nm_on_steel_the_angle_is_the_closed_forms_76_degrees_and_not_the_papers_60():
-    # tan = m / (M_y mu_d) with mu_d = mu_s / 2, which is ours: the paper gives none. The weight is small beside the
-    # load; it and the turn over the first 10 mm take half a degree.
+    # tan = m / (M_y mu_d) with mu_d = mu_s / 2, to which the paper fixed it. The weight is small beside the load; it
+    # and the turn over the first 10 mm take half a degree.
+    # "To a maximum of about 60 degrees" is said of steel at 0.0085 g.
     angle = degrees(tumble(6.0, STEEL))
     assert sliding(0.5 * STEEL) == pytest.approx(76.1, abs=0.05)
     assert angle == pytest.approx(sliding(0.5 * STEEL), abs=1)
     assert not 55 < angle < 65
 
 
+def test_no_friction_within_the_papers_ten_percent_brings_steel_to_60_degrees_within_five():
+    # By the closed form that takes mu_d of 0.235 to 0.36, nearly twice the 0.1125 to 0.1375 of the band.
+    assert min(sliding(share * 0.5 * STEEL) for share in (0.9, 1.0, 1.1)) > 74
+    assert sliding(0.235) == pytest.approx(65, abs=0.2)
+
+
+def test_at_6_nm_on_brick_the_angle_is_the_closed_forms_63_degrees():
+    assert degrees(tumble(6.0, BRICK)) == pytest.approx(sliding(0.5 * BRICK), abs=1)
+
+
 def test_at_0_22_nm_on_steel_the_angle_lies_between_those_of_the_other_torques():
-    # The paper says no more of it than that the angle grows with torque, to about 60 degrees at the largest. Ours is
-    # at the end of that already: 61.6, another sign that steel slides too easily here.
+    # Of Figure 5, steel, the paper says that the angle grows with torque, to about 60 degrees at the largest. Ours is
+    # at the end of that already: 61.6, a sign that steel slides too easily here under a step of the torque.
     low, middle, high = (degrees(tumble(torque, STEEL)) for torque in (0.125, 0.22, 6.0))
     assert low < middle < high
     assert middle == pytest.approx(61.6, abs=0.1)
 
 
-def test_no_one_ratio_of_mu_d_to_mu_s_brings_steel_and_brick_to_60_degrees_within_five():
-    # By the closed form steel would take a ratio above 0.94, brick one below 0.71.
-    ratios = [0.5 + 0.01 * k for k in range(51)]
-    fits = {mu_s: {k for k, r in enumerate(ratios) if abs(sliding(r * mu_s) - 60) <= 5} for mu_s in (STEEL, BRICK)}
-    assert fits[STEEL] and fits[BRICK] and not fits[STEEL] & fits[BRICK]
-    # With mu_d = mu_s the model is where the closed form is on steel, and as far from the paper on brick.
-    assert degrees(tumble(6.0, STEEL, mu_d=STEEL)) == pytest.approx(sliding(STEEL), abs=1)
-    assert degrees(tumble(6.0, BRICK, mu_d=BRICK)) == pytest.approx(sliding(BRICK), abs=1)
+PIVOT = 22.5 - math.degrees(0.01 / (2 * LENGTH))
+"""Chord of the first 10 mm of a pure pivot [degrees], which starts at 22.5."""
+
+
+def low_torque_angles(rise, duration):
+    cases = [(mu_s, level, torque) for mu_s in (STEEL, BRICK) for level in (0.0085, 0.015) for torque in (0.125, 0.22)]
+    return {case: degrees(tumble(case[2], case[0], case[1], duration, rise=rise)) for case in cases}
+
+
+def test_under_a_step_four_of_eight_low_torques_start_near_22_5_and_four_of_steel_and_brick_exceed_it():
+    # "Most of the low-torque experiments ... identified by the ~22.5 degree initial trajectory angle. Five experiments
+    # exceed this angle ... Four of these used the brakes": on all four surfaces one low torque of sixteen does.
+    angles = low_torque_angles(None, 3.5)
+    beyond = {case for case, angle in angles.items() if angle > 27.5}
+    assert beyond == {(STEEL, 0.0085, 0.125), (STEEL, 0.0085, 0.22), (STEEL, 0.015, 0.22), (BRICK, 0.0085, 0.22)}
+    assert all(angle == pytest.approx(PIVOT, abs=0.5) for case, angle in angles.items() if case not in beyond)
+
+
+def test_under_a_torque_that_rises_over_a_quarter_of_a_second_seven_of_eight_pivot_and_one_exceeds_22_5():
+    angles = low_torque_angles(0.25, 4.0)
+    assert [case for case, angle in angles.items() if angle > 27.5] == [(STEEL, 0.0085, 0.22)]
+    near = [angle for case, angle in angles.items() if case != (STEEL, 0.0085, 0.22)]
+    assert all(20.7 < angle < 21.0 for angle in near)
+    assert first_that_lasts(tumble(0.125, STEEL, rise=0.25)) == "pivot"
 
 
 def first_that_lasts(run):
@@ -131,10 +156,10 @@ def test_the_six_cases_at_0_0085_g_hop_first_at_the_documented_angles_and_for_th
             assert end - begin == pytest.approx(length, abs=0.01)
 
 
-def test_fewer_tumbles_end_in_a_hop_shorter_than_the_contact_before_it_than_the_paper_saw_in_5_of_6(runs):
-    # The motor trials of a 2.5 s run. Brakes throw the platform for longer than the whole run.
-    brief = {case: (hop := first_hop(runs[case])) and hop[2] - hop[1] < hop[1] for case in HOPS if case[1] != 6.0}
-    assert brief == {(BRICK, 0.125): True, (BRICK, 0.22): True, (STEEL, 0.125): True, (STEEL, 0.22): False}
+def test_all_six_hop_as_the_papers_simulation_does_where_its_video_saw_five(runs):
+    # "Even for a short tumble in 0.0085 g the simulation predicts the platform will ... perform a brief hop ...
+    # high-speed video confirms this in 5 of 6 cases." How brief is not said; ours are longer with the brakes.
+    assert all(first_hop(run) is not None for run in runs.values())
     for mu_s in (STEEL, BRICK):
         _, begin, end = first_hop(runs[mu_s, 6.0])
         assert end is None and 2.5 - begin > 20 * begin

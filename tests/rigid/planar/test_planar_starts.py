@@ -9,21 +9,17 @@ less than a fifth of the weight.
 """
 
 import math
-from pathlib import Path
 
 import pytest
 from rigid_trials import MASS, G, free, in_rig
 
-import experiments
 from rigid import Effect, Trial, simulate
-
-RISES = Path(experiments.__file__).parent / "terms" / "torque_rise.py"
 
 
 def steel(*, rise: float | None, reading: str = "pair") -> Trial:
     given: dict = {"mu_s": 0.25, "torque_until": 100.0}
     if rise is not None:
-        given["effects"] = (Effect(id="torque-rise", parameters={"rise": rise}, file=RISES),)
+        given["effects"] = (Effect(id="torque-rise", parameters={"rise": rise}),)
     if reading == "weight":
         given["counterweight"] = MASS * (1 - 0.0085)
         given["gravity_sim"] = G * (MASS - given["counterweight"]) / (MASS + given["counterweight"])

@@ -1,0 +1,53 @@
+"""Real beds, small ones: made stiffer without another grain in another place, and prepared by the recipe of grains
+that stick; a foot in them."""
+
+import numpy as np
+import pytest
+
+from dem import Bed
+from experiments.penetrate import beds
+from experiments.penetrate import experiment as penetrate
+from experiments.penetrate.settings import PenetrateSettings
+
+SMALL = {
+    "bed_size": (0.024, 0.024, 0.018), "grain": 0.003, "tip_diameter": 0.006, "depth": 0.004, "shaft_length": 0.014,
+    "allow_coarse": True, "seeds": (1,), "threads": 1, "frame_count": 0,
+}  # fmt: skip
+
+
+def test_a_bed_made_stiffer_has_the_same_grains_in_their_places_at_rest(tmp_path, monkeypatch):
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
+    settings = PenetrateSettings(**SMALL)
+    young = beds.choose_softness(settings).young
+    bed = Bed.prepare(
+        beds.find_material(settings), size=settings.bed_size, grain=0.003, gravity=settings.gravity, young=young,
+        max_overlap=0.05, cache=False, threads=1,
+    )  # fmt: skip
+    stiffer = beds.stiffened(bed, 1.5 * young, settings)
+    before, now = bed.grains(), stiffer.grains()
+    assert np.array_equal(before.radius, now.radius)
+    moved = np.linalg.norm(now.position - before.position, axis=1) / 0.003
+    assert np.quantile(moved, 0.9) < 0.02  # loose ones on top may roll over
+    assert moved.max() < 0.5
+    assert stiffer.material == bed.material.softened(1.5 * young)
+    assert stiffer.time_step == pytest.approx(bed.time_step / np.sqrt(1.5), rel=1e-6)  # as 1 / sqrt(E)
+    assert stiffer.overlap_limit == bed.overlap_limit
+    assert stiffer.kinetic_energy < 1e-5 * stiffer.weight * 0.003
+    assert stiffer.floor_force == pytest.approx(stiffer.weight, rel=0.01)
+    assert (stiffer.time, stiffer.max_overlap) == (0.0, 0.0)
+
+
+@pytest.mark.long
+def test_a_foot_in_grains_that_stick_works_from_one_option_in_low_gravity(tmp_path, monkeypatch):
+    """JSC-1A by its recipe, prepared at 1 g, bears 0.01 N at 1e-3 g; sand without cohesion does a metre down."""
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
+    settings = PenetrateSettings(
+        **SMALL, material="jsc-1a-loose-heights", gravity="1e-3g", load=0.01, speeds=(0.2,), drop_speeds=()
+    )
+    result = penetrate.run(settings, tmp_path / "run")
+    (facts,) = result["bed"]["seeds"]
+    assert facts["packing_fraction"] == pytest.approx(0.57, abs=0.03)
+    assert "rest" not in result
+    assert result["quantities"]["sinkage_dem"]["value"] < 0.003
+    assert result["quantities"]["max_overlap"]["value"] <= settings.max_overlap

@@ -1,0 +1,107 @@
+"""Known biases (limits.toml): the table of docs/limits.md, and what a report says of its kind of run.
+
+`python -m vis.page.limits docs/limits.md` puts the table between the marks of that page.
+"""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+__all__ = ["KINDS", "Limit", "all_limits", "kind_of", "limits_table", "limits_words", "put_table"]
+
+KINDS = ("spike on grains", "platform on grains", "bed", "planar model", "diagnosis")
+"""Kinds of runs that limits concern."""
+_BEGIN, _END = "<!-- limits: begin -->", "<!-- limits: end -->"
+_GROUPS = {
+    True: "What fails",
+    False: "What is biased, left out or not measured",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limit:
+    """One bias."""
+
+    what: str
+    size: str  # How large, and which way
+    source: str  # A page of docs, with its heading
+    runs: tuple[str, ...]  # Kinds of runs that it concerns
+    fails: bool = False  # Whether something measured or published is missed
+    case: tuple[str, ...] = ()  # Rows of docs/validation.md that fail by it
+    said: str = ""  # What reports say of it, size and direction included; "": nothing
+
+
+@cache
+def all_limits() -> tuple[Limit, ...]:
+    """Every limit, failures first. Raises ValueError for an entry of the file that cannot be."""
+    file = Path(__file__).with_name("limits.toml")
+    found = []
+    for entry in tomllib.loads(file.read_text(encoding="utf-8"))["limit"]:
+        given = dict(entry) | {
+            "source": entry["from"],
+            "runs": tuple(entry["runs"]),
+            "case": tuple(entry.get("case", ())),
+        }
+        del given["from"]
+        limit = Limit(**given)
+        if unknown := set(limit.runs) - set(KINDS):
+            raise ValueError(f"limits.toml: {limit.what!r}: runs holds {sorted(unknown)}; there is {', '.join(KINDS)}")
+        found.append(limit)
+    return tuple(sorted(found, key=lambda limit: not limit.fails))
+
+
+def kind_of(result: Mapping[str, Any]) -> str | None:
+    """The kind of run that a result.json is of; None where no limit concerns it."""
+    experiment = str(result.get("experiment") or "")
+    on_grains = result.get("ground") == "bed" or "grains" in result
+    if experiment.startswith("tumble"):
+        return "platform on grains" if on_grains else "planar model"
+    if experiment in ("hop", "paper", "campaign"):
+        return "planar model"
+    if experiment.startswith("bed"):
+        return "bed"
+    if experiment == "diagnose":
+        return "diagnosis"
+    law_alone = result.get("ground") == "spring-damper"
+    return "spike on grains" if experiment in ("penetrate", "") and not law_alone else None
+
+
+def limits_words(result: Mapping[str, Any]) -> list[str]:
+    """What the report of this result says of the limits of its kind of run, size and direction included."""
+    kind = kind_of(result)
+    return [limit.said for limit in all_limits() if kind in limit.runs and limit.said]
+
+
+def limits_table(limits: Sequence[Limit]) -> list[str]:
+    """The lines of the table of docs/limits.md, a table for each group."""
+    lines = []
+    for fails, heading in _GROUPS.items():
+        lines += [f"### {heading}", "", "| what | how large, which way | runs | from |", "|---|---|---|---|"]
+        for limit in limits:
+            if limit.fails == fails:
+                page, _, heading = limit.source.partition("#")
+                link = f"[{page}]({limit.source})"
+                lines.append(f"| {limit.what} | {limit.size} | {', '.join(limit.runs)} | {link} |")
+        lines.append("")
+    return lines
+
+
+def put_table(page: Path) -> None:
+    """Write the table anew between the marks of `page`. Raises ValueError where the marks are not there."""
+    text = page.read_text(encoding="utf-8")
+    before, begin, rest = text.partition(_BEGIN)
+    _, end, after = rest.partition(_END)
+    if not (begin and end):
+        raise ValueError(f"{page} has no {_BEGIN} and {_END} for the table to stand between")
+    table = "\n".join(limits_table(all_limits()))
+    page.write_text(f"{before}{begin}\n{table}{end}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    put_table(Path(sys.argv[1]))
