@@ -47,7 +47,7 @@ INERTIAL = 0.009
 DEEP = (0.031, 0.029, 0.02)  # how far each is pushed [m]: as the shortest of its measured pushes, and a little more
 COARSE, FINE = 0.01, 0.0075  # mean diameters of the grains [m]: 6 and 8 across the smallest plate
 SEEDS, FINE_SEEDS = (1,), (1,)  # of the wide beds of coarse grains; of the smallest plate's of fine ones
-SMALL_BOX, SMALL_SEEDS = (0.18, 0.18, 0.14), (1, 2)  # the bed of the smallest plate [m]; seeds of coarse grains in it
+SMALL_BOX, SMALL_SEEDS = (0.18, 0.18, 0.14), (1,)  # the bed of the smallest plate [m]; seeds of coarse grains in it
 STEP = 0.00025  # between two depths of a curve [m]
 BAND, POWER_BAND = 0.25, 0.3  # of K and of the curves, of the exponent [1]; ours
 DOTS = 40  # of a curve in a figure
@@ -222,7 +222,7 @@ def held(prediction: Mapping[str, Any]) -> list[Held]:
 def effects(prediction: Mapping[str, Any]) -> dict[str, float]:
     """What K of the smallest plate owes to chance, the grains' size and the bed's width [1].
 
-    ``scatter``: standard deviation between like beds, of all of which there are several. ``size``: c of K = K_0
+    ``scatter``: standard deviation between the beds of coarse grains, of both widths. ``size``: c of K = K_0
     (1 - c d / D), from coarse and fine grains in the small bed. ``narrow``: mean ratio less one of a narrower
     bed, with the same seeds.
     """
@@ -234,10 +234,9 @@ def effects(prediction: Mapping[str, Any]) -> dict[str, float]:
     wide, small = each(grain=COARSE), each(grain=COARSE, box=SMALL_BOX)
     fine = each(grain=FINE, box=SMALL_BOX)
     ratio = float(small.mean() / fine.mean())  # (1 - c d / D) / (1 - c d' / D)
-    several = [group / group.mean() for group in (wide, small, fine) if len(group) > 1]
-    spread = sum(float(((group - 1) ** 2).sum()) for group in several) / sum(len(group) - 1 for group in several)
+    alike = np.concatenate([wide, small])
     return {
-        "scatter": math.sqrt(spread), "size": smallest * (1 - ratio) / (COARSE - ratio * FINE),
+        "scatter": float(alike.std(ddof=1) / alike.mean()), "size": smallest * (1 - ratio) / (COARSE - ratio * FINE),
         "narrow": float((small[: len(wide)] / wide[: len(small)]).mean()) - 1,
     }  # fmt: skip
 
@@ -272,12 +271,10 @@ def compared_with(prediction: Mapping[str, Any]) -> Outcome:
         "pushes", each=each, fine=1e3 * FINE, coarse=1e3 * COARSE, packing=float(packing.mean()),
         density=float(packing.mean()) * SAND.density, inertial=INERTIAL, rolling=SAND.rolling_friction,
         least=min(row["count"] for row in kept), most=max(row["count"] for row in kept),
-        overlap=100 * max(row["overlap"] for row in kept),
+        overlap=100 * max(row["overlap"] for row in kept), narrow=100 * other["narrow"], small=1e3 * SMALL_BOX[0],
+        wide=1e3 * BOX[0],
     )  # fmt: skip
-    rest = say(
-        "rest", narrow=100 * other["narrow"], small=1e3 * SMALL_BOX[0], wide=1e3 * BOX[0],
-        coarse=1e3 * COARSE, thick=1e3 * THICK,
-    )  # fmt: skip
+    rest = say("rest", thick=1e3 * THICK)
     return Outcome(numbers, list(_plots(rows, names)), [words, rest, _collapse(rows)])
 
 
