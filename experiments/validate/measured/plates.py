@@ -50,6 +50,7 @@ SEEDS, FINE_SEEDS = (1,), (1,)  # of the wide beds of coarse grains; of the smal
 SMALL_BOX, SMALL_SEEDS = (0.18, 0.18, 0.14), (1,)  # the bed of the smallest plate [m]; seeds of coarse grains in it
 STEP = 0.00025  # between two depths of a curve [m]
 BAND, POWER_BAND = 0.25, 0.3  # of K and of the curves, of the exponent [1]; ours
+FROM = 0.004  # from this depth on the powers of diameter and depth are read [m]
 DOTS = 40  # of a curve in a figure
 
 
@@ -294,6 +295,19 @@ def _plots(rows: Sequence[Held], names: Sequence[str]) -> Iterator[Plot]:
     yield Plot("One curve for all plates, were it so", "z / D [1]", "F / (rho g D^3) [1]", curves)
 
 
+def powers(rows: Sequence[Held], kind: str) -> tuple[float, float]:
+    """a and b of F = c D^a z^b, least squares in logarithms over the depths that all plates reach. ``kind``: of curve."""
+    deepest = min(float(one.grid[-1]) for one in rows)
+    terms, logs = [], []
+    for one in rows:
+        here = (one.grid >= FROM) & (one.grid <= deepest)
+        z, force = one.grid[here], getattr(one, kind).mean(axis=0)[here]
+        terms.append(np.column_stack([np.ones(len(z)), np.full(len(z), math.log(one.diameter)), np.log(z)]))
+        logs.append(np.log(force))
+    found = np.linalg.lstsq(np.concatenate(terms), np.concatenate(logs), rcond=None)[0]
+    return float(found[1]), float(found[2])
+
+
 def _collapse(rows: Sequence[Held]) -> str:
     """What of the curves no bed without cohesion, walls and grains' size can have, in words."""
     share = min(float(one.grid[-1]) / one.diameter for one in rows)
@@ -301,9 +315,12 @@ def _collapse(rows: Sequence[Held]) -> str:
     for kind in ("measured", "beds"):
         forces = [np.interp(share * one.diameter, one.grid, getattr(one, kind).mean(axis=0)) for one in rows]
         units = [BULK_DENSITY * GRAVITY * one.diameter**3 for one in rows]
-        found.append([float(force / unit) for force, unit in zip(forces, units, strict=True)])
-    measured, ours = (listed(values, ".2f") for values in found)
-    return say("collapse", share=share, measured=measured, ours=ours, power=exponent(PLATES, found[0]) + 3)
+        found.append(listed([float(force / unit) for force, unit in zip(forces, units, strict=True)], ".1f"))
+    theirs, ours = (powers(rows, kind) for kind in ("measured", "beds"))
+    return say(
+        "collapse", share=share, measured=found[0], ours=found[1], least=1e3 * FROM, a=theirs[0], b=theirs[1],
+        both=sum(theirs), ours_a=ours[0], ours_b=ours[1], ours_both=sum(ours),
+    )  # fmt: skip
 
 
 def _compute(tell: Tell) -> Outcome:
