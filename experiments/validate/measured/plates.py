@@ -276,7 +276,9 @@ def compared_with(prediction: Mapping[str, Any]) -> Outcome:
         wide=1e3 * BOX[0],
     )  # fmt: skip
     rest = say("rest", thick=1e3 * THICK)
-    return Outcome(numbers, list(_plots(rows, names)), [words, rest, _collapse(rows)])
+    one_bed = by_plate(prediction, grain=COARSE)
+    alike = [stiffness(one.grid, one_bed[one.diameter].mean(axis=0)[: len(one.grid)]) for one in rows]
+    return Outcome(numbers, list(_plots(rows, names)), [words, rest, _collapse(rows, exponent(PLATES, alike))])
 
 
 def _plots(rows: Sequence[Held], names: Sequence[str]) -> Iterator[Plot]:
@@ -296,7 +298,7 @@ def _plots(rows: Sequence[Held], names: Sequence[str]) -> Iterator[Plot]:
 
 
 def powers(rows: Sequence[Held], kind: str) -> tuple[float, float]:
-    """a and b of F = c D^a z^b, least squares in logarithms over the depths that all plates reach. ``kind``: of curve."""
+    """a and b of F = c D^a z^b, by logarithms, over the depths that all plates reach. ``kind``: of curve."""
     deepest = min(float(one.grid[-1]) for one in rows)
     terms, logs = [], []
     for one in rows:
@@ -308,8 +310,11 @@ def powers(rows: Sequence[Held], kind: str) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
-def _collapse(rows: Sequence[Held]) -> str:
-    """What of the curves no bed without cohesion, walls and grains' size can have, in words."""
+def _collapse(rows: Sequence[Held], alike: float) -> str:
+    """What of the curves no bed without cohesion, walls and grains' size can have, in words.
+
+    ``alike``: exponent of the diameter in K where all plates go into one bed.
+    """
     share = min(float(one.grid[-1]) / one.diameter for one in rows)
     found = []
     for kind in ("measured", "beds"):
@@ -320,6 +325,7 @@ def _collapse(rows: Sequence[Held]) -> str:
     return say(
         "collapse", share=share, measured=found[0], ours=found[1], least=1e3 * FROM, a=theirs[0], b=theirs[1],
         both=sum(theirs), ours_a=ours[0], ours_b=ours[1], ours_both=sum(ours),
+        alike=alike,
     )  # fmt: skip
 
 
