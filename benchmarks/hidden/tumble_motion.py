@@ -42,7 +42,7 @@ Numbers = ti.types.struct(**dict.fromkeys(COLUMNS, ti.f64))
 @ti.func
 def numbers_of(table: ti.template(), i):
     """Of one trial, by name."""
-    return Numbers(**{name: table[i, k] for k, name in ti.static(enumerate(COLUMNS))})
+    return Numbers(*[table[i, k] for k in ti.static(range(len(COLUMNS)))])
 
 
 @ti.func

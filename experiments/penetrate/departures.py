@@ -169,7 +169,11 @@ def sentences(
         bed, law = sinkage
         against = f", {_deeper(law[0] / bed[0])}" if bed[0] > 0 else ""
         sunk, law_sunk = (foldable(quote(*depth, "m", significant=2)) for depth in sinkage)
-        said.append(say("sinkage", bed=sunk, law=law_sunk, against=against))
+        if bed[0] < 0:
+            on_top = foldable(quote(-bed[0], bed[1], "m", significant=2))
+            said.append(say("sinkage_on_top", bed=on_top, law=law_sunk))
+        else:
+            said.append(say("sinkage", bed=sunk, law=law_sunk, against=against))
     if returned is not None:
         back = f"gives back {_share(returned[0])} of the work put in"
         if returned[0] < 0:

@@ -24,6 +24,7 @@ from rigid import SpringDamper
 
 from .fit import Fit, drag_gap, fit_spring_damper, moments_of, spread
 from .settings import STANDARD_GRAVITY, PenetrateSettings, say
+from .similarity import pace_of
 from .units import Unit, make_run
 
 __all__ = ["BedFacts", "Findings", "bed_entry", "bed_quantities", "drop_note", "mean_of", "model_run", "returned_work"]
@@ -61,7 +62,10 @@ class BedFacts:
 
 def drop_note(settings: PenetrateSettings) -> str:
     """What a drop is, and what it is not."""
-    return say("drop", s=settings, free=settings.mass * STANDARD_GRAVITY)
+    on_earth = pace_of(settings) == 1.0
+    gravity = STANDARD_GRAVITY if on_earth else settings.gravity
+    where = "in the laboratory" if on_earth else f"at {settings.gravity:.3g} m/s2"
+    return say("drop", s=settings, free=settings.mass * gravity, where=where)
 
 
 class Findings:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from experiments.grains.bearing import COHESIONS, UNSURE, bearing_capacity, friction_angle
+from experiments.grains.bearing import COHESIONS, UNSURE, bearing_capacity, friction_angle, strength
 from experiments.runs.types import Json
 
 from . import beds
@@ -55,7 +55,7 @@ def answer(findings: Findings, material: Any) -> Json | None:
     load, area = settings.weight, math.pi * settings.tip_diameter**2 / 4
     expected = beds.expected_bearing(settings)
     stiffness = findings.fit.stiffness if findings.fit.stiffness > 0 else expected.stiffness
-    plate = beds.expected_stiffness(settings)
+    plate = beds.expected_stiffness(settings) / strength(material)
     depths = [load / stiffness, max(0.0, load - expected.held) / plate]
     low, high = min(depths), max(depths)
     never = low > settings.foot

@@ -172,7 +172,10 @@ def warnings_of(findings: Findings) -> Iterator[str]:
     if sunk["value"] is not None and sunk["value"] < 2 * grain:  # hardly more than a grain
         several = sum(value is not None for value in findings.sinkages(findings.beds)) > 1
         so = "its spread between seeds is part of the answer" if several else "another seed will give another"
-        yield say("shallow", shown=_words(sunk), grains=sunk["value"] / grain, so=so)
+        if sunk["value"] < 0:
+            yield say("on_top", shown=_words(sunk | {"value": -sunk["value"]}), so=so)
+        else:
+            yield say("shallow", shown=_words(sunk), grains=sunk["value"] / grain, so=so)
     bound = overdamped_below(settings.weight, settings.lowering_speed) / pace_of(settings)
     if findings.of("set_down") and fit.stiffness > bound:
         yield say("overdamped", fit=fit, bound=bound)

@@ -100,7 +100,7 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
         load = words.value_of(quantities, "load")
         under = f"under {quantity(quantities['load'])}" if load is not None else "under its load"
         note = f"{under}; the spring-damper says {model}"
-        tiles.append(("Sinks to rest at", quantity(quantities["sinkage_dem"]), note))
+        tiles.append(("Sinks to rest at", _rests_at(quantities), note))
     if push := _push(run):
         tiles.append(("Sand pushes back with", *push))
     if words.value_of(quantities, "drag_gap") is not None:
@@ -202,7 +202,8 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
     model = f" The fitted spring-damper says {quantity(quantities.get('sinkage_spring_damper'))}"
     if sunk is not None:
         load = f" of {quantity(quantities['load'])}" if words.value_of(quantities, "load") is not None else ""
-        text = f"Set down under its load{load}, the spike comes to rest {quantity(quantities['sinkage_dem'])} deep."
+        text = f"Set down under its load{load}, the spike comes to rest {_rests_at(quantities)}"
+        text += " deep." if sunk >= 0 else ": grains that stick out carry it."
         if law is not None:
             text += model + (f", {_deeper(law / sunk)}." if sunk > 0 else ".")
         return text + more
@@ -212,6 +213,13 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
         return ""
     text = "Not known: set down under its load, the spike did not come to rest in the time that was followed."
     return text + (f"{model}." if law is not None else "") + more
+
+
+def _rests_at(quantities: Mapping[str, Any]) -> str:
+    """The depth at rest, or how far above depth 0 a spike rests that grains which stick out carry."""
+    entry = quantities["sinkage_dem"]
+    above = -(words.value_of(quantities, "sinkage_dem") or 0.0)
+    return f"{quantity({**entry, 'value': above})} above the surface" if above > 0 else quantity(entry)
 
 
 def _restless(run: RunFolder, quantities: Mapping[str, Any]) -> bool:

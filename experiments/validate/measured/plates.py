@@ -46,12 +46,11 @@ THICK = 0.01  # of a plate [m]: a guess; sand may fall on it
 INERTIAL = 0.009
 DEEP = (0.031, 0.029, 0.02)  # how far each is pushed [m]: as the shortest of its measured pushes, and a little more
 COARSE, FINE = 0.01, 0.0075  # mean diameters of the grains [m]: 6 and 8 across the smallest plate
-SEEDS = (1, 2, 3)
-SMALL_BOX, STIFF = (0.18, 0.18, 0.14), 8e7
-"""The bed of the smallest plate; stiffer grains in it, to see what softness does."""
-SMALL_SEEDS, STIFF_SEEDS = (1, 2), (1,)  # of the smallest plate in its bed of coarse grains
+SEEDS, FINE_SEEDS = (1,), (1,)  # of the wide beds of coarse grains; of the smallest plate's of fine ones
+SMALL_BOX, SMALL_SEEDS = (0.18, 0.18, 0.14), (1,)  # the bed of the smallest plate [m]; seeds of coarse grains in it
 STEP = 0.00025  # between two depths of a curve [m]
 BAND, POWER_BAND = 0.25, 0.3  # of K and of the curves, of the exponent [1]; ours
+FROM = 0.004  # from this depth on the powers of diameter and depth are read [m]
 DOTS = 40  # of a curve in a figure
 
 
@@ -100,8 +99,9 @@ def settings() -> Json:
         "material": {key: value for key, value in asdict(SAND).items() if key != "sources"}, "stages": list(STAGES),
         "spread": SPREAD, "young": YOUNG, "box": list(BOX), "gravity": GRAVITY, "bulk_density": BULK_DENSITY,
         "plates": list(PLATES), "thick": THICK, "inertial_number": INERTIAL, "depths": list(DEEP), "coarse": COARSE,
-        "fine": FINE, "seeds": list(SEEDS), "small_box": list(SMALL_BOX), "small_seeds": list(SMALL_SEEDS),
-        "stiff": STIFF, "stiff_seeds": list(STIFF_SEEDS), "step": STEP,
+        "fine": FINE, "seeds": list(SEEDS),
+        "fine_seeds": list(FINE_SEEDS), "small_box": list(SMALL_BOX), "small_seeds": list(SMALL_SEEDS),
+        "step": STEP,
     }  # fmt: skip
 
 
@@ -126,9 +126,9 @@ def on_grid(run: Mapping[str, np.ndarray], grid: np.ndarray) -> np.ndarray:
 def pushes() -> list[Push]:
     """Every push of the prediction."""
     coarse = [Push(d, COARSE, seed) for seed in SEEDS for d in PLATES]
-    fine = [Push(PLATES[0], FINE, seed, SMALL_BOX) for seed in SEEDS]
+    fine = [Push(PLATES[0], FINE, seed, SMALL_BOX) for seed in FINE_SEEDS]
     small = [Push(PLATES[0], COARSE, seed, SMALL_BOX) for seed in SMALL_SEEDS]
-    return [*coarse, *fine, *small, *(Push(PLATES[0], COARSE, seed, SMALL_BOX, STIFF) for seed in STIFF_SEEDS)]
+    return [*coarse, *fine, *small]
 
 
 def predicted(tell: Tell) -> Json:
@@ -199,12 +199,6 @@ class Held:
         return stiffness(self.grid, self.measured.mean(axis=0))
 
     @property
-    def chance(self) -> float:
-        """Standard error of ours, from how beds differ [1]."""
-        each = self.stiffnesses(self.beds)
-        return float(each.std(ddof=1) / math.sqrt(len(each)) / each.mean()) if len(each) > 1 else math.nan
-
-    @property
     def off(self) -> float:
         """How far the mean curves are apart, over the measured one; root mean squares [1]."""
         wanted = self.measured.mean(axis=0)
@@ -227,10 +221,11 @@ def held(prediction: Mapping[str, Any]) -> list[Held]:
 
 
 def effects(prediction: Mapping[str, Any]) -> dict[str, float]:
-    """What K of the smallest plate owes to the grains' size, the bed's width and the softness; bed by bed [1].
+    """What K of the smallest plate owes to chance, the grains' size and the bed's width [1].
 
-    ``size``: c of K = K_0 (1 - c d / D), from coarse and fine grains in the small bed. ``narrow``, ``stiff``: mean
-    ratio less one of a narrower bed, of stiffer grains in it.
+    ``scatter``: standard deviation between the beds of coarse grains, of both widths. ``size``: c of K = K_0
+    (1 - c d / D), from coarse and fine grains in the small bed. ``narrow``: mean ratio less one of a narrower
+    bed, with the same seeds.
     """
     smallest, grid = PLATES[0], grid_of(DEEP[0])
 
@@ -238,11 +233,12 @@ def effects(prediction: Mapping[str, Any]) -> dict[str, float]:
         return np.array([stiffness(grid, force) for force in by_plate(prediction, **wanted)[smallest]])
 
     wide, small = each(grain=COARSE), each(grain=COARSE, box=SMALL_BOX)
-    fine, stiff = each(grain=FINE, box=SMALL_BOX), each(grain=COARSE, box=SMALL_BOX, young=STIFF)
+    fine = each(grain=FINE, box=SMALL_BOX)
     ratio = float(small.mean() / fine.mean())  # (1 - c d / D) / (1 - c d' / D)
+    alike = np.concatenate([wide, small])
     return {
-        "size": smallest * (1 - ratio) / (COARSE - ratio * FINE), "narrow": float(small.mean() / wide.mean()) - 1,
-        "stiff": float((stiff / small[: len(stiff)]).mean()) - 1,
+        "scatter": float(alike.std(ddof=1) / alike.mean()), "size": smallest * (1 - ratio) / (COARSE - ratio * FINE),
+        "narrow": float((small[: len(wide)] / wide[: len(small)]).mean()) - 1,
     }  # fmt: skip
 
 
@@ -264,24 +260,25 @@ def compared_with(prediction: Mapping[str, Any]) -> Outcome:
     each = "; ".join(
         say(
             "plate", name=name, theirs=one.theirs, spread=100 * one.stiffnesses(one.measured).std(ddof=1) / one.theirs,
-            ours=one.ours, chance=100 * one.chance, across=one.diameter / one.grain, beds=len(one.beds),
+            ours=one.ours, chance=100 * other["scatter"] / math.sqrt(len(one.beds)), across=one.diameter / one.grain,
+            beds=len(one.beds),
             finer=100 * (1 / (1 - other["size"] * one.grain / one.diameter) - 1),
         )
         for name, one in zip(names, rows, strict=True)
     )  # fmt: skip
-    kept = [row for row in prediction["pushes"] if row["young"] == YOUNG]
+    kept = prediction["pushes"]
     packing = np.array([row["packing"] for row in kept])
     words = say(
         "pushes", each=each, fine=1e3 * FINE, coarse=1e3 * COARSE, packing=float(packing.mean()),
         density=float(packing.mean()) * SAND.density, inertial=INERTIAL, rolling=SAND.rolling_friction,
         least=min(row["count"] for row in kept), most=max(row["count"] for row in kept),
-        overlap=100 * max(row["overlap"] for row in kept),
+        overlap=100 * max(row["overlap"] for row in kept), narrow=100 * other["narrow"], small=1e3 * SMALL_BOX[0],
+        wide=1e3 * BOX[0],
     )  # fmt: skip
-    rest = say(
-        "rest", narrow=100 * other["narrow"], small=1e3 * SMALL_BOX[0], wide=1e3 * BOX[0], stiff=100 * other["stiff"],
-        times=STIFF / YOUNG, coarse=1e3 * COARSE, thick=1e3 * THICK,
-    )  # fmt: skip
-    return Outcome(numbers, list(_plots(rows, names)), [words, rest, _collapse(rows)])
+    rest = say("rest", thick=1e3 * THICK)
+    one_bed = by_plate(prediction, grain=COARSE)
+    alike = [stiffness(one.grid, one_bed[one.diameter].mean(axis=0)[: len(one.grid)]) for one in rows]
+    return Outcome(numbers, list(_plots(rows, names)), [words, rest, _collapse(rows, exponent(PLATES, alike))])
 
 
 def _plots(rows: Sequence[Held], names: Sequence[str]) -> Iterator[Plot]:
@@ -300,16 +297,36 @@ def _plots(rows: Sequence[Held], names: Sequence[str]) -> Iterator[Plot]:
     yield Plot("One curve for all plates, were it so", "z / D [1]", "F / (rho g D^3) [1]", curves)
 
 
-def _collapse(rows: Sequence[Held]) -> str:
-    """What of the curves no bed without cohesion, walls and grains' size can have, in words."""
+def powers(rows: Sequence[Held], kind: str) -> tuple[float, float]:
+    """a and b of F = c D^a z^b, by logarithms, over the depths that all plates reach. ``kind``: of curve."""
+    deepest = min(float(one.grid[-1]) for one in rows)
+    terms, logs = [], []
+    for one in rows:
+        here = (one.grid >= FROM) & (one.grid <= deepest)
+        z, force = one.grid[here], getattr(one, kind).mean(axis=0)[here]
+        terms.append(np.column_stack([np.ones(len(z)), np.full(len(z), math.log(one.diameter)), np.log(z)]))
+        logs.append(np.log(force))
+    found = np.linalg.lstsq(np.concatenate(terms), np.concatenate(logs), rcond=None)[0]
+    return float(found[1]), float(found[2])
+
+
+def _collapse(rows: Sequence[Held], alike: float) -> str:
+    """What of the curves no bed without cohesion, walls and grains' size can have, in words.
+
+    ``alike``: exponent of the diameter in K where all plates go into one bed.
+    """
     share = min(float(one.grid[-1]) / one.diameter for one in rows)
     found = []
     for kind in ("measured", "beds"):
         forces = [np.interp(share * one.diameter, one.grid, getattr(one, kind).mean(axis=0)) for one in rows]
         units = [BULK_DENSITY * GRAVITY * one.diameter**3 for one in rows]
-        found.append([float(force / unit) for force, unit in zip(forces, units, strict=True)])
-    measured, ours = (listed(values, ".2f") for values in found)
-    return say("collapse", share=share, measured=measured, ours=ours, power=exponent(PLATES, found[0]) + 3)
+        found.append(listed([float(force / unit) for force, unit in zip(forces, units, strict=True)], ".1f"))
+    theirs, ours = (powers(rows, kind) for kind in ("measured", "beds"))
+    return say(
+        "collapse", share=share, measured=found[0], ours=found[1], least=1e3 * FROM, a=theirs[0], b=theirs[1],
+        both=sum(theirs), ours_a=ours[0], ours_b=ours[1], ours_both=sum(ours),
+        alike=alike,
+    )  # fmt: skip
 
 
 def _compute(tell: Tell) -> Outcome:

@@ -248,6 +248,19 @@ def test_what_rests_has_no_such_answer(fake, tmp_path):
     assert "depth_to_rest" not in result["quantities"]
 
 
+def test_a_foot_that_grains_above_the_surface_carry_rests_above_it(fake, tmp_path, monkeypatch):
+    """F = K (z + 2 mm), more than the load at first touch: it rests above depth 0, which words call no sinkage."""
+    law, _ = fake
+    law |= {"hardness": 1.0, "rate": 0.001, "proud": 2e-3}
+    settings = PenetrateSettings(gravity="1e-3g", load=5e-4, seeds=(1,), frame_count=0, mass=2e-4)
+    result = penetrate.run(settings, tmp_path / "run")
+    assert result["quantities"]["sinkage_dem"]["value"] < 0
+    said = summarise(read_folder(tmp_path / "run"))
+    on_top = [text for text in [*result["departures"]["sentences"], *result["warnings"]] if "stick out of the" in text]
+    answer = said["answers"][0]["answer"].split(" A set-down")[0]
+    golden("penetrate/rests_on_top", [said["tiles"][0]["value"], answer, *on_top, result["departures"]["drop"]])
+
+
 def test_a_law_that_creeps_in_its_damper_is_not_at_rest(fake, tmp_path):
     """K = 0 and a large C: F = C v carries the load at a creep; W = K z nowhere, so there is no sinkage of the law."""
     law, _ = fake

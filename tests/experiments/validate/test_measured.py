@@ -1,5 +1,6 @@
 """Cases that hold the bed against measured experiments: what is chosen, what counts, how curves are compared."""
 
+import json
 import math
 from pathlib import Path
 
@@ -69,3 +70,16 @@ def test_measured_pushes_are_read_at_their_fresh_forces_only():
     for _, _, depth, force in found:
         assert len(depth) == len(force) < 400 and (np.diff(force) != 0).all()
         assert 0.016 < depth.max() < 0.04
+
+
+def test_the_kept_prediction_is_of_these_settings_and_gives_the_numbers_of_the_table():
+    prediction = json.loads(PREDICTION.read_text(encoding="utf-8"))
+    assert prediction["settings"] == json.loads(json.dumps(plates.settings()))
+    assert len(prediction["pushes"]) == len(plates.pushes())
+    table = json.loads((ROOT / "docs" / "results" / "validate" / "result.json").read_text(encoding="utf-8"))
+    row = next(one for one in table["cases"] if one["id"] == "plates-in-sand")
+    found = {one.quantity: one for one in plates.compared_with(prediction).comparisons}
+    assert found.keys() == {one["quantity"] for one in row["comparisons"]} and len(found) == 7
+    for one in row["comparisons"]:
+        assert found[one["quantity"]].ours == pytest.approx(one["ours"], rel=1e-3)
+        assert found[one["quantity"]].reference == pytest.approx(one["reference"], rel=1e-6)
