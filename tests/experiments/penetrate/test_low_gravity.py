@@ -109,7 +109,7 @@ def test_a_load_that_no_depth_bears_makes_no_grains_stiffer(monkeypatch):
 
 
 def test_under_a_flat_tip_grains_are_made_twice_as_stiff(monkeypatch):
-    """Kept: peaks of 3.6 % at 20.6 kPa (docs/results/penetrate-foot-sand-weak). They leave room, at half they would not."""
+    """Kept: peaks of 3.6 % at 20.6 kPa (docs/results/penetrate-foot-sand-weak). At half of it they were past 5 %."""
     monkeypatch.setattr(beds, "find_material", lambda settings: WEAK)
     own = FOOT | {"bed_size": (0.064, 0.064, 0.04), "gravity": "1e-3g"}
     flat, ball = (beds.choose_softness(PenetrateSettings(**own | {"tip": tip})).young for tip in ("flat", "sphere"))
