@@ -19,6 +19,7 @@ from dem.engine.state import read_file
 from dem.grains.materials import caveat
 from dem.measure.shearing import Shearing, shear_bed
 from dem.prepare.bedfile import find_bed
+from experiments.grains.softening import stable_overlap
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
@@ -106,6 +107,8 @@ def _compute(settings: BedShearSettings, folder: RunFolder, progress: Progress) 
         assert bed is not None
         grain = 2 * float(bed.grains().radius.mean())
         if not folder.is_done(name):
+            # A lid presses harder than the bed's own weight, for which its grains were made.
+            bed.overlap_limit = stable_overlap(bed.material, bed.overlap_limit)
             run = shear_bed(
                 bed, pressure=pressure * bed.weight / (bed.size[0] * bed.size[1]), way=settings.way * grain,
                 inertial_number=settings.inertial_number, grain=grain, tell=progress.update,

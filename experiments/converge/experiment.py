@@ -65,10 +65,8 @@ class _Work:
         return Path(self.settings.members) if self.settings.members else self.folder.path / "members"
 
     def make(self, member: Member) -> None:
-        """Carry out a member, or go on with it; nothing where it is done."""
+        """Carry out a member, or go on with it."""
         path = self.home / member.folder
-        if self._read(member, path):
-            return
         self.progress.stage(member.id, total=1.0)
         own = RunFolder.open(path) if (path / "run.toml").is_file() else RunFolder.create(
             path, "penetrate", member.settings, code=fingerprint()
@@ -85,10 +83,11 @@ class _Work:
             self.progress.message(f"{member.id}: {error}")
             return
         own.set_status("done")
-        self._read(member, path)
+        self.read(member)
 
-    def _read(self, member: Member, path: Path) -> bool:
+    def read(self, member: Member) -> bool:
         """Take the numbers of a member that is done, and say whether it is."""
+        path = self.home / member.folder
         own = RunFolder.open(path) if (path / "run.toml").is_file() else None
         if own is None or own.status != "done" or not (path / "result.json").is_file():
             return False
@@ -129,9 +128,10 @@ def _carry_out(settings: ConvergeSettings, folder: RunFolder, progress: Progress
         work = _Work(settings, folder, progress, members, every[len(members) :])
         for line in (*plan_told(settings, members, work.left_out), *doubts(settings)):
             progress.message(line)
-        progress.plan({member.id: 3600 * member.core_hours for member in members}, seconds={"report": 10.0}, unit=1.0)
-        result: Result | None = None
-        for member in members:
+        todo = [member for member in members if not work.read(member)]
+        progress.plan({member.id: 3600 * member.core_hours for member in todo}, seconds={"report": 10.0}, unit=1.0)
+        result = work.keep() if work.numbers else None
+        for member in todo:
             work.make(member)
             if work.numbers:
                 result = work.keep()

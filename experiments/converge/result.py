@@ -10,12 +10,13 @@ from dem.grains.materials import caveat
 from experiments.penetrate import beds
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
-from vis.page.numbers import column, foldable, quote
+from vis.page.numbers import column, foldable
 
 from .analysis import QUANTITIES, REST, Finding, findings_of, told, two_finest
 from .costs import core_hours, step_count
 from .design import BASE, Member, Variant, inertial_number, told_of
 from .settings import ConvergeSettings, say
+from .statistics import Interval
 
 __all__ = ["conclude", "doubts", "plan_told"]
 
@@ -153,9 +154,9 @@ def _errors(entries: Mapping[str, Json]) -> Json:
             continue
         size = abs(entry["value"])
         numbers = [entry["value"], *(_without_round_off(entry[key], size) for key in _NAMES)]
-        unit, shown = column(numbers, entry["unit"], significant=2)
-        value = quote(entry["value"], entry["chance"] or entry["total"], entry["unit"]).split("±")[0].split("\xa0")[0]
-        rows.append([name.replace("_", " "), foldable(value), *map(foldable, shown[1:]), "" if unit == "1" else unit])
+        unit, (_, *errors) = column(numbers, entry["unit"], significant=2)
+        _, (value, *_) = column(numbers, entry["unit"])
+        rows.append([name.replace("_", " "), *map(foldable, (value, *errors, "" if unit == "1" else unit))])
     head = ["quantity", "at the real grain", *_NAMES.values(), "unit"]
     return {"title": say("errors_title"), "head": head, "rows": rows}
 
@@ -193,12 +194,19 @@ def _differences(found: Mapping[str, Finding], variants: Sequence[Variant]) -> I
         by_id = {one.variant.id: one.interval for one in finding.differences}
         if by_id:
             spans = (by_id.get(variant.id) for variant in others)
-            unit = QUANTITIES[name].unit
-            cells = ["–" if span is None else foldable(quote(span.mean, span.half, unit)) for span in spans]
-            rows.append([name.replace("_", " "), *cells])
+            rows.append([name.replace("_", " "), *(_span(span, QUANTITIES[name].unit) for span in spans)])
     if rows:
         head = ["quantity", *(variant.id for variant in others)]
         yield {"title": say("differences_title"), "head": head, "rows": rows, "words": True}
+
+
+def _span(span: Interval | None, unit: str) -> str:
+    """An interval in words; a dash for none."""
+    if span is None:
+        return "–"
+    shown, (mean, half) = column((span.mean, span.half), unit, significant=2)
+    words = mean if span.half is None else f"{mean} ± {half}"
+    return foldable(f"{words} {shown}".strip())
 
 
 def _sentences(found: Mapping[str, Finding], settings: ConvergeSettings, variants: Sequence[Variant]) -> Iterator[str]:
@@ -206,10 +214,10 @@ def _sentences(found: Mapping[str, Finding], settings: ConvergeSettings, variant
     for name in ("stiffness", "sinkage"):
         verdict = two_finest(found[name]) if name in found else None
         if verdict is not None:
-            half = "unknown" if verdict["half"] is None else f"{100 * verdict['half']:.2g} %"
             finer, next_one = verdict["ratios"]
-            share = 100 * verdict["difference"]
-            yield say(f"finest_{verdict['verdict']}", what=name, fine=finer, next=next_one, share=share, half=half)
+            share, half = (None if verdict[key] is None else 100 * verdict[key] for key in ("difference", "half"))
+            by = f"{share:+.2g} %, with one bed of a size" if half is None else f"{share:+.2g} ± {half:.2g} %"
+            yield say(f"finest_{verdict['verdict']}", what=name, fine=finer, next=next_one, by=by)
     if "damping" in found:
         line, total = found["damping"].at_life, found["damping"].total
         reach = total if total is not None else line.chance

@@ -8,7 +8,7 @@ from dem.contact.timestep import time_step_for
 from dem.grains.materials import material
 from dem.prepare import prepare
 from dem.prepare.bedfile import find_bed
-from experiments.grains.bearing import Bearing, bearing_of, strength
+from experiments.grains.bearing import UNSURE, Bearing, bearing_of, strength
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.recipes import recipe_of
 from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material, stable_overlap
@@ -24,7 +24,8 @@ from .units import RAIN, deepest
 
 __all__ = [
     "bed_step", "choose_softness", "expected_bearing", "expected_stiffness", "find_material", "fingerprint",
-    "first_gravity", "overlap_bound", "prepare_bed", "stages_of", "stiffened",
+    "first_gravity", "overlap_bound", "prepare_bed", "resting_load",
+    "sinks_away", "stages_of", "stiffened",
 ]  # fmt: skip
 
 _SPELL, _MOST_SPELLS = 1.5, 60
@@ -32,6 +33,9 @@ _SPELL, _MOST_SPELLS = 1.5, 60
 _STICKING = 1.8
 """By which the largest forces of grains that stick exceed those that chains have in others [1]: in beds of
 jsc-1a-loose and -heights of 2,000 grains, four across a flat foot, moduli chosen without it had to rise 1.8 times."""
+_FLAT = 2.0
+"""The same of flat tips over those that widen [1]: in `sand-weak` and `sand` moduli chosen without it had to be 1.8 and
+1.9 times as large (docs/results/penetrate-foot-sand-weak, -sand)."""
 _DRAG = 0.3  # Time of the drag at first [sqrt(d / g)]
 _STILL = 1e-5  # Mean kinetic energy at rest [m g d]
 
@@ -147,14 +151,16 @@ def choose_softness(settings: PenetrateSettings) -> Softening:
         drop_depth(speed, settings.mass, settings.weight - bears.held, stiffness) for speed in settings.dropped_speeds
     ]
     heavier = first_gravity(settings) / settings.gravity  # while it is prepared
-    # No bed presses on a tip with more than it bears.
-    pressure = min(settings.weight, stiffness * floor + bears.held) / area
+    depth, pressure = settings.depth, 0.0
+    if not sinks_away(settings):  # it is dropped and set down; no bed presses with more than it bears
+        depth = min(floor, max(settings.depth, *drops)) if drops else settings.depth
+        pressure = min(settings.weight, stiffness * floor + bears.held) / area
+    peaks = _FLAT if settings.tip == "flat" else 1.0
     return soften_material(
         material, young=settings.young, max_overlap=settings.max_overlap, grain=settings.grain, spread=settings.spread,
         gravity=settings.gravity, bed_height=heavier * settings.bed_size[2],
-        depth=min(floor, max(settings.depth, *drops) if drops else settings.depth), speed=speed,
-        fastest=fastest, fall=heavier * RAIN * settings.bed_size[2], pressure=pressure,
-        strength=strength(material), resistance=_STICKING * bears.resistance,
+        depth=depth, speed=speed, fastest=fastest, fall=heavier * RAIN * settings.bed_size[2], pressure=pressure,
+        strength=peaks * strength(material), resistance=_STICKING * bears.resistance,
     )  # fmt: skip
 
 
@@ -170,3 +176,15 @@ def expected_bearing(settings: PenetrateSettings) -> Bearing:
     """What the bed may well bear on the tip: weight and cohesion of the grains (`experiments.grains.bearing`)."""
     area = math.pi * settings.tip_diameter**2 / 4
     return bearing_of(find_material(settings), grain=settings.grain, gravity=settings.gravity, area=area)
+
+
+def resting_load(settings: PenetrateSettings, *, sure: float = 1.0) -> float:
+    """The load that comes to rest where drops are stopped [N], in a bed `sure` times as strong as expected."""
+    return sure * expected_bearing(settings).load(deepest(settings))
+
+
+def sinks_away(settings: PenetrateSettings) -> bool:
+    """Whether the load is too much for the whole foot and for this bed, even if they bear twice what is expected."""
+    bears = expected_bearing(settings)
+    deep = settings.weight > UNSURE * bears.load(settings.foot)
+    return deep and settings.weight > resting_load(settings, sure=UNSURE)

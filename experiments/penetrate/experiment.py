@@ -36,7 +36,7 @@ from .beds import fingerprint
 from .findings import BedFacts
 from .recorded import campaign_of, sensors_of
 from .refusals import check
-from .rest import made_units, sinks_away
+from .rest import made_units
 from .result import conclude, softening_note, staged_note, stiffer_note
 from .settings import PenetrateSettings, say
 from .similarity import fast_for_gravity, similarity_of
@@ -78,7 +78,7 @@ def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) 
         any_drops = any(unit.kind == "drop" for unit in units)
         dropped = f", a dropped spike moves {settings.mass:.4g} kg" if any_drops else ""
         progress.message(f"the load is {settings.weight:.4g} N{dropped}")
-        if sinks_away(settings):
+        if beds.sinks_away(settings):
             rests = beds.expected_bearing(settings).depth(settings.weight)
             progress.message(say("only_driven", s=settings, rests=rests))
         plan = PenetratePlan(

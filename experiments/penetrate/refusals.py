@@ -12,7 +12,7 @@ from experiments.grains.where import check_memory, check_where
 from . import beds
 from .amended import read_law
 from .reference import read_reference
-from .rest import made_units, resting_load, sinks_away
+from .rest import made_units
 from .settings import PenetrateSettings, say
 from .units import deepest, expected_time, plan_units
 
@@ -65,16 +65,16 @@ def check(settings: PenetrateSettings) -> None:
 
 def _check_reach(settings: PenetrateSettings) -> None:
     """Refuse what would end near the floor, but for a load that no depth of the foot bears: that is an answer."""
-    if sinks_away(settings):
+    if beds.sinks_away(settings):
         return
     bears, floor = beds.expected_bearing(settings), deepest(settings)
     deeper = f"{floor:.3g} m, one tip's diameter above the floor"
     rests = bears.depth(settings.weight)
-    if settings.weight > resting_load(settings, sure=UNSURE):
+    if settings.weight > beds.resting_load(settings, sure=UNSURE):
         key = "load" if settings.load is not None else "platform_mass"
         value = f"{settings.load:g} N" if settings.load is not None else f"{settings.platform_mass:g} kg"
         on = "" if settings.load is not None else f", {settings.weight:.3g} N on a spike,"
-        most = resting_load(settings, sure=1 / UNSURE)
+        most = beds.resting_load(settings, sure=1 / UNSURE)
         raise ValueError(say("rests_deep", key=key, value=value, on=on, rests=rests, deeper=deeper, most=most))
     stiffness, load = UNSURE * bears.stiffness, settings.weight - bears.held
     for key in ("drop_speeds", "other_drop_speeds"):

@@ -12,35 +12,23 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from experiments.grains.bearing import COHESIONS, UNSURE, bearing_capacity, friction_angle, strength
+from experiments.grains.bearing import COHESIONS, bearing_capacity, friction_angle, strength
 from experiments.runs.types import Json
 
 from . import beds
 from .findings import Findings
 from .settings import PenetrateSettings, say
-from .units import Unit, deepest
+from .units import Unit
 
-__all__ = ["answer", "made_units", "resting_load", "sinks_away"]
+__all__ = ["answer", "made_units"]
 
 _BESIDE = "jsc-1a-loose-heights"
 """The material to try where grains without cohesion do not bear."""
 
 
-def resting_load(settings: PenetrateSettings, *, sure: float = 1.0) -> float:
-    """The load that comes to rest where drops are stopped [N], in a bed `sure` times as strong as expected."""
-    return sure * beds.expected_bearing(settings).load(deepest(settings))
-
-
-def sinks_away(settings: PenetrateSettings) -> bool:
-    """Whether the load is too much for the whole foot and for this bed, even if they bear twice what is expected."""
-    bears = beds.expected_bearing(settings)
-    deep = settings.weight > UNSURE * bears.load(settings.foot)
-    return deep and settings.weight > resting_load(settings, sure=UNSURE)
-
-
 def made_units(settings: PenetrateSettings, units: Sequence[Unit]) -> list[Unit]:
     """Those of the runs that are made: drops and set-downs of a load that only goes to the floor are left out."""
-    return [unit for unit in units if unit.kind == "driven"] if sinks_away(settings) else list(units)
+    return [unit for unit in units if unit.kind == "driven"] if beds.sinks_away(settings) else list(units)
 
 
 def answer(findings: Findings, material: Any) -> Json | None:

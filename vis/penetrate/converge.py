@@ -19,6 +19,8 @@ __all__ = ["write_converge_report"]
 
 _SHOWN = {"m": (1e3, "mm"), "J": (1e3, "mJ"), "1": (1.0, "")}
 """SI unit -> how many of the unit shown it has, and that unit."""
+_BEYOND = 0.4
+"""How far the axis of a figure goes beyond beds and line for all errors, over their height [1]."""
 _TILES = ("stiffness", "damping", "sinkage", "stiffness_standing")
 
 
@@ -109,11 +111,25 @@ def _over_size(axis: Axes, told: Result, life: float, scale: float) -> None:
                 axis.errorbar([life], [value], yerr=scale * error, color=MODEL, elinewidth=width, capsize=capped)
         axis.plot([life], [value], color=MODEL, marker="D", ms=5.5, zorder=5)
     axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
+    axis.set_ylim(*_heights(told, scale))
     ticks = [(x, f"{x:.3g}\nD/d = {1 / x:.3g}") for x in ends] + (
         [(life, f"{life:.2g}\nreal grain")] if told["line"] else []
     )
     axis.set_xticks(*zip(*ticks, strict=True))
     axis.set(xlim=(0.0, 1.08 * max(ends)), xlabel="grain over tip diameter, d / D [1]")
+
+
+def _heights(told: Result, scale: float) -> tuple[float, float]:
+    """Ends of the axis: all beds and the line with its interval; of all errors as much as leaves those visible."""
+    value, total = told["value"], told["total"] or 0.0
+    shown = [0.0, value, *(bed for size in told["sizes"] for bed in size["values"])]
+    shown += [y + sign * (half or 0.0) for _, y, half in told["line"] for sign in (-1, 1)]
+    shown += [size["mean"] + sign * (size["half"] or 0.0) for size in told["sizes"] for sign in (-1, 1)]
+    low, high = min(shown), max(shown)
+    room = _BEYOND * (high - low)
+    ends = (max(min(low, value - total), low - room), min(max(high, value + total), high + room))
+    margin = 0.05 * (ends[1] - ends[0])
+    return scale * (ends[0] - margin), scale * (ends[1] + margin)
 
 
 def _changes(axis: Axes, changes: Sequence[Result], scale: float, unit: str) -> None:
