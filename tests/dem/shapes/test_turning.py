@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import dem.engine.engine
 from dem import Ball, Bed, Capsule, Material, Sleep
 
 ROUGH = Material(
@@ -52,9 +53,10 @@ def layers():
 
 @pytest.mark.long
 @pytest.mark.parametrize("sleeps", [False, pytest.param(True, marks=pytest.mark.cpu_only("sleep"))])
-def test_grains_on_a_floor_under_bodies_turn_by_weight_floor_sides_sleepers_and_bodies(sleeps):
-    """A ball that goes through the end of the periodic cell and a capsule that turns, both dug in; with sleep and
+def test_grains_on_a_floor_under_bodies_turn_by_weight_floor_sides_sleepers_and_bodies(sleeps, monkeypatch):
+    """A ball that goes through the end of the periodic cell and a capsule that turns, both dug in; with slow grains and
     without. Kept and restored on the way, to the same bits."""
+    monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 60)
     bed = layers()
     bed.add_body(Ball(radius=5e-3), position=(0.075, 0.02, 0.0174))
     bed.add_body(Capsule(start=(0, 0, -0.004), end=(0, 0, 0.004), radius=3e-3), position=(0.03, 0.02, 0.0193))
@@ -62,7 +64,7 @@ def test_grains_on_a_floor_under_bodies_turn_by_weight_floor_sides_sleepers_and_
     bed.track_contact_work()
     before = bed.angular_momentum()
     if sleeps:
-        bed.let_sleep(Sleep(speed=0.05, waking_speed=0.3, calm=0.3, every=16))
+        bed.let_sleep(Sleep(speed=0.2, own=0.6, waking_speed=0.6, calm=0.1, every=8, stretch=2.0))
     bed.move_body(1, velocity=(0.15, 0.02, -0.1), spin=(3.0, 1.0, 0.0))
     bed.move_body(2, velocity=(0.0, 0.0, -0.2), spin=(0.0, 8.0, 2.0))
     bed.advance(150)
@@ -72,8 +74,8 @@ def test_grains_on_a_floor_under_bodies_turn_by_weight_floor_sides_sleepers_and_
     now = bed.angular_momentum()
     assert np.abs(now["bodies"]).max() > 1e-7 and np.abs(now["first_body"]).max() > 1e-6
     assert off < 1e-12 * most
-    if sleeps:  # some fell asleep, and all have woken again
-        assert bed.grain_steps < 0.97 * bed.grain_count * bed.steps and not bed.asleep.any()
+    if sleeps:  # some were slow, and some are
+        assert bed.grain_steps < 0.98 * bed.grain_count * bed.steps and bed.sleeper.fast < bed.grain_count
     bed.restore(kept)
     bed.advance(250)
     assert all((now[name] == value).all() for name, value in bed.angular_momentum().items())
