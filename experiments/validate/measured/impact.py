@@ -41,7 +41,7 @@ CLEAR = BALL + BEAD
 SPEEDS = (0.4, 0.9, 1.8)  # on touching [m/s]
 BOX = (3.2, 3.2, 2.15)  # of the bed, over D + d
 PLACES = ((0.25, 0.25), (0.75, 0.75))
-SIZES = ((6, ((1, PLACES), (4, PLACES), (5, PLACES))), (8, ((2, PLACES),)))
+SIZES = ((6, ((1, PLACES), (4, PLACES), (5, PLACES))), (8, ((2, PLACES), (3, PLACES))))
 """D + d over d, which is one more than the grains across the ball; seeds of the beds, and places in each."""
 STOP_BAND, DEPTH_BAND, TIME_BAND, K_BAND, D1_BAND = 0.03, 0.1, 0.15, 0.25, 0.15
 LONGEST = 0.4  # [s]
