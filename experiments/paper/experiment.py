@@ -40,8 +40,8 @@ from .transitions import HARD, say
 
 __all__ = ["FACTORS", "Job", "SLIDING", "SWEPT", "Variant", "check", "plan_jobs", "resume", "run", "variants"]
 
-SAMPLE_INTERVAL = 5e-3
-"""Between the rows that are kept [s]; numbers come from the integration itself."""
+SAMPLE_INTERVAL, SELDOM = 5e-3, 5e-2
+"""Between the rows that are kept [s], and where none are; numbers come from the integration itself."""
 
 
 @dataclass(frozen=True)
@@ -127,9 +127,8 @@ def _integrate(job: Job) -> Json:
     trial, full = torque_within_limit(
         job.trial, max_wheel_speed=job.max_wheel_speed, duration=job.duration, method=job.method
     )
-    trajectory = simulate(
-        trial, duration=job.duration, method=job.method, sample_interval=SAMPLE_INTERVAL, lean=job.lean
-    )
+    every = SELDOM if job.kind == "rivals" else SAMPLE_INTERVAL
+    trajectory = simulate(trial, duration=job.duration, method=job.method, sample_interval=every, lean=job.lean)
     away = np.hypot(trajectory.x - trajectory.x[0], trajectory.y - trajectory.y[0])
     beyond = np.flatnonzero(away >= job.trusted)
     end = int(beyond[0]) + 1 if len(beyond) else len(away)

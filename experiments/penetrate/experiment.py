@@ -6,7 +6,6 @@ contacts included, so that a run that was stopped or killed continues bitwise. T
 the same runs are made on it, and the two are compared.
 """
 
-import math
 import re
 import time
 from collections.abc import Sequence
@@ -48,6 +47,9 @@ ROOM = 0.8
 """Share of `max_overlap` that is aimed at where grains were too soft [1]."""
 LEAST_STIFFER = 1.25
 """By which grains become stiffer at least, and by how much more each time it happens again on a seed [1]."""
+MOST_STIFFER = 10.0
+"""How many times as stiff as was chosen grains become at most [1]: past that they jam between tip and floor, and no
+modulus is enough (jsc-1a-dense-heights, four grains across the tip, eight deep: 12 times was not)."""
 
 
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -190,7 +192,7 @@ class _Work:
         # It was stopped as it passed the bound: how far it would have gone shows only in that it happens again.
         more = LEAST_STIFFER ** len(self._notes(seed))
         stiffer = more * max(now.stiffer(overlap, ROOM * settings.max_overlap), LEAST_STIFFER * young)
-        if not math.isfinite(stiffer) or stiffer > self.softening.real:
+        if not stiffer <= min(self.softening.real, MOST_STIFFER * self.softening.young):
             return False
         note = {"seed": seed, "unit": unit.id if unit else "", "overlap": overlap, "before": young, "young": stiffer}
         if unit is not None:
@@ -257,7 +259,7 @@ class _Work:
 def _remedy(error: RuntimeError) -> str:
     """What to change where the bed has failed."""
     if "overlap" in str(error):
-        return "change young (stiffer grains), the speeds or max_overlap"
+        return "change young (stiffer grains), the speeds or max_overlap; where grains jam, finer ones or a larger bed"
     if "rest" in str(error) or "rain" in str(error):
         return "change gravity, bed_size or the seed"
     return "change time_step (shorter), young or the speeds"

@@ -10,7 +10,7 @@ from dem import Bed
 from experiments.validate.base.drops import BEADS, drop, part
 from experiments.validate.beds.intrusion import cone_coefficient
 from experiments.validate.beds.low_gravity import collapsed, power_of
-from experiments.validate.measured.impact import energy, published, separated
+from experiments.validate.measured.impact import KNOTS, Refit, energy, published, refit, separated
 from rigid.ground.rft import tractions
 
 
@@ -37,10 +37,14 @@ def test_the_law_of_katsuragi_and_durian_is_read_off_its_own_trajectories():
     known = found.regressed
     assert known.sum() > 10 and found.drag[known] == pytest.approx(1 / 0.05, rel=0.02)
     assert found.rest[known] == pytest.approx(1500.0 * found.depth[known], abs=0.5)
-    assert found.misfit < 0.01 and found.misfit_of(0.05, 1500.0) < 0.01 < 0.1 < found.misfit_of(0.02, 1500.0)
-    assert found.two_numbers() == pytest.approx((0.05, 1500.0), rel=0.03)
+    plain, other = (Refit((slope,) * len(KNOTS), 1500.0) for slope in (1 / 0.05, 50.0))
+    assert found.k_over_m == pytest.approx(1500.0, rel=0.02)
+    assert found.misfit < 0.01 and found.misfit_of(plain) < 0.01 < 0.1 < found.misfit_of(other)
+    again = refit(falls)
+    assert again.k_over_m == pytest.approx(1500.0, rel=0.02) and found.misfit_of(again) < 0.02
     for fall, speed in zip(falls, speeds, strict=True):
-        assert found.stop(speed) == pytest.approx(fall["depth"][-1], rel=0.01)
+        assert plain.stop(speed**2) == pytest.approx(fall["depth"][-1], rel=1e-3)
+        assert again.stop(speed**2) == pytest.approx(fall["depth"][-1], rel=3e-3)
     assert published(2.0)[1] < published(0.5)[1]  # the faster, the sooner it stops
 
 

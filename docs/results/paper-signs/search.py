@@ -60,6 +60,7 @@ LEVERS: dict[str, dict[str, Any]] = {
     "powder, 1/4, torque rise 0.25 s": powder(0.25) | {"effects": RISES, "actuators": ("motor",)},
     "rough sand, torque rise 0.25 s": sand(1.2) | {"effects": RISES, "actuators": ("motor",)},
     "rough sand, from the surface": sand(1.2) | SURFACE,
+    "rough sand, motor from the surface": sand(1.2) | SURFACE | {"actuators": ("motor",)},
     "powder, 1/4, from the surface": powder(0.25) | SURFACE,
     "powder, from the surface": powder(1.0) | SURFACE,
 }

@@ -2,10 +2,11 @@
 
 As they do, the law is read off a(z, v): at each depth the forces of drops that pass it at different speeds are put on a
 straight line over v^2, whose slope is 1 / d1 there and whose start is what depth alone does, k z / m if the law is
-right. Both are left free at every depth (``Separated``), so that a bed whose force has another form shows it, and the
-law so found is asked for the depths at which the balls of its own drops stop. A fit of d1 and k/m to v^2 over depth,
-as it stood here before, hides it: over the first grains the drag is many times as large as deeper down, and one d1 for
-all of it stops no ball where it stopped.
+right. Both are left free at every depth (``Separated``), so that a bed whose force has another form shows it. What it
+shows is the published k z / m beside a drag that is larger where the ball goes in; refit with that (``Refit``) the law
+is asked for the depths at which its own balls stop. A fit of d1 and k/m to v^2 over depth, as it stood here before,
+hides it: where the ball goes in the drag is several times as large as deeper down, and one d1 for all of it stops no
+ball where it stopped.
 
 The force is taken from the energy, d(v^2)/dz = 2 g - 2 F / m, over bins of depth, so that nothing is differentiated
 twice. By the law v^2 over z is known in closed form (Clark & Behringer 2013, EPL 101, 64001).
@@ -22,13 +23,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
 
-from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, tracked
+from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, tracked
 from experiments.validate.base.drops import BEADS, Drop
 
 from . import say
 
-__all__ = ["BALL", "CASES", "K_OVER_M", "MASS", "Separated", "energy", "published", "separated"]
+__all__ = [
+    "BALL", "CASES", "KNOTS", "K_OVER_M", "MASS", "Refit", "Separated", "energy", "published",
+    "refit", "separated",
+]  # fmt: skip
 
 BALL, BEAD, MASS, GRAVITY = 0.0254, 0.0003, 0.0692, 9.81  # diameters [m], [kg], [m/s2]
 D1, K_OVER_M = 0.087, 1040.0  # published [m], [1/s2]
@@ -36,11 +41,14 @@ CLEAR = BALL + BEAD
 SPEEDS = (0.4, 0.9, 1.8)  # on touching [m/s]
 BOX = (3.2, 3.2, 2.15)  # of the bed, over D + d
 PLACES = ((0.25, 0.25), (0.75, 0.75))
-SIZES = ((6, ((1, PLACES),)), (8, ((2, PLACES), (3, PLACES))))
+SIZES = ((6, ((1, PLACES), (4, PLACES), (5, PLACES))), (8, ((2, PLACES), (3, PLACES))))
 """D + d over d, which is one more than the grains across the ball; seeds of the beds, and places in each."""
-STOP_BAND, DEPTH_BAND, TIME_BAND = 0.03, 0.1, 0.15
+STOP_BAND, DEPTH_BAND, TIME_BAND, K_BAND, D1_BAND = 0.03, 0.1, 0.15, 0.25, 0.15
 LONGEST = 0.4  # [s]
 BIN = 0.002  # of depth [m]
+POINTS, STOPS = 50, 4
+KNOTS = (0.0, 0.004, 0.008, 0.012, 0.016, 0.02, 0.03, 0.04)  # at which the refit law has drags of its own [m]
+_DEPTHS = np.linspace(0.0, 0.15, 1501)  # at which it is integrated [m]
 
 Fall = Mapping[str, np.ndarray]
 
@@ -92,41 +100,87 @@ class Separated:
         """Of the separated law: its residuals over the forces, root mean squares [1]."""
         return self._misfit(self.drag, self.rest)
 
-    def misfit_of(self, d1: float, k_over_m: float) -> float:
-        """Of the law with two numbers, likewise [1]."""
-        return self._misfit(np.full_like(self.drag, 1 / d1), k_over_m * self.depth)
+    def misfit_of(self, law: "Refit") -> float:
+        """Of a law with numbers, likewise [1]."""
+        return self._misfit(law.at(self.depth), law.k_over_m * self.depth)
+
+    @property
+    def k_over_m(self) -> float:
+        """Of what depends on depth alone: the straight line through the surface, where drags were regressed [1/s2]."""
+        known = self.regressed
+        return float(self.rest[known] @ self.depth[known] / (self.depth[known] @ self.depth[known]))
 
     def _misfit(self, drag: np.ndarray, rest: np.ndarray) -> float:
         off = self.force - self.squares * drag - rest
         return float(np.sqrt(np.nanmean(off**2) / np.nanmean(self.force**2)))
-
-    def two_numbers(self) -> tuple[float, float]:
-        """d1 [m] and k/m [1/s2] that come nearest: least squares over all bins and drops of F / m = v^2 / d1 + k z / m.
-
-        Below the bins where the drag is that of the first grains; see ``beyond``.
-        """
-        here = np.isfinite(self.force) & self.beyond
-        deep = np.broadcast_to(self.depth, self.force.shape)[here]
-        terms = np.column_stack([self.squares[here], deep])
-        slope, k_over_m = np.linalg.lstsq(terms, self.force[here], rcond=None)[0]
-        return 1 / float(slope) if slope > 0 else math.inf, float(k_over_m)
 
     @property
     def beyond(self) -> np.ndarray:
         """Which bins lie deeper than half the ball: there its whole front is in the beads."""
         return self.depth > 0.5 * BALL
 
-    def stop(self, speed: float) -> float:
-        """Depth at which the ball stops that touches with ``speed`` [m]; d(v^2)/dz = 2 g - 2 F / m, bin by bin."""
-        square, edge = speed**2, 0.0
-        for depth, drag, rest in zip(self.depth, self.drag, self.rest, strict=True):
-            width = 2 * (depth - edge)
-            after = square + 2 * width * (GRAVITY - drag * square - rest) / (1 + width * drag)
-            if after <= 0:
-                return edge + width * square / (square - after)
-            square, edge = after, edge + width
-        steady = 2 * (self.rest[-1] - GRAVITY)
-        return edge + square / steady if steady > 0 else math.inf
+
+@dataclass(frozen=True)
+class Refit:
+    """F / m = v^2 drag(z) + k z / m: the published law with a drag that is free at every depth."""
+
+    drag: tuple[float, ...]  # 1 / d1 at ``KNOTS``, straight between them [1/m]
+    k_over_m: float  # [1/s2]
+
+    def squares(self, start: float, depth: np.ndarray) -> np.ndarray:
+        """v^2 at these depths, of a ball with ``start`` = v^2 at depth 0 [m2/s2]; negative below its stop."""
+        exponent, gained = self._integrals()
+        return np.exp(-np.interp(depth, _DEPTHS, exponent)) * (start + np.interp(depth, _DEPTHS, gained))
+
+    def stop(self, start: float) -> float:
+        """Depth at which a ball stops that has ``start`` = v^2 at depth 0 [m]."""
+        left = start + self._integrals()[1]
+        if (left > 0).all():
+            return math.inf
+        k = int(np.argmax(left <= 0))
+        return float(_DEPTHS[k - 1] + (_DEPTHS[k] - _DEPTHS[k - 1]) * left[k - 1] / (left[k - 1] - left[k]))
+
+    def _integrals(self) -> tuple[np.ndarray, np.ndarray]:
+        """A = 2 int drag dz and I = int e^A (2 g - 2 k z / m) dz at ``_DEPTHS``: e^A v^2 = v0^2 + I."""
+        exponent = _cumulated(2 * self.at(_DEPTHS))
+        return exponent, _cumulated(np.exp(exponent) * 2 * (GRAVITY - self.k_over_m * _DEPTHS))
+
+    def at(self, depth: np.ndarray) -> np.ndarray:
+        """1 / d1 at depths [1/m]."""
+        return np.interp(depth, KNOTS, self.drag)
+
+
+def _cumulated(rate: np.ndarray) -> np.ndarray:
+    return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(_DEPTHS))])
+
+
+PUBLISHED = Refit((1 / D1,) * len(KNOTS), K_OVER_M)
+
+
+def start_of(one: Fall) -> float:
+    """v^2 of a drop at the undisturbed surface [m2/s2]; it touches the highest beads a little above."""
+    return float(np.interp(0.0, one["depth"], one["velocity"] ** 2))
+
+
+def refit(falls: Sequence[Fall]) -> Refit:
+    """The law that fits v^2 over depth of drops and where they stop, all drops alike, by least squares.
+
+    v^2 at ``POINTS`` depths counts over the largest of its drop, the stop over its depth and ``STOPS`` times as much as
+    all of these.
+    """
+    grids = [np.linspace(0.0, 0.98 * float(one["depth"][-1]), POINTS) for one in falls]
+    known = [np.interp(z, one["depth"], one["velocity"] ** 2) for z, one in zip(grids, falls, strict=True)]
+    stops = [float(one["depth"][-1]) for one in falls]
+
+    def off(numbers: np.ndarray) -> np.ndarray:
+        law = Refit(tuple(numbers[:-1] / D1), numbers[-1] * K_OVER_M)
+        parts = [(law.squares(u[0], z) - u) / u.max() for z, u in zip(grids, known, strict=True)]
+        last = [(law.stop(u[0]) / stop - 1) * math.sqrt(STOPS * POINTS) for u, stop in zip(known, stops, strict=True)]
+        return np.concatenate([*parts, np.clip(last, -10, 10)])
+
+    count = len(KNOTS)
+    found = least_squares(off, np.ones(count + 1), bounds=([0.0] * count + [0.1], [30.0] * count + [5.0])).x
+    return Refit(tuple((found[:-1] / D1).tolist()), float(found[-1]) * K_OVER_M)
 
 
 def separated(falls: Sequence[Fall], speeds: Sequence[float]) -> Separated:
@@ -169,11 +223,17 @@ class Size:
     settings: Sequence[Drop]
     falls: Sequence[Fall]
     law: Separated
+    fitted: Refit
 
     def mean(self, key: str, speed: float) -> float:
         """Of the last values of the drops with this speed."""
         ends = [run[key][-1] for one, run in zip(self.settings, self.falls, strict=True) if one.speed == speed]
         return float(np.mean(ends))
+
+    def refit_stop(self, speed: float) -> float:
+        """Mean of the stops that the refit law has for the drops with this speed [m]."""
+        drops = zip(self.settings, self.falls, strict=True)
+        return float(np.mean([self.fitted.stop(start_of(run)) for one, run in drops if one.speed == speed]))
 
 
 def _sizes(tell: Tell) -> list[Size]:
@@ -182,7 +242,7 @@ def _sizes(tell: Tell) -> list[Size]:
     found = []
     for (across, _), settings in zip(SIZES, planned, strict=True):
         falls = [next(runs) for _ in settings]
-        found.append(Size(across, settings, falls, separated(falls, [one.speed for one in settings])))
+        found.append(Size(across, settings, falls, separated(falls, [one.speed for one in settings]), refit(falls)))
     return found
 
 
@@ -195,8 +255,8 @@ def _drops(tell: Tell) -> Outcome:
     sizes = _sizes(tell)
     rows = [
         Comparison(
-            f"stop at {v:g} m/s by its own a(z, v), {one.across - 1} across", "mm", 1e3 * one.mean("depth", v),
-            1e3 * one.law.stop(v), STOP_BAND,
+            f"stop at {v:g} m/s by the refit law, {one.across - 1} across", "mm", 1e3 * one.mean("depth", v),
+            1e3 * one.refit_stop(v), STOP_BAND,
         )
         for one in sizes for v in SPEEDS
     ]  # fmt: skip
@@ -205,6 +265,15 @@ def _drops(tell: Tell) -> Outcome:
         rows.append(
             Comparison(f"depth at {v:g} m/s, to the beads' size", "mm", 1e3 * published(v)[0], 1e3 * deep, DEPTH_BAND)
         )
+    rows += [
+        Comparison(
+            f"k/m of what depends on depth alone, {one.across - 1} across", "1/s2", K_OVER_M, one.law.k_over_m, K_BAND
+        )
+        for one in sizes
+    ]
+    finest = sizes[-1]
+    slope = float(finest.law.drag[finest.law.regressed].mean())
+    rows.append(Comparison(f"1 / d1, mean over the depths, {finest.across - 1} across", "1/m", 1 / D1, slope, D1_BAND))
     first, last = SPEEDS[0], SPEEDS[-1]
     longer = _to_beads(sizes, [one.mean("time", last) / one.mean("time", first) for one in sizes])
     wanted = published(last)[1] / published(first)[1]
@@ -219,15 +288,15 @@ def _drops(tell: Tell) -> Outcome:
 
 
 def _words(one: Size) -> str:
-    law = one.law
-    d1, k_over_m = law.two_numbers()
+    law, fitted = one.law, one.fitted
     near, deep = law.regressed & ~law.beyond, law.regressed & law.beyond
     stood = ", ".join(f"{1e3 * one.mean('depth', v):.1f} ({1e3 * published(v)[0]:.1f}) at {v:g} m/s" for v in SPEEDS)
     return say(
         "of_size", across=one.across - 1, count=int(one.falls[0]["count"]), packing=float(one.falls[0]["packing"]),
         drops=len(one.falls), stood=stood, near=float(law.drag[near].mean()), deep=float(law.drag[deep].mean()),
-        deep_error=float(law.drag[deep].std(ddof=1) / math.sqrt(max(1, deep.sum()))), d1=100 * d1, k_over_m=k_over_m,
-        misfit=100 * law.misfit, two=100 * law.misfit_of(d1, k_over_m), theirs=100 * law.misfit_of(D1, K_OVER_M),
+        deep_error=float(law.drag[deep].std(ddof=1) / math.sqrt(max(1, deep.sum()))), k_over_m=law.k_over_m,
+        misfit=100 * law.misfit, refit=100 * law.misfit_of(fitted), fitted=fitted.k_over_m,
+        theirs=100 * law.misfit_of(PUBLISHED), drags=listed(fitted.drag, ".0f"),
     )  # fmt: skip
 
 

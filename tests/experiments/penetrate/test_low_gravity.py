@@ -339,7 +339,7 @@ def test_stages_beside_a_packing_are_refused(other):
 class Soft(FakeBed):
     """Overlaps by 5.12 % in the way in below 5 mm, until it is stiff enough."""
 
-    enough = 1.2e5
+    enough = 6e4
     young_now = 0.0
 
     def advance(self, steps, *, drag_time=np.inf):
@@ -387,6 +387,17 @@ def test_a_run_past_its_overlap_is_done_again_with_stiffer_grains_and_says_so(so
     assert sum("went" in text or "overlapped" in text for text in result["warnings"]) == len(notes)
     assert all(run["ended"] in ("done", "rest") for run in result["runs"])
     golden("penetrate/made_stiffer", [text for text in result["warnings"] if "overlapped" in text][:1])
+
+
+def test_grains_that_no_modulus_holds_end_the_run(soft, tmp_path, monkeypatch):
+    """At most ten times the modulus that was chosen, and the failure says what else would do."""
+    law, made = soft
+    monkeypatch.setattr(Soft, "enough", math.inf)
+    law["hardness"] = 1.0
+    settings = PenetrateSettings(gravity="1e-3g", load=1e-3, frame_count=0, drop_speeds=(), seeds=(1,))
+    with pytest.raises(RuntimeError, match="finer ones or a larger bed"):
+        penetrate.run(settings, tmp_path / "run")
+    assert 1 < max(made) / beds.choose_softness(settings).young <= penetrate.MOST_STIFFER
 
 
 def test_a_modulus_that_is_set_is_not_changed(soft, tmp_path):

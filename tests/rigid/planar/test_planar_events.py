@@ -297,7 +297,8 @@ def test_any_trial_with_any_effects_on_any_ground_ends_with_its_books_closed(see
     except ValueError as problem:
         assert "cannot stand" in str(problem) or "plastic-sinkage." in str(problem)
         return
-    assert run.notes["forced_steps"] == 0
+    # Without friction, under a torque that begins at zero, nothing tells sticking from sliding: one such step.
+    assert run.notes["forced_steps"] <= (mu_s == 0.0 and "torque-rise" in effects)
     assert run.energy_residual < 1e-6
     assert (np.diff(run.dissipated) > -1e-9).all()
     depths = [LENGTH * np.cos(run.theta + (n + 0.5) * math.pi / 4) - run.y for n in range(8)]
