@@ -241,7 +241,7 @@ SAND, SAND_WEAK = MATERIALS["sand"], MATERIALS["sand-weak"]
 
 CAVEATS = {
     "sand-weak": "its rolling friction is a guess: 24 to 25 degrees of triaxial friction, where fine sand has 30 to "
-    "33; 'sand' has 30, and a spike meets 1.7 times the force in it",
+    "33; 'sand' has 30, and a spike meets twice the force in it",
     "jsc-1a-loose": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand seven times as high as "
     "JSC-1A's; 'jsc-1a-loose-heights' is the one to take",
     "jsc-1a-dense": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand ten times as high as "

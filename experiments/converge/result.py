@@ -16,7 +16,7 @@ from .analysis import QUANTITIES, REST, Finding, findings_of, told, two_finest
 from .costs import core_hours, step_count
 from .design import BASE, Member, Variant, inertial_number, told_of
 from .settings import ConvergeSettings, say
-from .statistics import Interval
+from .statistics import Interval, interval_of
 
 __all__ = ["conclude", "doubts", "plan_told"]
 
@@ -99,7 +99,7 @@ def conclude(
         status="done" if len(done) == len(members) else "stopped",
         quantities=entries,
         departures={"sentences": list(_sentences(found, settings, variants))},
-        tables=[_errors(entries), _sizes(settings, variants, values), *_differences(found, variants)],
+        tables=[_errors(entries), _by_size(found), _sizes(settings, variants, values), *_differences(found, variants)],
         convergence={name: told(finding) for name, finding in found.items()},
         life=life / tip,
         variants=[{"id": v.id, **told_of(v)} for v in variants],
@@ -159,6 +159,18 @@ def _errors(entries: Mapping[str, Json]) -> Json:
         rows.append([name.replace("_", " "), *map(foldable, (value, *errors, "" if unit == "1" else unit))])
     head = ["quantity", "at the real grain", *_NAMES.values(), "unit"]
     return {"title": say("errors_title"), "head": head, "rows": rows}
+
+
+def _by_size(found: Mapping[str, Finding]) -> Json:
+    """The table of means over beds by grain size, the finest first."""
+    ratios = sorted({round(1 / size.x, 6) for finding in found.values() for size in finding.sizes}, reverse=True)
+    rows = []
+    for name, finding in found.items():
+        by_ratio = {round(1 / size.x, 6): interval_of(size.values) for size in finding.sizes}
+        unit = QUANTITIES[name].unit
+        rows.append([name.replace("_", " "), *(_span(by_ratio.get(ratio), unit) for ratio in ratios)])
+    head = ["quantity", *(f"D/d = {ratio:.3g}" for ratio in ratios)]
+    return {"title": say("by_size_title"), "head": head, "rows": rows, "words": True}
 
 
 def _sizes(settings: ConvergeSettings, variants: Sequence[Variant], values: Mapping[str, Any]) -> Json:
