@@ -90,7 +90,9 @@ def test_a_wrong_word_for_the_check_is_refused(word, monkeypatch):
 def test_lists_that_are_not_made_anew_in_time_are_found(checked, monkeypatch):
     """Grains go as far as they like: one has soon gone past half the skin."""
     real = checked.engine.launch
-    monkeypatch.setattr(checked.engine, "launch", lambda most, dt, limit, *rest: real(most, dt, 1e3 * limit, *rest))
+    monkeypatch.setattr(
+        checked.engine, "launch", lambda most, before, dt, limit, *rest: real(most, before, dt, 1e3 * limit, *rest)
+    )
     with pytest.raises(BedFailure, match=r"step \d+: .*(grain|body) \d+ has gone \S+ m.* half the skin"):
         checked.advance(2000)
 
@@ -99,7 +101,9 @@ def test_a_pair_that_no_list_has_is_found_when_it_touches(checked, monkeypatch):
     """The same skipped lists, with nothing looked at but who touches whom."""
     monkeypatch.setattr(dem.engine.checking, "_check_age", lambda bed, state: None)
     real = checked.engine.launch
-    monkeypatch.setattr(checked.engine, "launch", lambda most, dt, limit, *rest: real(most, dt, 1e3, *rest))
+    monkeypatch.setattr(
+        checked.engine, "launch", lambda most, before, dt, limit, *rest: real(most, before, dt, 1e3, *rest)
+    )
     with pytest.raises(BedFailure, match=r"grains? \d+ and .*\d+.* touch and are not listed"):
         checked.advance(2000)
 
