@@ -19,7 +19,7 @@ faces = np.array([[0, 2, 1], [0, 3, 2], [0, 4, 3], [0, 1, 4], [1, 2, 3], [1, 3, 
 meshio.write(out / "foot.stl", meshio.Mesh(corners, [("triangle", faces)]))
 
 foot = mesh_from_file(out / "foot.stl", scale=1e-3)
-bed = Bed.prepare("sand", size=(2 * width, 2 * width, 1.5 * width), grain=grain, gravity=9.81, seed=1)
+bed = Bed.prepare("sand", size=(2 * width, 2 * width, 1.5 * width), grain=grain, gravity=9.81, seed=1, young=3e7)
 body = bed.add_body([foot], position=(width, width, bed.surface + 0.5 * grain), friction=0.5)
 bed.move_body(body, velocity=(0.0, 0.0, -0.1))
 forces = []

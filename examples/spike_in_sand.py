@@ -8,7 +8,7 @@ from rigid import Spike
 
 small = "--small" in sys.argv
 size, grain, diameter = ((0.024, 0.024, 0.02), 0.004, 0.008) if small else ((0.12, 0.12, 0.08), 0.004, 0.024)
-bed = Bed.prepare("sand", size=size, grain=grain, gravity=9.81, seed=1)
+bed = Bed.prepare("sand", size=size, grain=grain, gravity=9.81, seed=1, young=3e7)  # for what a spike presses
 print(bed)
 
 depth = 0.5 * diameter

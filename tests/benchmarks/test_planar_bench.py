@@ -22,7 +22,7 @@ def test_all_terms_means_all():
 def test_bench_planar_writes_speed_and_agreement(tmp_path, monkeypatch):
     monkeypatch.setenv("HEDGEBED_BENCH_TRIALS", "200")
     monkeypatch.setenv("HEDGEBED_BENCH_ROUNDS", "2")
-    monkeypatch.setenv("HEDGEBED_BENCH_COMPARED", "6")
+    monkeypatch.setenv("HEDGEBED_BENCH_COMPARED", "18")
     assert main(["bench", "planar", "--out", str(tmp_path / "bench"), "--quiet"]) == 0
     bench = json.loads((tmp_path / "bench" / "bench.json").read_text(encoding="utf-8"))
     assert (bench["format"], bench["what"]) == ("hedgebed-bench/1", "planar")

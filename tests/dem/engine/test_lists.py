@@ -216,4 +216,6 @@ def test_lists_that_grow_in_mid_run_carry_histories_checkpoints_and_files(option
     small.advance(40)
     again.advance(40)
     found, wanted = again.state(), small.state()
+    summed = [state.pop("sleep_reals", np.zeros(2)) for state in (found, wanted)]
+    assert summed[0] == pytest.approx(summed[1], rel=1e-12)
     assert [name for name in wanted if not np.array_equal(found[name], wanted[name])] == []

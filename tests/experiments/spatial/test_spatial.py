@@ -81,7 +81,7 @@ def test_what_cannot_be_is_refused_before_any_work(cube, given, said):
 @pytest.mark.long
 def test_the_hand_sets_down_heavy_on_soft_ground_and_what_it_cannot_is_refused_by_name():
     """The Hedgehog free at 1 m/s2: 5.3 N on four spikes of sand, W / 4 K = 32 mm deep; at the rig's speed too late."""
-    heavy = {"surface": "sand", "gravity": 1.0, "duration": 0.05}
+    heavy = {"surface": "sand-weak", "gravity": 1.0, "duration": 0.05}
     plan = plan_spatial(SpatialSettings(**heavy))
     run = SpatialFollowed(SpatialSettings(**heavy), plan).run_on_law()
     while not run.placed:
