@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.runs.types import Json
+from vis.page.marks import insert
 
 __all__ = ["HEADINGS", "MARKS", "PHASES", "Sheet", "insert", "markdown", "marks_of", "print_or_insert", "rows", "show"]
 
@@ -263,16 +264,6 @@ def marks_of(bench: Json) -> tuple[str, str]:
     if found is None:
         raise ValueError(f"this bench.json ({bench.get('what')}) has no table for a page")
     return found
-
-
-def insert(text: str, table: str, marks: tuple[str, str]) -> str:
-    """A page with what is between two marks replaced by a table. Raises ValueError where a mark is missing."""
-    begin, end = marks
-    head, first, rest = text.partition(begin)
-    _, second, tail = rest.partition(end)
-    if not first or not second:
-        raise ValueError(f"the page lacks the marks {begin} and {end}")
-    return f"{head}{begin}\n{table}{end}{tail}"
 
 
 def print_or_insert(

@@ -1,11 +1,9 @@
 """What a member run costs, reckoned before the work: grains, steps, and hours of one core."""
 
-import math
-
 from experiments.penetrate import beds
 from experiments.penetrate.rest import made_units
 from experiments.penetrate.settings import PenetrateSettings
-from experiments.penetrate.units import PREPARATION, RAIN, TAPPED, expected_time, plan_units
+from experiments.penetrate.units import expected_time, plan_units, preparation_time
 
 __all__ = ["core_hours", "step_count"]
 
@@ -23,9 +21,7 @@ def step_count(settings: PenetrateSettings, *, bed: bool = True) -> float:
     units = [unit for unit in made_units(settings, plan_units(settings)) if unit.seed == settings.seeds[0]]
     time = sum(expected_time(settings, unit, stiffness, held=held) for unit in units)
     if bed:
-        fall = math.sqrt(2 * RAIN * settings.bed_size[2] / beds.first_gravity(settings))
-        tapped = settings.packing is not None or any("compact" in stage for stage in beds.stages_of(settings) or ())
-        time += PREPARATION * (TAPPED if tapped else 1.0) * fall
+        time += preparation_time(settings, beds.stages_of(settings), beds.first_gravity(settings))
     return time / step
 
 

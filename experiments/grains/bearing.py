@@ -21,7 +21,8 @@ from .recipes import recipe_of
 from .softening import PACKING, bearing_gradient
 
 __all__ = [
-    "COHESIONS", "UNSURE", "Bearing", "bearing_capacity", "bearing_of", "cohesion_of", "friction_angle", "strength",
+    "COHESIONS", "OF_PLATE", "UNSURE", "Bearing", "bearing_capacity", "bearing_of", "cohesion_of", "friction_angle",
+    "strength",
 ]  # fmt: skip
 
 COHESIONS = (10.0, 30.0, 100.0, 300.0, 1000.0)
@@ -34,7 +35,7 @@ _WEAK = 25.0
 _PER_DEGREE = 0.092
 """Growth of ln K with the angle: 1.7 times from 25.0 to 30.8 degrees [1/degree] (docs/materials.md); beyond that it is
 an extrapolation."""
-_PLATE = 0.41
+OF_PLATE = 0.41
 """K of `sand-weak` over that of a flat plate in 3D-RFT: 38 of 92 N/m [1]."""
 _RESISTANCE = 450.0
 """What a tip meets for their cohesion in grains that stick, over it [1]: 70 of 79 kPa for 150 Pa (docs/bed.md)."""
@@ -96,4 +97,4 @@ def bearing_of(material: Material, *, grain: float, gravity: float, area: float)
     if material.cohesion != "none":
         known = recipe_of(material).resistance
         resistance = known if known is not None else _RESISTANCE * cohesion_of(material, grain)
-    return Bearing(_PLATE * strength(material) * plate, resistance * area, resistance)
+    return Bearing(OF_PLATE * strength(material) * plate, resistance * area, resistance)

@@ -14,6 +14,7 @@ from typing import Any
 
 from experiments.grains.bearing import COHESIONS, bearing_capacity, friction_angle, strength
 from experiments.runs.types import Json
+from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import beds
 from .findings import Findings
@@ -55,7 +56,7 @@ def answer(findings: Findings, material: Any) -> Json | None:
     told: Json = {
         "s": settings, "depth": _length(depths[0]), "foot": 1e3 * settings.foot, "floor": 1e3 * settings.bed_size[2],
         "plate": _length(depths[1]),
-        "angle": angle, "enough": f"{enough:.2g}", "g": settings.gravity / 9.80665, "beside": _BESIDE,
+        "angle": angle, "enough": f"{enough:.2g}", "g": settings.gravity / STANDARD_GRAVITY, "beside": _BESIDE,
         "driven": 1e3 * settings.depth, "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the K expected",
     }  # fmt: skip
     cohesionless = material.cohesion == "none"

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from coupling import Drive, Drop, Run, SetDown
 from coupling.planar_body import PLACEMENT_TIME
+from experiments.grains.bearing import OF_PLATE
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress, as_expected
 from experiments.runs.types import Json
@@ -21,10 +22,11 @@ from rigid import Spike
 from .settings import PenetrateSettings
 from .similarity import pace_of
 
-__all__ = ["RAIN", "PenetratePlan", "Unit", "deepest", "expected_time", "make_run", "make_spike", "plan_units"]
+__all__ = [
+    "RAIN", "PenetratePlan", "Unit", "deepest", "expected_time", "make_run", "make_spike", "plan_units",
+    "preparation_time",
+]  # fmt: skip
 
-_SOFTER = 0.41
-"""K as fitted to the shipped case's runs over that of a flat plate in 3D-RFT: 38 of 92 N/m [1]."""
 _TIMES_TO_REST = 2.4
 """Of load / (lowering_speed K), until a set-down shows no sign of motion: 1.8 to 3.3 in six [1]."""
 
@@ -130,7 +132,7 @@ def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float, *, 
     A drop: to the first stop of m z'' = W - K z with the speed v, at w t = pi - atan(v K / (W w)), w^2 = K / m, and
     what follows. A set-down: of first order, with the placement's time constant c / K = W / (lowering_speed K).
     """
-    own = _SOFTER * stiffness
+    own = OF_PLATE * stiffness
     if unit.kind == "driven":
         return settings.depth / unit.speed + settings.hold + settings.depth / settings.retreat_speed
     if unit.kind == "drop":
@@ -161,6 +163,15 @@ FRAME = 40.0
 """What a frame costs, in steps [1]: 0.12 s among 20,187 grains."""
 SPRING_DAMPER = 1.0
 """What the fit and the same runs on the law take [s]."""
+
+
+def preparation_time(settings: PenetrateSettings, stages: Sequence[str] | None, gravity: float) -> float:
+    """About how long a bed takes to prepare in `stages` under a gravity [m/s2], on its clock [s]; 0: it is given."""
+    if settings.bed is not None:
+        return 0.0
+    fall = math.sqrt(2 * RAIN * settings.bed_size[2] / gravity)
+    tapped = settings.packing is not None or any("compact" in stage for stage in stages or ())
+    return PREPARATION * (TAPPED if tapped else 1.0) * fall
 
 
 class PenetratePlan:
@@ -212,12 +223,7 @@ class PenetratePlan:
         self._progress.expect({other.title: self._cost(other) for other in alike})
 
     def _bed_cost(self) -> float:
-        settings = self._settings
-        if settings.bed is not None:
-            return 0.0
-        fall = math.sqrt(2 * RAIN * settings.bed_size[2] / self._gravity)
-        tapped = settings.packing is not None or any("compact" in stage for stage in self._stages or ())
-        return PREPARATION * (TAPPED if tapped else 1.0) * fall / self._step
+        return preparation_time(self._settings, self._stages, self._gravity) / self._step
 
     def _cost(self, unit: Unit) -> float:
         frames = self._settings.frame_count + 3 if unit.id in self._shown and self._settings.frame_count else 0

@@ -13,11 +13,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from .marks import insert
+
 __all__ = ["KINDS", "Limit", "all_limits", "kind_of", "limits_table", "limits_words", "put_table"]
 
 KINDS = ("spike on grains", "platform on grains", "bed", "planar model", "diagnosis")
 """Kinds of runs that limits concern."""
-_BEGIN, _END = "<!-- limits: begin -->", "<!-- limits: end -->"
+_MARKS = ("<!-- limits: begin -->", "<!-- limits: end -->")
 _GROUPS = {
     True: "What fails",
     False: "What is biased, left out or not measured",
@@ -94,13 +96,9 @@ def limits_table(limits: Sequence[Limit]) -> list[str]:
 
 def put_table(page: Path) -> None:
     """Write the table anew between the marks of `page`. Raises ValueError where the marks are not there."""
-    text = page.read_text(encoding="utf-8")
-    before, begin, rest = text.partition(_BEGIN)
-    _, end, after = rest.partition(_END)
-    if not (begin and end):
-        raise ValueError(f"{page} has no {_BEGIN} and {_END} for the table to stand between")
     table = "\n".join(limits_table(all_limits()))
-    page.write_text(f"{before}{begin}\n{table}{end}{after}", encoding="utf-8")
+    text = insert(page.read_text(encoding="utf-8"), table, _MARKS, page=str(page))
+    page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
