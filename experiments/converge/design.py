@@ -37,8 +37,9 @@ ROOM = 2.0
 beforehand."""
 MOST_OVERLAP = 0.1
 """That `penetrate` takes [of a diameter]."""
-_SAME_NUMBERS = ("seeds", "threads", "checkpoint_interval", "frame_count", "cache", "allow_coarse")
-"""Settings that change no number of a member, and its seed, which stands beside them."""
+_NOT_OF_THE_BED = ("seeds", "arch", "threads", "checkpoint_interval", "frame_count", "cache", "allow_coarse")
+"""Settings that say how a member is computed, not which it is, and its seed, which stands beside them. `arch` changes
+its bits, not what they are drawn from: a sweep may be made in parts, some of them on a GPU."""
 
 
 def inertial_number(settings: PenetrateSettings, speed: float) -> float:
@@ -90,7 +91,7 @@ class Member:
     def folder(self) -> str:
         """The name of its run folder: the same for the same settings and code, whatever the sweep calls it."""
         settings = self.settings
-        kept = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _SAME_NUMBERS}
+        kept = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _NOT_OF_THE_BED}
         kept["material"] = repr(beds.find_material(settings))
         text = json.dumps([kept, self.seed, beds.fingerprint()], sort_keys=True)
         width, deep = 1e3 * settings.bed_size[0], 1e3 * settings.bed_size[2]
