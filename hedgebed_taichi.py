@@ -10,15 +10,19 @@ Imports nothing of ours.
 import atexit
 import contextlib
 import functools
+import inspect
 import io
 import os
 import re
 import sys
 import textwrap
 import warnings
+from collections.abc import Iterator
+from dataclasses import is_dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -96,13 +100,70 @@ def _load() -> Any:
         os.environ.setdefault(key, value)
     # quadrants says so whenever a field of vectors is filled; kernels that steps call have no such argument.
     warnings.filterwarnings("ignore", ".*Template mapper caching disabled")
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), _frames_known():
         taichi = import_module(chosen())
     _read_sources_once(chosen())
     if chosen() == "quadrants":
         _forget_launches()
+        _read_kernels_once()
     atexit.register(_end)
     return taichi
+
+
+@contextlib.contextmanager
+def _frames_known() -> Iterator[None]:
+    """While it is imported: spare it the search for a source that there is none of.
+
+    A decorator looks at the line that called it, to know whether its function stands in a class. Of a function at the
+    top of a module that is the import system's, which has no file.
+    """
+    ask = inspect.getframeinfo
+
+    def known(frame: Any, context: int = 1) -> Any:
+        if _imports(frame):
+            return inspect.Traceback(frame.f_code.co_filename, frame.f_lineno, frame.f_code.co_name, None, None)
+        return ask(frame, context)
+
+    inspect.getframeinfo = known
+    try:
+        yield
+    finally:
+        inspect.getframeinfo = ask
+
+
+def _imports(frame: Any) -> bool:
+    return str(frame.f_code.co_filename).startswith("<frozen ")
+
+
+def _read_kernels_once() -> None:
+    """Let quadrants read the source of a kernel once where it would twice.
+
+    Its first reading finds out which members of dataclasses and of structures with ndarrays are used. Kernels without
+    such an argument have none. A function that is given one all the same is refused by name in the second reading.
+    """
+    kernel = import_module("quadrants.lang.kernel").Kernel
+    arrays = import_module("quadrants.lang._ndarray").Ndarray
+    flat = vars(import_module("quadrants.lang._kernel_impl_dataclass"))
+    find, flatten = vars(kernel).get("_try_load_fastcache"), flat.get("unpack_ast_struct_expressions")
+
+    def plain(argument: Any, value: Any) -> bool:
+        held = vars(value).values() if hasattr(value, "__dict__") else ()
+        return not (
+            is_dataclass(argument.annotation) or is_dataclass(value) or any(isinstance(one, arrays) for one in held)
+        )
+
+    def found(self: Any, arguments: tuple[Any, ...], key: Any) -> set[str] | None:
+        used: set[str] | None = find(self, arguments, key)  # type: ignore[misc]
+        if used is None and all(map(plain, self.arg_metas, arguments)):
+            used = self.used_py_dataclass_parameters_by_key_enforcing[key] = set()
+        return used
+
+    def flattened(tree: Any, struct_locals: set[str]) -> Any:
+        return flatten(tree, struct_locals=struct_locals) if struct_locals else tree  # type: ignore[misc]
+
+    if find and flatten:
+        kernel._try_load_fastcache = found
+        flat["unpack_ast_struct_expressions"] = flattened
 
 
 def _forget_launches() -> None:
@@ -125,7 +186,8 @@ def _read_sources_once(name: str) -> None:
     """Keep what Taichi asks for again and again while it reads kernels: a fifth of the time to a script's first step.
 
     For every node of a syntax tree it wraps the source lines around it, for the message of an error that may come, and
-    for every call of a function it looks for the function's source. The answers are the same each time.
+    for every call of a function it looks for the function's source and puts its lines in order; and for every function
+    whether it stands in a class. The answers are the same each time.
     """
 
     @functools.cache
@@ -134,13 +196,29 @@ def _read_sources_once(name: str) -> None:
         made.wrap = functools.lru_cache(maxsize=10_000)(made.wrap)  # type: ignore[method-assign]
         return made
 
-    for module in ("ast.ast_transformer_utils", "kernel_impl", "_wrap_inspect"):
+    lines = SimpleNamespace(fill=functools.lru_cache(maxsize=10_000)(textwrap.fill), dedent=textwrap.dedent)
+    for module in ("ast.ast_transformer_utils", "kernel_impl", "_wrap_inspect", "_func_base"):
+        if find_spec(f"{name}.lang.{module}") is None:
+            continue
         names = vars(import_module(f"{name}.lang.{module}"))
+        if names.get("textwrap") is textwrap:
+            names["textwrap"] = lines
         if "TextWrapper" in names:
             names["TextWrapper"] = wrapper
         for reader in ("getsourcelines", "getsourcefile"):
             if reader in names:
                 names[reader] = functools.lru_cache(maxsize=500)(names[reader])
+        if "_inside_class" in names:
+            names["_inside_class"] = functools.partial(_inside_class, names["_inside_class"])
+
+
+def _inside_class(ask: Any, level_of_class_stackframe: int) -> bool:
+    """``ask``, but for a frame of the import system (see ``_frames_known``)."""
+    try:
+        frame = sys._getframe(level_of_class_stackframe)
+    except ValueError:  # there is none: a function of a script
+        return False
+    return not _imports(frame) and ask(level_of_class_stackframe + 1)
 
 
 def __getattr__(name: str) -> Any:
