@@ -57,10 +57,11 @@ def test_a_script_leaves_its_kernels_in_taichis_cache(tmp_path):
 # Kernels with nothing, with a dataclass of arrays, and with a member that is an array; how often each was read.
 READINGS = """
 import dataclasses
+import sys
 from hedgebed_taichi import ti
 
 ti.init(arch=ti.cpu, cpu_max_num_threads=1, offline_cache=False)
-kernels, readings = ti.lang.kernel.Kernel, []
+kernels, readings = sys.modules["quadrants.lang.kernel"].Kernel, []
 read = kernels.get_tree_and_ctx
 kernels.get_tree_and_ctx = lambda self, **options: (readings.append(self.func.__name__), read(self, **options))[1]
 
