@@ -19,6 +19,7 @@ from rigid.planar.trajectory import Trajectory
 from .result import motion_columns, result_of, trajectory_columns
 from .settings import TumbleSettings
 from .sweep import Sweep
+from .sweep_ranges import swept_gravities
 from .synthesis import check_tumble_campaign, write_tumble_campaign
 from .trial import TumblePlan, plan_tumble
 
@@ -78,7 +79,7 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
     sweep = Sweep(settings, model_file=copied, platform=platform) if settings.sweep else None
     plan = sweep.plans[sweep.shown] if sweep else plan_tumble(settings, model_file=copied, platform=platform)
-    for sentence in plan.announcement():
+    for sentence in [*(swept_gravities(sweep.ranges) if sweep else ()), *plan.announcement()]:
         progress.message(sentence)
     progress.stage("tumble", total=1.0)
     if settings.method == "coupled":

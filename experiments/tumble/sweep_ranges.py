@@ -1,12 +1,14 @@
-"""Ranges to sweep a number over, as they are typed: KEY=FROM:TO:STEP."""
+"""Ranges to sweep a number over, as they are typed: KEY=FROM:TO:STEP, or with a unit, KEY=1mg:9mg:2mg."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from experiments.runs.reading import nearest
+from experiments.runs.units import find_unit, has_unit, in_both
 from rigid.terms import EFFECTS
 
-__all__ = ["MOST_TRIALS", "SWEEPABLE", "SweepRange", "parse_sweep", "unit_of"]
+__all__ = ["MOST_TRIALS", "SWEEPABLE", "SweepRange", "parse_sweep", "swept_gravities", "unit_of"]
 
 SWEEPABLE = {
     "rig": "9.80665 m/s2", "gravity": "m/s2", "counterweight": "kg", "torque": "N m", "torque_until": "s",
@@ -32,10 +34,10 @@ class SweepRange:
 
 
 def parse_sweep(texts: tuple[str, ...]) -> tuple[SweepRange, ...]:
-    """The ranges of one key or two.
+    """The ranges of one key or two, in the units of `unit_of`.
 
-    Raises ValueError for what is no range, a key there is not, one key twice, more than two keys, and more trials than
-    2,500.
+    Raises ValueError for what is no range, a key there is not, a unit of another kind or behind some of the three
+    numbers only, one key twice, more than two keys, and more trials than 2,500.
     """
     ranges = tuple(_one(text) for text in texts)
     keys = [each.key for each in ranges]
@@ -57,22 +59,52 @@ def unit_of(key: str) -> str:
     return next(parameter.unit for parameter in EFFECTS[effect].parameters if parameter.name == name)
 
 
+def swept_gravities(ranges: tuple[SweepRange, ...]) -> Iterator[str]:
+    """What the ends of a range of gravities mean in m/s2 and in g, a sentence each."""
+    for each in ranges:
+        ends = list(dict.fromkeys((each.values[0], each.values[-1])))
+        yield from in_both(each.key, ends, find_unit(f"[{unit_of(each.key)}]"))
+
+
 def _one(text: str) -> SweepRange:
     key, equals, span = text.partition("=")
     key = key.strip().replace("-", "_") if "." not in key else key.strip()
-    try:
-        low, high, step = (float(word) for word in span.split(":"))
-    except ValueError:
-        raise ValueError(f"sweep = {text!r} is no range: {_TYPED} would do") from None
-    if not (equals and all(math.isfinite(value) for value in (low, high, step))):
+    words = span.split(":")
+    if not (equals and len(words) == 3 and all(has_unit(word) or _is_finite(word) for word in words)):
         raise ValueError(f"sweep = {text!r} is no range: {_TYPED} would do")
+    _check_key(key, text)
+    low, high, step = _numbers(key, words, text)
     if step <= 0 or high < low:
         raise ValueError(f"sweep = {text!r} goes nowhere: FROM below TO and a STEP above 0 would do")
-    _check_key(key, text)
     count = math.floor((high - low) / step * (1 + 1e-12) + 1e-9) + 1
     if count > MOST_TRIALS:
         raise ValueError(f"sweep = {text!r} makes {count} trials: at most {MOST_TRIALS} would do")
     return SweepRange(key, tuple(float(f"{low + k * step:.12g}") for k in range(count)))
+
+
+def _is_finite(word: str) -> bool:
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False
+
+
+def _numbers(key: str, words: list[str], text: str) -> list[float]:
+    """What FROM, TO and STEP mean in the unit of the key."""
+    with_unit = [word for word in words if has_unit(word)]
+    if not with_unit:
+        return [float(word) for word in words]
+    stated = unit_of(key)
+    unit = find_unit(f"[{stated}]")
+    if unit is None:
+        which = "has no unit" if stated == "1" else f"is in {stated}"
+        raise ValueError(f"sweep = {text!r}: {key} {which}: numbers without one would do")
+    if len(with_unit) < len(words):
+        raise ValueError(f"sweep = {text!r} has a unit behind some of FROM, TO and STEP: behind all or none would do")
+    try:
+        return [unit.value_of(word) for word in words]
+    except ValueError as error:
+        raise ValueError(f"sweep = {text!r}: {error}") from None
 
 
 def _check_key(key: str, text: str) -> None:

@@ -67,6 +67,10 @@ def test_a_sweep_is_its_tumbles_one_by_one(capsys, reported):
         ("mu-s=0.3:0.59:0.1", (0.3, 0.4, 0.5)),
         ("torque=0.1:0.1:1", (0.1,)),
         ("pendulum.length=2:3:0.25", (2.0, 2.25, 2.5, 2.75, 3.0)),
+        ("pendulum.length=200cm:250cm:0.25 m", (2.0, 2.25, 2.5)),
+        ("rig=8mg:9mg:0.5mg", (8e-3, 8.5e-3, 9e-3)),
+        ("gravity=1e-3g:2e-3 g:1mg", (9.80665e-3, 1.96133e-2)),
+        ("torque=100mNm:0.2Nm:50 mN m", (0.1, 0.15, 0.2)),
     ],
 )
 def test_a_range_holds_its_ends_as_far_as_the_step_leads(text, values):
@@ -87,6 +91,10 @@ def test_the_middle_of_a_sweep_is_a_tumble_of_its_own():
         (["--sweep", "mu_s"], ["sweep = 'mu_s' is no range", "mu_s=0.3:0.6:0.1"]),
         (["--sweep", "mu_s=0.3:0.6"], ["is no range"]),
         (["--sweep", "mu_s=0.3:inf:0.1"], ["is no range"]),
+        (["--sweep", "mu_s=0.3g:0.5g:0.1g"], ["mu_s has no unit"]),
+        (["--sweep", "inertia=0.07kg:0.08kg:0.01kg"], ["inertia is in kg m2"]),
+        (["--sweep", "rig=8mg:9mg:5e-4"], ["behind some of FROM, TO and STEP"]),
+        (["--sweep", "gravity=8mm:9mm:1mm"], ["'mm' is a unit of length", "acceleration in m/s2"]),
         (["--sweep", "mu_s=0.6:0.3:0.1"], ["goes nowhere"]),
         (["--sweep", "mus=0.3:0.6:0.1"], ["mus is no number that can be swept", "'mu_s'"]),
         (["--sweep", "pendulum.lenght=1:2:1"], ["lenght is no parameter of pendulum", "'length'"]),
@@ -176,3 +184,12 @@ def test_a_trial_that_stands_or_gets_away_by_one_model_only_is_counted_and_told(
     said = sweep.sentences(0, gaps)
     golden("tumble/sweep_by_one_model", said)
     assert "degrees" not in " ".join(said)
+
+
+def test_a_sweep_in_g_is_one_in_the_rigs_unit_and_says_both_units(capsys):
+    tokens = ["tumble", "--sweep", "rig=8mg:9mg:0.5mg", "--duration", "0.05", "--out", "a"]
+    assert main(tokens) == 0
+    said = capsys.readouterr()
+    assert "rig: 0.07845 m/s2, which is 0.008 g" in said.out + said.err
+    assert "rig: 0.08826 m/s2, which is 0.009 g" in said.out + said.err
+    assert read_series(Path("a/sweep.csv"))["rig_g"].tolist() == [8e-3, 8.5e-3, 9e-3]
