@@ -100,7 +100,7 @@ def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress
             write_text(_ROOT / "docs" / "validation.md", markdown(kept, command=_command(settings)))
             _keep_result(kept)
         elif settings.keep:
-            keep([_illustrated(row, folder.path) for row in result["cases"]], command=_command(settings))
+            keep([_illustrated(row, folder.path) for row in result["cases"]])
         return result
 
 
@@ -199,14 +199,15 @@ def _is_checkout() -> bool:
     return (_ROOT / "docs").is_dir() and (_ROOT / "pyproject.toml").is_file()
 
 
-def keep(cases: Sequence[Json], *, command: str) -> None:
+def keep(cases: Sequence[Json]) -> None:
     """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of.
 
-    A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run.
+    A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run. A row
+    has the command that runs its case alone: with others it comes to the same.
     """
     path = _ROOT / _KEPT
     before = dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
-    now = [dict(row) | {"command": command} for row in cases]
+    now = [dict(row) | {"command": f"hedgebed validate --only {row['id']}"} for row in cases]
     known = {row["id"]: row for row in [*(before["cases"] if before else ()), *now] if row["status"] in _RAN}
     rows = [
         case.about() | known[case.id] | {"family": case.family} if case.id in known else case.head() for case in SUITE

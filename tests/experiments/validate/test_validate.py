@@ -141,6 +141,15 @@ def test_a_case_run_by_itself_goes_into_the_kept_table_with_its_own_code(suite, 
         experiment.run(ValidateSettings(keep=True, document=str(tmp_path / "x.md")), tmp_path / "four")
 
 
+def test_cases_run_together_are_kept_with_the_command_of_each(suite, tmp_path, monkeypatch):
+    monkeypatch.setattr(experiment, "_ROOT", tmp_path)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "pyproject.toml").touch()
+    experiment.run(ValidateSettings(only=("good", "bad"), keep=True), tmp_path / "both")
+    text = (tmp_path / "docs" / "validation.md").read_text()
+    assert "--only good`" in text and "--only bad`" in text and "good bad" not in text
+
+
 def test_a_case_there_is_not_is_refused_with_the_nearest(tmp_path, capsys):
     assert main(["validate", "--only", "free-fal", "--out", str(tmp_path / "run")]) == 2
     told = capsys.readouterr().err
