@@ -190,5 +190,7 @@ def test_a_sweep_in_g_is_one_in_the_rigs_unit_and_says_both_units(capsys):
     tokens = ["tumble", "--sweep", "rig=8mg:9mg:0.5mg", "--duration", "0.05", "--out", "a"]
     assert main(tokens) == 0
     said = "".join(capsys.readouterr())
-    assert all(f"{size} m/s2" in said and f"{number} g" in said for size, number in ((0.07845, 0.008), (0.08826, 0.009)))
+    assert all(
+        f"{size} m/s2" in said and f"{number} g" in said for size, number in ((0.07845, 0.008), (0.08826, 0.009))
+    )
     assert read_series(Path("a/sweep.csv"))["rig_g"].tolist() == [8e-3, 8.5e-3, 9e-3]
