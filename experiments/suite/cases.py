@@ -12,8 +12,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,9 @@ __all__ = ["EXPERIMENTS", "KEPT", "LONGEST", "Case", "Cost", "cases", "cost_of_t
 
 RATES = ((2.8e3, 3.8e6), (2e4, 9.52e6), (1e5, 7.09e6))
 """Grain-steps a second, with rolling, by the count of grains computed: docs/performance.md, 2026-11-21, a quiet machine
-with 2 cores; the first from `grains3-row-seed1` (2,800 awake of 84,772), where one core does as well as two."""
+with 2 cores (a Xeon); the first from `grains3-row-seed1` (2,800 awake of 84,772), where one core does as well as two. The
+loops of 2026-11-26 made 26.2 and 22.8 million of 20,000 and 100,000 grains on an EPYC, without sleep: there cases take
+less than is said here, by up to 2.7 times. With sleep that is not measured."""
 BOOK = 1.19
 """Time of a step with the balance of what grains lose over one without (docs/coupling.md, 2026-11-22)."""
 MACRO_STEP = 5e-3
@@ -46,10 +49,13 @@ TAPPED = 0.0041
 POURED, DENSEST = 0.534, 0.62
 """Where they began, and, roughly, where ``compact:densest`` ends."""
 
-AWAKE = 20260 * 2.4e-3**3 / 0.036
-"""Grains that a motor's tumble keeps awake on average, times their diameter cubed, over the bed's width [m2]:
-grains1-sand-0.0085-0.22, 20.1 % of 100,753 over 2 s (the looks on 3 mm, of 0.9 to 1.2 s: 15, 25 and 28 % of 29,797). A
-brake shakes all of it (79, 84 %)."""
+PACED, PACED_LOWERING = 1.16, 1.30
+"""Grains computed by today's rules of sleep over those by the rules before 2026-11-26: after the hand lets go (40.5 %
+of the bed over 35.1) and while it lowers (58.2 over 44.8); five beds, docs/results/sleep-whole/runs.jsonl."""
+AWAKE = PACED * 20260 * 2.4e-3**3 / 0.036
+"""Grains that a motor's tumble computes a step, times their diameter cubed, over the bed's width [m2]:
+grains1-sand-0.0085-0.22, 20.1 % of 100,753 over 2 s, by the rules before 2026-11-26. The motors in sand that are kept
+computed 0.3 to 1.2 of that, least at 0.125 N m. A brake shakes all of it (79, 84 %)."""
 CALM = 3.0
 """What rest under a lowered gravity takes, with drag and then without, over the mean that is taken for it [1]: 2.2 at
 1e-6 g (docs/experiments.md)."""
@@ -62,9 +68,18 @@ class Cost:
     grains: float  # of the whole bed
     time_step: float  # [s]
     bed_seconds: float  # preparing the bed, once for all cases that share it [s]
-    run_seconds: float
-    """The tumble [s]; a motor's with sleep, as many grains awake as in the looks, otherwise every grain computed."""
-    grain_steps: float  # of the tumble
+    run_seconds: float  # the tumble [s]
+    grain_steps: float
+    """Of the tumble: those of its kept result, by today's rules of sleep; without one, of a motor with sleep by
+    `AWAKE`, otherwise every grain in each step."""
+    steps: float  # of the tumble
+    beside: float  # of the tumble, the coupling beyond the grains [s]
+    kept: bool = False  # whether the grain-steps are those of a kept result
+
+    def with_grain_steps(self, grain_steps: float) -> "Cost":
+        """The same for so many grain-steps of a kept result."""
+        seconds = _run_seconds(grain_steps, self.steps) + self.beside
+        return replace(self, grain_steps=grain_steps, run_seconds=seconds, kept=True)
 
     @property
     def seconds(self) -> float:
@@ -98,13 +113,18 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     computed = grains
     if settings.sleep and settings.actuator == "motor":
         computed = min(grains, AWAKE * settings.bed_size[1] / settings.grain**3)
+    beside = steps / settings.substeps * MACRO_STEP
     prepared = grains / settings.bed_repeats
     making = FALL_TIMES + TAP * _taps(settings)
     return Cost(
         grains=grains, time_step=step, bed_seconds=making * fall / step * prepared / _rate(prepared),
-        run_seconds=BOOK * steps * computed / _rate(computed) + steps / settings.substeps * MACRO_STEP,
-        grain_steps=steps * computed,
+        run_seconds=_run_seconds(steps * computed, steps) + beside, grain_steps=steps * computed, steps=steps,
+        beside=beside,
     )  # fmt: skip
+
+
+def _run_seconds(grain_steps: float, steps: float) -> float:
+    return BOOK * grain_steps / _rate(grain_steps / steps)
 
 
 def _taps(settings: TumbleSettings) -> int:
@@ -165,9 +185,28 @@ def cases(names: Sequence[str] = ()) -> list[Case]:
     return [case for case in found if not names or any(case.name.startswith(name) for name in names)]
 
 
-def estimate(case: Case) -> Cost | str:
-    """What it costs; or in words why it cannot be run. The same for beds that differ in their seed alone."""
-    return _estimate(case.settings.model_copy(update={"seed": 1}))
+def estimate(case: Case, results: Path | None = None) -> Cost | str:
+    """What it costs; or in words why it cannot be run.
+
+    With a result kept in `results`, its grain-steps; otherwise the same for beds that differ in their seed alone.
+    """
+    found = _estimate(case.settings.model_copy(update={"seed": 1}))
+    kept = _kept_grain_steps(results / case.name) if results is not None else None
+    return found if kept is None or isinstance(found, str) else found.with_grain_steps(kept)
+
+
+def _kept_grain_steps(folder: Path) -> float | None:
+    """Grain-steps of a kept result, those of earlier rules of sleep at what today's are expected to be."""
+    try:
+        grains = read_json(folder / "result.json")["grains"]
+        tumble, lowering = grains["grain_steps"], grains["grain_steps_lowering"]
+        settings = tomllib.loads((folder / "run.toml").read_text(encoding="utf-8"))["settings"]
+    except (OSError, ValueError, KeyError):
+        return None
+    if settings.get("sleep") and "sleep_pace" not in settings:
+        everything = grains["grain_steps_all_awake"]
+        tumble, lowering = min(PACED * tumble, everything), PACED_LOWERING * lowering
+    return float(tumble + lowering)
 
 
 @functools.cache

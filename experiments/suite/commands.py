@@ -63,7 +63,7 @@ def _list(
 
 
 def _row(case: Case, results: Path, work: Path) -> Json:
-    found, (stands, why) = estimate(case), standing(case, results, work)
+    found, (stands, why) = estimate(case, results), standing(case, results, work)
     row: Json = {"case": case.name, "experiment": case.experiment, "standing": stands, "why": why}
     if isinstance(found, str):
         return row | {"standing": "done" if stands == "done" else "not yet", "why": found, "words": ["", "", ""]}
@@ -72,6 +72,7 @@ def _row(case: Case, results: Path, work: Path) -> Json:
         row |= {"standing": "too long", "why": why}
     numbers = {
         "grains": round(found.grains), "time_step": found.time_step, "grain_steps": found.grain_steps,
+        "grain_steps_from": "result" if found.kept else "estimate",
         "bed_seconds": found.bed_seconds, "run_seconds": found.run_seconds,
     }  # fmt: skip
     words = [f"{round(found.grains, -2):,.0f}", duration(found.bed_seconds), duration(found.run_seconds)]

@@ -72,6 +72,23 @@ def test_a_bed_that_is_tapped_denser_costs_its_taps_too():
     assert (denser - poured) / (tapped - poured) == pytest.approx(17 / 9)
 
 
+def test_a_case_with_a_result_costs_its_grain_steps_by_todays_rules_of_sleep(tmp_path):
+    """Those of before 2026-11-26 computed 1.16 times fewer, 1.3 times while the platform was set down."""
+    (case,) = suite.cases(("grains6-trial-0.125-seed1",))
+    folder = tmp_path / case.name
+    folder.mkdir()
+    grains = {"grain_steps": 4e8, "grain_steps_lowering": 1e8, "grain_steps_all_awake": 3e9}
+    (folder / "result.json").write_text(json.dumps({"grains": grains}))
+    (folder / "run.toml").write_text("[settings]\nsleep = true\nsleep_pace = 4\n")
+    without, now = suite.estimate(case), suite.estimate(case, tmp_path)
+    assert suite.estimate(case, tmp_path / "nothing") == without
+    assert (now.grain_steps, now.kept, without.kept) == (5e8, True, False)
+    (folder / "run.toml").write_text("[settings]\nsleep = true\n")
+    once = suite.estimate(case, tmp_path)
+    assert once.grain_steps == pytest.approx(1.16 * 4e8 + 1.3 * 1e8)
+    assert now.run_seconds < once.run_seconds < without.run_seconds
+
+
 @pytest.fixture
 def stubbed(monkeypatch, tmp_path):
     """Two cases of an hour and of a day; runs that write what a run writes."""
@@ -80,7 +97,9 @@ def stubbed(monkeypatch, tmp_path):
     monkeypatch.setattr(
         suite_commands, "cases", lambda names=(): [case for case in chosen if not names or case.name in names]
     )
-    monkeypatch.setattr(suite_commands, "estimate", lambda case: Cost(8e4, 1e-5, 100.0, seconds[case.name] - 100, 1e10))
+    monkeypatch.setattr(
+        suite_commands, "estimate", lambda case, _: Cost(8e4, 1e-5, 100.0, seconds[case.name] - 100, 1e10, 1e5, 0)
+    )
     calls = []
 
     def run(command, **_):
