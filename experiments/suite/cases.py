@@ -29,7 +29,7 @@ __all__ = ["EXPERIMENTS", "KEPT", "LONGEST", "Case", "Cost", "cases", "cost_of_t
 RATES = ((2.8e3, 3.8e6), (2e4, 9.52e6), (1e5, 7.09e6))
 """Grain-steps a second, with rolling, by the count of grains computed: docs/performance.md, 2026-11-21, a quiet machine
 with 2 cores (a Xeon); the first from `grains3-row-seed1` (2,800 awake of 84,772), where one core does as well as two.
-The loops of 2026-11-26 made 26.2 and 22.8 million of 20,000 and 100,000 grains on an EPYC, without sleep: there cases take
+On an EPYC the loops of 2026-11-26 made 26.2 and 22.8 million of 20,000 and 100,000 without sleep: there cases take
 less than is said here, by up to 2.7 times. With sleep that is not measured."""
 BOOK = 1.19
 """Time of a step with the balance of what grains lose over one without (docs/coupling.md, 2026-11-22)."""
