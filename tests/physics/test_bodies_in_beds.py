@@ -8,10 +8,11 @@ from scipy.integrate import solve_ivp
 
 from dem import Bed
 from experiments.validate.base.drops import BEADS, drop, part
+from experiments.validate.beds import intrusion, low_gravity
 from experiments.validate.beds.intrusion import cone_coefficient
 from experiments.validate.beds.low_gravity import collapsed, power_of
 from experiments.validate.measured.impact import KNOTS, Refit, energy, published, refit, separated
-from rigid.ground.rft import tractions
+from rigid.ground.rft import flat_plate, tractions
 
 
 def law(speed, d1, k_over_m):
@@ -55,6 +56,44 @@ def test_a_cone_bears_the_sum_of_its_rings():
     h = (np.arange(4000) + 0.5) / 4000
     rings = alpha * (2 * math.pi * h * math.tan(half) / math.cos(half) * (1 - h)).mean()
     assert cone_coefficient(half, surface_friction=0.5) == pytest.approx(rings, rel=1e-6)
+
+
+def test_bodies_that_obey_3d_rft_come_out_as_predicted_and_a_weak_cone_does_not(monkeypatch):
+    """Plates F = 0.876 xi A z, a cone F = xi c z^3; the plate of 15 grains gives xi back."""
+    depth = np.linspace(0.0, 0.08, 500)
+    pointed = cone_coefficient(intrusion.HALF_ANGLE, surface_friction=BEADS.friction)
+
+    def driven(name, shape, seed):
+        pushed = pointed * depth**3
+        if name != "cone":
+            across = float(name.split()[2]) * intrusion.GRAIN
+            pushed = flat_plate() * math.pi / 4 * across**2 * depth
+        weak = 0.5 if name == "cone" and seed == weaker else 1.0
+        return {"depth": depth, "force": 2e5 * weak * pushed, "packing": np.array(0.58), "count": np.array(9)}
+
+    monkeypatch.setattr(intrusion, "_driven", driven)
+    weaker = None
+    found = intrusion.CASES["rft"](lambda done: None)
+    assert [one.ours for one in found.comparisons] == pytest.approx([1.0] * 3) and found.status == "pass"
+    assert "0.200 MPa/m" in found.remarks[0]
+    weaker = intrusion.SEEDS[0]
+    assert intrusion.CASES["rft"](lambda done: None).comparisons[-1].ours == pytest.approx(1 - 0.5 / 3)
+
+
+def test_balls_of_two_sizes_on_one_curve_pass_and_one_that_goes_deeper_by_a_sixth_does_not(monkeypatch):
+    def fall(drop):
+        length = drop.ball + drop.grain
+        unit, deeper = math.sqrt(length / drop.gravity), share if drop.ball == smallest else 1.0
+        time = np.linspace(0.0, 3 * unit, 60)
+        return {"time": time, "depth": deeper * length * (1 - np.exp(-time / unit)), "count": np.array(9)}
+
+    monkeypatch.setattr(low_gravity.Drop, "run", fall)
+    smallest, share = min(low_gravity.ACROSS) * low_gravity.GRAIN, 1.0
+    found = low_gravity.CASES["size-collapse"](lambda done: None)
+    assert found.status == "pass" and found.comparisons[1].ours == pytest.approx(0.0, abs=1e-12)
+    share = 7 / 6
+    found = low_gravity.CASES["size-collapse"](lambda done: None)
+    assert found.status == "fail" and found.comparisons[0].ours / found.comparisons[0].reference == pytest.approx(7 / 6)
 
 
 def test_curves_of_one_law_at_several_gravities_collapse():

@@ -6,8 +6,9 @@ half-angle (`rigid.ground.rft` has alpha and xi_n). The law has one number of th
 angle: the cubic in mu that 3D-RFT gives for it is far from such grains (docs/validation.md), and says nothing about
 how forces go with area and shape, which is what the law is for.
 
-Forces are means over depths at which a plate's force is past its transient, in three beds. 3D-RFT is for grains small
-against the body; here the largest plate is nine of them wide.
+Forces are means over the same depths for all, from half to the whole width of the largest plate: nearer to the surface
+a plate bears in proportion to its width rather than to its depth, which no law of z A has. 3D-RFT is for grains small
+against the body; here the largest plate is fifteen of them wide.
 """
 
 import math
@@ -17,7 +18,7 @@ import numpy as np
 
 from dem import Cone, Cylinder
 from experiments.validate.base.case import Comparison, Curve, Outcome, Plot, Tell, listed, tracked
-from experiments.validate.base.drops import BEADS, drive_down, part, prepared
+from experiments.validate.base.drops import BEADS, STRUCK, drive_down, part, prepared
 from experiments.validate.measured.impact import BALL, K_OVER_M, MASS
 from rigid.ground.laws import find_law
 from rigid.ground.rft import flat_plate, stress_gradient, tractions
@@ -27,12 +28,13 @@ from . import say
 __all__ = ["CASES", "cone_coefficient"]
 
 GRAIN = 0.0257 / 6  # as in the coarser bed of the case katsuragi-durian
-SIZE = (26 * GRAIN, 26 * GRAIN, 18 * GRAIN)
+SIZE = (45 * GRAIN, 45 * GRAIN, 30 * GRAIN)
 GRAVITY, SEEDS = 9.81, (1, 2, 3)
-PLATES = (9.0, 7.0, 5.0)  # diameters, over d; the first calibrates
+PLATES = (15.0, 10.0, 7.0)  # diameters, over d; the first calibrates
 HALF_ANGLE = math.radians(30.0)
 SPEED = 0.15  # [m/s]
-PLATE_DEPTHS, CONE_DEPTHS = (2.0, 7.0), (3.5, 8.5)  # over which forces are taken, over d
+DEPTHS = (7.5, 15.0)  # over which forces are taken, over d
+STIFFER = 1.5  # than a bed would be by itself, which is made for half of what a plate bears
 MU = 0.459  # shear over mean stress of six sheared samples of these beads at large strain, 2026-11-23
 BAND = 0.25
 
@@ -44,46 +46,48 @@ def cone_coefficient(half_angle: float, *, surface_friction: float) -> float:
     return alpha * math.pi * math.tan(half_angle) / (3 * cosine)
 
 
-def _driven(name: str, shape: Cone | Cylinder, seed: int, depth: float) -> dict[str, np.ndarray]:
+def _driven(name: str, shape: Cone | Cylinder, seed: int) -> dict[str, np.ndarray]:
     def compute() -> Mapping[str, np.ndarray]:
-        bed = prepared(grain=GRAIN, size=SIZE, gravity=GRAVITY, seed=seed)
-        found = drive_down(bed, shape, at=(0.5 * SIZE[0], 0.5 * SIZE[1]), speed=SPEED, depth=depth * GRAIN)
-        return found | {"packing": np.array(bed.packing_fraction)}
+        bed = prepared(grain=GRAIN, size=SIZE, gravity=GRAVITY, seed=seed, stiffer=STIFFER)
+        bed.overlap_limit = STRUCK
+        about = {"packing": np.array(bed.packing_fraction), "count": np.array(bed.grain_count)}
+        at = (0.5 * SIZE[0], 0.5 * SIZE[1])
+        return about | drive_down(bed, shape, at=at, speed=SPEED, depth=(DEPTHS[1] + 0.5) * GRAIN)
 
-    return part("intrusion", {"body": name, "seed": seed, "depth": depth, "speed": SPEED, "size": SIZE}, compute)
+    numbers = {"grain": GRAIN, "size": SIZE, "stiffer": STIFFER, "speed": SPEED, "depth": DEPTHS[1]}
+    return part("intrusion", {"body": name, "seed": seed, **numbers}, compute)
 
 
-def _work_over(run: Mapping[str, np.ndarray], depths: tuple[float, float], law: np.ndarray) -> float:
+def _mean_over(run: Mapping[str, np.ndarray], law: np.ndarray) -> float:
     """Mean force over the mean of a law at the same depths: xi_n, where the law is of xi_n = 1."""
-    inside = (run["depth"] >= depths[0] * GRAIN) & (run["depth"] <= depths[1] * GRAIN)
+    inside = (run["depth"] >= DEPTHS[0] * GRAIN) & (run["depth"] <= DEPTHS[1] * GRAIN)
     return float(run["force"][inside].mean() / law[inside].mean())
 
 
 def _compute(tell: Tell) -> Outcome:
-    height = (CONE_DEPTHS[1] + 2) * GRAIN
-    bodies: list[tuple[str, Cone | Cylinder, tuple[float, float]]] = [
-        (f"plate of {across:g} d", Cylinder(0.0, GRAIN, 0.5 * across * GRAIN), PLATE_DEPTHS) for across in PLATES
-    ]
-    bodies.append(("cone", Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE)), CONE_DEPTHS))
+    height = (DEPTHS[1] + 2) * GRAIN
     areas = [0.25 * math.pi * (across * GRAIN) ** 2 for across in PLATES]
     pointed = cone_coefficient(HALF_ANGLE, surface_friction=BEADS.friction)
-    jobs = [(k, seed) for k in range(len(bodies)) for seed in SEEDS]
-    runs = [_driven(bodies[k][0], bodies[k][1], seed, bodies[k][2][1] + 0.5) for k, seed in tracked(jobs, tell)]
+    # Of each body its name, its shape, and F = xi_n a z^b by the law as (a, b).
+    bodies: list[tuple[str, Cone | Cylinder, float, int]] = [
+        (f"plate of {across:g} d", Cylinder(0.0, GRAIN, 0.5 * across * GRAIN), flat_plate() * area, 1)
+        for across, area in zip(PLATES, areas, strict=True)
+    ]
+    bodies.append(("cone", Cone(0.0, height, 0.0, height * math.tan(HALF_ANGLE)), pointed, 3))
+    jobs = [(name, shape, seed) for name, shape, _, _ in bodies for seed in SEEDS]
+    runs = [_driven(*job) for job in tracked(jobs, tell)]
     each, curves = [], []
-    for k, (name, _, depths) in enumerate(bodies):
+    grid = np.linspace(0.0, DEPTHS[1] * GRAIN, 50)
+    for k, (name, _, factor, power) in enumerate(bodies):
         own = runs[k * len(SEEDS) : (k + 1) * len(SEEDS)]
-        laws = [
-            pointed * run["depth"] ** 3 if k == len(areas) else flat_plate() * areas[k] * run["depth"] for run in own
-        ]
-        each.append(np.array([_work_over(run, depths, law) for run, law in zip(own, laws, strict=True)]))
-        grid = np.linspace(0.0, depths[1] * GRAIN, 50)
-        law = each[0].mean() * (pointed * grid**3 if k == len(areas) else flat_plate() * areas[k] * grid)
+        each.append(np.array([_mean_over(run, factor * run["depth"] ** power) for run in own]))
+        law = each[0].mean() * factor * grid**power
         mean = np.mean([np.interp(grid, run["depth"], run["force"]) for run in own], axis=0)
         curves += [Curve(f"3D-RFT, {name}", 1e3 * grid, law, False), Curve(name, 1e3 * grid, mean)]
     found = float(each[0].mean())
     rows = [
         Comparison(f"force of the {name}, over the calibrated law", "1", 1.0, float(ratio.mean()) / found, BAND)
-        for (name, _, _), ratio in zip(bodies[1:], each[1:], strict=True)
+        for (name, *_), ratio in zip(bodies[1:], each[1:], strict=True)
     ]
     density = float(np.mean([run["packing"] for run in runs])) * BEADS.density
     cubic = stress_gradient(bulk_density=density, friction=MU, gravity=GRAVITY)
@@ -91,8 +95,7 @@ def _compute(tell: Tell) -> Outcome:
     remark = say(
         "plates", found=1e-6 * found, seeds=len(SEEDS), cubic=1e-6 * cubic, mu=MU, density=density, largest=PLATES[0],
         spread=listed(spread, ".0f"), half_angle=math.degrees(HALF_ANGLE), speed=SPEED, grain=1e3 * GRAIN,
-        wide=SIZE[0] / GRAIN, deep=SIZE[2] / GRAIN, plate_depths=PLATE_DEPTHS[0], plate_depths_2=PLATE_DEPTHS[1],
-        cone_depths=CONE_DEPTHS[0], cone_depths_2=CONE_DEPTHS[1],
+        wide=SIZE[0] / GRAIN, deep=SIZE[2] / GRAIN, first=DEPTHS[0], last=DEPTHS[1], count=int(runs[0]["count"]),
     )  # fmt: skip
     whole_ball, radius = find_law("rft"), 0.5 * BALL
     beads = {"radius": radius, "bulk_density": 1520.0, "friction": math.tan(math.radians(24)), "gravity": GRAVITY}

@@ -25,7 +25,8 @@ STEEL, ALUMINIUM = 8065.0, 2700.0  # density of the ball: Katsuragi & Durian's; 
 PLACES = ((0.25, 0.25), (0.75, 0.75), (0.25, 0.75), (0.75, 0.25))  # where it comes down, over the bed's sides
 SWEEP = ((9.81, 1), (1e-5, 6))  # gravity [m/s2], seed: the ends of what a bed is for
 FROUDE = 2.0
-ACROSS, ACROSS_AT = (10, 14), ((9.81, 8), (0.1, 7))  # grains across a ball, its bed grows with it; gravity and seed
+ACROSS: dict[int, tuple[float, tuple[int, ...]]] = {10: (9.81, (8,)), 14: (0.1, (7,))}
+"""Grains across a ball, whose beds grow with it: gravity [m/s2] and seeds of the beds. 20 would take 112,000 grains."""
 MURDOCH_GRAVITIES = ((1.0, 3), (0.2, 4))
 MURDOCH_SPEEDS = (0.05, 0.1, 0.2, 0.4)
 SUNDAY_GRAIN, SUNDAY_FROUDE = 0.01, (0.5, 1.0, 2.0, 4.0)  # beads of 1 cm: ten across the ball
@@ -140,28 +141,33 @@ def _size(tell: Tell) -> Outcome:
     # The ball as grains' centres see it, D + d, is what scales (Kumar et al. 2017), and its mass with the cube of that.
     balls = [across * GRAIN for across in ACROSS]
     lengths = [ball + GRAIN for ball in balls]
-    density = [
-        STEEL * (length / lengths[0] * balls[0] / ball) ** 3 for ball, length in zip(balls, lengths, strict=True)
-    ]
-    settings = [
-        setting(gravity, seed, at, one, FROUDE * math.sqrt(gravity * length * balls[0] / lengths[0]), ball=ball)
-        for (gravity, seed), ball, length, one in zip(ACROSS_AT, balls, lengths, density, strict=True) for at in PLACES
-    ]  # fmt: skip
+    settings, units, each = [], [], []
+    for (gravity, seeds), ball, length in zip(ACROSS.values(), balls, lengths, strict=True):
+        density = STEEL * (length / lengths[0] * balls[0] / ball) ** 3
+        speed = FROUDE * math.sqrt(gravity * length * balls[0] / lengths[0])
+        drops = [setting(gravity, seed, at, density, speed, ball=ball) for seed in seeds for at in PLACES]
+        settings += drops
+        each += [length] * len(drops)
+        units += [math.sqrt(length / gravity)] * len(drops)
     runs = [one.run() for one in tracked(settings, tell)]
-    each = [length for length in lengths for _ in PLACES]
-    units = [math.sqrt(length / one.gravity) for length, one in zip(each, settings, strict=True)]
     grid, depths = collapsed(runs, each, units)
-    beds = depths.reshape(-1, len(PLACES), len(grid)).mean(axis=1)
-    names = [f"{across:g} grains across, {g:g} m/s2" for across, (g, _) in zip(ACROSS, ACROSS_AT, strict=True)]
-    (smaller, larger), final = beds, float(beds[0][-1])
-    rows = [
-        Comparison(f"final depth over D + d, {names[1]}", "1", final, float(larger[-1]), BAND),
-        near_zero("largest difference over the final depth", np.abs(larger - smaller).max() / final, BAND),
-    ]
-    curves = [Curve(names[0], grid, smaller, False), Curve(names[1], grid, larger)]
-    spread = [100 * float(one[:, -1].std(ddof=1)) / 2 / float(one[:, -1].mean()) for one in depths.reshape(2, 4, -1)]
-    remark = say("larger_ball", beads=BEADS, froude=FROUDE, across=ACROSS, spread=listed(spread, ".0f"),
-                 counts=listed((float(run["count"]) for run in runs[:: len(PLACES)]), ".0f"))  # fmt: skip
+    sizes = np.split(depths, np.cumsum([len(seeds) * len(PLACES) for _, seeds in ACROSS.values()])[:-1])
+    means = [one.mean(axis=0) for one in sizes]
+    names = [f"{across:g} grains across, {gravity:g} m/s2" for across, (gravity, _) in ACROSS.items()]
+    largest, final = means[-1], float(means[-1][-1])
+    rows = []
+    for name, mean in zip(names[:-1], means[:-1], strict=True):
+        rows.append(Comparison(f"final depth over D + d, {name}", "1", final, float(mean[-1]), BAND))
+        off = float(np.abs(mean - largest).max()) / final
+        rows.append(near_zero(f"largest difference over the final depth, {name}", off, BAND))
+    curves = [Curve(names[-1], grid, largest, False)]
+    curves += [Curve(name, grid, mean) for name, mean in zip(names[:-1], means[:-1], strict=True)]
+    spread = [100 * float(one[:, -1].std(ddof=1)) / math.sqrt(len(one)) / float(one[:, -1].mean()) for one in sizes]
+    counts = {one.ball: float(run["count"]) for one, run in zip(settings, runs, strict=True)}
+    remark = say(
+        "larger_ball", beads=BEADS, froude=FROUDE, across=listed(ACROSS, "g"), largest=max(ACROSS), drops=len(sizes[0]),
+        beds=len(seeds), spread=listed(spread, ".0f"), counts=listed(counts.values(), ".0f"),
+    )  # fmt: skip
     return Outcome(
         rows, [Plot("One Froude number", "t sqrt(g / (D + d)) [1]", "depth over D + d [1]", curves)], [remark]
     )
