@@ -28,13 +28,13 @@ __all__ = [
 COHESIONS = (10.0, 30.0, 100.0, 300.0, 1000.0)
 """Cohesions of regolith for which an answer is given [Pa]."""
 _ANGLES = ((0.0, 21.4), (0.1, 25.0), (0.3, 28.9), (0.356, 30.8), (0.8, 36.4), (1.2, 39.9))
-"""Rolling friction -> friction angle at large strain of grains with a friction of 0.5 [degrees] (docs/materials.md:
-triaxial; the last one of a ring shear)."""
+"""Rolling friction -> friction angle at large strain of grains with a friction of 0.5 [degrees], in samples of 600
+grains (docs/notes/materials.md: triaxial; the last one of a ring shear)."""
 _WEAK = 25.0
 """The angle of the grains that K was first fitted to, `sand-weak` [degrees]."""
 _PER_DEGREE = 0.092
-"""Growth of ln K with the angle: 1.7 times from 25.0 to 30.8 degrees [1/degree] (docs/materials.md); beyond that it is
-an extrapolation."""
+"""Growth of ln K with the angle: 1.7 times from 25.0 to 30.8 degrees [1/degree] (docs/notes/materials.md); beyond that
+it is an extrapolation."""
 OF_PLATE = 0.41
 """K of `sand-weak` over that of a flat plate in 3D-RFT: 38 of 92 N/m [1]."""
 _RESISTANCE = 450.0
