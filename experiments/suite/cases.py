@@ -43,7 +43,7 @@ docs/performance.md, rounded up."""
 
 TAP = 1.07
 """What a tap and the rest after it take, over the time of that fall: 0.189 s to 0.176 s, nine taps of the bed of
-grains1-jsc1a-*, 61,452 grains before the last `level` (docs/experiments.md, 2026-11-23)."""
+grains1-jsc1a-*, 61,452 grains before the last `level` (docs/notes/experiments.md, 2026-11-23)."""
 TAPPED = 0.0041
 """Packing fraction that a tap adds, of the same nine: from 0.5343 to 0.5715."""
 POURED, DENSEST = 0.534, 0.62
@@ -58,7 +58,7 @@ grains1-sand-0.0085-0.22, 20.1 % of 100,753 over 2 s, by the rules before 2026-1
 computed 0.3 to 1.2 of that, least at 0.125 N m. A brake shakes all of it (79, 84 %)."""
 CALM = 3.0
 """What rest under a lowered gravity takes, with drag and then without, over the mean that is taken for it [1]: 2.2 at
-1e-6 g (docs/experiments.md)."""
+1e-6 g (docs/notes/experiments.md)."""
 
 
 @dataclass(frozen=True)
