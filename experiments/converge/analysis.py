@@ -5,12 +5,14 @@ chance     of its interval over beds
 grain      what that line may be wrong by
 the rest   width, depth, overlap, speed: each the end farther from 0 of the interval of the paired difference between
            the base and the widest, the deepest, the stiffest and the slowest; together the root of their squares.
-           What was not measured is not in it, and named.
+           A share of the base's mean, taken of the value, but for C, which may be 0. What was not measured is not in
+           it, and named.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from statistics import fmean
 
 import numpy as np
 
@@ -38,11 +40,13 @@ class Quantity:
 
     unit: str
     words: str
+    scales: bool = True
+    """It is above 0, and what changes the bed is taken to change it by a share."""
 
 
 QUANTITIES = {
     "stiffness": Quantity("N/m", "stiffness K, fitted"),
-    "damping": Quantity("N s/m", "damping C, fitted"),
+    "damping": Quantity("N s/m", "damping C, fitted", scales=False),
     "sinkage": Quantity("m", "sinkage at rest"),
     "work": Quantity("J", "work to the deepest point, slowest drive"),
     **{f"force_{band}": Quantity("N", "") for band in range(1, BANDS + 1)},
@@ -112,6 +116,8 @@ class Finding:
     sizes: tuple[Size, ...]
     at_life: Extrapolation
     differences: tuple[Difference, ...]
+    base: float | None
+    """Mean over the beds of the base; None without one."""
 
     @property
     def farthest(self) -> dict[str, Difference]:
@@ -135,7 +141,10 @@ class Finding:
     def rest(self) -> float | None:
         """Root of the squares of what is known of width, depth, overlap and speed; None where nothing is."""
         reached = [one.reach for one in self.farthest.values() if one.reach is not None]
-        return math.hypot(*reached) if reached else None
+        if not reached:
+            return None
+        share = abs(self.at_life.value / self.base) if QUANTITIES[self.name].scales and self.base else 1.0
+        return share * math.hypot(*reached)
 
     @property
     def total(self) -> float | None:
@@ -168,7 +177,8 @@ def findings_of(variants: Sequence[Variant], values: Values, *, life: float, tip
                     seed: own[variant.id][seed] - own[BASE][seed] for seed in own[BASE] if seed in own[variant.id]
                 }
                 differences.append(Difference(variant, between, shared))
-        found[name] = Finding(name, sizes, line, tuple(differences))
+        base = fmean(own[BASE].values()) if own[BASE] else None
+        found[name] = Finding(name, sizes, line, tuple(differences), base)
     return found
 
 
