@@ -1,7 +1,8 @@
 """`hedgebed bench diagnose`: campaigns with something hidden in them, diagnosed; what was named, what was missed.
 
-    hedgebed bench diagnose [--kind penetration|tumble|rig|both|all] [--count 40] [--seed 1] [--only WHAT] [--trials N]
-                            [--baselines yes|no] [--out DIR]
+    hedgebed bench diagnose [--kind penetration|tumble|rig|both|all|second-push|second-rig|second-tumble|second]
+                            [--count 40] [--seed 1] [--only WHAT] [--trials N] [--structure STD] [--baselines yes|no]
+                            [--out DIR]
 
 The campaigns are those of `hidden_suite`. Each is written to a folder, and a process of its own that is given that
 folder and nothing else diagnoses it. DIR/cases.jsonl keeps every verdict: the same command with the same DIR goes on
@@ -12,6 +13,7 @@ since. With ``pip install .[bench]`` the baselines (`benchmarks/baseline/`) get 
 import ast
 import hashlib
 import json
+import math
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -31,6 +33,7 @@ from .baseline import methods as others
 from .diagnosis.table import CASES_FILE, read_cases, show, summarise
 from .diagnosis.worker import answer, begin
 from .hidden.suite import KINDS, make_case, suite
+from .second.campaigns import KINDS as SECOND
 from .race.machine import now
 
 __all__ = ["continues", "digest", "read_cases", "run"]
@@ -44,40 +47,46 @@ _CODE = {
         ("benchmarks/hidden/penetration.py", "benchmarks/hidden/tumble.py", "benchmarks/hidden/tumble_motion.py"),
     ),
     "rig": ("benchmarks/hidden/rig.py", "benchmarks/hidden/rig_bed.py"),
+    **dict.fromkeys(SECOND, ("benchmarks/second",)),
     "baselines": ("benchmarks/baseline/methods.py", "benchmarks/baseline/residuals.py"),
 }
-_SEVERAL = {"both": ("penetration", "tumble"), "all": KINDS}
+_SEVERAL = {"both": ("penetration", "tumble"), "all": ("penetration", "tumble", "rig"), "second": tuple(SECOND)}
 
 
 def run(
     out: Path, *, progress: Progress, kind: str = "both", count: int = 40, seed: int = 1, only: str = "",
-    trials: int = 0, baselines: str = "yes", ask: Ask | None = None,
+    trials: int = 0, structure: str = "", baselines: str = "yes", ask: Ask | None = None,
 ) -> Json:  # fmt: skip
     """Make, diagnose and count.
 
     Args:
         out: folder of cases.jsonl, which grows as it goes, and is where it goes on.
         progress: what is done, and how long it has to go.
-        kind: of campaigns: penetration, tumble, rig (penetrations of another maker), both (the first two) or all.
+        kind: of campaigns: penetration, tumble, rig (penetrations of another maker), both (the first two) or all
+            three; second-push, second-rig, second-tumble or second (all three of the second simulator).
         count: campaigns of each kind.
         seed: of the suite.
         only: hide this in every campaign; empty: the suite's mixture.
         trials: of every campaign; 0: 6 to 24.
+        structure: of the second simulator's campaigns, how much what the base model leaves out of it changes, over the
+            noise; empty: each campaign draws its own.
         baselines: "yes" where the baselines are to run beside, if they are installed; "no".
         ask: what answers for a folder; None: the diagnosis, in a process of its own.
 
     Raises ValueError for settings that cannot be.
     """
     if kind not in (*KINDS, *_SEVERAL):
-        raise ValueError(f"kind = {kind!r}: {', '.join(KINDS)}, both or all was expected")
+        raise ValueError(f"kind = {kind!r}: {', '.join(KINDS)}, both, all or second was expected")
     if count < 1:
         raise ValueError(f"count = {count}: at least 1 was expected")
     if trials and not 4 <= trials <= 100:
         raise ValueError(f"trials = {trials}: 0 (6 to 24), or 4 to 100, was expected")
     if baselines not in ("yes", "no"):
         raise ValueError(f"baselines = {baselines!r}: yes or no was expected")
-    kinds = _SEVERAL.get(kind, (kind,))
-    plans = {one: suite(one, count, seed=seed, only=only or None, trials=trials or None) for one in kinds}
+    kinds, size = _SEVERAL.get(kind, (kind,)), _size(structure)
+    plans = {
+        one: suite(one, count, seed=seed, only=only or None, trials=trials or None, structure=size) for one in kinds
+    }
     missing = others.missing() if baselines == "yes" else ""
     if missing:
         progress.message(missing)
@@ -112,6 +121,17 @@ def run(
         result[one] = summarise([done[_key(one, case)] for case in cases])
         show(one, result[one])
     return result
+
+
+def _size(structure: str) -> float | None:
+    """The option `structure` as a number; None where it is empty. Raises ValueError for what is no such number."""
+    try:
+        size = float(structure) if structure else None
+    except ValueError:
+        size = math.nan
+    if size is not None and not 0.0 < size <= 10.0:
+        raise ValueError(f"structure = {structure!r}: a number above 0 and up to 10 was expected")
+    return size
 
 
 def continues(out: Path) -> bool:
@@ -153,8 +173,9 @@ def _one(kind: str, case: Json, ask: Ask, before: Json | None, wanted: bool) -> 
         record = {
             "kind": kind, "case": case, "date": now(), "code": digest("code"), "suite": digest(kind),
             "truth": list(hidden.effects), "outside": hidden.outside, "signature": float(hidden.signature),
-            "true_parameters": hidden.parameters if kind == "tumble" else {}, "coloured": bool(hidden.coloured),
-            "trials": len(campaign.tables.trial), **({"hidden": hidden.extra} if kind == "rig" else {}),
+            "true_parameters": hidden.parameters if kind.endswith("tumble") or kind == "second-rig" else {},
+            "coloured": bool(hidden.coloured), "trials": len(campaign.tables.trial),
+            **({"hidden": hidden.extra} if kind == "rig" or kind in SECOND else {}),
         } | said  # fmt: skip
     if wanted and "base_values" in record:
         with threadpool_limits(1):

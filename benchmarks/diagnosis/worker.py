@@ -48,4 +48,6 @@ def _diagnosed(folder: str) -> Json:
         "base_values": {name: float(value) for name, value in found.base_values.items()},
         "depends_on": found.dependence[0],
         "findings": [finding.what for finding in found.findings],
+        "leading": list(found.choice.best.effects) if found.choice is not None else [],
+        "at_bounds": [bound.parameter for bound in found.bounds_after],
     }

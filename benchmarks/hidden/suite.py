@@ -17,13 +17,16 @@ import numpy as np
 from experiments.campaign import Campaign, write_campaign
 from experiments.runs.types import Json
 
+from benchmarks.second.campaigns import KINDS as SECOND
+
 from . import penetration as hidden_penetration
 from . import rig as hidden_rig
 from . import tumble as hidden_tumble
 
 __all__ = ["KINDS", "STRENGTHS", "make_case", "suite", "write_suite"]
 
-KINDS = ("penetration", "tumble", "rig")  # of made-up campaigns: those of a rig are penetrations, too, of another maker
+KINDS = ("penetration", "tumble", "rig", *SECOND)
+"""Of made-up campaigns. Those of `rig` are penetrations of another maker; `second-...` are of the second simulator."""
 STRENGTHS = (0.7, 50.0)  # signatures that are aimed at, over the noise: from not quite to be seen to plain
 
 _SHARES = {"effect": 0.53, "null": 0.22, "outside": 0.17, "pair": 0.08}
@@ -32,17 +35,24 @@ _MAKERS: dict[str, tuple[Any, Callable[..., tuple[Campaign, Any]]]] = {
     "penetration": (hidden_penetration, hidden_penetration.make_hidden),
     "tumble": (hidden_tumble, hidden_tumble.make_hidden_tumble),
     "rig": (hidden_rig, hidden_rig.make_rig),
+    **{name: (kind, kind.make) for name, kind in SECOND.items()},
 }
 
 
-def suite(kind: str, count: int, *, seed: int = 1, only: str | None = None, trials: int | None = None) -> list[Json]:
+def suite(
+    kind: str, count: int, *, seed: int = 1, only: str | None = None, trials: int | None = None,
+    structure: float | None = None,
+) -> list[Json]:  # fmt: skip
     """Arguments of `make_case` for `count` campaigns of `kind`: seed, kind of what is hidden, and strength.
 
     `only`: null, pair, an effect or one thing outside the library: the same for every case. `trials`: of every
-    campaign; None for 6 to 24. Raises ValueError for a kind of trial or something hidden that there is not.
+    campaign; None for 6 to 24. `structure`: how much the second simulator's structure changes, over the noise; None
+    for what each campaign draws. Raises ValueError for a kind of trial or something hidden that there is not.
     """
     if kind not in KINDS:
         raise ValueError(f"kind = {kind!r}: {' or '.join(KINDS)} was expected")
+    if structure is not None and kind not in SECOND:
+        raise ValueError(f"structure = {structure:g}: only campaigns of {', '.join(SECOND)} have one")
     maker, _ = _MAKERS[kind]
     names = {"effect": maker.EFFECTS, "outside": maker.OUTSIDE, "null": ("null",), "pair": ("pair",)}
     every = [name for group in names.values() for name in group]
@@ -60,7 +70,8 @@ def suite(kind: str, count: int, *, seed: int = 1, only: str | None = None, tria
         place = (first[group] + taken[group] * _GOLDEN) % 1.0
         taken[group] += 1
         strength = {} if hidden == "null" else {"strength": round(math.exp(low + place * (high - low)), 3)}
-        cases.append({"seed": 1000 * seed + k, "kind": hidden} | strength | ({"trials": trials} if trials else {}))
+        more = ({"trials": trials} if trials else {}) | ({} if structure is None else {"structure": structure})
+        cases.append({"seed": 1000 * seed + k, "kind": hidden} | strength | more)
     return cases
 
 

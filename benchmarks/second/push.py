@@ -1,0 +1,332 @@
+"""Campaigns of pushes and drops by the second simulator: plain tables and columns, and the answer.
+
+Nothing here comes from `rigid`, `coupling` or `experiments`. A law is evaluated along a fine path, all trials at once;
+drops are stepped by Heun's rule with a fixed step. What the structure changes: the bed's first grains are loose, so that
+spring and damper set in over a depth, and the frame between drive and tip is compliant.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .noise import Noise, draw_noise
+from .tumble import Made, Secret
+
+__all__ = ["EFFECTS", "OUTSIDE", "Law", "fall", "make_push"]
+
+Array = NDArray[np.float64]
+Random = np.random.Generator
+Numbers = dict[str, float]
+Columns = list[dict[str, Array]]
+EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
+OUTSIDE = ("relaxation", "jamming", "cell-drift", "ringing")
+"""What no library has: a force that fades at a stop, one that goes up and down with depth, a cell that warms up, a frame
+that rings after each change of speed."""
+_G = 9.80665
+_FINE = 3000  # points of a path
+_STEP = 1e-4  # of a drop [s]
+_LADDER, _SPAN = 13, 3000.0
+_TRUE_STRUCTURE = (0.05, 0.45)
+_SOFT = np.geomspace(1e-7, 5e-3, 14)  # depths over which the bed sets in that are tried [m]
+
+
+class Law:
+    """The bed's force on many spikes at once, with its memory: arrays of shape [lane_count]."""
+
+    def __init__(self, k: Array | float, c: Array | float, depth: float, s: Mapping[str, float]) -> None:
+        self.k, self.c, self.depth, self.s = k, c, depth, s
+        self.top: Array | float = 0.0
+        self.slow: Array | float = 0.0
+
+    def __call__(self, z: Array, v: Array, dt: Array | float) -> Array:
+        """Force [N] at depth `z` [m], speed `v` [m/s], a step `dt` [s] after the last."""
+        s, deep = self.s, np.maximum(z, 0.0)
+        self.top = np.maximum(self.top, deep)
+        force = self.spring(deep)
+        soft = s.get("soft", 0.0)
+        there = 1.0 - np.exp(-deep / soft) if soft > 0.0 else (z >= 0.0).astype(float)
+        if "plastic" in s:  # a straight line, steeper than the spring, down from the deepest point
+            steeper = self.k / (1.0 - s["plastic"])
+            back = self.spring(self.top) - steeper * (self.top - deep)
+            force = np.where(deep < self.top, np.maximum(back, 0.0), force)
+        force = force + self.c * np.maximum(v, 0.0) * there
+        if "drag" in s:
+            force = force + s["drag"] * np.maximum(v, 0.0) ** 2 * np.minimum(deep / s["drag_depth"], 1.0)
+        if "pull" in s:
+            let = np.clip(deep / (0.15 * self.depth), 0.0, 1.0)
+            force = force - s["pull"] * let * (1.0 - np.exp((deep - self.top) / s["pull_reach"]))
+        if "shaft" in s:
+            force = force + s["shaft"] * (deep / self.depth) ** s["shaft_power"] * np.tanh(v / s["shaft_speed"])
+        if "jam" in s:
+            force = force + s["jam"] * np.sin(2 * np.pi * deep / s["jam_length"]) * deep / self.depth
+        if "relax" in s:  # a spring in series with a dashpot, beside the bed
+            self.slow = (self.slow + s["relax"] * np.maximum(v, 0.0) * dt * there) * np.exp(-dt / s["relax_time"])
+            force = force + self.slow
+        return np.where(z >= 0.0, force, 0.0)  # a drop begins at 0, in touch
+
+    def spring(self, deep: Array | float) -> Array:
+        """Loading curve, without damper [N]."""
+        s, soft = self.s, self.s.get("soft", 0.0)
+        x = np.asarray(deep, dtype=float)
+        force = self.k * (x - soft * (1.0 - np.exp(-x / soft)) if soft > 0.0 else x)
+        if "harden" in s:
+            share = x / self.depth
+            grows = share ** s["harden_power"] if s["harden_power"] > 0.0 else 1.0 - np.exp(-3.0 * share)
+            force = force * np.maximum(1.0 + s["harden"] * grows, 0.05)
+        if "layer" in s:
+            y = (x - s["layer_depth"]) / s["layer_width"]
+            below = s["layer_width"] * np.logaddexp(0.0, y)
+            force = force + s["layer"] * self.k * (
+                below if s["layer_slope"] > 0.5 else 0.3 * self.depth * 0.5 * (1.0 + np.tanh(y))
+            )
+        return np.asarray(force)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    k: float
+    c: float
+    mass: float
+    depth: float
+    stated: tuple[float, float]
+    doubt: tuple[float, float]
+    trials: tuple[dict[str, Any], ...]
+    style: dict[str, float]
+    std: dict[str, float]
+    noise: dict[str, Noise]
+    structure: Numbers
+
+
+def make_push(
+    seed: int, *, kind: str | None = None, strength: float | None = None, trials: int | None = None,
+    structure: float | None = None,
+) -> tuple[Made, Secret]:  # fmt: skip
+    """A campaign and what is hidden in it; arguments as of `tumble.make_tumble`, effects `EFFECTS` and `OUTSIDE`.
+
+    Raises ValueError for a kind that there is not.
+    """
+    random = np.random.default_rng((seed, 26))
+    kind = kind or str(random.choice(EFFECTS))
+    if kind not in ("null", "pair", *EFFECTS, *OUTSIDE):
+        raise ValueError(f"kind = {kind!r}: null, pair, {', '.join((*EFFECTS, *OUTSIDE))} was expected")
+    strength = strength if strength is not None else math.exp(random.uniform(math.log(0.7), math.log(50.0)))
+    size = structure if structure is not None else math.exp(random.uniform(*np.log(_TRUE_STRUCTURE)))
+    names = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False)) if kind == "pair" else (kind,)
+    plan = _draw_plan(random, names, trials)
+    plan, reached = _with_structure(random, plan, size)
+    clean, slopes = _slopes(plan)
+    forms = [_form(random, plan, name) for name in names if kind != "null"]
+    chosen = [_at_strength(plan, form, strength, clean, slopes) for form in forms]
+    settings = {name: value for numbers, _ in chosen for name, value in numbers.items()}
+    outside = kind if kind in OUTSIDE else None
+    secret = Secret(
+        () if kind == "null" or outside else names, outside, {}, min((seen for _, seen in chosen), default=0.0),
+        any(noise.kind == "coloured" for noise in plan.noise.values()), len(plan.trials),
+        {"structure": reached, "legs": plan.structure, "each": [seen for _, seen in chosen], "settings": settings,
+         "noise": {name: noise.kind for name, noise in plan.noise.items()}},
+    )  # fmt: skip
+    return _record(random, plan, _measure(plan, settings)), secret
+
+
+def _draw_plan(random: Random, names: Sequence[str], trials: int | None) -> _Plan:
+    def between(low: float, high: float) -> float:
+        return float(random.uniform(low, high))
+
+    k, depth = math.exp(between(math.log(400), math.log(4000))), between(0.012, 0.03)
+    mass = min(between(0.2, 0.8), 0.4 * k * depth / _G)
+    c = between(0.05, 0.3) * 2 * math.sqrt(k * mass)
+    free = random.random() < 0.2
+    doubt = (2.0, 2.0) if free else (0.1, 0.2)
+    stated = (k / (1 + 0.1 * float(np.clip(random.standard_normal(), -2, 2))),
+              c / (1 + 0.2 * float(np.clip(random.standard_normal(), -2, 2))))  # fmt: skip
+    returns = bool({"plastic-sinkage", "adhesion", "shaft-friction", "relaxation"} & set(names)) or random.random() < 0.7
+    speeds = np.geomspace(between(0.004, 0.01), between(0.06, 0.2), int(random.choice((2, 3, 4))))
+    count = trials or int(random.choice((6, 8, 8, 9, 12)))
+    drops = 0 if random.random() < 0.5 else count // 3
+    scatter = between(0.0, 0.02) * bool(random.random() < 0.3)  # of each push's own mean speed, as people push
+    fast = between(0.3, 0.5), between(0.7, 1.0)
+    own = [{"mode": "driven", "speed": round(float(speeds[n % len(speeds)] * (1 + scatter * random.standard_normal())), 6)}
+           for n in range(count - drops)]  # fmt: skip
+    own += [{"mode": "drop", "speed": round(fast[n % 2] * 0.6 * depth * math.sqrt(k / mass), 5)} for n in range(drops)]
+    style = {"returns": float(returns), "above": between(0.0, 0.006), "hold": between(0.1, 0.8), "rest": between(0.1, 0.3),
+             "rate": float(random.choice((100.0, 200.0, 400.0))), "ramp": between(0.03, 0.12)}  # fmt: skip
+    std = {"depth": 10 ** between(math.log10(2e-5), -4.0), "force": k * depth * 10 ** between(-2.6, -1.8),
+           "accel": 10 ** between(-1.3, -0.5)}  # fmt: skip
+    return _Plan(k, c, mass, depth, stated, doubt, tuple(own), style, std, {name: draw_noise(random) for name in std}, {})
+
+
+def _form(random: Random, plan: _Plan, name: str) -> Callable[[float], Numbers]:
+    """The effect `name`, from its amplitude to the numbers of the law; a size of 1 is as large as the spring's force."""
+    full, depth = plan.k * plan.depth, plan.depth
+    fastest = max(t["speed"] for t in plan.trials)
+    sign, second = float(random.choice((-1.0, 1.0))), bool(random.random() < 0.5)
+    share = float(random.uniform(0.3, 1.0))
+    table: dict[str, Callable[[float], Numbers]] = {
+        "inertial-drag": lambda a: {"drag": 3.0 * full * a / fastest**2, "drag_depth": (0.05 + second) * depth},
+        "depth-hardening": lambda a: {"harden": (2.0 if sign > 0 else -0.6) * a, "harden_power": 0.5 + share if second else -1.0},
+        "plastic-sinkage": lambda a: {"plastic": 0.97 * a},
+        "adhesion": lambda a: {"pull": 0.8 * full * a, "pull_reach": 0.1 * share * depth},
+        "shaft-friction": lambda a: {"shaft": full * a, "shaft_power": float(second) * share, "shaft_speed": 1e-3},
+        "layering": lambda a: {"layer": (2.0 if sign > 0 else -0.7) * a, "layer_depth": (0.25 + 0.4 * share) * depth,
+                               "layer_width": 0.03 * depth, "layer_slope": float(second or sign < 0)},
+        "relaxation": lambda a: {"relax": 2.0 * plan.k * a, "relax_time": 0.1 * share},
+        "jamming": lambda a: {"jam": 0.6 * full * a, "jam_length": 0.15 * share * depth},
+        "cell-drift": lambda a: {"cell_drift": sign * full * a},
+        "ringing": lambda a: {"ring": 0.5 * full * a, "ring_rate": 8.0 + 20.0 * share, "ring_time": 0.05 + 0.2 * share},
+    }  # fmt: skip
+    return table[name]
+
+
+def _paths(plan: _Plan) -> tuple[Array, Array, Array, Array]:
+    """Times, depths, speeds and changes of speed of the driven trials, shape [trial_count, point_count]."""
+    style, times, depths, speeds, jolts = plan.style, [], [], [], []
+    for trial in plan.trials:
+        if trial["mode"] != "driven":
+            continue
+        v, way = trial["speed"], plan.depth + style["above"]
+        parts = [(0.0, style["rest"]), (v, way / v), (0.0, style["hold"])]
+        parts += [(-v, 0.9 * way / v), (0.0, 0.1)] if style["returns"] else []
+        ends = np.cumsum([0.0, *(lasts for _, lasts in parts)])
+        time = np.linspace(0.0, ends[-1], _FINE)
+        ramp = style["ramp"] * way / v
+        speed, jolt = np.zeros(_FINE), np.zeros(_FINE)
+        for (before, _), (after, _), at in zip([(0.0, 0.0), *parts], parts, ends, strict=False):
+            u = np.clip((time - at) / ramp + 0.5, 0.0, 1.0)
+            speed += (after - before) * u * u * (3.0 - 2.0 * u)  # eased by a smooth step
+            jolt += (after - before) / v * np.where(time > at, np.exp(-(time - at)), 0.0)
+        z = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
+        times.append(time)
+        depths.append(z * way / z.max() - style["above"])
+        speeds.append(np.gradient(depths[-1], time))
+        jolts.append(jolt)
+    return np.array(times), np.array(depths), np.array(speeds), np.array(jolts)
+
+
+def _measure(plan: _Plan, settings: Mapping[str, float], k: float = 1.0, c: float = 1.0) -> Columns:
+    """Time, depth, and force or acceleration of each trial, without noise, K and C times `k` and `c`."""
+    s = {**plan.structure, **settings}
+    found: Columns = []
+    driven = [t for t in plan.trials if t["mode"] == "driven"]
+    if driven:
+        time, depth, speed, _ = _paths(plan)
+        law = Law(plan.k * k, plan.c * c, plan.depth, s)
+        steps = time[:, 1] - time[:, 0]
+        force = np.array([law(z, v, steps) for z, v in zip(depth.T, speed.T, strict=True)]).T
+        for t, z, f, v, trial in zip(time, depth, force, speed, driven, strict=True):
+            f = f + s.get("cell_drift", 0.0) * (1.0 - np.exp(-t / (0.6 * t[-1])))
+            if "ring" in s:
+                f = f + s["ring"] * _ringing(t, v / trial["speed"], s["ring_rate"], s["ring_time"])
+            rows = np.arange(0.0, t[-1], max(1.0 / plan.style["rate"], t[-1] / 1000))
+            z = z + f / s["frame"] if s.get("frame") else z  # the depth is read at the drive
+            found.append({"t_s": rows, "depth_m": np.interp(rows, t, z), "force_N": np.interp(rows, t, f)})
+    speeds = np.array([t["speed"] for t in plan.trials if t["mode"] == "drop"])
+    if len(speeds):
+        law = Law(plan.k * k, plan.c * c, plan.depth, s)
+        t, z, a = fall(law, speeds, plan.mass, _G, 0.25, rate=2 * plan.style["rate"])
+        a = a + s.get("cell_drift", 0.0) / plan.mass * (1.0 - np.exp(-t / 0.15))[:, None]
+        found += [{"t_s": t, "depth_m": z[:, n], "accel_m_s2": a[:, n]} for n in range(len(speeds))]
+    return found
+
+
+def _ringing(time: Array, speed: Array, rate: float, lasts: float) -> Array:
+    """A damped oscillator that each change of speed sets off, over the change."""
+    dt, w = time[1] - time[0], 2 * math.pi * rate
+    decay = np.exp((-1.0 / lasts + 1j * w) * dt)
+    kicks, state, out = np.diff(speed, prepend=speed[0]), 0j, np.zeros(len(time))
+    for n, kick in enumerate(kicks):
+        state = state * decay + kick
+        out[n] = state.imag
+    return out
+
+
+def fall(law: Law, speeds: Array, mass: float, gravity: float, duration: float, *, rate: float) -> tuple[Array, Array, Array]:
+    """Times [s] and, shape [row_count, drop_count], depths [m] and accelerations [m/s2] of spikes dropped at `speeds`."""
+    every = max(1, round(1.0 / rate / _STEP))
+    z, v, times, depths, rates = np.zeros(len(speeds)), speeds.astype(float), [], [], []
+    a = np.full(len(speeds), gravity)
+    for n in range(round(duration / _STEP) + 1):
+        if n % every == 0:
+            times.append(n * _STEP)
+            depths.append(z.copy())
+            rates.append(a.copy())
+        ahead = z + _STEP * v
+        first = gravity - law(z, v, 0.5 * _STEP) / mass
+        second = gravity - law(ahead, v + _STEP * first, 0.5 * _STEP) / mass
+        z = z + _STEP * (v + 0.5 * _STEP * first)
+        v = v + 0.5 * _STEP * (first + second)
+        a = gravity - law(z, v, 0.0) / mass
+    return np.array(times), np.array(depths), np.array(rates)
+
+
+def _over_noise(plan: _Plan, columns: Columns) -> list[Array]:
+    """Readings over their noise, one array a trial; a push's depth is wrong by a tenth of its noise once smoothed."""
+    push = math.hypot(plan.std["force"], 0.1 * plan.k * plan.std["depth"])
+    return [one["force_N"] / push if "force_N" in one
+            else np.concatenate([one["depth_m"] / plan.std["depth"], one["accel_m_s2"] / plan.std["accel"]])
+            for one in columns]  # fmt: skip
+
+
+def _slopes(plan: _Plan) -> tuple[Columns, Array]:
+    """Readings with nothing hidden, and what one standard deviation of K and C changes, over the noise."""
+    clean = _measure(plan, {})
+    base = np.concatenate(_over_noise(plan, clean))
+    nudged = (_measure(plan, {}, k=1.02), _measure(plan, {}, c=1.02))
+    scale = [doubt / 0.02 for doubt in plan.doubt]
+    return clean, np.array([(np.concatenate(_over_noise(plan, one)) - base) * s for one, s in zip(nudged, scale, strict=True)])
+
+
+def _left(plan: _Plan, clean: Columns, slopes: Array, made: Columns) -> float:
+    """Root mean square of a change over the noise, without what K and C explain."""
+    change = np.concatenate(_over_noise(plan, made)) - np.concatenate(_over_noise(plan, clean))
+    normal = slopes @ slopes.T + np.eye(len(slopes))
+    rest = change - np.linalg.solve(normal, slopes @ change) @ slopes
+    return float(np.sqrt(np.mean(rest**2)))
+
+
+def _with_structure(random: Random, plan: _Plan, size: float) -> tuple[_Plan, float]:
+    frame = float(random.uniform(30.0, 300.0)) * plan.k
+    clean, slopes = _slopes(plan)
+    tried = [{"soft": float(soft), "frame": frame} for soft in _SOFT]
+    sizes = [_left(plan, clean, slopes, _measure(plan, one)) for one in tried]
+    logs = np.maximum.accumulate(np.log(np.maximum(sizes, 1e-6))) + 1e-6 * np.arange(len(sizes))
+    soft = math.exp(float(np.interp(math.log(size), logs, np.log(_SOFT))))
+    plan = replace(plan, structure={"soft": soft, "frame": frame})
+    return plan, _left(plan, clean, slopes, _measure(plan, {}))
+
+
+def _at_strength(
+    plan: _Plan, form: Callable[[float], Numbers], strength: float, clean: Columns, slopes: Array
+) -> tuple[Numbers, float]:
+    """The numbers of the effect whose signature comes nearest to `strength`, and that signature."""
+    sizes = np.geomspace(1.0 / _SPAN, 1.0, _LADDER)
+    seen = np.array([_left(plan, clean, slopes, _measure(plan, form(float(a)))) for a in sizes])
+    best = int(np.argmin(np.abs(np.log(np.maximum(seen, 1e-9) / strength))))
+    finer = np.geomspace(sizes[max(best - 1, 0)], sizes[min(best + 1, _LADDER - 1)], 7)
+    seen = np.array([_left(plan, clean, slopes, _measure(plan, form(float(a)))) for a in finer])
+    best = int(np.argmin(np.abs(np.log(np.maximum(seen, 1e-9) / strength))))
+    return form(float(finer[best])), float(seen[best])
+
+
+def _record(random: Random, plan: _Plan, made: Columns) -> Made:
+    columns, trials = {}, []
+    of = {"depth_m": "depth", "force_N": "force", "accel_m_s2": "accel"}
+    for number, (trial, one) in enumerate(zip(plan.trials, made, strict=True), 1):
+        id = f"{number:03d}"
+        columns[id, "data"] = {
+            name: plan.noise[of[name]].on(values, plan.std[of[name]], random) if name in of else values
+            for name, values in one.items()
+        }
+        trials.append({"id": id, "gravity": _G, **trial, "data": f"{id}.csv"})
+    tables: dict[str, Any] = {
+        "format": "hedgehog-campaign/1", "kind": "penetration", "name": "second",
+        "spike": {"mass": plan.mass, "diameter": 0.012, "tip": "sphere"},
+        "surface": {"kind": "sand", "granular": True, "stiffness": plan.stated[0], "damping": plan.stated[1]},
+        "uncertainty": {"stiffness": plan.doubt[0], "damping": plan.doubt[1]},
+        "sensors": {name: {"std": (std,)} for name, std in plan.std.items()},
+        "trial": tuple(trials),
+    }  # fmt: skip
+    return Made(tables, columns)

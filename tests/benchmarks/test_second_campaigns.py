@@ -1,0 +1,85 @@
+"""Campaigns of the second simulator: pushes by closed forms, sensors, noise, structure, and the format."""
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.hidden.suite import suite
+from benchmarks.second.campaigns import KINDS, campaign_of
+from benchmarks.second.noise import KINDS as NOISES
+from benchmarks.second.noise import Noise
+from benchmarks.second.push import Law, fall, make_push
+from benchmarks.second.tumble import make_tumble
+from experiments.campaign import read_campaign, write_campaign
+
+
+def test_a_drop_sinks_as_the_damped_oscillator_does():
+    """m z'' + C z' + K z = m g, z(0) = 0, z'(0) = v, until it turns: closed form; Heun's rule to the square of its step."""
+    k, c, mass, v = 1500.0, 6.0, 0.4, 0.6
+    t, z, a = fall(Law(k, c, 0.02, {}), np.array([v]), mass, 9.80665, 0.1, rate=1000.0)
+    decay, rest = 0.5 * c / mass, mass * 9.80665 / k
+    w = math.sqrt(k / mass - decay**2)
+    exact = rest + np.exp(-decay * t) * (-rest * np.cos(w * t) + (v - decay * rest) / w * np.sin(w * t))
+    going = t < t[int(np.argmax(exact))]
+    assert z[going, 0] == pytest.approx(exact[going], abs=3e-6)
+    assert a[going, 0][1:] == pytest.approx(9.80665 - (k * z[going, 0] + c * np.gradient(exact, t)[going])[1:] / mass, abs=0.05)
+
+
+def test_the_bed_is_a_spring_and_a_damper_on_the_way_in_and_a_spring_on_the_way_out():
+    law = Law(900.0, 4.0, 0.02, {})
+    assert law(np.array([0.01]), np.array([0.1]), 0.0)[0] == pytest.approx(900 * 0.01 + 4 * 0.1)
+    assert law(np.array([0.01]), np.array([-0.1]), 0.0)[0] == pytest.approx(900 * 0.01)
+    assert law(np.array([-0.001]), np.array([0.1]), 0.0)[0] == 0.0
+
+
+@pytest.mark.parametrize("kind", NOISES)
+def test_every_noise_has_the_stated_standard_deviation(kind):
+    read = Noise(kind, 0.5, 1.2).on(np.linspace(0.0, 1.0, 40_000), 0.003, np.random.default_rng(1))
+    assert np.std(read - np.linspace(0.0, 1.0, 40_000)) == pytest.approx(0.003, rel=0.04)
+
+
+def test_a_camera_whose_scale_is_off_shows_a_first_pose_that_is_off_too():
+    made, secret = make_tumble(5, rig=True, kind="camera-scale", strength=30.0, trials=6)
+    scale = secret.parameters["camera-scale.scale"]
+    assert abs(scale - 1) > 0.01
+    std = made.tables["sensors"]["pose"]["std"][1]
+    for trial in made.tables["trial"]:
+        pose = made.columns[trial["id"], "pose"]
+        start = pose["y_m"][pose["t_s"] < 0].mean()
+        assert start == pytest.approx(scale * 0.2 * math.cos(math.pi / 8), abs=4 * std)
+
+
+def test_structure_comes_out_as_large_as_it_was_asked_for():
+    for size in (0.1, 1.0):
+        _, secret = make_tumble(7, rig=True, kind="null", structure=size, trials=6)
+        assert secret.extra["structure"] == pytest.approx(size, rel=0.4)
+        _, secret = make_push(7, kind="null", structure=size, trials=6)
+        assert secret.extra["structure"] == pytest.approx(size, rel=0.4)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_seed_makes_one_campaign_and_it_is_valid(kind, tmp_path):
+    maker = KINDS[kind]
+    case = {"seed": 3, "kind": maker.OUTSIDE[0], "strength": 5.0, "trials": 6, "structure": 0.3}
+    (made, told), (again, _) = maker.maker(**case), maker.maker(**case)
+    assert (told.effects, told.outside) == ((), maker.OUTSIDE[0])
+    assert all(np.array_equal(made.columns[key][name], again.columns[key][name])
+               for key in made.columns for name in made.columns[key])  # fmt: skip
+    folder = write_campaign(tmp_path / "campaign", campaign_of(made))
+    assert len(read_campaign(folder).tables.trial) == 6
+    assert told.outside not in (folder / "campaign.toml").read_text(encoding="utf-8")
+
+
+def test_a_signature_is_near_what_was_asked_for():
+    _, told = make_push(4, kind="depth-hardening", strength=10.0, trials=6)
+    assert 6.0 < told.signature < 16.0
+    _, told = make_tumble(4, rig=False, kind="umbilical", strength=10.0, trials=6)
+    assert 6.0 < told.signature < 16.0
+
+
+def test_what_cannot_be_hidden_is_refused():
+    with pytest.raises(ValueError, match="pendulum"):
+        make_push(1, kind="pendulum")
+    with pytest.raises(ValueError, match="structure = 1"):
+        suite("tumble", 3, structure=1.0)
