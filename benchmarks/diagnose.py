@@ -33,8 +33,8 @@ from .baseline import methods as others
 from .diagnosis.table import CASES_FILE, read_cases, show, summarise
 from .diagnosis.worker import answer, begin
 from .hidden.suite import KINDS, make_case, suite
-from .second.campaigns import KINDS as SECOND
 from .race.machine import now
+from .second.campaigns import KINDS as SECOND
 
 __all__ = ["continues", "digest", "read_cases", "run"]
 

@@ -14,10 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.second.campaigns import KINDS as SECOND
 from experiments.campaign import Campaign, write_campaign
 from experiments.runs.types import Json
-
-from benchmarks.second.campaigns import KINDS as SECOND
 
 from . import penetration as hidden_penetration
 from . import rig as hidden_rig

@@ -149,7 +149,7 @@ def torque_now(p: ti.template(), t, wheel, touching):
 def energy_of(p: ti.template(), x, y, th, vx, vy, om, legs, springs, depths):
     """Kinetic energy and what gravity, surface, legs and friction springs hold [J]; base model with its structure."""
     rise = vx * ti.sin(p.slope) + vy * ti.cos(p.slope)
-    E = 0.5 * (p.mass * (vx ** 2 + vy ** 2) + p.counterweight * rise**2 + p.inertia * om ** 2)
+    E = 0.5 * (p.mass * (vx**2 + vy**2) + p.counterweight * rise**2 + p.inertia * om**2)
     E += (p.mass + p.counterweight) * p.gravity_sim * (x * ti.sin(p.slope) + y * ti.cos(p.slope))
     for n in ti.static(range(_TIPS)):
         if depths[n] > 0.0:
@@ -162,8 +162,8 @@ def energy_of(p: ti.template(), x, y, th, vx, vy, om, legs, springs, depths):
 def run(table: ti.types.ndarray(), step: ti.f64, every: ti.i32, settle: ti.i32, rows: ti.i32, out: ti.types.ndarray()):
     for lane in range(table.shape[0]):
         p = Numbers(*[table[lane, k] for k in ti.static(range(len(COLUMNS)))])
-        legs, shortening, springs, tops, modes, ways, depths = (
-            Tips(0.0), Tips(0.0), Tips(0.0), Tips(0.0), Tips(0.0), Tips(1.0), Tips(0.0)
+        legs, springs, tops, modes, ways, depths = (
+            Tips(0.0), Tips(0.0), Tips(0.0), Tips(0.0), Tips(1.0), Tips(0.0)
         )  # fmt: skip
         weight = (p.mass + p.counterweight) * p.gravity_sim
         x, th, wheel = 0.0, 0.0, p.wheel_speed_0
@@ -262,8 +262,8 @@ def run(table: ti.types.ndarray(), step: ti.f64, every: ti.i32, settle: ti.i32, 
 def move(numbers: np.ndarray, duration: float, *, step: float = STEP) -> tuple[np.ndarray, np.ndarray]:
     """Times [s], shape [row_count], and motions, shape [lane_count, row_count, 10], the last axis as `ROWS`.
 
-    `numbers`: shape [lane_count, column_count], the columns as `COLUMNS`. `duration`: after t = 0 [s]. Raises ValueError
-    for a table of another shape, RuntimeError where a motion is not finite.
+    `numbers`: shape [lane_count, column_count], the columns as `COLUMNS`. `duration`: after t = 0 [s]. Raises
+    ValueError for a table of another shape, RuntimeError where a motion is not finite.
     """
     numbers = np.ascontiguousarray(numbers, dtype=float)
     if numbers.ndim != 2 or numbers.shape[1] != len(COLUMNS):

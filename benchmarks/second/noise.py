@@ -1,7 +1,7 @@
 """Noise of the second simulator: it has the stated standard deviation, but is not white and Gaussian.
 
-Each sensor of a campaign draws one kind. `tails`: Student's t with five degrees of freedom. `coloured`: each value keeps
-a part of the one before. `coarse`: readings are rounded to whole steps. `plain`: white and Gaussian.
+Each channel of a campaign draws one kind. `tails`: Student's t with five degrees of freedom. `coloured`: each value
+keeps a part of the one before. `coarse`: readings are rounded to whole steps. `plain`: white and Gaussian.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """Campaigns of pushes and drops by the second simulator: plain tables and columns, and the answer.
 
 Nothing here comes from `rigid`, `coupling` or `experiments`. A law is evaluated along a fine path, all trials at once;
-drops are stepped by Heun's rule with a fixed step. What the structure changes: the bed's first grains are loose, so that
-spring and damper set in over a depth, and the frame between drive and tip is compliant.
+drops are stepped by Heun's rule with a fixed step. The structure: the bed's first grains are loose, so that spring and
+damper set in over a depth, and the frame between drive and tip is compliant.
 """
 
 import math
@@ -24,8 +24,8 @@ Numbers = dict[str, float]
 Columns = list[dict[str, Array]]
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("relaxation", "jamming", "cell-drift", "ringing")
-"""What no library has: a force that fades at a stop, one that goes up and down with depth, a cell that warms up, a frame
-that rings after each change of speed."""
+"""What no library has: a force that fades at a stop, one that goes up and down with depth, a cell that warms up, a
+frame that rings after each change of speed."""
 _G = 9.80665
 _FINE = 3000  # points of a path
 _STEP = 1e-4  # of a drop [s]
@@ -143,31 +143,37 @@ def _draw_plan(random: Random, names: Sequence[str], trials: int | None) -> _Pla
     doubt = (2.0, 2.0) if free else (0.1, 0.2)
     stated = (k / (1 + 0.1 * float(np.clip(random.standard_normal(), -2, 2))),
               c / (1 + 0.2 * float(np.clip(random.standard_normal(), -2, 2))))  # fmt: skip
-    returns = bool({"plastic-sinkage", "adhesion", "shaft-friction", "relaxation"} & set(names)) or random.random() < 0.7
+    returns = (
+        bool({"plastic-sinkage", "adhesion", "shaft-friction", "relaxation"} & set(names)) or random.random() < 0.7
+    )
     speeds = np.geomspace(between(0.004, 0.01), between(0.06, 0.2), int(random.choice((2, 3, 4))))
     count = trials or int(random.choice((6, 8, 8, 9, 12)))
     drops = 0 if random.random() < 0.5 else count // 3
     scatter = between(0.0, 0.02) * bool(random.random() < 0.3)  # of each push's own mean speed, as people push
     fast = between(0.3, 0.5), between(0.7, 1.0)
-    own = [{"mode": "driven", "speed": round(float(speeds[n % len(speeds)] * (1 + scatter * random.standard_normal())), 6)}
-           for n in range(count - drops)]  # fmt: skip
+    pushed = [float(speeds[n % len(speeds)] * (1 + scatter * random.standard_normal())) for n in range(count - drops)]
+    own = [{"mode": "driven", "speed": round(speed, 6)} for speed in pushed]
     own += [{"mode": "drop", "speed": round(fast[n % 2] * 0.6 * depth * math.sqrt(k / mass), 5)} for n in range(drops)]
-    style = {"returns": float(returns), "above": between(0.0, 0.006), "hold": between(0.1, 0.8), "rest": between(0.1, 0.3),
-             "rate": float(random.choice((100.0, 200.0, 400.0))), "ramp": between(0.03, 0.12)}  # fmt: skip
+    style = {"returns": float(returns), "above": between(0.0, 0.006), "hold": between(0.1, 0.8),
+             "rest": between(0.1, 0.3), "rate": float(random.choice((100.0, 200.0, 400.0))),
+             "ramp": between(0.03, 0.12)}  # fmt: skip
     std = {"depth": 10 ** between(math.log10(2e-5), -4.0), "force": k * depth * 10 ** between(-2.6, -1.8),
            "accel": 10 ** between(-1.3, -0.5)}  # fmt: skip
-    return _Plan(k, c, mass, depth, stated, doubt, tuple(own), style, std, {name: draw_noise(random) for name in std}, {})
+    return _Plan(
+        k, c, mass, depth, stated, doubt, tuple(own), style, std, {name: draw_noise(random) for name in std}, {}
+    )
 
 
 def _form(random: Random, plan: _Plan, name: str) -> Callable[[float], Numbers]:
-    """The effect `name`, from its amplitude to the numbers of the law; a size of 1 is as large as the spring's force."""
+    """The effect `name`, from its amplitude to the numbers of the law; 1 is as large as the spring's force."""
     full, depth = plan.k * plan.depth, plan.depth
     fastest = max(t["speed"] for t in plan.trials)
     sign, second = float(random.choice((-1.0, 1.0))), bool(random.random() < 0.5)
     share = float(random.uniform(0.3, 1.0))
     table: dict[str, Callable[[float], Numbers]] = {
         "inertial-drag": lambda a: {"drag": 3.0 * full * a / fastest**2, "drag_depth": (0.05 + second) * depth},
-        "depth-hardening": lambda a: {"harden": (2.0 if sign > 0 else -0.6) * a, "harden_power": 0.5 + share if second else -1.0},
+        "depth-hardening": lambda a: {"harden": (2.0 if sign > 0 else -0.6) * a,
+                                      "harden_power": 0.5 + share if second else -1.0},
         "plastic-sinkage": lambda a: {"plastic": 0.97 * a},
         "adhesion": lambda a: {"pull": 0.8 * full * a, "pull_reach": 0.1 * share * depth},
         "shaft-friction": lambda a: {"shaft": full * a, "shaft_power": float(second) * share, "shaft_speed": 1e-3},
@@ -243,8 +249,10 @@ def _ringing(time: Array, speed: Array, rate: float, lasts: float) -> Array:
     return out
 
 
-def fall(law: Law, speeds: Array, mass: float, gravity: float, duration: float, *, rate: float) -> tuple[Array, Array, Array]:
-    """Times [s] and, shape [row_count, drop_count], depths [m] and accelerations [m/s2] of spikes dropped at `speeds`."""
+def fall(
+    law: Law, speeds: Array, mass: float, gravity: float, duration: float, *, rate: float
+) -> tuple[Array, Array, Array]:
+    """Times [s] and, shape [row_count, drop_count], depths [m] and accelerations [m/s2] of drops at `speeds`."""
     every = max(1, round(1.0 / rate / _STEP))
     z, v, times, depths, rates = np.zeros(len(speeds)), speeds.astype(float), [], [], []
     a = np.full(len(speeds), gravity)
@@ -276,7 +284,9 @@ def _slopes(plan: _Plan) -> tuple[Columns, Array]:
     base = np.concatenate(_over_noise(plan, clean))
     nudged = (_measure(plan, {}, k=1.02), _measure(plan, {}, c=1.02))
     scale = [doubt / 0.02 for doubt in plan.doubt]
-    return clean, np.array([(np.concatenate(_over_noise(plan, one)) - base) * s for one, s in zip(nudged, scale, strict=True)])
+    return clean, np.array(
+        [(np.concatenate(_over_noise(plan, one)) - base) * s for one, s in zip(nudged, scale, strict=True)]
+    )
 
 
 def _left(plan: _Plan, clean: Columns, slopes: Array, made: Columns) -> float:

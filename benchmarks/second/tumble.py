@@ -1,7 +1,7 @@
 """Campaigns of tumbles by the second simulator, with or without the rig: plain tables and columns, and the answer.
 
-Nothing here comes from `rigid`, `coupling` or `experiments`. Camera, IMU and wheel have clocks and origins of their own:
-the camera's scale is about its own origin on the surface, the IMU's first sample falls where its clock puts it.
+Nothing here comes from `rigid`, `coupling` or `experiments`. Camera, IMU and wheel have clocks and origins of their
+own: the camera's scale is about its own origin on the surface, the IMU's first sample falls where its clock puts it.
 """
 
 import math
@@ -130,7 +130,9 @@ def _draw_plan(random: Random, rig: bool, trials: int | None) -> _Plan:
     gravities = (0.0834, 0.147) if rig else tuple(random.choice((0.03, 0.06, 0.1, 0.15), 2, replace=False).tolist())
     motors = random.choice((0.125, 0.16, 0.22, 0.3), 2, replace=False).tolist()
     brake, spin = float(random.choice((2.0, 4.0, 6.0))), float(random.choice((200.0, 300.0, 400.0)))
-    conditions = [(g, t, "motor", 0.0) for g in gravities for t in motors] + [(g, brake, "brake", spin) for g in gravities]
+    conditions = [(g, t, "motor", 0.0) for g in gravities for t in motors] + [
+        (g, brake, "brake", spin) for g in gravities
+    ]
     count = trials or int(random.choice((6, 8, 8, 8, 12)))
     until = float(random.choice((10.0, 0.8)))
     own = tuple(
@@ -163,7 +165,7 @@ def _with_structure(random: Random, plan: _Plan, size: float) -> tuple[_Plan, fl
     softer = float(random.uniform(0.3, 1.0))  # a friction spring over a leg
     tried = [{"leg_stiffness": k, "leg_time": _LEG_TIME, "shear_stiffness": softer * k,
               "shear_damping": 2e-3 * softer * k} for k in _STRUCTURES.tolist()]  # fmt: skip
-    rigid, weighing = _weighing(plan)
+    _, weighing = _weighing(plan)
     sizes = [weighing.whole(readings) for readings in _measure(plan, tried)]
     logs = np.maximum.accumulate(np.log(np.maximum(sizes[::-1], 1e-4)))  # from stiff to soft
     logs += 1e-6 * np.arange(len(logs))
@@ -180,7 +182,9 @@ def _at_strength(
     ladder = [form.at(float(a)) for a in np.geomspace(1.0 / _SPAN, 1.0, _LADDER)]
     seen = [weighing.most(readings) for readings in _measure(plan, ladder)]
     best = int(np.argmin(np.abs(np.log(np.maximum(seen, 1e-9) / strength))))
-    low, high = (10 ** (math.log10(_SPAN) * (max(0, min(n, _LADDER - 1)) / (_LADDER - 1) - 1)) for n in (best - 1, best + 1))
+    low, high = (
+        10 ** (math.log10(_SPAN) * (max(0, min(n, _LADDER - 1)) / (_LADDER - 1) - 1)) for n in (best - 1, best + 1)
+    )
     ladder = [form.at(float(a)) for a in np.geomspace(low, high, 7)]  # once more, between its neighbours
     seen = [weighing.most(readings) for readings in _measure(plan, ladder)]
     best = int(np.argmin(np.abs(np.log(np.maximum(seen, 1e-9) / strength))))
@@ -291,7 +295,9 @@ def _record(random: Random, plan: _Plan, readings: Readings) -> Made:
         for sensor, (stamp, labels) in sensors.items():
             columns[id, sensor] = {"t_s": one[stamp]} | {label: noisy[name] for label, name in labels.items()}
         stated = {key: value for key, value in trial.items() if key != "counterweight" or plan.rig}
-        trials.append({"id": id, **stated, "pose": f"{id}-pose.csv", "imu": f"{id}-imu.csv", "wheel": f"{id}-wheel.csv"})
+        trials.append(
+            {"id": id, **stated, "pose": f"{id}-pose.csv", "imu": f"{id}-imu.csv", "wheel": f"{id}-wheel.csv"}
+        )
     stated = plan.stated
     tables: dict[str, Any] = {
         "format": "hedgehog-campaign/1", "kind": "tumble", "name": "second",

@@ -11,13 +11,14 @@ from experiments.campaign.tables import PenetrationTrial, TumbleTrial
 from .pushes import down
 from .words import Array, Finding, factor_words, say, std_of
 
-__all__ = ["Condition", "condition_of", "condition_words", "odd_replicates"]
+__all__ = ["Condition", "condition_of", "condition_words", "odd_replicates", "pace_of"]
 
 Condition = tuple[object, ...]
 
 _AT_ODDS = 20.0  # times as far from its replicates as these from one another, in mean square, a trial is at odds
 _NOISE = 4.0  # and times farther, in mean square, than the sensors' noise would put it
 _SIZEABLE = 0.1  # and share of the channel's standard deviation by which it differs: beds differ by some percent
+_FASTER = 2.0  # ratio of two speeds beyond which pushes are never of one condition
 _POINTS = 80  # places at which replicates are compared
 
 
@@ -31,7 +32,25 @@ def condition_of(tables: TumbleCampaign | PenetrationCampaign, trial: Any) -> Co
         )  # fmt: skip
     assert isinstance(trial, PenetrationTrial)
     grains = trial.gravity if trial.grain_gravity is None else trial.grain_gravity
-    return trial.mode, tables.diameter_of(trial), trial.gravity, grains, trial.speed
+    return trial.mode, tables.diameter_of(trial), trial.gravity, grains, pace_of(tables, trial)
+
+
+def pace_of(tables: PenetrationCampaign, trial: PenetrationTrial) -> float | None:
+    """The speed that stands for a trial's among replicates [m/s]; None where none is stated.
+
+    Of a drop its own. Of a push the least stated one from which on C times the difference is below the noise of the
+    force, and the ratio at most 2: a mean speed that changes the force by less than the noise makes no new condition.
+    """
+    if trial.speed is None or trial.mode == "drop" or tables.sensors.force is None:
+        return trial.speed
+    speeds = sorted(abs(t.speed) for t in tables.trial if t.mode == trial.mode and t.speed is not None)
+    least, noise = speeds[0], tables.sensors.force.std[0]
+    for speed in speeds:
+        if tables.surface.damping * (speed - least) > noise or speed > _FASTER * least:
+            least = speed
+        if speed >= abs(trial.speed):
+            break
+    return least
 
 
 def condition_words(tables: TumbleCampaign | PenetrationCampaign, trial: Any) -> str:

@@ -15,7 +15,7 @@ from experiments.campaign import read_campaign, write_campaign
 
 
 def test_a_drop_sinks_as_the_damped_oscillator_does():
-    """m z'' + C z' + K z = m g, z(0) = 0, z'(0) = v, until it turns: closed form; Heun's rule to the square of its step."""
+    """m z'' + C z' + K z = m g, z(0) = 0, z'(0) = v, until it turns: closed form."""
     k, c, mass, v = 1500.0, 6.0, 0.4, 0.6
     t, z, a = fall(Law(k, c, 0.02, {}), np.array([v]), mass, 9.80665, 0.1, rate=1000.0)
     decay, rest = 0.5 * c / mass, mass * 9.80665 / k
@@ -23,7 +23,9 @@ def test_a_drop_sinks_as_the_damped_oscillator_does():
     exact = rest + np.exp(-decay * t) * (-rest * np.cos(w * t) + (v - decay * rest) / w * np.sin(w * t))
     going = t < t[int(np.argmax(exact))]
     assert z[going, 0] == pytest.approx(exact[going], abs=3e-6)
-    assert a[going, 0][1:] == pytest.approx(9.80665 - (k * z[going, 0] + c * np.gradient(exact, t)[going])[1:] / mass, abs=0.05)
+    assert a[going, 0][1:] == pytest.approx(
+        9.80665 - (k * z[going, 0] + c * np.gradient(exact, t)[going])[1:] / mass, abs=0.05
+    )
 
 
 def test_the_bed_is_a_spring_and_a_damper_on_the_way_in_and_a_spring_on_the_way_out():

@@ -47,7 +47,7 @@ def test_free_fall_is_a_parabola_to_rounding_and_turns_at_one_speed():
 
 @pytest.mark.parametrize("step", [4e-4, 2e-4, 1e-4])
 def test_without_damper_and_friction_energy_is_kept_to_the_square_of_the_step(step):
-    """Bounces from 2 cm on single tips: a leapfrog's bound is (omega step)^2 of the energy, omega^2 = K (1/m + d^2/J)."""
+    """Bounces from 2 cm on single tips: a leapfrog keeps energy to (omega step)^2, omega^2 = K (1/m + d^2/J)."""
     m = moved(1.0, step=step, free_start=1.0, y_0=0.22, theta_0=0.1, damping=0.0, mu_s=0.0, mu_d=0.0, gravity_sim=1.0)
     hops = m["touching"] == 0  # while it touches, a row's depths are of half a step before
     assert (np.diff(hops.astype(int)) == 1).any()
@@ -88,8 +88,8 @@ def test_a_platform_on_one_sticking_tip_falls_over_as_a_pendulum():
 @pytest.mark.parametrize("more", [{}, {"leg_stiffness": 2e5, "leg_time": 2e-3}])
 def test_on_a_slope_it_sticks_up_to_what_two_independent_rows_hold_and_slides_beyond(more):
     """Both rows hold half of the force each; the upper one has the load N (1 - tan(a) cot(pi / 8)) / 2 and slips first.
-    Up to there nothing moves. Beyond what the lower one holds beside it (tan(a) = (mu_s + mu_d) / (2 - cot(pi / 8) (mu_s -
-    mu_d))) all slides. Between the two it depends on how the load was put on."""
+    Up to there nothing moves. Beyond what the lower one holds beside it (tan(a) = (mu_s + mu_d) / (2 - cot(pi / 8)
+    (mu_s - mu_d))) all slides. Between the two it depends on how the load was put on."""
     cot = 1.0 / math.tan(math.pi / 8)
     first, edge = 0.3 / (1.0 + 0.3 * cot), 0.45 / (2.0 - 0.15 * cot)
     below, above = (
@@ -112,7 +112,7 @@ def test_the_least_torque_that_tips_it_is_weight_times_lever():
 
 
 def test_a_compliant_leg_gives_way_by_its_load_over_its_stiffness():
-    """Static: half the weight along the vertical, its part along the leg cos(pi/8) on each of two legs, without friction."""
+    """Static: half the weight on each of two legs, its part cos(pi/8) along the leg, without friction."""
     m = moved(0.2, leg_stiffness=5e3, leg_time=2e-3, mu_s=0.0, mu_d=0.0, shear_stiffness=1e-3, shear_damping=0.0)
     half = 0.5 * 5.3 * 0.1
     shorter = half * math.cos(math.pi / 8) / 5e3
@@ -141,7 +141,9 @@ def test_with_stiff_legs_it_moves_as_the_base_model_of_rigid(numbers):
     given = {"counterweight": 5.21, "gravity_sim": 0.0834, "mu_s": 0.5, "mu_d": 0.25} | numbers
     given.pop("gravity_local", None)
     exact = simulate(
-        Trial(mass=5.3, inertia=0.06, actuator="motor", **given), duration=1.2, times=np.minimum(mine["time"], 1.2)[::50]
+        Trial(mass=5.3, inertia=0.06, actuator="motor", **given),
+        duration=1.2,
+        times=np.minimum(mine["time"], 1.2)[::50],
     )
     shown = {name: mine[name][::50][: len(exact.time)] for name in ("x", "y", "theta")}
     assert shown["x"] == pytest.approx(exact.x, abs=5e-6)

@@ -19,7 +19,7 @@ from experiments.diagnose.noise.lone_beds import lone_finding
 from experiments.diagnose.noise.replicates import Scatter, exchanged, groups_of, odd_trials, split_trials, trends
 from experiments.diagnose.noise.wander import Wander
 
-from . import deciding, renoised
+from . import deciding, matters, renoised
 from .outcome import Diagnosis, Known, finish
 from .search import Choice, Search
 
@@ -381,6 +381,12 @@ class _Course:
             return self._nothing(choice.left)
         held = self._held_out_gate(choice.best.fit)
         verdict = deciding.verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
+        if not (verdict in ("named", "ambiguous") and choice.left.passed and (held is None or held.passed)):
+            enough = self._base_suffices(choice, verdict)
+            if enough is not None:
+                return enough
+            choice, verdict = self._by_size(choice, verdict)
+            held = self._held_out_gate(choice.best.fit)
         # Where a second effect was called for, diverging trials were considered before it.
         before = verdict == "unknown" and choice.left.passed and len(choice.best.effects) > 1
         if not (asked.aside or before):
@@ -419,6 +425,40 @@ class _Course:
         if verdict in ("named", "ambiguous") and held is not None and not held.passed:
             self.findings += deciding.held_out_divergences(choice.best.fit, held_out, asked.seed)
         return finish(self._known(model_std), self.base, choice, verdict, alone=self.alone, held=held, sure=sure)
+
+    @property
+    def _scatter(self) -> dict[str, float]:
+        """All that replicates differ by, as known so far."""
+        return {**self.problem.known_std, **self.model_std, **self.wander.model_std}
+
+    def _base_suffices(self, choice: Choice, verdict: str) -> Diagnosis | None:
+        """That nothing is missing, where what the base model leaves is too small to matter; with other trials held out
+        where only those show more, unless these diverge late. None where it leaves more."""
+        asked, base, held_out = self.asked, self.base, self.held_out
+        left = matters.left_by(base, held_out, self._scatter)
+        if left.fit > matters.MOST:
+            return None
+        small = left.held_out is None or left.held_out <= matters.MOST
+        others = () if small else deciding.missed(base, held_out, asked.seed)
+        if not others:
+            return self._nothing(choice.left) if matters.is_as_stated(base, self._scatter) else None
+        if verdict != "unknown" or asked.looked_at:
+            return None
+        self.tell("what is left shows in trials that were held out: others are held out", 0.0)
+        anew = self._again(aside=asked.aside, looked_at=others)
+        return None if anew.verdict == "unknown" else anew
+
+    def _by_size(self, choice: Choice, verdict: str) -> tuple[Choice, str]:
+        """The fewest names that explain what matters, and the verdict that follows."""
+        choice = matters.fewest(choice, self.held_out, self._scatter)
+        if self._bends_to_anything(choice) or not matters.explains(choice, self.held_out, self._scatter):
+            return choice, verdict
+        return choice, "ambiguous" if choice.alternatives else "named"
+
+    def _bends_to_anything(self, choice: Choice) -> bool:
+        """Whether there are so many effects that each must have one amplitude, and one has not."""
+        many = len(choice.best.effects) + bool(self.asked.aside) >= deciding.MANY
+        return many and (choice.predicted is None or not deciding.one_number(choice))
 
     def _stands(self, anew: Diagnosis, gone: Sequence[Finding]) -> bool:
         """Whether a diagnosis without the trials `gone` is kept; a whole condition is set aside for an effect only."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from .fitting import Fit
 
-__all__ = ["Bound", "bends_little_away", "bounds_met", "is_strained"]
+__all__ = ["Bound", "bends_little_away", "bounds_met", "is_strained", "strained_parameters"]
 
 _FAR = 5.0  # standard deviations from the stated value that no true number has (chance 6e-7)
 _FAR_FOR_LITTLE, _LITTLE = 3.5, 0.5
@@ -46,7 +46,12 @@ class Bound:
 
 def is_strained(found: Fit) -> bool:
     """Whether the model needs numbers that the campaign all but excludes, but for those that its forms redefine."""
-    return any(b.strains and not _redefined(found, b.parameter) for b in bounds_met(found))
+    return bool(strained_parameters(found))
+
+
+def strained_parameters(found: Fit) -> tuple[str, ...]:
+    """Names of those numbers: they may absorb a structural difference between the model and what was measured."""
+    return tuple(b.parameter for b in bounds_met(found) if b.strains and not _redefined(found, b.parameter))
 
 
 def bends_little_away(found: Fit, base: Fit) -> bool:

@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial
+from experiments.check.replicas import pace_of
 from experiments.diagnose.fit.problem import Array, Finding, TrialInfo
 from experiments.diagnose.noise.colour import Colour, colour_of, together
 from experiments.diagnose.noise.replicates import parted
@@ -343,7 +344,8 @@ def _info(tables: PenetrationCampaign, table: PenetrationTrial, speed: float) ->
     gravity = table.gravity
     grains = gravity if table.grain_gravity is None else table.grain_gravity
     diameter = tables.diameter_of(table)
-    alike = f"{table.speed:.6g}" if table.speed is not None else "by hand"
+    pace = pace_of(tables, table)
+    alike = f"{pace:.6g}" if pace is not None else "by hand"
     return TrialInfo(
         id=table.id,
         condition=(table.mode, diameter, gravity, grains, alike),
