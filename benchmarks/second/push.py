@@ -8,13 +8,12 @@ damper set in over a depth, and the frame between drive and tip is compliant.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .noise import Noise, draw_noise
-from .tumble import Made, Secret
+from .tumble import Made, Secret, Table
 
 __all__ = ["EFFECTS", "OUTSIDE", "Law", "fall", "make_push"]
 
@@ -94,7 +93,7 @@ class _Plan:
     depth: float
     stated: tuple[float, float]
     doubt: tuple[float, float]
-    trials: tuple[dict[str, Any], ...]
+    trials: tuple[Table, ...]
     style: dict[str, float]
     std: dict[str, float]
     noise: dict[str, Noise]
@@ -331,7 +330,7 @@ def _record(random: Random, plan: _Plan, made: Columns) -> Made:
             for name, values in one.items()
         }
         trials.append({"id": id, "gravity": _G, **trial, "data": f"{id}.csv"})
-    tables: dict[str, Any] = {
+    tables: Table = {
         "format": "hedgehog-campaign/1", "kind": "penetration", "name": "second",
         "spike": {"mass": plan.mass, "diameter": 0.012, "tip": "sphere"},
         "surface": {"kind": "sand", "granular": True, "stiffness": plan.stated[0], "damping": plan.stated[1]},

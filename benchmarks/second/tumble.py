@@ -16,9 +16,10 @@ from .forms import FREE, NAMED, OUTSIDE, RIG, Form, draw_form
 from .motion import COLUMNS, move
 from .noise import Noise, draw_noise
 
-__all__ = ["CHANNELS", "Made", "Secret", "make_tumble"]
+__all__ = ["CHANNELS", "Made", "Secret", "Table", "make_tumble"]
 
 Array = NDArray[np.float64]
+Table = dict[str, Any]
 Random = np.random.Generator
 Readings = list[dict[str, Array]]
 CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
@@ -51,14 +52,14 @@ class Secret:
     uncertain numbers and the camera's zeros explain is taken out; of a pair the lesser one's."""
     coloured: bool
     trials: int
-    extra: dict[str, Any] = field(default_factory=dict)
+    extra: Table = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Made:
     """A campaign as plain tables, as in campaign.toml, and columns by trial and sensor."""
 
-    tables: dict[str, Any]
+    tables: Table
     columns: dict[tuple[str, str], dict[str, Array]]
 
 
@@ -71,7 +72,7 @@ class _Plan:
     stated: dict[str, float]
     true: dict[str, float]
     gravity_factor: Array  # of each trial
-    trials: tuple[dict[str, Any], ...]
+    trials: tuple[Table, ...]
     duration: float
     std: dict[str, float]
     noise: dict[str, Noise]
@@ -299,7 +300,7 @@ def _record(random: Random, plan: _Plan, readings: Readings) -> Made:
             {"id": id, **stated, "pose": f"{id}-pose.csv", "imu": f"{id}-imu.csv", "wheel": f"{id}-wheel.csv"}
         )
     stated = plan.stated
-    tables: dict[str, Any] = {
+    tables: Table = {
         "format": "hedgehog-campaign/1", "kind": "tumble", "name": "second",
         "platform": {"mass": stated["mass"], "inertia": stated["inertia"], "spike_length": 0.2},
         "wheel": {"inertia": 1.2e-3},

@@ -144,9 +144,10 @@ def _result(found: Diagnosis, diagnosis: Json) -> Result:
         for kind, std in found.model_std.items()
     ]
     warnings = [finding.what for finding in said_once(found.findings)]
-    beside = (
-        "it does not explain the data" if is_strained(found.best) else "beside the effects named it means another thing"
-    )
+    beside = "beside the effects named it means another thing"
+    if is_strained(found.best):
+        unknown = found.verdict == "unknown"
+        beside = "it does not explain the data" if unknown else "it absorbs a difference in structure"
     for model, bounds, meaning in (
         ("the base model", found.bounds_before, "it bends them because it lacks something"),
         ("the best model", found.bounds_after if found.forms else (), beside),

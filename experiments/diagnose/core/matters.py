@@ -48,8 +48,8 @@ def _gaps(found: Fit, held_out: tuple[str, ...], scatter: Scatter) -> _Gaps:
 
 
 def explains(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> bool:
-    """Whether the best model's first name leads every rival by `_LEAD`, and what is left of held-out trials is too small
-    to matter, or nearly all is closed. What is left is then reported as residue."""
+    """Whether the best model's first name leads every rival by `_LEAD`, and what is left of held-out trials is too
+    small to matter, or nearly all is closed. What is left is then reported as residue."""
     if not choice.best.effects or any(rival.behind < _LEAD for rival in choice.rivals):
         return False
     after, weighed = _gaps(choice.best.fit, held_out, scatter)

@@ -188,6 +188,7 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
     diagnosis["by_phase"], diagnosis["by_channel"] = gaps.by_phase, gaps.by_channel
     diagnosis["by_condition"], diagnosis["parted"] = gaps.by_condition, gaps.parted
+    diagnosis["residue"] = gaps.residue
     write_json(folder / "diagnosis.json", diagnosis)
     return diagnosis
 

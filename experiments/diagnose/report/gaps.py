@@ -12,8 +12,11 @@ from experiments.diagnose.fit.problem import Array
 
 __all__ = ["Gaps"]
 
+Row = dict[str, Any]
+
 _ZEROED = ("x", "y", "theta")  # channels whose zero is fitted in each trial
 _WINDOW = 9  # samples of the running mean
+_SURE = 3.0  # standard errors of a mean square of noise beyond which it is more than noise
 _SIGMAS = 5.0  # standard errors of that mean at which a trial leaves the base model
 
 
@@ -23,9 +26,10 @@ class Gaps:
     def __init__(self) -> None:
         self._phases: dict[tuple[str, str, bool], list[float]] = {}
         self._channels: dict[tuple[str, bool], list[float]] = {}
+        self._beyond: dict[str, list[float]] = {}  # of the best model: readings, sums of squares and variances
         self._conditions: dict[tuple[tuple[str, float], ...], list[float]] = {}
         self._trials: dict[tuple[tuple[str, float], ...], set[str]] = {}
-        self._parted: list[dict[str, Any]] = []
+        self._parted: list[Row] = []
 
     def add(
         self, trial: str, channel: str, time: Array, before: Array, after: Array, std: Array, std_after: Array,
@@ -44,6 +48,10 @@ class Gaps:
             for target, values in ((sums, rest[counts]), (over, rest[counts] / noise[counts])):
                 target[at] += len(values)
                 target[at + 1] += float(np.sum(values**2))
+            if at:
+                beyond = self._beyond.setdefault(channel, [0.0] * 3)
+                for place, part in enumerate((counts, rest[counts] ** 2, noise[counts] ** 2)):
+                    beyond[place] += float(np.sum(part))
             valid = np.where(np.isinf(noise), np.nan, rest / noise)
             for phase, rows in own.items():
                 cell = self._phases.setdefault((str(phase), channel, held_out), zeros.copy())
@@ -60,7 +68,7 @@ class Gaps:
                                      "held_out": held_out})  # fmt: skip
 
     @property
-    def by_phase(self) -> list[dict[str, Any]]:
+    def by_phase(self) -> list[Row]:
         """Chi-square per sample by phase and channel, without cells in which no reading counts."""
         return [
             {"phase": phase, "channel": channel, "held_out": held_out} | cell
@@ -68,7 +76,7 @@ class Gaps:
         ]  # fmt: skip
 
     @property
-    def by_channel(self) -> list[dict[str, Any]]:
+    def by_channel(self) -> list[Row]:
         """Root mean square of measured less modelled, in the channel's unit (mm, degrees)."""
         return [
             {"channel": channel, "unit": unit_of(channel)[0], "held_out": held_out, "samples": cell["samples"]}
@@ -77,7 +85,19 @@ class Gaps:
         ]  # fmt: skip
 
     @property
-    def by_condition(self) -> list[dict[str, Any]]:
+    def residue(self) -> list[Row]:
+        """What the best model leaves beyond the noise: root mean square in the channel's unit (mm, degrees, N), of the
+        channels in which it exceeds what chance makes of the noise's own mean square (3 standard errors)."""
+        found = []
+        for channel, (count, squares, variances) in sorted(self._beyond.items()):
+            beyond = (squares - variances) / max(count, 1.0)
+            if beyond > _SURE * math.sqrt(2 / max(count, 1.0)) * variances / max(count, 1.0):
+                unit, factor = unit_of(channel)
+                found.append({"channel": channel, "unit": unit, "rms": factor * math.sqrt(beyond)})
+        return found
+
+    @property
+    def by_condition(self) -> list[Row]:
         """Chi-square per sample by the trials' settings."""
         return [
             {"settings": dict(settings), "trials": sorted(self._trials[settings])} | cell
@@ -85,12 +105,12 @@ class Gaps:
         ]  # fmt: skip
 
     @property
-    def parted(self) -> list[dict[str, Any]]:
+    def parted(self) -> list[Row]:
         """When each channel of each trial first leaves the base model: its running mean is beyond 5 errors."""
         return sorted(self._parted, key=lambda row: (row["trial"], row["at_s"]))
 
 
-def _cell(sums: list[float]) -> dict[str, Any]:
+def _cell(sums: list[float]) -> Row:
     """Samples, and the mean squares before and after; empty where no reading counts."""
     count, before, count_after, after = sums
     if not (count and count_after):

@@ -78,7 +78,21 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         first = [*_candidates(diagnosis), *_left(diagnosis), *worse_sentences(diagnosis)]
     else:
         first = [*sure_sentences(diagnosis), *worse_sentences(diagnosis)]
+    if diagnosis["verdict"] != "unknown":
+        first += _residue(diagnosis)
     return [*_doubts(diagnosis), *first, *scatter_sentence(diagnosis), f"Next experiment: {ask}"]
+
+
+def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
+    """How large what is left is, and which numbers absorb a difference in structure; it decides nothing."""
+    sentences = []
+    if left := diagnosis.get("residue", []):
+        sizes = ", ".join(f"{row['rms']:.2g} {row['unit']} in {row['channel']}" for row in left)
+        sentences.append(say("residue", sizes=sizes))
+    if far := _strained(diagnosis, "after"):
+        names = " and ".join(f"{bound['parameter']} ({bound['sigmas']:+.1f} sigma)" for bound in far)
+        sentences.append(say("absorbs", names=names))
+    return sentences
 
 
 def _doubts(diagnosis: Mapping[str, Any]) -> list[str]:
