@@ -220,7 +220,11 @@ def _measure(plan: _Plan, settings: Mapping[str, float], k: float = 1.0, c: floa
         time, depth, speed, _ = _paths(plan)
         law = Law(plan.k * k, plan.c * c, plan.depth, s)
         steps = time[:, 1] - time[:, 0]
-        force = np.array([law(z, v, steps) for z, v in zip(depth.T, speed.T, strict=True)]).T
+        if "relax" in s:  # point by point: what fades depends on all that was before
+            force = np.array([law(z, v, steps) for z, v in zip(depth.T, speed.T, strict=True)]).T
+        else:
+            law.top = np.maximum.accumulate(np.maximum(depth, 0.0), axis=1)
+            force = law(depth, speed, steps[:, None])
         for t, z, f, v, trial in zip(time, depth, force, speed, driven, strict=True):
             f = f + s.get("cell_drift", 0.0) * (1.0 - np.exp(-t / (0.6 * t[-1])))
             if "ring" in s:
