@@ -10,6 +10,7 @@ from benchmarks.second.campaigns import KINDS, campaign_of
 from benchmarks.second.noise import KINDS as NOISES
 from benchmarks.second.noise import Noise
 from benchmarks.second.push import Law, fall, make_push
+from benchmarks.second.structure import counted, draw
 from benchmarks.second.tumble import make_tumble
 from experiments.campaign import read_campaign, write_campaign
 
@@ -85,3 +86,25 @@ def test_what_cannot_be_hidden_is_refused():
         make_push(1, kind="pendulum")
     with pytest.raises(ValueError, match="structure = 1"):
         suite("tumble", 3, structure=1.0)
+
+
+def record(truth, verdict, effects=(), *, outside=None, structure=1.0, **more):
+    return {"case": {"structure": structure}, "truth": truth, "outside": outside, "verdict": verdict,
+            "effects": list(effects), "alternatives": [], **more}  # fmt: skip
+
+
+def test_a_figure_of_sizes_of_structure_counts_what_became_of_each_class(tmp_path):
+    records = [
+        record([], "none"), record([], "named", ["layering"]), record([], "unknown", outside="ringing"),
+        record(["adhesion"], "named", ["adhesion"]), record(["adhesion"], "named", ["adhesion", "layering"]),
+        record(["adhesion"], "unknown", leading=["adhesion"]), record(["adhesion"], "none", structure=0.1),
+    ]  # fmt: skip
+    found = counted(records)
+    assert found["nothing hidden"][1.0] == {"right": 1, "wrong name": 1}
+    assert found["outside the library"][1.0] == {"right": 1}
+    assert found["one effect"][1.0] == {"right": 1, "right name among several": 1, "unknown, right name leads": 1}
+    assert found["one effect"][0.1] == {"none": 1}
+    draw(tmp_path / "figure.png", records)
+    assert (tmp_path / "figure.png").stat().st_size > 1000
+    with pytest.raises(ValueError, match="--structure"):
+        draw(tmp_path / "none.png", [record([], "none", structure=None)])

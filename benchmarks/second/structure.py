@@ -1,0 +1,100 @@
+"""How verdicts change with a model structure error of a known size: a figure, and the counts behind it.
+
+    python -m benchmarks.second.structure FIGURE.png DIR ...
+
+DIR are folders of ``hedgebed bench diagnose --kind second-... --structure STD``. A bar is one size of the error, root
+mean square over the noise of the sensors: the share of each verdict among nulls, single effects and effects that no
+library has.
+"""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+
+from benchmarks.diagnosis.table import read_cases
+from experiments.runs.types import Json
+
+__all__ = ["counted", "draw", "outcome_of"]
+
+GROUPS = ("nothing hidden", "one effect", "outside the library")
+OUTCOMES = {
+    "right": "#2a7f62", "right name among several": "#8fc1a9", "unknown, right name leads": "#e0b050",
+    "unknown": "#b0b0b0", "none": "#d9d9d9", "wrong name": "#b3413a",
+}  # fmt: skip
+"""Outcomes and their colours; `unknown` is right, and green, outside the library, `none` where nothing is hidden."""
+
+
+def group_of(case: Json) -> str | None:
+    """Which of `GROUPS` a record is of; None for a pair."""
+    if case["outside"]:
+        return GROUPS[2]
+    return GROUPS[len(case["truth"])] if len(case["truth"]) < 2 else None
+
+
+def outcome_of(case: Json) -> str:
+    """One of `OUTCOMES` for a record of cases.jsonl."""
+    verdict, names = case["verdict"], case["effects"]
+    if group_of(case) == GROUPS[2]:
+        return "right" if verdict == "unknown" else verdict if verdict == "none" else "wrong name"
+    if not case["truth"]:
+        return "right" if verdict == "none" else verdict if verdict == "unknown" else "wrong name"
+    if verdict == "none":
+        return "none"
+    if verdict == "unknown":
+        leads = case.get("leading", [])[:1] == case["truth"][:1]
+        return "unknown, right name leads" if leads else "unknown"
+    if names == case["truth"] and not case["alternatives"]:
+        return "right"
+    held = case["truth"][0] in {*names, *case["alternatives"]}
+    return "right name among several" if held else "wrong name"
+
+
+def counted(cases: Sequence[Json]) -> dict[str, dict[float, Counter[str]]]:
+    """Group -> size of the error that was asked for -> how often each outcome came."""
+    found: dict[str, dict[float, Counter[str]]] = {group: {} for group in GROUPS}
+    for case in cases:
+        size, group = case["case"].get("structure"), group_of(case)
+        if size is not None and group is not None:
+            found[group].setdefault(float(size), Counter())[outcome_of(case)] += 1
+    return found
+
+
+def draw(path: Path, cases: Sequence[Json]) -> None:
+    """Write the figure of these records to `path`. Raises ValueError where none has a stated size."""
+    found = counted(cases)
+    if not any(found.values()):
+        raise ValueError("no record has a stated structure: run bench diagnose with --structure")
+    mpl.use("Agg")
+    figure, axes = plt.subplots(1, len(GROUPS), figsize=(10, 3.6), sharey=True, layout="constrained")
+    for axis, group in zip(axes, GROUPS, strict=True):
+        sizes = sorted(found[group])
+        below = [0.0] * len(sizes)
+        for outcome, colour in OUTCOMES.items():
+            shares = [found[group][size][outcome] / found[group][size].total() for size in sizes]
+            axis.bar(range(len(sizes)), shares, bottom=below, color=colour, label=outcome, width=0.8)
+            below = [low + share for low, share in zip(below, shares, strict=True)]
+        axis.set_xticks(range(len(sizes)), [f"{size:g}\n({found[group][size].total()})" for size in sizes])
+        axis.set_title(group)
+        axis.set_xlabel("structure error over the noise\n(campaigns)")
+    axes[0].set_ylabel("share of campaigns")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Draw, and print the counts."""
+    cases = [case for folder in arguments[1:] for case in read_cases(Path(folder))]
+    draw(Path(arguments[0]), cases)
+    print(json.dumps({group: {str(size): dict(own) for size, own in sorted(sizes.items())}
+                      for group, sizes in counted(cases).items()}, indent=1))  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
