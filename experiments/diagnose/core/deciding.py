@@ -18,8 +18,9 @@ from .rivals import folds_of, predict
 from .search import Choice
 
 __all__ = [
-    "MANY", "Gap", "certain", "closes", "diverging_beside", "explains_nothing", "gap_of", "held_out_divergences",
-    "missed", "one_number", "smallest", "unscattered", "values_of_all", "verdict_of", "well_known",
+    "Gap", "bends_to_anything", "certain", "closes", "diverging_beside", "explains_nothing", "gap_of",
+    "held_out_divergences", "missed", "one_number", "smallest", "unscattered", "values_of_all", "verdict_of",
+    "well_known",
 ]  # fmt: skip
 
 _AS_LIKELY = 1.0  # nats within which a third effect is named as well
@@ -39,7 +40,7 @@ _LATE = 0.5  # share of a held-out trial's time up to which a model that explain
 _CERTAIN = 0.1
 """Share of what the base model leaves, fitted, predicted and held out, that an effect may leave that is certain beside
 something unknown."""
-MANY = 3
+_MANY = 3
 """Effects that together bend to nearly anything, a trial set aside counted as one: each of so many must have one
 amplitude in the cross-validation."""
 _ONE_NUMBER = 0.1  # relative uncertainty of that amplitude: a real effect is the same in all conditions
@@ -90,7 +91,7 @@ def verdict_of(
     found = choice.best.fit
     if not choice.best.effects or is_strained(found) or bends_little_away(found, choice.base.fit):
         return "unknown"
-    if len(choice.best.effects) + set_aside >= MANY and (choice.predicted is None or not one_number(choice)):
+    if bends_to_anything(choice, set_aside=set_aside):
         return "unknown"
     after = gap_of(found, held_out)
     fits, predicts = choice.left.passed, held is None or held.passed
@@ -106,6 +107,12 @@ def verdict_of(
         # Where nothing at all is left of the trials that were fitted, all held out but one may diverge, and late.
         passed = passed or (fits and ask(len(held_out) - 1, share=_LATE) is not None)
     return ("ambiguous" if choice.alternatives else "named") if passed else "unknown"
+
+
+def bends_to_anything(choice: Choice, *, set_aside: bool) -> bool:
+    """Whether there are so many effects that each must have one amplitude, and one has not."""
+    many = len(choice.best.effects) + set_aside >= _MANY
+    return many and (choice.predicted is None or not one_number(choice))
 
 
 def explains_nothing(choice: Choice, held_out: tuple[str, ...]) -> bool:

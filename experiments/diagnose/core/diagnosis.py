@@ -401,8 +401,7 @@ class _Course:
             # What no fitted trial shows of a form may show in these: an effect then has to explain all of them.
             others = deciding.missed(choice.best.fit, held_out, asked.seed)
             if others:
-                self.tell("what the name leaves shows in trials that were held out: others are held out", 0.0)
-                anew = self._again(looked_at=others)
+                anew = self._looking_at(others)
                 if anew.verdict != "unknown":
                     return anew
         sure: tuple[str, ...] = ()
@@ -422,6 +421,8 @@ class _Course:
                     choice = replace(anew.choice, best=Hypothesis.of(best), left=choice.left)
                     held = self._held_out_gate(best)
                 model_std = {**model_std, **wander.model_std}
+                if sure and matters.explains(choice, held_out, {**self._scatter, **model_std}):
+                    verdict = "named"  # as near as another replicate comes
         if verdict in ("named", "ambiguous") and held is not None and not held.passed:
             self.findings += deciding.held_out_divergences(choice.best.fit, held_out, asked.seed)
         return finish(self._known(model_std), self.base, choice, verdict, alone=self.alone, held=held, sure=sure)
@@ -444,21 +445,16 @@ class _Course:
             return self._nothing(choice.left) if matters.is_as_stated(base, self._scatter) else None
         if verdict != "unknown" or asked.looked_at:
             return None
-        self.tell("what is left shows in trials that were held out: others are held out", 0.0)
-        anew = self._again(aside=asked.aside, looked_at=others)
+        anew = self._looking_at(others)
         return None if anew.verdict == "unknown" else anew
 
     def _by_size(self, choice: Choice, verdict: str) -> tuple[Choice, str]:
         """The fewest names that explain what matters, and the verdict that follows."""
         choice = matters.fewest(choice, self.held_out, self._scatter)
-        if self._bends_to_anything(choice) or not matters.explains(choice, self.held_out, self._scatter):
+        bends = deciding.bends_to_anything(choice, set_aside=bool(self.asked.aside))
+        if bends or not matters.explains(choice, self.held_out, self._scatter):
             return choice, verdict
         return choice, "ambiguous" if choice.alternatives else "named"
-
-    def _bends_to_anything(self, choice: Choice) -> bool:
-        """Whether there are so many effects that each must have one amplitude, and one has not."""
-        many = len(choice.best.effects) + bool(self.asked.aside) >= deciding.MANY
-        return many and (choice.predicted is None or not deciding.one_number(choice))
 
     def _stands(self, anew: Diagnosis, gone: Sequence[Finding]) -> bool:
         """Whether a diagnosis without the trials `gone` is kept; a whole condition is set aside for an effect only."""
@@ -477,14 +473,13 @@ class _Course:
         """No effect is missing by the fitted trials; once more with others held out where these show more."""
         asked = self.asked
         if others := () if asked.looked_at else deciding.missed(self.base, self.held_out, asked.seed):
-            self.tell("what is left shows in trials that were held out: others are held out", 0.0)
-            return self._again(aside=asked.aside, looked_at=others)
+            return self._looking_at(others)
         self.findings += deciding.held_out_divergences(self.base, self.held_out, asked.seed)
         return finish(self._known(self.model_std), self.base, None, "none", alone=self.alone, last=last)
 
     def _known(self, model_std: Mapping[str, float]) -> Known:
         findings = (*self.findings, *(jitter.finding for jitter in self.jitters))
-        model_std = {**self.problem.known_std, **model_std, **self.wander.model_std}
+        model_std = {**self._scatter, **model_std}
         return Known(self.problem, self.held_out, self.first, findings, self.jitters, self.colours, model_std)
 
     def _held_out_gate(self, found: Fit) -> Verdict | None:
@@ -493,6 +488,11 @@ class _Course:
             return None
         values = held_out_fit(found.model, self.held_out, found.values)
         return held_out_gate(found, self.held_out, values, seed=self.asked.seed)
+
+    def _looking_at(self, others: tuple[str, ...]) -> Diagnosis:
+        """The whole course once more with the held-out trials `others` fitted, and other ones held out."""
+        self.tell("what is left shows in trials that were held out: others are held out", 0.0)
+        return self._again(aside=self.asked.aside, looked_at=others)
 
     def _again(self, problem: Problem | None = None, **changes: Any) -> Diagnosis:
         """The whole course once more, with other trials aside or held out."""

@@ -195,7 +195,7 @@ def _path(trial: Prepared) -> tuple[float, ...]:
     if trial.table.speed is None:
         return ()
     deepest = max(float(trial.smooth.depth.max()), 1e-9)
-    return deepest, 2.0 - float(trial.smooth.depth[-1]) / deepest, lasted
+    return deepest, 2.0 - float(trial.smooth.depth[-1]) / deepest, lasted * abs(trial.table.speed)
 
 
 def stds(tables: PenetrationCampaign, driven: bool) -> tuple[float, float]:
