@@ -30,7 +30,8 @@ _FINE = 3000  # points of a path
 _STEP = 1e-4  # of a drop [s]
 _LADDER, _SPAN = 13, 3000.0
 _TRUE_STRUCTURE = (0.05, 0.45)
-_SOFT = np.geomspace(1e-7, 5e-3, 14)  # depths over which the bed sets in that are tried [m]
+_STRUCTURES = np.geomspace(2e-5, 1.0, 16)  # shares of the softest bed and frame that are tried
+_SOFTEST = 5e-3  # depth over which the softest bed sets in [m]
 
 
 class Law:
@@ -301,13 +302,16 @@ def _left(plan: _Plan, clean: Columns, slopes: Array, made: Columns) -> float:
 
 
 def _with_structure(random: Random, plan: _Plan, size: float) -> tuple[_Plan, float]:
-    frame = float(random.uniform(30.0, 300.0)) * plan.k
+    """The plan with a bed and a frame as soft as changes the readings by `size` over the noise, and what they do."""
+    frame = float(random.uniform(1.0, 10.0)) * plan.k  # stiffness of the softest frame [N/m]
     clean, slopes = _slopes(plan)
-    tried = [{"soft": float(soft), "frame": frame} for soft in _SOFT]
-    sizes = [_left(plan, clean, slopes, _measure(plan, one)) for one in tried]
+
+    def soft(share: float) -> Numbers:
+        return {"soft": _SOFTEST * share, "frame": frame / share}
+
+    sizes = [_left(plan, clean, slopes, _measure(plan, soft(float(share)))) for share in _STRUCTURES]
     logs = np.maximum.accumulate(np.log(np.maximum(sizes, 1e-6))) + 1e-6 * np.arange(len(sizes))
-    soft = math.exp(float(np.interp(math.log(size), logs, np.log(_SOFT))))
-    plan = replace(plan, structure={"soft": soft, "frame": frame})
+    plan = replace(plan, structure=soft(math.exp(float(np.interp(math.log(size), logs, np.log(_STRUCTURES))))))
     return plan, _left(plan, clean, slopes, _measure(plan, {}))
 
 

@@ -437,9 +437,9 @@ class _Course:
         where only those show more, unless these diverge late. None where it leaves more."""
         asked, base, held_out = self.asked, self.base, self.held_out
         left = matters.left_by(base, held_out, self._scatter)
-        if left.fit > matters.MOST:
+        small = matters.is_small(left, len(base.model.trials), len(held_out))
+        if not small and left.fit > matters.MOST:
             return None
-        small = left.held_out is None or left.held_out <= matters.MOST
         others = () if small else deciding.missed(base, held_out, asked.seed)
         if not others:
             return self._nothing(choice.left) if matters.is_as_stated(base, self._scatter) else None

@@ -19,7 +19,7 @@ from .rivals import compare
 from .scatter_gap import gap_with_scatter
 from .search import Choice
 
-__all__ = ["MOST", "explains", "fewest", "is_as_stated", "left_by"]
+__all__ = ["MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by"]
 
 MOST = SMALL  # the gap up to which what is left is too small to matter
 _LEAD = 10.0  # nats by which a name must lead every rival
@@ -45,6 +45,15 @@ def _gaps(found: Fit, held_out: tuple[str, ...], scatter: Scatter) -> _Gaps:
     stages = [(values, model.forms)]
     weighed = gap_with_scatter(model.problem, scatter, stages, model.trials, held_out)
     return gap_of(found, held_out, values), None if weighed is None else Gap(*weighed.after)
+
+
+def is_small(left: Gap, fitted: int, held_out: int) -> bool:
+    """Whether what is left of held-out trials, and of all trials together, is too small to matter.
+
+    `fitted`, `held_out`: how many trials of each there are."""
+    if left.held_out is None:
+        return left.fit <= MOST
+    return max(left.held_out, (fitted * left.fit + held_out * left.held_out) / (fitted + held_out)) <= MOST
 
 
 def explains(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> bool:
