@@ -23,7 +23,7 @@ __all__ = ["counted", "draw", "outcome_of"]
 
 GROUPS = ("nothing hidden", "one effect", "outside the library")
 OUTCOMES = {
-    "right": "#2a7f62", "right name among several": "#8fc1a9", "unknown, right name leads": "#e0b050",
+    "right": "#2a7f62", "among several": "#8fc1a9", "unknown, it leads": "#e0b050",
     "unknown": "#b0b0b0", "none": "#d9d9d9", "wrong name": "#b3413a",
 }  # fmt: skip
 """Outcomes and their colours; `unknown` is right, and green, outside the library, `none` where nothing is hidden."""
@@ -47,11 +47,11 @@ def outcome_of(case: Json) -> str:
         return "none"
     if verdict == "unknown":
         leads = case.get("leading", [])[:1] == case["truth"][:1]
-        return "unknown, right name leads" if leads else "unknown"
+        return "unknown, it leads" if leads else "unknown"
     if names == case["truth"] and not case["alternatives"]:
         return "right"
     held = case["truth"][0] in {*names, *case["alternatives"]}
-    return "right name among several" if held else "wrong name"
+    return "among several" if held else "wrong name"
 
 
 def counted(cases: Sequence[Json]) -> dict[str, dict[float, Counter[str]]]:

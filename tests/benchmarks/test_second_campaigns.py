@@ -104,7 +104,7 @@ def test_a_figure_of_sizes_of_structure_counts_what_became_of_each_class(tmp_pat
     found = counted(records)
     assert found["nothing hidden"][1.0] == {"right": 1, "wrong name": 1}
     assert found["outside the library"][1.0] == {"right": 1}
-    assert found["one effect"][1.0] == {"right": 1, "right name among several": 1, "unknown, right name leads": 1}
+    assert found["one effect"][1.0] == {"right": 1, "among several": 1, "unknown, it leads": 1}
     assert found["one effect"][0.1] == {"none": 1}
     draw(tmp_path / "figure.png", records)
     assert (tmp_path / "figure.png").stat().st_size > 1000

@@ -1,5 +1,5 @@
 """Diagnosis of pushes and drops of a spike.
 
-Imports `experiments.campaign`, `experiments.diagnose.core`, `experiments.diagnose.fit`, `experiments.diagnose.noise`,
-`experiments.grains`, `rigid`.
+Imports `experiments.campaign`, `experiments.check`, `experiments.diagnose.core`, `experiments.diagnose.fit`,
+`experiments.diagnose.noise`, `experiments.grains`, `rigid`.
 """
