@@ -18,7 +18,9 @@ Condition = tuple[object, ...]
 _AT_ODDS = 20.0  # times as far from its replicates as these from one another, in mean square, a trial is at odds
 _NOISE = 4.0  # and times farther, in mean square, than the sensors' noise would put it
 _SIZEABLE = 0.1  # and share of the channel's standard deviation by which it differs: beds differ by some percent
-_FASTER = 2.0  # ratio of two speeds beyond which pushes are never of one condition
+_FASTER, _FASTER_OF_ALL = 1.1, 2.0
+"""Ratio of two speeds beyond which pushes are never of one condition: usually, and where all pushes of the campaign are
+within it, so that speed is no setting of theirs."""
 _POINTS = 80  # places at which replicates are compared
 
 
@@ -39,14 +41,15 @@ def pace_of(tables: PenetrationCampaign, trial: PenetrationTrial) -> float | Non
     """The speed that stands for a trial's among replicates [m/s]; None where none is stated.
 
     Of a drop its own. Of a push the least stated one from which on C times the difference is below the noise of the
-    force, and the ratio at most 2: a mean speed that changes the force by less than the noise makes no new condition.
+    force, and the ratio small: a mean speed that changes the force by less than the noise makes no new condition.
     """
     if trial.speed is None or trial.mode == "drop" or tables.sensors.force is None:
         return trial.speed
     speeds = sorted(abs(t.speed) for t in tables.trial if t.mode == trial.mode and t.speed is not None)
     least, noise = speeds[0], tables.sensors.force.std[0]
+    most = _FASTER_OF_ALL if speeds[-1] <= _FASTER_OF_ALL * least else _FASTER
     for speed in speeds:
-        if tables.surface.damping * (speed - least) > noise or speed > _FASTER * least:
+        if tables.surface.damping * (speed - least) > noise or speed > most * least:
             least = speed
         if speed >= abs(trial.speed):
             break
