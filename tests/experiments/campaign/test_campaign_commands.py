@@ -68,7 +68,8 @@ def test_a_new_campaign_is_checked_with_a_report(tmp_path, capsys):
     again = ["campaign", "check", str(tmp_path / "run" / "run.toml"), "--out", str(tmp_path / "again"), "--quiet"]
     assert main([*again, "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert [trial["alike"] for trial in result["trials"]] == [1, 1, 1]
+    # the speeds of both pushes change the force by less than its noise
+    assert [trial["alike"] for trial in result["trials"]] == [2, 2, 1]
     assert result["recordings"][2]["rate"] == pytest.approx(1000.0)
 
 
