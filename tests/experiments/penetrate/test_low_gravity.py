@@ -319,6 +319,12 @@ def test_every_material_that_sticks_has_a_recipe_and_is_poured_dry(name):
     assert with_packing == ("rain:dry", "compact:0.55", "stick", "level")
 
 
+def test_dense_jsc_1a_is_made_stiff_enough_for_what_a_flat_foot_met():
+    """0.61 MPa in its first 3 mm (recipes.toml): a run that began with the modulus for 0.15 MPa failed."""
+    own = FOOT | {"material": "jsc-1a-dense-heights", "bed_size": (0.064, 0.064, 0.03), "gravity": "1e-3g"}
+    assert beds.choose_softness(PenetrateSettings(**own)).pressure > 0.61e6
+
+
 def test_others_are_poured_dry_where_they_stick_and_rained_where_they_do_not():
     assert recipe_of(STICKY).stages == POURED_DRY
     assert recipe_of(WEAK).stages is None
