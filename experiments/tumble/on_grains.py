@@ -39,7 +39,7 @@ from .trial import plan_tumble, spikes_of
 __all__ = ["PlanarForecast", "PlanarOnBed"]
 
 ROLLED = {"motor": 0.8, "brake": 0.4}
-"""Way on grains over that of rolling without slip or loss: 0.64 to 0.78 and 0.3 were met (docs/notes/experiments.md) [1]."""
+"""Way on grains over that of rolling without slip [1]: 0.64 to 0.78 and 0.3 were met (docs/notes/experiments.md)."""
 THROW = 2.0  # Speed of a grain that a spike throws up, over the spike's [1]: an elastic ball has twice the wall's
 HULL_SHARE = 0.95  # The hull's cylinder over the distance of its sides: it stays inside the hull [1]
 
