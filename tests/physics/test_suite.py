@@ -14,7 +14,7 @@ from experiments.validate.beds import dosta, silo
 from experiments.validate.experiment import run_case
 from experiments.validate.suite import SUITE, chosen
 
-FAILING = {"katsuragi-durian", "murdoch", "plates-in-sand", "rft", "size-collapse"}
+FAILING = {"katsuragi-durian", "murdoch", "plates-in-sand", "rft"}
 """Cases that are known to fail; docs/validation.md says why. One that passes is to be taken off."""
 LONG = {"dmt", "incline-rolling", "jkr", "large-neck"}
 """Quick cases that take 10 s and more here, with their kernels to compile."""
