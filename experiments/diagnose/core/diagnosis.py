@@ -381,9 +381,9 @@ class _Course:
             return self._nothing(choice.left)
         held = self._held_out_gate(choice.best.fit)
         verdict = deciding.verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
-        if not (verdict in ("named", "ambiguous") and choice.left.passed and (held is None or held.passed)):
-            enough = self._base_suffices(choice, verdict)
-            if enough is not None:
+        everything = verdict in ("named", "ambiguous") and choice.left.passed and (held is None or held.passed)
+        if not (everything and matters.takes_below(self.base, choice.best.fit, held_out, self._scatter)):
+            if (enough := self._base_suffices(choice, verdict)) is not None:
                 return enough
             choice, verdict = self._by_size(choice, verdict)
             held = self._held_out_gate(choice.best.fit)

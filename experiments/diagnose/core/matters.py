@@ -4,6 +4,7 @@ The rule is that of the format (docs/diagnose.md, "What matters"). A gap is chi-
 Where replicates differ by more than the sensors, the scatter between them counts as noise.
 """
 
+import math
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
@@ -19,13 +20,14 @@ from .rivals import compare
 from .scatter_gap import gap_with_scatter
 from .search import Choice
 
-__all__ = ["MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by"]
+__all__ = ["MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by", "takes_below"]
 
 MOST = SMALL  # the gap up to which what is left is too small to matter
 _LEAD = 10.0  # nats by which a name must lead every rival
 _CLOSED = 0.99
 """Share of what the base model leaves beyond the noise, on fitted and held-out trials, that a name must close where
 more than `MOST` is left beside it: 97.6 % of a magnet was closed by a pendulum."""
+_ERRORS = 3.0
 _COMPARED = 3  # other names that are compared with one that is taken alone
 _WITHIN = 3.0  # standard deviations from what was stated within which a number is as stated
 
@@ -54,6 +56,18 @@ def is_small(left: Gap, fitted: int, held_out: int) -> bool:
     if left.held_out is None:
         return left.fit <= MOST
     return max(left.held_out, (fitted * left.fit + held_out * left.held_out) / (fitted + held_out)) <= MOST
+
+
+def takes_below(base: Fit, best: Fit, held_out: tuple[str, ...], scatter: Scatter) -> bool:
+    """Whether the best model takes the gap of held-out trials (of all, where none are held out) below that of the base
+    model by more than the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise."""
+    trials = held_out or base.model.trials
+    before, after = (left_by(one, held_out, scatter) for one in (base, best))
+    count = sum(len(base.model.problem.samples(trial).time) for trial in trials)
+    gained = before.fit - after.fit
+    if before.held_out is not None and after.held_out is not None:
+        gained = before.held_out - after.held_out
+    return gained > _ERRORS * math.sqrt(2 / max(count, 1))
 
 
 def explains(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> bool:
