@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.diagnose.fit.bounds import strained_parameters
+from experiments.diagnose.fit.bounds import bounds_met, strained_parameters
 from experiments.diagnose.fit.evidence import SMALL, Hypothesis
 from experiments.diagnose.fit.fitting import Fit, fit
 
@@ -60,7 +60,10 @@ def is_small(left: Gap, fitted: int, held_out: int) -> bool:
 
 def takes_below(base: Fit, best: Fit, held_out: tuple[str, ...], scatter: Scatter) -> bool:
     """Whether the best model takes the gap of held-out trials (of all, where none are held out) below that of the base
-    model by more than the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise."""
+    model by more than the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise. A form with a
+    number at the end of its range only imitates something small."""
+    if any(not bound.strains for bound in bounds_met(best)):
+        return False
     trials = held_out or base.model.trials
     before, after = (left_by(one, held_out, scatter) for one in (base, best))
     count = sum(len(base.model.problem.samples(trial).time) for trial in trials)
