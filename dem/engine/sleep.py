@@ -15,13 +15,13 @@ The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g g
   moves faster than ``own`` sqrt(g d), or when the force on it is out of balance: more than ``unbalanced`` of the mean
   force of its contacts, or of m g where that is more. Those that it touches come with it.
 * A slow grain falls asleep when it has moved below ``still`` sqrt(g d) for as long, and so have those that it touches,
-  none of them fast.
+  none of them fast; at every fourth of these looks only.
 * A sleeper wakes, and is slow, when the sum of the forces on it has changed by ``change`` of its contacts' mean force
   (or of m g) since it fell asleep, or when a grain awake that is listed with it moves faster than ``waking_speed``
   sqrt(g d). All sleepers in its cell of the grid and the 26 around it wake with it. So do those near a body.
 
 Looked at every ``every`` steps, a multiple of ``pace``: then slow and fast grains are at the same time. A bed of one
-chunk has no slow grains, and its fast ones fall asleep by the first rule.
+chunk has no slow grains, and its fast ones fall asleep by the first rule with the speed of the third.
 
 What fast grains do to a slow one over its step is summed and given to it whole, so that action is reaction. What is
 left is the floor's: ``Bed.reaction`` of the floor has the sleepers' weight, the force of those awake on them, and the
@@ -89,10 +89,8 @@ class Sleeper:
         self.heavy, self.stout = rules.heaviness(self.pace)
         e.rest.heavy[None], e.rest.stout[None] = self.heavy, self.stout
         self.reach = rules.reach * d
-        self.quick, self.slow, self.own = (
-            share * math.sqrt(g * d) for share in (rules.waking_speed, rules.speed, rules.own)
-        )
-        self.still = (rules.still if self.pace > 1 else rules.speed) * math.sqrt(g * d)
+        speeds = (rules.waking_speed, rules.speed if self.pace > 1 else rules.still, rules.own, rules.still)
+        self.quick, self.slow, self.own, self.still = (share * math.sqrt(g * d) for share in speeds)
         self.firm = self._firm()
         checks = rules.calm * math.sqrt(d / g) / bed.time_step / rules.every / _CALM_CHECKS
         self.rest_every = max(1, round(checks)) * rules.every
@@ -135,10 +133,13 @@ class Sleeper:
         if steps % self.rest_every == 0:
             e.find_calm(self.slow, self.still, _CALM_CHECKS, self.reach, self.firm, rest, e.shapes)
         news = rest.news.to_numpy()
+        due = bool(news[WOKEN])
         if steps % self.rest_every == 0:
-            self.leaving += SLOW_DOWN * bool(int(news[SLOWING]) > _WORTH * self.fast)
-            self.leaving += FALL_ASLEEP * bool(int(news[SLEEPING]) > _WORTH * self.awake)
-        return bool(news[WOKEN]) or self.leaving > 0
+            # Falling asleep stores the contacts of all sleepers, so that it is not for every look.
+            dozing = steps % (_CALM_CHECKS * self.rest_every) == 0 and int(news[SLEEPING]) > _WORTH * self.awake
+            slowing = int(news[SLOWING]) > (0 if due or dozing else _WORTH * self.fast)
+            self.leaving = SLOW_DOWN * slowing + FALL_ASLEEP * dozing
+        return due or self.leaving > 0
 
     def rearrange(self, *, all_awake: bool) -> None:
         """Who is fast, slow and asleep from here on; between ``keep_lists`` and ``sort``, and ``settle`` after it."""
@@ -147,7 +148,7 @@ class Sleeper:
             rest.woken.fill(1)
         else:
             e.change_balance(1.0, rest)
-            if self.leaving:
+            if self.leaving & FALL_ASLEEP:
                 e.sum_bearing(rest)
         e.stir(self.bed.time_step, self.reach, self.leaving, int(all_awake), rest, e.shapes, e.balance)
         rest.news.fill(0)

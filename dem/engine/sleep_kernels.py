@@ -293,7 +293,9 @@ class Sleepers(EnginePart):
             self.count[self.SORTED], self.count[self.SORTED_CELLS] = until, cells
             self.count[self.AWAKE], self.count[self.FAST] = awake, awake - slow
             room = self.count[self.ALL_CHUNKS] - ti.min(slow, 1)
-            chunks = ti.max(1, ti.min(room, (awake - slow + grains_per_chunk - 1) // grains_per_chunk))
+            # An even number: the few chunks of most steps are shared out between two threads, or four.
+            chunks = ti.max(1, (awake - slow + grains_per_chunk - 1) // grains_per_chunk)
+            chunks = ti.min(room, chunks + chunks % 2)
             self.count[self.FAST_CHUNKS] = chunks
             room = self.count[self.ALL_CHUNKS] - chunks
             self.count[self.CHUNKS] = chunks + ti.min(room, (slow + grains_per_chunk - 1) // grains_per_chunk)

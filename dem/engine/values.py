@@ -91,8 +91,8 @@ class Sleep:
     Raises ValueError: a number that is not above 0, or not whole; ``every`` that is no multiple of ``pace``.
     """
 
-    speed: float = 5e-3  # A fast grain below this may become slow [sqrt(g d)]
-    calm: float = 1.0  # For how long it must be, and a slow one to fall asleep [sqrt(d / g)]
+    speed: float = 1e-2  # A fast grain below this may become slow [sqrt(g d)]
+    calm: float = 0.25  # For how long it must be, and a slow one to fall asleep [sqrt(d / g)]
     reach: float = 3.0  # No grain this near to a body is slow or sleeps [d]
     pace: int = 4
     """Steps of the bed for one of a slow grain; 1: none is slow."""
@@ -100,10 +100,10 @@ class Sleep:
     """How much nearer to the limit of stability such a step is: a slow grain's mass counts (pace / stretch)^2 times,"""
     spin_stretch: float = 1.6
     """and its moment of inertia (pace / spin_stretch)^2 times; none counts less than once."""
-    own: float = 2e-2  # A slow grain above this is fast again [sqrt(g d)]
-    unbalanced: float = 0.2  # So is one on which this force is out of balance [its contacts' mean force, or m g]
-    still: float = 3e-3  # A slow grain below this may fall asleep [sqrt(g d)]
-    change: float = 0.1  # A sleeper wakes when the force on it has changed by this [its contacts' mean force, or m g],
+    own: float = 4e-2  # A slow grain above this is fast again [sqrt(g d)]
+    unbalanced: float = 0.5  # So is one on which this force is out of balance [its contacts' mean force, or m g]
+    still: float = 1e-3  # A slow grain below this may fall asleep [sqrt(g d)]
+    change: float = 0.3  # A sleeper wakes when the force on it has changed by this [its contacts' mean force, or m g],
     waking_speed: float = 5e-2  # or a neighbour has this speed [sqrt(g d)]
     every: int = 96
     """Steps between two checks: what changes makes new lists, and those cost as much as four steps of all grains."""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import dem.engine.engine
+import dem.engine.sleep
 from dem import Ball, Bed, Material, Sleep
 from dem.engine.energy import bed_energies
 from dem.engine.lists import Lists
@@ -144,8 +145,44 @@ def test_a_held_state_is_taken_back_with_its_sleepers_to_the_same_bits(layer):
         assert bits() == after
 
 
+def test_grains_fall_asleep_at_every_fourth_look_only(layer, monkeypatch):
+    """So that the contacts of sleepers, which are stored anew for it, are stored a quarter as often."""
+    monkeypatch.setattr(dem.engine.sleep, "_WORTH", 0.0)
+    bed, state = layer
+    bed.restore(state)
+    bed.let_sleep(Sleep(every=8, calm=0.08, still=3e-3, change=0.05))
+    assert bed.sleeper.rest_every == 24
+    fewer, before = [], bed.asleep.copy()
+    for _ in range(250):
+        start = bed.steps
+        bed.advance(8)
+        if (bed.asleep & ~before).any():
+            fewer.append(start)
+        before = bed.asleep.copy()
+    assert len(fewer) > 3 and bed.asleep.mean() > 0.5
+    assert not np.any(np.array(fewer) % 96)
+
+
+def test_a_bed_of_one_chunk_puts_to_sleep_what_is_slower_than_a_sleeper_may_be():
+    """There slow grains, which may be faster, are not; grains that slide on a smooth floor keep their speed."""
+    rules, d = Sleep(every=8, calm=0.05), 4e-3
+    pace = np.sqrt(9.81 * d)
+    speeds = pace * np.array([0.5 * rules.still, 0.5 * rules.speed])
+    assert rules.still < 0.5 * rules.speed
+    x = np.array([[0.5 * d, 2 * d, 0.5 * d], [6.5 * d, 8 * d, 0.5 * d]])
+    bed = Bed.from_grains(
+        Material("smooth", 2600, 1e7, 0.25, 0.0, 0.3, 0.0), positions=x, radii=np.full(2, 0.5 * d),
+        velocities=np.column_stack([speeds, 0 * speeds, 0 * speeds]), size=(12 * d, 12 * d, 0.02), threads=2,
+    )  # fmt: skip
+    bed.advance(3000)  # the bounce of setting the grains down is over
+    bed.let_sleep(rules)
+    bed.advance(400)
+    assert bed.sleeper.pace == 1
+    assert list(bed.asleep) == [True, False]
+
+
 def test_what_cannot_be_is_refused(layer):
-    with pytest.raises(ValueError, match=r"waking_speed = 0.001 and own = 0.02 must be above speed = 0.005"):
+    with pytest.raises(ValueError, match=r"waking_speed = 0.001 and own = 0.04 must be above speed = 0.01"):
         Sleep(waking_speed=1e-3)
     with pytest.raises(ValueError, match="change = 0 must be above 0"):
         Sleep(change=0)
