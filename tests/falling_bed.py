@@ -42,8 +42,8 @@ def solids():
 
 # Under these many of the grains are slow, fall asleep and wake in mid-fall.
 DOZING = {
-    "speed": 0.5, "calm": 0.02, "reach": 0.2, "pace": 4, "stretch": 2.0, "spin_stretch": 1.0, "own": 2.0,
-    "unbalanced": 3.0, "still": 0.5, "change": 3.0, "waking_speed": 2.0, "every": 8,
+    "speed": 0.5, "calm": 0.02, "settling": 1.0, "reach": 0.2, "pace": 4, "stretch": 2.0, "spin_stretch": 1.0,
+    "own": 2.0, "unbalanced": 3.0, "still": 0.5, "change": 3.0, "waking_speed": 2.0, "every": 8,
 }  # fmt: skip
 
 

@@ -6,12 +6,11 @@ all steps. LIGGGHTS could have it as a mesh only, and the LIGGGHTS of Debian 12 
 mesh; YADE is ten times slower in the race.
 """
 
-import math
 import os
 import re
 import shutil
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -96,11 +95,9 @@ def push_ours(grains: Grains, push: Push, *, points: int, threads: int, sleep: S
     # Compile what the push needs, of sleep until the first are asleep, with the spike at rest; then begin anew: the
     # peer is compiled, too.
     state = bed.state()
-    calm = 0.0
-    if sleep is not None:
-        bed.let_sleep(sleep)
-        calm = 1.5 * sleep.calm * math.sqrt(DIAMETER / 9.81)
-    bed.advance(max(2 * SAMPLES, round(calm / TIME_STEP)))
+    if sleep is not None:  # by rules under which they do so in twelve looks
+        bed.let_sleep(replace(sleep, settling=1.0, calm=1e-3, still=sleep.speed))
+    bed.advance(2 * SAMPLES if sleep is None else 12 * sleep.every)
     bed.reaction(body)
     bed.restore(state)
     if sleep is not None:

@@ -31,7 +31,7 @@ class Rest:
 
     def __init__(self, *, grains: int, cells: int, chunks: int, rows: int, real):
         F = ti.Vector.field
-        # ``was``: before the lists were last made. ``quiet``: checks in a row at which it was slow.
+        # ``was``: before the lists were last made. ``quiet``: looks in a row at which it was slow.
         self.asleep, self.was, self.woken, self.leaves, self.quiet, self.busy = (
             ti.field(ti.i32, grains) for _ in range(6)
         )
@@ -293,7 +293,7 @@ class Sleepers(EnginePart):
             self.count[self.SORTED], self.count[self.SORTED_CELLS] = until, cells
             self.count[self.AWAKE], self.count[self.FAST] = awake, awake - slow
             room = self.count[self.ALL_CHUNKS] - ti.min(slow, 1)
-            # An even number: the few chunks of most steps are shared out between two threads, or four.
+            # An even number: so few chunks are shared out evenly between two threads.
             chunks = ti.max(1, (awake - slow + grains_per_chunk - 1) // grains_per_chunk)
             chunks = ti.min(room, chunks + chunks % 2)
             self.count[self.FAST_CHUNKS] = chunks
@@ -446,7 +446,7 @@ class Sleepers(EnginePart):
         for i in range(self.count[self.AWAKE]):
             k = self.id[i]
             limit = ti.cast(ti.select(i < self.count[self.FAST], slow, still), self.real)
-            rest.quiet[k] = ti.select(self.surface_speed(i) < limit, rest.quiet[k] + 1, 0)
+            rest.quiet[k] = ti.select(self.surface_speed(i) < limit, rest.quiet[k] + 1, ti.min(0, rest.quiet[k]))
             rest.busy[k] = 0
             rest.leaves[k] = 0
         for i in range(self.count[self.AWAKE]):
@@ -478,9 +478,9 @@ class Sleepers(EnginePart):
     def keeps_up(self, i, j, rest: ti.template()):
         """Whether grain i keeps its neighbour j from what is next: it is not quiet; it is fast, and j slow."""
         fast = i < self.count[self.FAST]
-        result = fast and rest.quiet[self.id[i]] == 0
+        result = fast and rest.quiet[self.id[i]] <= 0
         if j >= self.count[self.FAST]:
-            result = fast or rest.quiet[self.id[i]] == 0
+            result = fast or rest.quiet[self.id[i]] <= 0
         return result
 
     @ti.kernel

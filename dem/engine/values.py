@@ -92,7 +92,8 @@ class Sleep:
     """
 
     speed: float = 1e-2  # A fast grain below this may become slow [sqrt(g d)]
-    calm: float = 0.25  # For how long it must be, and a slow one to fall asleep [sqrt(d / g)]
+    calm: float = 0.25  # For how long it must be, and a slow one to fall asleep [sqrt(d / g)];
+    settling: float = 5.0  # so many times as long before the first are slow: a bed that still settles swings as a whole
     reach: float = 3.0  # No grain this near to a body is slow or sleeps [d]
     pace: int = 4
     """Steps of the bed for one of a slow grain; 1: none is slow."""
@@ -103,7 +104,7 @@ class Sleep:
     own: float = 4e-2  # A slow grain above this is fast again [sqrt(g d)]
     unbalanced: float = 0.5  # So is one on which this force is out of balance [its contacts' mean force, or m g]
     still: float = 1e-3  # A slow grain below this may fall asleep [sqrt(g d)]
-    change: float = 0.3  # A sleeper wakes when the force on it has changed by this [its contacts' mean force, or m g],
+    change: float = 0.1  # A sleeper wakes when the force on it has changed by this [its contacts' mean force, or m g],
     waking_speed: float = 5e-2  # or a neighbour has this speed [sqrt(g d)]
     every: int = 96
     """Steps between two checks: what changes makes new lists, and those cost as much as four steps of all grains."""

