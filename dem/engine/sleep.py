@@ -9,7 +9,7 @@ other sleepers keep their springs. All others are **fast**.
 The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g gravity, all of the bed:
 
 * A fast grain becomes slow when its speed and its surface's turning have been below ``speed`` sqrt(g d) at every look
-  for ``calm`` sqrt(d / g) (``settling`` times as long to begin with), no fast grain that it touches moves faster, no
+  for ``calm`` sqrt(d / g) (to begin with after ``settling`` times that), no fast grain that it touches moves faster, no
   body but the floor is within ``reach`` d, and no other grain overlaps it by more than a long step bears
   (``Sleeper.firm``).
 * A slow grain is fast again when a body comes within ``reach`` d, when another overlaps it by more than that, when it
@@ -95,8 +95,9 @@ class Sleeper:
         self.firm = self._firm()
         checks = rules.calm * math.sqrt(d / g) / bed.time_step / rules.every / _CALM_CHECKS
         self.rest_every = max(1, round(checks)) * rules.every
-        # Below 0: to be quiet so many looks more.
-        e.rest.quiet.fill(-max(0, round(_CALM_CHECKS * (rules.settling - 1))))
+        # Below 0: looks at which all counts as quiet.
+        more = (rules.settling - 1) * _CALM_CHECKS * checks * rules.every / self.rest_every
+        e.rest.quiet.fill(-max(0, round(more)))
         self.awake = self.fast = bed.grain_count
         self.mass = 0.0
         self.slept = 0.0  # Mass asleep, summed over the steps of the last advance [kg]

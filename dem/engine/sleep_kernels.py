@@ -446,7 +446,8 @@ class Sleepers(EnginePart):
         for i in range(self.count[self.AWAKE]):
             k = self.id[i]
             limit = ti.cast(ti.select(i < self.count[self.FAST], slow, still), self.real)
-            rest.quiet[k] = ti.select(self.surface_speed(i) < limit, rest.quiet[k] + 1, ti.min(0, rest.quiet[k]))
+            counts = rest.quiet[k] < 0 or self.surface_speed(i) < limit
+            rest.quiet[k] = ti.select(counts, rest.quiet[k] + 1, 0)
             rest.busy[k] = 0
             rest.leaves[k] = 0
         for i in range(self.count[self.AWAKE]):

@@ -93,7 +93,7 @@ class Sleep:
 
     speed: float = 1e-2  # A fast grain below this may become slow [sqrt(g d)]
     calm: float = 0.25  # For how long it must be, and a slow one to fall asleep [sqrt(d / g)];
-    settling: float = 5.0  # so many times as long before the first are slow: a bed that still settles swings as a whole
+    settling: float = 4.0  # so many times as long before the first are slow: a bed that still settles swings as a whole
     reach: float = 3.0  # No grain this near to a body is slow or sleeps [d]
     pace: int = 4
     """Steps of the bed for one of a slow grain; 1: none is slow."""
