@@ -173,7 +173,7 @@ def _one(kind: str, case: Json, ask: Ask, before: Json | None, wanted: bool) -> 
         record = {
             "kind": kind, "case": case, "date": now(), "code": digest("code"), "suite": digest(kind),
             "truth": list(hidden.effects), "outside": hidden.outside, "signature": float(hidden.signature),
-            "true_parameters": hidden.parameters if kind.endswith("tumble") or kind == "second-rig" else {},
+            "true_parameters": hidden.parameters if kind == "tumble" or kind in SECOND else {},
             "coloured": bool(hidden.coloured), "trials": len(campaign.tables.trial),
             **({"hidden": hidden.extra} if kind == "rig" or kind in SECOND else {}),
         } | said  # fmt: skip

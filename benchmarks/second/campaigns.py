@@ -8,7 +8,7 @@ from typing import Any
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, TumbleCampaign
 
 from . import forms, push, tumble
-from .tumble import Made, Secret
+from .drawing import Made, Secret
 
 __all__ = ["KINDS", "Kind", "campaign_of"]
 

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .drawing import Numbers
+
 __all__ = ["FREE", "NAMED", "OUTSIDE", "RIG", "Form", "draw_form"]
 
-Numbers = dict[str, float]
 FREE = (
     "wheel-vibration", "com-offset", "slope", "tip-radius", "torque-fade", "inertial-drag", "depth-hardening",
     "plastic-sinkage", "adhesion", "rate-friction", "umbilical", "bearing-drag", "clock-offset", "camera-scale",

@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .drawing import Made, Numbers, Secret, Table, at_strength, draw_case, softness_for
 from .noise import Noise, draw_noise
-from .tumble import Made, Secret, Table
 
 __all__ = ["EFFECTS", "OUTSIDE", "Law", "fall", "make_push"]
 
 Array = NDArray[np.float64]
 Random = np.random.Generator
-Numbers = dict[str, float]
 Columns = list[dict[str, Array]]
 EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
 OUTSIDE = ("relaxation", "jamming", "cell-drift", "ringing")
@@ -30,7 +29,6 @@ _FINE = 3000  # points of a path
 _STEP = 1e-4  # of a drop [s]
 _PARTS, _TOUCH = 20, 0.005  # of a step, up to this time [s]: a bed sets in over some micrometres
 _LADDER, _SPAN = 13, 3000.0
-_TRUE_STRUCTURE = (0.05, 0.45)
 _STRUCTURES = np.geomspace(2e-5, 1.0, 16)  # shares of the softest bed and frame that are tried
 _SOFTEST = 5e-3  # depth over which the softest bed sets in [m]
 
@@ -111,17 +109,17 @@ def make_push(
     Raises ValueError for a kind that there is not.
     """
     random = np.random.default_rng((seed, 26))
-    kind = kind or str(random.choice(EFFECTS))
-    if kind not in ("null", "pair", *EFFECTS, *OUTSIDE):
-        raise ValueError(f"kind = {kind!r}: null, pair, {', '.join((*EFFECTS, *OUTSIDE))} was expected")
-    strength = strength if strength is not None else math.exp(random.uniform(math.log(0.7), math.log(50.0)))
-    size = structure if structure is not None else math.exp(random.uniform(*np.log(_TRUE_STRUCTURE)))
+    kind, strength, size = draw_case(random, kind, strength, structure, effects=EFFECTS, outside=OUTSIDE)
     names = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False)) if kind == "pair" else (kind,)
     plan = _draw_plan(random, names, trials)
     plan, reached = _with_structure(random, plan, size)
     clean, slopes = _slopes(plan)
     forms = [_form(random, plan, name) for name in names if kind != "null"]
-    chosen = [_at_strength(plan, form, strength, clean, slopes) for form in forms]
+
+    def signatures(ladder: list[Numbers]) -> list[float]:
+        return [_left(plan, clean, slopes, _measure(plan, numbers)) for numbers in ladder]
+
+    chosen = [at_strength(form, signatures, strength, span=_SPAN, count=_LADDER) for form in forms]
     settings = {name: value for numbers, _ in chosen for name, value in numbers.items()}
     outside = kind if kind in OUTSIDE else None
     secret = Secret(
@@ -313,22 +311,8 @@ def _with_structure(random: Random, plan: _Plan, size: float) -> tuple[_Plan, fl
         return {"soft": _SOFTEST * share, "frame": frame / share}
 
     sizes = [_left(plan, clean, slopes, _measure(plan, soft(float(share)))) for share in _STRUCTURES]
-    logs = np.maximum.accumulate(np.log(np.maximum(sizes, 1e-6))) + 1e-6 * np.arange(len(sizes))
-    plan = replace(plan, structure=soft(math.exp(float(np.interp(math.log(size), logs, np.log(_STRUCTURES))))))
+    plan = replace(plan, structure=soft(softness_for(size, _STRUCTURES, sizes, least=1e-6)))
     return plan, _left(plan, clean, slopes, _measure(plan, {}))
-
-
-def _at_strength(
-    plan: _Plan, form: Callable[[float], Numbers], strength: float, clean: Columns, slopes: Array
-) -> tuple[Numbers, float]:
-    """The numbers of the effect whose signature comes nearest to `strength`, and that signature."""
-    sizes = np.geomspace(1.0 / _SPAN, 1.0, _LADDER)
-    seen = np.array([_left(plan, clean, slopes, _measure(plan, form(float(a)))) for a in sizes])
-    best = int(np.argmin(np.abs(np.log(np.maximum(seen, 1e-9) / strength))))
-    finer = np.geomspace(sizes[max(best - 1, 0)], sizes[min(best + 1, _LADDER - 1)], 7)
-    seen = np.array([_left(plan, clean, slopes, _measure(plan, form(float(a)))) for a in finer])
-    best = int(np.argmin(np.abs(np.log(np.maximum(seen, 1e-9) / strength))))
-    return form(float(finer[best])), float(seen[best])
 
 
 def _record(random: Random, plan: _Plan, made: Columns) -> Made:

@@ -7,19 +7,18 @@ own: the camera's scale is about its own origin on the surface, the IMU's first 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .drawing import Made, Numbers, Secret, Table, at_strength, draw_case, softness_for
 from .forms import FREE, NAMED, OUTSIDE, RIG, Form, draw_form
 from .motion import COLUMNS, move
 from .noise import Noise, draw_noise
 
-__all__ = ["CHANNELS", "Made", "Secret", "Table", "make_tumble"]
+__all__ = ["CHANNELS", "make_tumble"]
 
 Array = NDArray[np.float64]
-Table = dict[str, Any]
 Random = np.random.Generator
 Readings = list[dict[str, Array]]
 CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
@@ -35,32 +34,8 @@ _LEG_TIME = 2e-3  # damper over stiffness of a leg [s]
 _STRUCTURES = np.geomspace(300.0, 3e6, 13)  # stiffnesses of a leg that are tried [N/m]
 _NEAR = (0.75, 1.33)  # share of the structure asked for that will do
 _REDRAWS = 9
-_TRUE_STRUCTURE = (0.05, 0.45)  # sizes that are drawn, over the noise
 _RATES = {"camera": 120.0, "imu": 100.0, "wheel": 600.0}
 _LEAD, _WINDOW = 0.2, 0.004
-
-
-@dataclass(frozen=True)
-class Secret:
-    """What is true of a campaign; nothing of it stands in the campaign."""
-
-    effects: tuple[str, ...]
-    outside: str | None
-    parameters: dict[str, float]  # those with a fixed name, "<effect>.<name>"
-    signature: float
-    """Root mean square of what the effect changes in the channel that it changes most, over the noise, after what the
-    uncertain numbers and the camera's zeros explain is taken out; of a pair the lesser one's."""
-    coloured: bool
-    trials: int
-    extra: Table = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Made:
-    """A campaign as plain tables, as in campaign.toml, and columns by trial and sensor."""
-
-    tables: Table
-    columns: dict[tuple[str, str], dict[str, Array]]
 
 
 @dataclass(frozen=True)
@@ -92,11 +67,7 @@ def make_tumble(
     """
     random = np.random.default_rng((seed, 27 + rig))
     named = RIG if rig else FREE
-    kind = kind or str(random.choice(named))
-    if kind not in ("null", "pair", *named, *OUTSIDE):
-        raise ValueError(f"kind = {kind!r}: null, pair, {', '.join((*named, *OUTSIDE))} was expected")
-    strength = strength if strength is not None else math.exp(random.uniform(math.log(0.7), math.log(50.0)))
-    size = structure if structure is not None else math.exp(random.uniform(*np.log(_TRUE_STRUCTURE)))
+    kind, strength, size = draw_case(random, kind, strength, structure, effects=named, outside=OUTSIDE)
     plan, reached = _with_structure(random, _draw_plan(random, rig, trials), size)
     for _ in range(_REDRAWS):  # on the edge between sticking and slipping a touch of structure changes all
         if _NEAR[0] < reached / size < _NEAR[1]:
@@ -106,7 +77,11 @@ def make_tumble(
     names = tuple(str(e) for e in random.choice(named, 2, replace=False)) if kind == "pair" else (kind,)
     forms = [_form(random, plan, name) for name in names if kind != "null"]
     clean, weighing = _weighing(plan)
-    chosen = [_at_strength(plan, form, strength, clean, weighing) for form in forms]
+
+    def signatures(ladder: list[Numbers]) -> list[float]:
+        return [weighing.most(readings) for readings in _measure(plan, ladder)]
+
+    chosen = [at_strength(form.at, signatures, strength, span=_SPAN, count=_LADDER) for form in forms]
     settings = {name: value for numbers, _ in chosen for name, value in numbers.items()}
     made = _measure(plan, [settings])[0] if chosen else clean
     outside = kind if kind in OUTSIDE else None
@@ -164,32 +139,16 @@ def _form(random: Random, plan: _Plan, name: str) -> Form:
 def _with_structure(random: Random, plan: _Plan, size: float) -> tuple[_Plan, float]:
     """The plan with legs and friction springs that change the readings by `size` over the noise, and what they do."""
     softer = float(random.uniform(0.3, 1.0))  # a friction spring over a leg
-    tried = [{"leg_stiffness": k, "leg_time": _LEG_TIME, "shear_stiffness": softer * k,
-              "shear_damping": 2e-3 * softer * k} for k in _STRUCTURES.tolist()]  # fmt: skip
+
+    def legs(stiffness: float) -> Numbers:
+        return {"leg_stiffness": stiffness, "leg_time": _LEG_TIME, "shear_stiffness": softer * stiffness,
+                "shear_damping": 2e-3 * softer * stiffness}  # fmt: skip
+
     _, weighing = _weighing(plan)
-    sizes = [weighing.whole(readings) for readings in _measure(plan, tried)]
-    logs = np.maximum.accumulate(np.log(np.maximum(sizes[::-1], 1e-4)))  # from stiff to soft
-    logs += 1e-6 * np.arange(len(logs))
-    stiffness = math.exp(float(np.interp(math.log(size), logs, np.log(_STRUCTURES[::-1]))))
-    legs = {"leg_stiffness": stiffness, "leg_time": _LEG_TIME, "shear_stiffness": softer * stiffness,
-            "shear_damping": 2e-3 * softer * stiffness}  # fmt: skip
-    return replace(plan, legs=legs), weighing.whole(_measure(plan, [legs])[0])
-
-
-def _at_strength(
-    plan: _Plan, form: Form, strength: float, clean: Readings, weighing: "_Weighing"
-) -> tuple[dict[str, float], float]:
-    """The numbers of the effect whose signature comes nearest to `strength`, and that signature."""
-    ladder = [form.at(float(a)) for a in np.geomspace(1.0 / _SPAN, 1.0, _LADDER)]
-    seen = [weighing.most(readings) for readings in _measure(plan, ladder)]
-    best = int(np.argmin(np.abs(np.log(np.maximum(seen, 1e-9) / strength))))
-    low, high = (
-        10 ** (math.log10(_SPAN) * (max(0, min(n, _LADDER - 1)) / (_LADDER - 1) - 1)) for n in (best - 1, best + 1)
-    )
-    ladder = [form.at(float(a)) for a in np.geomspace(low, high, 7)]  # once more, between its neighbours
-    seen = [weighing.most(readings) for readings in _measure(plan, ladder)]
-    best = int(np.argmin(np.abs(np.log(np.maximum(seen, 1e-9) / strength))))
-    return ladder[best], float(seen[best])
+    soft_last = _STRUCTURES[::-1]
+    sizes = [weighing.whole(readings) for readings in _measure(plan, [legs(k) for k in soft_last.tolist()])]
+    plan = replace(plan, legs=legs(softness_for(size, soft_last, sizes, least=1e-4)))
+    return plan, weighing.whole(_measure(plan, [{}])[0])
 
 
 class _Weighing:

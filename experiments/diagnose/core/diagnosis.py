@@ -382,11 +382,13 @@ class _Course:
         held = self._held_out_gate(choice.best.fit)
         verdict = deciding.verdict_of(choice, held, held_out, asked.seed, set_aside=bool(asked.aside))
         everything = verdict in ("named", "ambiguous") and choice.left.passed and (held is None or held.passed)
-        if not (everything and matters.takes_below(self.base, choice.best.fit, held_out, self._scatter)):
-            if (enough := self._base_suffices(choice, verdict)) is not None:
+        left = matters.left_by(self.base, held_out, self._scatter)
+        if not (everything and matters.takes_below(left, choice.best.fit, held_out, self._scatter)):
+            if (enough := self._base_suffices(left, choice, verdict)) is not None:
                 return enough
-            choice, verdict = self._by_size(choice, verdict)
-            held = self._held_out_gate(choice.best.fit)
+            of_size, verdict = self._by_size(choice, verdict)
+            if of_size is not choice:
+                choice, held = of_size, self._held_out_gate(of_size.best.fit)
         # Where a second effect was called for, diverging trials were considered before it.
         before = verdict == "unknown" and choice.left.passed and len(choice.best.effects) > 1
         if not (asked.aside or before):
@@ -432,29 +434,27 @@ class _Course:
         """All that replicates differ by, as known so far."""
         return {**self.problem.known_std, **self.model_std, **self.wander.model_std}
 
-    def _base_suffices(self, choice: Choice, verdict: str) -> Diagnosis | None:
+    def _base_suffices(self, left: deciding.Gap, choice: Choice, verdict: str) -> Diagnosis | None:
         """That nothing is missing, where what the base model leaves is too small to matter; with other trials held out
         where only those show more, unless these diverge late. None where it leaves more."""
-        asked, base, held_out = self.asked, self.base, self.held_out
-        left = matters.left_by(base, held_out, self._scatter)
-        small = matters.is_small(left, len(base.model.trials), len(held_out))
+        small = matters.is_small(left, len(self.base.model.trials), len(self.held_out))
         if not small and left.fit > matters.MOST:
             return None
-        others = () if small else deciding.missed(base, held_out, asked.seed)
+        others = () if small else deciding.missed(self.base, self.held_out, self.asked.seed)
         if not others:
-            return self._nothing(choice.left) if matters.is_as_stated(base, self._scatter) else None
-        if verdict != "unknown" or asked.looked_at:
+            return self._nothing(choice.left) if matters.is_as_stated(self.base, self._scatter) else None
+        if verdict != "unknown" or self.asked.looked_at:
             return None
         anew = self._looking_at(others)
         return None if anew.verdict == "unknown" else anew
 
     def _by_size(self, choice: Choice, verdict: str) -> tuple[Choice, str]:
         """The fewest names that explain what matters, and the verdict that follows."""
-        choice = matters.fewest(choice, self.held_out, self._scatter)
-        bends = deciding.bends_to_anything(choice, set_aside=bool(self.asked.aside))
-        if bends or not matters.explains(choice, self.held_out, self._scatter):
-            return choice, verdict
-        return choice, "ambiguous" if choice.alternatives else "named"
+        fewest = matters.fewest(choice, self.held_out, self._scatter)
+        bends = deciding.bends_to_anything(fewest, set_aside=bool(self.asked.aside))
+        if bends or (fewest is choice and not matters.explains(choice, self.held_out, self._scatter)):
+            return fewest, verdict
+        return fewest, "ambiguous" if fewest.alternatives else "named"
 
     def _stands(self, anew: Diagnosis, gone: Sequence[Finding]) -> bool:
         """Whether a diagnosis without the trials `gone` is kept; a whole condition is set aside for an effect only."""

@@ -58,15 +58,14 @@ def is_small(left: Gap, fitted: int, held_out: int) -> bool:
     return max(left.held_out, (fitted * left.fit + held_out * left.held_out) / (fitted + held_out)) <= MOST
 
 
-def takes_below(base: Fit, best: Fit, held_out: tuple[str, ...], scatter: Scatter) -> bool:
+def takes_below(before: Gap, best: Fit, held_out: tuple[str, ...], scatter: Scatter) -> bool:
     """Whether the best model takes the gap of held-out trials (of all, where none are held out) below that of the base
-    model by more than the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise. A form with a
-    number at the end of its range only imitates something small."""
+    model, `before`, by more than the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise. A form
+    with a number at the end of its range only imitates something small."""
     if any(not bound.strains for bound in bounds_met(best)):
         return False
-    trials = held_out or base.model.trials
-    before, after = (left_by(one, held_out, scatter) for one in (base, best))
-    count = sum(len(base.model.problem.samples(trial).time) for trial in trials)
+    after, model = left_by(best, held_out, scatter), best.model
+    count = sum(len(model.problem.samples(trial).time) for trial in held_out or model.trials)
     gained = before.fit - after.fit
     if before.held_out is not None and after.held_out is not None:
         gained = before.held_out - after.held_out
