@@ -20,6 +20,7 @@ __all__ = [
 ]  # fmt: skip
 
 MOST = 8  # Changes of state that are stated one by one
+AFTER = 1.0  # When way, height, rotation and work are taken [s]: they scatter less from bed to bed than the first angle
 
 
 def quantities_of(trajectory: Trajectory) -> dict[str, Json]:
@@ -42,6 +43,25 @@ def quantities_of(trajectory: Trajectory) -> dict[str, Json]:
         "energy_residual": quantity(trajectory.energy_residual, "1", say("of_residual")),
         "sinkage_start": quantity(float(sinkage[0, [0, -1]].mean()), "m", say("of_sinkage_start")),
         "sinkage_largest": quantity(float(sinkage.max()), "m", say("of_any_row_then")),
+    } | _after_a_second(trajectory)
+
+
+def _after_a_second(trajectory: Trajectory) -> dict[str, Json]:
+    """How far ahead and up the centre is, how far it has rotated and what work the torque has done, one second after
+    the start; null in a shorter trial."""
+    note = say("of_after", after=AFTER)
+    columns = {
+        "ahead_1s": (trajectory.x, "m"),
+        "up_1s": (trajectory.y, "m"),
+        "rotation_1s": (trajectory.theta, "rad"),
+        "torque_work_1s": (trajectory.torque_work, "J"),
+    }
+    long_enough = trajectory.time[-1] >= AFTER
+    return {
+        name: quantity(
+            float(np.interp(AFTER, trajectory.time, values) - values[0]) if long_enough else None, unit, note
+        )
+        for name, (values, unit) in columns.items()
     }
 
 

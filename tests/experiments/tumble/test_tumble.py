@@ -84,8 +84,16 @@ def test_the_quantities_are_those_of_the_trajectory():
         "energy_residual": "1",
         "sinkage_start": "m",
         "sinkage_largest": "m",
+        "ahead_1s": "m",
+        "up_1s": "m",
+        "rotation_1s": "rad",
+        "torque_work_1s": "J",
     }
     rows = read_series(Path("a/trajectory.csv"))
+    for name, column in {"ahead_1s": "x_m", "up_1s": "y_m", "rotation_1s": "theta_rad"}.items():
+        assert value_of("a", name) == pytest.approx(rows[column][-1] - rows[column][0], rel=1e-9)
+    hop = value_of("a", "transition_angle_hop")  # The torque ends with the hop
+    assert value_of("a", "torque_work_1s") == pytest.approx(0.22 * hop, rel=1e-6)
     away = np.hypot(rows["x_m"] - rows["x_m"][0], rows["y_m"] - rows["y_m"][0])
     first = int(np.argmax(away >= 0.01))
     angle = math.atan2(rows["y_m"][first] - rows["y_m"][0], rows["x_m"][first] - rows["x_m"][0])
@@ -102,8 +110,8 @@ def test_the_quantities_are_those_of_the_trajectory():
 
 def test_what_never_happens_is_null():
     assert main(["tumble", "--torque", "0.02", *SHORT, "--out", "a"]) == 0  # W l sin(pi/8) = 0.067 N m would tip it
-    for name in ("trajectory_angle", "transition_angle_slip", "transition_angle_hop"):
-        assert value_of("a", name) is None
+    for name in ("trajectory_angle", "transition_angle_slip", "transition_angle_hop", "ahead_1s", "torque_work_1s"):
+        assert value_of("a", name) is None  # SHORT ends before one second
 
 
 def test_a_centre_that_stays_within_10_mm_is_told_how_far_it_got_and_which_way():
