@@ -22,6 +22,7 @@ from .platform.spike import Section, Spike
 from .terms import EFFECTS, Term
 
 if TYPE_CHECKING:
+    from .ground_file import GroundFile, read_ground
     from .hop import (
         Flight,
         Launch,
@@ -41,14 +42,16 @@ if TYPE_CHECKING:
     from .spatial.spatial import simulate as simulate_spatial
 
 __all__ = [
-    "EFFECTS", "GROUNDS", "STATES", "BatchTrajectory", "Contact", "Effect", "Flight", "Flywheel", "Ground", "Launch",
+    "EFFECTS", "GROUNDS", "STATES", "BatchTrajectory", "Contact", "Effect", "Flight", "Flywheel", "Ground",
+    "GroundFile", "Launch",
     "Platform", "Reaction", "Section", "SpatialTrajectory", "SpatialTrial", "SpringDamper", "Spike", "Stance",
     "SurfaceGround", "Term", "TorqueHistory", "Trajectory", "Trial", "Tumbler", "brake_launch", "escape_speed",
     "find_platform", "flight", "impulsive_launch", "launch", "launch_speed_for", "least_viable_angle", "platform_names",
-    "read_platform", "simulate", "simulate_batch", "simulate_spatial",
+    "read_ground", "read_platform", "simulate", "simulate_batch", "simulate_spatial",
 ]  # fmt: skip
 
 _LATER = {
+    "ground_file": ("GroundFile", "read_ground"),
     "platform.actuation": ("Flywheel", "TorqueHistory"),
     "hop": (
         "Flight", "Launch", "Tumbler", "brake_launch", "escape_speed", "flight", "impulsive_launch", "launch",

@@ -8,6 +8,7 @@ then does the same hop from ground that gives (`experiments.hop.on_surface`): bo
 import math
 from dataclasses import asdict
 
+from experiments.platform.ground_file import range_warnings, with_kept_ground
 from experiments.platform.numbers import keep_platform
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
@@ -36,6 +37,7 @@ def check(settings: HopSettings) -> None:
 
 
 def _compute(settings: HopSettings, folder: RunFolder, progress: Progress) -> Result:
+    settings = with_kept_ground(settings, folder.path)
     plan, hop = find_hop(settings, keep_platform(settings.platform, folder.path, progress.message))
     for sentence in plan.sentences():
         progress.message(sentence)
@@ -204,6 +206,9 @@ def _sentences(
 def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> list[str]:
     """How far off rigid ground is, and how near escape the faster of the two launches is."""
     found, left, flown = [], hop.launch, hop.flight
+    if given is not None:
+        of_grains = {"gravity": plan.tumbler.gravity, "diameter": plan.tip_diameter}
+        found += range_warnings(plan.fitted, given.trajectory, **of_grains)
     other = given.launch if given is not None else None
     if given is None:
         found.append(say("taken_as_rigid", plan=plan))

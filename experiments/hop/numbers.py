@@ -5,16 +5,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from experiments.platform.ground_file import SPIKES_PER_ROW, fitted_ground
 from experiments.platform.numbers import platform_numbers
 from experiments.platform.settled import Number, Settled, check_spike_length, defaults_said, of_other_spikes
 from experiments.runs.types import Json
+from rigid.ground_file import GroundFile
 from rigid.hop import Tumbler
-from rigid.model.trial import Trial
+from rigid.model.trial import Ground, Trial
 from rigid.platform.actuation import Flywheel
 from rigid.platform.files import find_platform
 from rigid.platform.platform import Platform
 
-from .settings import DEFAULT_DISTANCE, HopSettings
+from .settings import DEFAULT_DISTANCE, HopSettings, say
 
 __all__ = ["HopPlan", "plan_hop"]
 
@@ -35,10 +37,21 @@ class HopPlan:
     numbers: Mapping[str, Number]
     choices: Mapping[str, str]  # what else stands at its default: name -> value
     warnings: tuple[str, ...] = ()
+    fitted: GroundFile | None = None  # the file that the law comes from
+    tip_diameter: float = 0.0  # of the platform [m]
+
+    @property
+    def law(self) -> Ground | None:
+        """What computes the force under a row; None: the spring-damper of K and C."""
+        if self.fitted is None or self.fitted.law == "spring-damper":
+            return None
+        return Ground(name=self.fitted.law, parameters=self.fitted.values, spikes_per_row=SPIKES_PER_ROW)
 
     @property
     def ground(self) -> str:
         """The ground that gives, in words."""
+        if self.law is not None:
+            return say("of_law", surface=self.surface, law=self.law.name)
         return f"{self.surface} (K = {self.stiffness:g} N/m, C = {self.damping:g} N s/m a row)"
 
     def sentences(self) -> list[str]:
@@ -70,15 +83,19 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
         numbers.settle("torque", own.brake_torque, f"{brake} of platform {of_platform.name}, at its largest")
     elif settings.torque is not None:
         numbers.settle("torque", settings.torque, "given")
-    surface, warnings = numbers.settle_surface(settings.surface)
+    fitted = fitted_ground(settings.ground)
+    surface, warnings = numbers.settle_surface(settings.surface, fitted=fitted, row_of=SPIKES_PER_ROW)
     whose = f"platform {of_platform.name}"
     warnings += of_other_spikes(numbers, surface, diameter=of_platform.spike_diameter, whose=whose)
+    if fitted is not None and fitted.law != "spring-damper":
+        for name in ("stiffness", "damping"):
+            del numbers[name]
     wheel = replace(
         own, inertia=numbers.value("wheel_inertia"), max_speed=numbers.value("max_wheel_speed"),
         motor_torque=numbers.value("max_motor_torque"),
     )  # fmt: skip
     body = ("mass", "inertia", "spike_length", "wheel_inertia", "stiffness", "damping", "mu_s", "mu_d")
-    own_numbers: Json = {name: numbers.value(name) for name in body}
+    own_numbers: Json = {name: numbers.value(name) for name in body if name in numbers}
     Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own_numbers)  # refuses what no body can have
     warnings += numbers.check_actuation(settings.actuator, of_platform) + numbers.check_body(of_platform)
     tumbler = Tumbler(
@@ -92,7 +109,8 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
         choices["body_radius"] = "none, a flat ground"
     return HopPlan(
         platform=platform, wheel=wheel, brake=brake, tumbler=tumbler, surface=surface,
-        stiffness=numbers.value("stiffness"), damping=numbers.value("damping"), spike_count=of_platform.spike_count,
+        stiffness=own_numbers.get("stiffness", 0.0), damping=own_numbers.get("damping", 0.0),
+        spike_count=of_platform.spike_count, fitted=fitted, tip_diameter=of_platform.spike_diameter,
         distance=numbers.value("distance") if settings.asks_for == "distance" else None, numbers=numbers,
         choices=choices, warnings=tuple(warnings),
     )  # fmt: skip

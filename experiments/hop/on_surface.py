@@ -49,7 +49,8 @@ def hop_trial(plan: HopPlan, *, torque: float, wheel_speed: float | None) -> Tri
     return Trial(
         mass=t.mass, inertia=t.inertia, spike_length=t.spike_length, spike_count=plan.spike_count,
         stiffness=plan.stiffness, damping=plan.damping, mu_s=t.mu_s, mu_d=t.sliding_friction, gravity_sim=t.gravity,
-        gravity=t.gravity, torque=torque, wheel_inertia=wheel.inertia, **actuation,  # type: ignore[arg-type]
+        gravity=t.gravity, torque=torque, wheel_inertia=wheel.inertia, ground=plan.law,
+        **actuation,  # type: ignore[arg-type]
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from experiments.platform.settings import PlatformSettings, Positive
 from experiments.runs.strict import StrictSettings
+from rigid.ground_file import is_ground_file
 from vis.page.sentences import Sentences
 
 __all__ = ["DEFAULT_DISTANCE", "HopSettings"]
@@ -36,8 +37,16 @@ class _Question(StrictSettings):
 class HopSettings(PlatformSettings, _Question):
     """A hop: what the flywheel must do for a distance, or how far it goes; how the platform leaves and flies."""
 
+    ground: str = "spring-damper"
+    """Law under the spikes: spring-damper, with K and C of the surface, or a ground.toml of one spike."""
+
     @model_validator(mode="after")
     def _one_question(self) -> Self:
+        if self.ground != "spring-damper":
+            if not is_ground_file(self.ground):
+                raise ValueError(say("no_ground", s=self))
+            if key := next((key for key in ("stiffness", "damping") if getattr(self, key) is not None), None):
+                raise ValueError(say("of_the_spring_damper", key=key, value=getattr(self, key), s=self))
         if self.wheel_speed_0 is not None and self.actuator == "motor":
             raise ValueError(say("wheel_of_a_motor", s=self))
         if self.wheel_speed_0 is not None and self.distance is not None:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.platform.ground_file import fitted_ground, range_warnings, with_kept_ground
 from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
@@ -29,6 +30,7 @@ from experiments.tumble.result import trajectory_columns
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import SPIKES_PER_ROW, plan_tumble, turns_of
 from rigid.ground.laws import find_law
+from rigid.ground_file import GroundFile
 from rigid.model.trial import Effect, Ground, Trial
 from rigid.planar.simulate import simulate
 
@@ -61,6 +63,8 @@ class Job:
     """Where a motor's torque ends [rad/s]; not known of a wheel with another inertia than the platform's."""
     kind: str = ""
     varied: Mapping[str, Any] = field(default_factory=dict)  # as `variants` has them
+    fitted: GroundFile | None = None  # where the law's range is to be kept
+    tip_diameter: float = 0.0  # of the platform [m]
 
     @property
     def lean(self) -> float | None:
@@ -88,6 +92,13 @@ def check(settings: PaperSettings) -> None:
 def plan_jobs(settings: PaperSettings, platform_file: Path | None = None) -> list[Job]:
     """Every integration, in order; `platform_file` stands in for ``settings.platform``, where that was copied."""
     platform = platform_numbers(settings.platform, file=platform_file)
+    fitted = fitted_ground(settings.ground)
+    if fitted is not None and fitted.material not in {find_surface(name).grains for name in settings.surfaces}:
+        named = ", ".join(settings.surfaces)
+        raise ValueError(
+            f"ground = {settings.ground!r} was fitted in {fitted.material!r}, and none of surfaces = {named} is made "
+            f"of it: add such a surface"
+        )
     turns = turns_of(settings.motor_torques, settings.brake_torques, settings.brake_wheel_speed)
     places = product(settings.rigs, turns, settings.surfaces)
     return [job for place in places for job in _case_jobs(settings, *place, platform)]
@@ -97,10 +108,15 @@ def _case_jobs(
     settings: PaperSettings, rig: float, turn: Json, surface: str, platform: PlatformNumbers
 ) -> Iterator[Job]:
     """The integrations of one gravity, torque and surface."""
+    fitted = fitted_ground(settings.ground)
+    on_file = fitted is not None and find_surface(surface).grains == fitted.material
+    ground = {"ground": settings.ground} if on_file else {}
     plan = plan_tumble(
-        TumbleSettings(rig=rig, surface=surface, platform=settings.platform, rig_reading=settings.rig_reading, **turn),
+        TumbleSettings(
+            rig=rig, surface=surface, platform=settings.platform, rig_reading=settings.rig_reading, **ground, **turn
+        ),
         platform=platform,
-    )
+    )  # fmt: skip
     trial, torque = plan.trial, turn["torque"]
     name = f"{surface}-{rig:g}g-{torque:g}Nm"
     brake = turn["actuator"] == "brake"
@@ -112,6 +128,7 @@ def _case_jobs(
         return Job(
             f"{name}-{variant.replace(' ', '-')}", rig, torque, surface, variant, changed,
             short if kind == "rivals" else duration, settings.trusted, limit, kind, varied or {},
+            plan.fitted if variant == "nominal" else None, platform.spike_diameter,
         )  # fmt: skip
 
     yield job("nominal", trial)
@@ -144,6 +161,9 @@ def _integrate(job: Job) -> Json:
         "wheel_at_limit": full, "transitions": states,
         "friction": [job.trial.mu_s, job.trial.sliding_friction],
         "launch": _launch(trajectory, states),
+        "beyond_range": range_warnings(
+            job.fitted, trajectory, gravity=job.trial.gravity, diameter=job.tip_diameter
+        ),
         "rows": trajectory_columns(trajectory) if job.variant in ("nominal", "low", "high", "paper") else None,
     }  # fmt: skip
 
@@ -182,6 +202,7 @@ def _all(jobs: Sequence[Job], workers: int) -> Iterator[Json]:
 
 def _compute(settings: PaperSettings, folder: RunFolder, progress: Progress) -> Result:
     workers = settings.workers or cores_there()
+    settings = with_kept_ground(settings, folder.path)
     jobs = plan_jobs(settings, keep_platform(settings.platform, folder.path, progress.message))
     progress.plan({"trials": float(len(jobs)), "report": 0.1 * len(jobs)})
     progress.stage("trials", total=float(len(jobs)))
@@ -214,6 +235,8 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
     weighed = evidence(settings, found)
     guesses = sorted({job.surface for job in jobs if find_surface(job.surface).guess})
     warnings = [f"the numbers of {name} are a guess until they are calibrated" for name in guesses]
+    warnings += [f"{entry['id']}: {said}" for entry in found for said in entry.pop("beyond_range")]
+    fitted = next((job.fitted for job in jobs if job.fitted is not None), None)
     platform = jobs[0].trial
     return Result.make(
         "paper",
@@ -221,6 +244,7 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
         quantities=_quantities(cases, stated, weighed),
         platform={key: getattr(platform, key) for key in ("mass", "inertia", "spike_length", "wheel_inertia")},
         brake_wheel_speed=settings.brake_wheel_speed,
+        **({} if fitted is None else {"ground_file": fitted.model_dump()}),
         surfaces={name: asdict(find_surface(name)) for name in settings.surfaces},
         claims=stated,
         tables=[
@@ -349,7 +373,7 @@ def _grains(trial: Trial, *, whole: bool) -> Iterator[Variant]:
         return
     for stiffness in sorted({default, own, *(find_surface(name).stiffness for name in GRANULAR)}):
         # No damper: it gives back all that it took.
-        spring = replace(trial, stiffness=stiffness, damping=0.0)
+        spring = replace(trial, stiffness=stiffness, damping=0.0, ground=None)
         varied = {"law": "spring-damper", "stiffness": stiffness, "rebound": 1.0}
         yield f"spring {stiffness:.4g} N per m", spring, "grains", varied
         for rebound in (HALF, LITTLE):

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from experiments.platform.settings import NotNegative, Positive
 from experiments.runs.strict import StrictSettings
+from rigid.ground_file import is_ground_file
 
 from .transitions import HARD, measured_angles
 
@@ -22,6 +23,9 @@ class PaperSettings(StrictSettings):
     brake_torques: tuple[Positive, ...] = Field((6.0,), description="Torques of brakes [N m].")
     surfaces: tuple[str, ...] = Field(("steel", "brick", "sand", "jsc1a"), min_length=1)
     """Materials; Figures 5 to 7 take steel and brick."""
+    ground: str | None = None
+    """A ground.toml of one spike, whose law stands under the trials on surfaces of its grains; K and C of each surface
+    if not given."""
     friction_band: float = Field(0.1, gt=0, lt=1, description="Friction is varied by this, relative, up and down [1].")
     measured_angles: tuple[str, ...] = ()
     """Transition angles read off Figure 6, SURFACE-TORQUE-STATE=DEGREES with slip or hop for the state
@@ -63,6 +67,8 @@ class PaperSettings(StrictSettings):
         if set(self.motor_torques) & set(self.brake_torques):
             raise ValueError(f"brake_torques = {list(self.brake_torques)} holds a torque of motor_torques too")
         torques = (*self.motor_torques, *self.brake_torques)
+        if self.ground is not None and not is_ground_file(self.ground):
+            raise ValueError(f"ground = {self.ground!r} is no file: the path of a ground.toml was expected")
         hard = [surface for surface in HARD if surface in self.surfaces]
         measured_angles(self.measured_angles, surfaces=hard, torques=torques)
         return self

@@ -2,8 +2,8 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed penetrate`; calling one imports what computes.
 
-Imports `coupling`, `dem`, `experiments.campaign`, `experiments.diagnose`, `experiments.grains`, `experiments.runs`,
-`rigid`, `vis`.
+Imports `coupling`, `dem`, `experiments.campaign`, `experiments.diagnose`, `experiments.grains`, `experiments.platform`,
+`experiments.runs`, `rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

@@ -35,6 +35,7 @@ from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
 from .findings import mean_of, returned_work
+from .on_law import law_step
 from .settings import PenetrateSettings, say
 from .units import Unit, make_run, make_spike, plan_units
 
@@ -258,9 +259,6 @@ class AmendedGround:
         self._top, self._ever = float(state["top"]), float(state["ever"])
 
 
-_ROWS = 400
-"""Macro steps in which the fastest run passes the driven depth, where no bed says how long a step is."""
-
 Runs = Mapping[str, Penetration]
 
 
@@ -302,8 +300,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
         units = plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]}))
         progress.stage("spring-damper", total=float(len(units)))
         plain, runs = {}, {}
-        fastest = max(*settings.speeds, *settings.drop_speeds, settings.retreat_speed)
-        step = settings.time_step or settings.depth / fastest / _ROWS / settings.substeps
+        step = law_step(settings)
         for done, unit in enumerate(units, 1):
             plain[unit.id] = make_run(settings, unit, law.plain(step)).run()
             runs[unit.id] = law.run(unit, plain[unit.id])

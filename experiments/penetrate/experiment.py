@@ -33,6 +33,7 @@ from . import beds
 from .amended import run_without_bed
 from .beds import fingerprint
 from .findings import BedFacts
+from .on_law import run_on_law
 from .recorded import campaign_of, sensors_of
 from .refusals import check
 from .rest import made_units
@@ -55,6 +56,8 @@ modulus is enough (jsc-1a-dense-heights, four grains across the tip, eight deep:
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     if settings.ground == "spring-damper":
         return run_without_bed(settings, folder, progress)
+    if settings.ground != "bed":
+        return run_on_law(settings, folder, progress)
     with folder.lock():
         result = compute(settings, folder, progress)
         draw_report(folder, progress, _picture_costs(folder.path, result))

@@ -10,10 +10,11 @@ from pydantic.fields import FieldInfo
 from experiments.campaign import PenetrationModel, read_model
 from experiments.runs.types import Json
 from experiments.runs.units import find_unit
+from rigid.ground_file import read_ground
 
 from .following import following, pace, sticking_of
 
-__all__ = ["settings_of_bed", "settings_of_gravity", "settings_of_model"]
+__all__ = ["settings_of_bed", "settings_of_gravity", "settings_of_ground", "settings_of_model"]
 
 
 def settings_of_bed(given: Json) -> Json:
@@ -110,6 +111,21 @@ def settings_of_model(given: Json) -> Json:
         if gravities and math.isclose(min(gravities), max(gravities), rel_tol=1e-6):
             own["load"] = spike.mass * gravities[0]
     return {name: value for name, value in own.items() if value is not None} | given
+
+
+def settings_of_ground(given: Json) -> Json:
+    """`given` with the tip of its ground file where it gives none, and the gravity where the file has only one.
+
+    A file that cannot be read is refused later.
+    """
+    try:
+        fitted = read_ground(str(given["ground"]))
+    except ValueError:
+        return given
+    foot = fitted.foot
+    own: Json = {"tip": foot.tip, "cone_angle": foot.cone_angle, "tip_diameter": foot.diameter}
+    low, high = fitted.range["gravity"]
+    return own | ({"gravity": high} if low == high else {}) | given
 
 
 def _plain(value: float) -> float:

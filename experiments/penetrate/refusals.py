@@ -8,6 +8,7 @@ from experiments.grains.bearing import UNSURE
 from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.staged import check_bed_stages
 from experiments.grains.where import check_memory, check_where
+from experiments.platform.ground_file import fitted_ground
 
 from . import beds
 from .amended import read_law
@@ -30,7 +31,8 @@ def check(settings: PenetrateSettings) -> None:
         read_law(settings.model, settings)
     if settings.campaign is not None:
         check_target(settings.campaign)
-    if settings.ground == "spring-damper":
+    if settings.ground != "bed":
+        fitted_ground(settings.ground)
         return
     stuff = beds.find_material(settings)
     if settings.bed_stages is not None:

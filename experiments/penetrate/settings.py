@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from experiments.grains.advice import costs, times_as_long
 from experiments.runs.strict import NotNegative, Positive, SeedNumber, StrictSettings, Threads
+from rigid.ground_file import is_ground_file
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.sentences import Sentences
 
@@ -106,8 +107,8 @@ class PenetrateSettings(StrictSettings):
     other_drop_speeds: tuple[Positive, ...] = Field((0.15,), description="Drops on the seeds after the first [m/s].")
 
     # Beside it
-    ground: Literal["bed", "spring-damper"] = "bed"
-    """What the spike goes into: the bed, or, without a bed, the spring-damper of `model`."""
+    ground: str = "bed"
+    """What the spike goes into: bed, or without a bed spring-damper, that of `model`, or the law in a ground.toml."""
     model: str | None = Field(None, min_length=1)
     """A model.toml of penetration, as diagnose writes it: its law, effects and all, is run beside bed and
     spring-damper. Without a bed its spike, mass and load are taken where they are not given."""
@@ -145,7 +146,7 @@ class PenetrateSettings(StrictSettings):
 
         No drops are none on every seed.
         """
-        from .given import settings_of_bed, settings_of_gravity, settings_of_model
+        from .given import settings_of_bed, settings_of_gravity, settings_of_ground, settings_of_model
 
         if not isinstance(given, dict):
             return given
@@ -153,6 +154,8 @@ class PenetrateSettings(StrictSettings):
             given = {"other_drop_speeds": ()} | given
         if given.get("ground") == "spring-damper" and given.get("model"):
             given = settings_of_model(given)
+        if is_ground_file(str(given.get("ground", ""))):
+            given = settings_of_ground(given)
         given = settings_of_bed(given) if isinstance(given.get("bed"), str) and given["bed"] else given
         return given if given.get("ground") == "spring-damper" else settings_of_gravity(given, cls.model_fields)
 
@@ -200,7 +203,7 @@ class PenetrateSettings(StrictSettings):
         return None
 
     def _bed(self) -> str | None:
-        if self.ground == "spring-damper":  # there is none then
+        if self.ground != "bed":  # there is none then
             return say("sleep_without_bed") if self.sleep else None
         width, height = min(self.bed_size[:2]), self.bed_size[2]
         wide, deep = 4 * self.tip_diameter, self.depth + self.tip_diameter
@@ -272,9 +275,13 @@ class PenetrateSettings(StrictSettings):
         return None
 
     def _beside(self) -> str | None:
+        if self.ground not in ("bed", "spring-damper") and not is_ground_file(self.ground):
+            return say("no_ground", s=self)
+        if is_ground_file(self.ground) and self.model is not None:
+            return say("model_and_file", s=self)
         if self.ground == "spring-damper" and self.model is None:
             return "ground = 'spring-damper' needs model, the model.toml whose K and C it has: none is given"
-        if self.ground == "spring-damper" and self.campaign is not None:
+        if self.ground != "bed" and self.campaign is not None:
             return say("campaign_without_bed", s=self)
         return None
 

@@ -10,11 +10,12 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
+from rigid.ground_file import GroundFile
 from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
 from .numbers import PlatformNumbers
-from .surfaces import DEFAULT_SURFACE, find_surface
+from .surfaces import DEFAULT_SURFACE, find_surface, surface_of_grains
 
 __all__ = ["Number", "Plan", "Settled", "at_default", "check_lengths", "check_spike_length", "of_earth", "rig_fault"]
 
@@ -100,25 +101,42 @@ class Settled(dict[str, Number]):
             self.settle(name, getattr(platform, name) if known else math.inf, origin)
 
     def settle_surface(
-        self, surface: str | None, *, model: Any = None, spikes_per_row: float = 1.0
+        self,
+        surface: str | None,
+        *,
+        model: Any = None,
+        spikes_per_row: float = 1.0,
+        fitted: GroundFile | None = None,
+        row_of: float = 2.0,
     ) -> tuple[str, list[str]]:
         """Settle K, C and friction; return the material's name and warnings about it. `model`: a `TumbleModel`.
 
-        K and C are of a row, or of one of its `spikes_per_row`, half a row's where that is 2.
+        K and C are of a row, or of one of its `spikes_per_row`, half a row's where that is 2. Those of a spring-damper
+        in `fitted`, which is of one spike, are multiplied by `row_of`; friction is that of the surface of its grains.
 
         Raises ValueError for an unknown surface, and for more sliding than static friction.
         """
         material: Any
         warnings: list[str] = []
+        if fitted is not None and surface is None and model is None:
+            surface = surface_of_grains(fitted.material)
+            if surface is None:
+                warnings.append(say("friction_of_default", fitted=fitted, surface=DEFAULT_SURFACE))
         if surface is None and model is not None:
             material, name, origin = model.surface, model.surface.kind, "model"
         else:
             material = found = find_surface(surface or DEFAULT_SURFACE)
             name, origin = found.name, f"surface {found.name}"
-            warnings = [say("guess", surface=found)] if found.guess else []
+            if fitted is not None and surface is not None and found.grains != fitted.material:
+                warnings.append(say("friction_of_other", fitted=fitted, surface=found.name))
+            warnings += [say("guess", surface=found)] if found.guess and fitted is None else []
         shared = origin if spikes_per_row == 1 else f"{origin}, a row's halved"
         for key in ("stiffness", "damping"):
-            self.settle(key, getattr(material, key) / spikes_per_row, shared)
+            if fitted is not None and fitted.law == "spring-damper":
+                of_row = f"ground file, of one spike, times {row_of:g}"
+                self[key] = Number(row_of * fitted.values[key], _UNITS[key], of_row)
+            else:
+                self.settle(key, getattr(material, key) / spikes_per_row, shared)
         self.settle("mu_s", material.mu_s, origin)
         if self["mu_s"].origin == "given":
             self.settle("mu_d", 0.5 * self.value("mu_s"), "default: half of mu_s")

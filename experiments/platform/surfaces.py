@@ -8,7 +8,7 @@ from pathlib import Path
 from experiments.runs.reading import nearest
 from hedgebed_renamed import material_of_today
 
-__all__ = ["DEFAULT_SURFACE", "Surface", "find_surface", "surface_names"]
+__all__ = ["DEFAULT_SURFACE", "Surface", "find_surface", "surface_names", "surface_of_grains"]
 
 FILE = Path(__file__).parent / "surfaces.toml"
 DEFAULT_SURFACE = "brick"
@@ -44,6 +44,11 @@ def _surfaces() -> dict[str, Surface]:
 def surface_names() -> list[str]:
     """The names there are."""
     return list(_surfaces())
+
+
+def surface_of_grains(material: str) -> str | None:
+    """The surface whose beds are made of these grains; None where there is none."""
+    return next((name for name, surface in _surfaces().items() if surface.grains == material), None)
 
 
 def find_surface(name: str) -> Surface:

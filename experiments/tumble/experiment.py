@@ -8,6 +8,7 @@ trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json,
 from typing import Literal
 
 from experiments.campaign.files import keep_model
+from experiments.platform.ground_file import with_kept_ground
 from experiments.platform.numbers import keep_platform, platform_numbers, torque_within_limit
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
@@ -75,6 +76,7 @@ def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -
 
 def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
     """A tumble on the spring-damper or another law, with its sweep and its campaign where they are asked for."""
+    settings = with_kept_ground(settings, folder.path)
     copied = keep_model(settings.model, folder.path)
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
     sweep = Sweep(settings, model_file=copied, platform=platform) if settings.sweep else None

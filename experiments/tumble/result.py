@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from experiments.platform.ground_file import range_warnings
 from experiments.platform.numbers import ball_radius, tip_depth
 from experiments.runs.result import quantity
 from experiments.runs.types import Json
@@ -104,6 +105,8 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         warnings.append(say("wheel_at_limit", limit=plan.max_wheel_speed, when=full))
     if trajectory.trajectory_angle is None:
         warnings.append(stayed_words(trajectory))
+    fitted = plan.fitted
+    warnings += range_warnings(fitted, trajectory, gravity=trial.gravity, diameter=plan.spikes.diameter)
     return {
         "title": title_of(plan),
         "status": "done",
@@ -111,7 +114,8 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         "departures": {"sentences": tumble_sentences(trajectory)},
         "trial": plan.trial_table(trial.weight),
         "surface": plan.surface,
-        "ground": settings.ground,
+        "ground": settings.ground if fitted is None else fitted.law,
+        **({} if fitted is None else {"ground_file": {"material": fitted.material, "source": fitted.source}}),
         "actuator": settings.actuator,
         "method": trajectory.method,
         "duration": settings.duration,

@@ -12,6 +12,7 @@ from experiments.grains.settings import OF_THE_MASTER, TumbleBedSettings
 from experiments.platform.settings import NotNegative, PlatformSettings, Positive
 from experiments.runs.reading import nearest
 from rigid.ground.laws import GROUNDS
+from rigid.ground_file import is_ground_file
 from rigid.terms import EFFECTS
 from vis.page.sentences import Sentences
 
@@ -34,7 +35,8 @@ class TrialSettings(PlatformSettings):
     ground: str = Field(
         "spring-damper",
         description="Law that computes the surface's force: "
-        f"{' or '.join(', '.join(GROUNDS).rsplit(', ', 1))}; for tumble also bed, a bed of grains.",
+        f"{' or '.join(', '.join(GROUNDS).rsplit(', ', 1))}, or a ground.toml of one spike; for tumble also bed, a "
+        "bed of grains.",
     )
     ground_parameters: tuple[str, ...] = ()
     """Parameters of another law than the spring-damper, of one spike, as name=value in SI."""
@@ -73,6 +75,8 @@ class TrialSettings(PlatformSettings):
             return say("parameters_of_other_laws", given=given) if given else None
         if self.ground == "bed":
             return say("parameters_of_a_bed") if self.ground_parameters else None
+        if is_ground_file(self.ground) and self.ground_parameters:
+            return say("parameters_of_a_file", s=self, given=" ".join(self.ground_parameters))
         for key, value in (("stiffness", self.stiffness), ("damping", self.damping)):
             if value is not None:
                 return say("of_the_spring_damper", key=key, value=value, s=self)
@@ -131,7 +135,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
 
     def _known_ground(self) -> str | None:
         grounds = [*GROUNDS, "bed"]
-        if self.ground in grounds:
+        if self.ground in grounds or is_ground_file(self.ground):
             return None
         known = nearest(self.ground, grounds)
         return say("no_ground", s=self, known=known + ("" if known.endswith("?") else " (of grains)"))

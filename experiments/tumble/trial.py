@@ -11,9 +11,11 @@ from typing import Any
 
 from experiments.campaign import TumbleModel, read_model
 from experiments.platform import settled
+from experiments.platform.ground_file import SPIKES_PER_ROW, fitted_ground
 from experiments.platform.numbers import PlatformNumbers, platform_numbers
 from experiments.platform.settled import check_spike_length
 from experiments.runs.types import Json
+from rigid.ground_file import GroundFile
 from rigid.model.trial import Effect, Ground, Trial
 from rigid.platform.rig import STANDARD_GRAVITY, Rig
 from rigid.terms import EFFECTS
@@ -25,7 +27,6 @@ __all__ = ["DEFAULT_RIG", "Spikes", "TumblePlan", "model_trial", "plan_tumble", 
 
 TORQUE = 0.22  # The paper's middle one [N m]
 DEFAULT_RIG = 0.0085  # The paper's lower gravity [9.80665 m/s2]
-SPIKES_PER_ROW = 2.0  # The platform stands on two rows of two
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class TumblePlan(settled.Plan):
     platform: PlatformNumbers  # What gives the numbers that nothing else gives
     spikes: Spikes  # What grains meet of its spikes
     max_wheel_speed: float = math.inf  # Where a motor's torque ends [rad/s]
+    fitted: GroundFile | None = None  # The file that the law comes from
 
 
 def plan_tumble(
@@ -81,7 +83,10 @@ def plan_tumble(
     platform = platform_numbers(settings.platform) if platform is None else platform
     numbers.settle_platform(platform, model=model)
     check_spike_length(numbers)
-    surface, warnings = numbers.settle_surface(settings.surface, model=model)
+    fitted = fitted_ground(settings.ground)
+    surface, warnings = numbers.settle_surface(
+        settings.surface, model=model, fitted=fitted, row_of=SPIKES_PER_ROW
+    )  # fmt: skip
     _settle_gravity(settings, model, numbers)
     weak = platform.max_motor_torque < TORQUE
     torque, origin = (platform.max_motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
@@ -94,7 +99,7 @@ def plan_tumble(
     numbers.settle_limits(platform, in_model=model is not None)
     warnings += numbers.check_actuation(settings.actuator, platform)
     warnings += numbers.check_body(platform) if model is None else []
-    ground = _ground(settings)
+    ground = _ground(settings, fitted)
     if ground is None:
         diameter = platform.spike_diameter if spikes is None else spikes.diameter
         whose = f"platform {platform.name}" if spikes is None else "this run"
@@ -113,6 +118,7 @@ def plan_tumble(
         for name, value in ground.law.values(ground.parameters).items():
             unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
+            origin = "ground file, of one spike" if fitted is not None else origin
             numbers[name] = settled.Number(value, unit, origin)
     rows = f"rows of platform {platform.name}" if model is None else "model"
     numbers["spike_count"] = settled.Number(trial.spike_count, "1", rows)
@@ -124,7 +130,7 @@ def plan_tumble(
     spikes = spikes or Spikes(platform.spike_diameter, platform.spike_clear, ("spike_diameter", "spike_clear"))
     return TumblePlan(
         trial=trial, numbers=numbers, surface=surface, choices=_choices(settings, surface, model), platform=platform,
-        spikes=spikes, warnings=tuple(warnings), max_wheel_speed=numbers.value("max_wheel_speed"),
+        spikes=spikes, warnings=tuple(warnings), max_wheel_speed=numbers.value("max_wheel_speed"), fitted=fitted,
     )  # fmt: skip
 
 
@@ -189,10 +195,12 @@ def _rig_warnings(trial: Trial) -> list[str]:
     return [say("weight_off", trial=trial, hung=hung)]
 
 
-def _ground(settings: TumbleSettings) -> Ground | None:
-    """The law that is named; None for the spring-damper of K and C."""
-    if settings.ground == "spring-damper":
+def _ground(settings: TumbleSettings, fitted: GroundFile | None) -> Ground | None:
+    """The law that is named, or that of a file; None for the spring-damper of K and C."""
+    if (settings.ground if fitted is None else fitted.law) == "spring-damper":
         return None
+    if fitted is not None:
+        return Ground(name=fitted.law, parameters=fitted.values, spikes_per_row=SPIKES_PER_ROW)
     parameters = dict(_assignment("ground_parameters", text) for text in settings.ground_parameters)
     try:
         return Ground(name=settings.ground, parameters=parameters, spikes_per_row=SPIKES_PER_ROW)

@@ -122,7 +122,7 @@ def read_folder(folder: str | Path) -> RunFolder:
             continue
         name = str(entry.get("id", "unnamed"))
         bed = model = amended = None
-        if result.get("ground") != "spring-damper":
+        if result.get("ground", "bed") == "bed":
             bed = _try_series(path, entry.get("series"), f"run {name}: the bed's series", missing)
         if "model_series" in entry or result.get("experiment") not in PYTHON_RUNS:
             model = _try_series(path, entry.get("model_series"), f"run {name}: the spring-damper's series", missing)

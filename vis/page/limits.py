@@ -70,7 +70,7 @@ def kind_of(result: Mapping[str, Any]) -> str | None:
         return "bed"
     if experiment == "diagnose":
         return "diagnosis"
-    law_alone = result.get("ground") == "spring-damper"
+    law_alone = result.get("ground", "bed") != "bed"
     return "spike on grains" if experiment in ("penetrate", "") and not law_alone else None
 
 

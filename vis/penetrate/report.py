@@ -50,8 +50,8 @@ def write_penetration_report(folder: str | Path, *, pictures: bool = True, progr
     """Make every plot and picture of the run folder, and its report.html; parameters as those of `vis.write_report`."""
     tell = progress if progress is not None else lambda done: None
     run = read_folder(folder)
-    if run.result.get("ground") == "spring-damper" and _is_amended(run):
-        return _write_amended_report(folder, progress=progress)
+    if run.result.get("ground", "bed") != "bed" and (_is_amended(run) or "ground_file" in run.result):
+        return _write_law_report(folder, progress=progress)
     plots, undrawn = make_plots(run)
     tell(0.1)
     drawn = Pictures(notes=["Pictures were not asked for."])
@@ -130,8 +130,9 @@ def words_of_effects(result: Result) -> str:
 
 def _draw_amended(run: RunFolder) -> Figure | None:
     """Force against depth of driven runs, depth against time of drops and set-downs; None where there is no law."""
+    alone = "ground_file" in run.result
     driven, drops, stood = (
-        [r for r in run.of_kind(kind) if r.amended is not None] for kind in ("driven", "drop", "set_down")
+        [r for r in run.of_kind(kind) if r.amended is not None or alone] for kind in ("driven", "drop", "set_down")
     )
     groups = [_by_speed(driven), _by_speed(drops) + ([("set down", stood)] if stood else [])]
     groups = [group[:_MOST] for group in groups if group]
@@ -145,31 +146,34 @@ def _draw_amended(run: RunFolder) -> Figure | None:
         for axis in row[len(group) :]:
             axis.set_visible(False)
     handles = [handle("bed", BED, lw=1.0)] if any(r.bed is not None for r in run.runs) else []
-    law = handle(f"with {words_of_effects(run.result)}", AMENDED)
-    legend_above(drawing, [*handles, handle("spring-damper", MODEL, ls=DASHED), law], 3)
+    laws = [handle(str(run.result["ground"]) if alone else "spring-damper", MODEL, ls=DASHED)]
+    laws += [] if alone else [handle(f"with {words_of_effects(run.result)}", AMENDED)]
+    legend_above(drawing, [*handles, *laws], 3)
     return drawing
 
 
 @report_of()
-def _write_amended_report(report: Report) -> Path:
+def _write_law_report(report: Report) -> Path:
     """Make figures/ and report.html of a run without a bed, and return the report."""
     numbers, drawing = report.result["quantities"], _draw_amended(read_folder(report.folder))
-    blocks = [text("There is nothing to draw.")] if drawing is None else [report.draw("amended", drawing)]
+    of_file = "ground_file" in report.result
+    key = "law" if of_file else "amended"
+    blocks = [text("There is nothing to draw.")] if drawing is None else [report.draw(key, drawing)]
     rows = [
         (name.replace("_", " "), quote(entry["value"], entry["std"], entry["unit"]), str(entry.get("note", "")))
         for name, entry in numbers.items()
     ]
-    sunk = [quote(numbers[f"sinkage_{law}"]["value"], None, "m") for law in ("spring_damper", "amended")]
-    tiles = [
-        Tile("Sinks", sunk[0], "spring-damper"),
-        Tile("Sinks", sunk[1], f"with {words_of_effects(report.result)}", second=True),
-    ]
+    laws = {"spring_damper": "spring-damper", "amended": f"with {words_of_effects(report.result)}"}
+    laws = {"law": str(report.result["ground"])} if of_file else laws
+    sunk = {law: quote(numbers[f"sinkage_{law}"]["value"], None, "m") for law in laws}
+    tiles = [Tile("Sinks", sunk[law], words, second=law == "amended") for law, words in laws.items()]
+    whose = f"no bed: the law of {'a ground file' if of_file else 'the model'} only"
     sections = [
         Section("", blocks),
         Section("Numbers", [table(("quantity", "value", "note"), rows, words=True)]),
         again("hedgebed penetrate THIS_FOLDER/run.toml", "From where it was started:"),
     ]
-    return report.write(sections, lead=["penetrate", "no bed: the model's law only"], tiles=tiles)
+    return report.write(sections, lead=["penetrate", whose], tiles=tiles)
 
 
 def _by_speed(runs: Sequence[Run]) -> list[tuple[str, list[Run]]]:

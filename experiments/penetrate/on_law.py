@@ -1,0 +1,109 @@
+"""`hedgebed penetrate --ground ground.toml`: the runs of one seed on the law in a ground file, without a bed."""
+
+from dataclasses import asdict
+
+from coupling import Penetration
+from experiments.platform.ground_file import fitted_ground, with_kept_ground
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.result import Result, quantities_of
+from experiments.runs.version import __version__
+from experiments.runs.whole_runs import publish
+from rigid.ground_file import GroundFile
+
+from .findings import mean_of, returned_work
+from .settings import PenetrateSettings, say
+from .units import Unit, make_run, make_spike, plan_units
+
+__all__ = ["law_step", "run_on_law"]
+
+_ROWS = 400
+"""Macro steps in which the fastest run passes the driven depth, where no bed says how long a step is."""
+
+
+def law_step(settings: PenetrateSettings) -> float:
+    """Step of a law that has no step of its own [s]: `time_step`, or so that a run has some hundred rows."""
+    fastest = max(*settings.speeds, *settings.drop_speeds, settings.retreat_speed)
+    return settings.time_step or settings.depth / fastest / _ROWS / settings.substeps
+
+
+def run_on_law(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
+    """Drive, drop and set down the spike on the law; write and return the result.
+
+    Raises ValueError for a file that cannot be read.
+    """
+    with folder.lock():
+        fitted = fitted_ground(with_kept_ground(settings, folder.path).ground)
+        assert fitted is not None  # the settings see to it
+        units = plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]}))
+        progress.stage(fitted.law, total=float(len(units)))
+        runs: dict[str, Penetration] = {}
+        for done, unit in enumerate(units, 1):
+            runs[unit.id] = make_run(settings, unit, fitted.ground(time_step=law_step(settings))).run()
+            folder.write_series(unit.id, runs[unit.id].columns())
+            progress.update(done)
+        set_down = [runs[unit.id].resting_depth for unit in units if unit.kind == "set_down"]
+        returned = [returned_work(runs[unit.id]) for unit in units if unit.kind == "driven"]
+        found: dict[str, tuple[float | None, str, str]] = {
+            "load": (settings.weight, "N", "on the spike, set down and dropped"),
+            "sinkage_law": (mean_of(set_down), "m", "depth at rest under the load"),
+            "work_returned_law": (mean_of(returned), "1", "work out over work in, driven"),
+        }
+        fitted_to = {
+            parameter.name: {
+                "value": fitted.parameters[parameter.name].value,
+                "std": fitted.parameters[parameter.name].std,
+                "unit": parameter.unit,
+                "note": f"of the file; {parameter.summary}",
+            }
+            for parameter in fitted.surface_law.parameters
+        }
+        made = Result.make(
+            "penetrate",
+            ground=fitted.law,
+            ground_file=fitted.model_dump(),
+            version=__version__,
+            title=f"A {1e3 * settings.tip_diameter:g} mm spike on the law {fitted.law} of {fitted.material}",
+            quantities=quantities_of(found, std=None) | fitted_to,
+            runs=[_entry(unit, runs[unit.id]) for unit in units],
+            spike=asdict(make_spike(settings)) | {"load": settings.weight},
+            departures={"sentences": [say("of_file", fitted=fitted)]},
+            warnings=_warnings(settings, fitted, units, runs),
+        )
+        return publish(folder, made, progress)
+
+
+def _entry(unit: Unit, run: Penetration) -> dict[str, object]:
+    numbers = {f"model_{name}": value for name, value in run.quantities().items()}
+    return {
+        "id": unit.id, "kind": unit.kind, "seed": None, "speed": unit.speed, "model_series": f"series/{unit.id}.csv",
+        "ended": run.ended, "quantities": numbers,
+    }  # fmt: skip
+
+
+def _warnings(
+    settings: PenetrateSettings, fitted: GroundFile, units: list[Unit], runs: dict[str, Penetration]
+) -> list[str]:
+    """Where the spike or a run is outside the range of the law, and runs that did not come to rest."""
+    said = fitted.beyond(gravity=settings.gravity, diameter=settings.tip_diameter)
+    if settings.tip != fitted.foot.tip:
+        said.append(say("tip_of_file", s=settings, fitted=fitted))
+    fastest = {unit.id: _speed(runs[unit.id]) for unit in units}
+    worst = {
+        "load": max((run.peak_force, name) for name, run in runs.items()),
+        "depth": max((run.max_depth, name) for name, run in runs.items()),
+        "speed": max((speed, name) for name, speed in fastest.items()),
+    }
+    for key, (value, name) in worst.items():
+        said += [f"{name}: {text}" for text in fitted.beyond(**{key: max(value, fitted.range[key][0])})]
+    slowest, name = min((fastest[unit.id], unit.id) for unit in units if unit.kind == "driven")
+    said += [f"{name}: {text}" for text in fitted.beyond(speed=min(slowest, fitted.range["speed"][1]))]
+    if any(unit.kind == "set_down" and runs[unit.id].resting_depth is None for unit in units):
+        said.append("the spike set down did not come to rest: there is no sinkage_law")
+    return said
+
+
+def _speed(run: Penetration) -> float:
+    """Largest speed at which the tip goes in [m/s]; 0 where it never does."""
+    inside = run.depth > 0
+    return float(run.velocity[inside].max()) if inside.any() else 0.0

@@ -1,0 +1,80 @@
+"""A law from a ground file under a platform: the file that a run keeps, and whether a tumble leaves its range."""
+
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from pydantic import BaseModel
+
+from experiments.runs.folder import write_text
+from rigid.ground_file import GroundFile, is_ground_file, read_ground
+from rigid.planar.trajectory import Trajectory
+
+from . import say
+from .numbers import ball_radius, tip_angles, tip_depth
+
+__all__ = ["GROUND_COPY", "SPIKES_PER_ROW", "fitted_ground", "range_warnings", "reached", "with_kept_ground"]
+
+GROUND_COPY = "ground.toml"
+"""The copy's name in the run's folder."""
+SPIKES_PER_ROW = 2.0  # The platform stands on two rows of two
+Settings = TypeVar("Settings", bound=BaseModel)
+
+
+def fitted_ground(ground: str | None) -> GroundFile | None:
+    """The file that a setting `ground` names; None where it names a law, a bed or nothing.
+
+    Raises ValueError, naming the file and each fault in it.
+    """
+    return read_ground(ground) if ground is not None and is_ground_file(ground) else None
+
+
+def with_kept_ground(settings: Settings, folder: Path) -> Settings:
+    """`settings` whose `ground`, if it is a file, is the copy of it in the run's folder, made if missing."""
+    ground: str | None = settings.ground  # type: ignore[attr-defined]
+    if ground is None or not is_ground_file(ground):
+        return settings
+    copy = folder / GROUND_COPY
+    if not copy.exists():
+        read_ground(ground)
+        write_text(copy, Path(ground).read_text(encoding="utf-8"))
+    return settings.model_copy(update={"ground": str(copy)})
+
+
+def reached(trajectory: Trajectory, *, spikes_per_row: float = SPIKES_PER_ROW) -> dict[str, float]:
+    """Largest load on one spike [N], depth of a tip [m] and speed at which a tip goes in [m/s] at the samples.
+
+    The load is that of the trial's law at each depth and speed, without its effects. All are 0 if nothing touches.
+    """
+    trial = trajectory.trial
+    radius = ball_radius(trial)
+    depth = tip_depth(trajectory.theta, trajectory.y, count=trial.spike_count, length=trial.spike_length, radius=radius)
+    arms = (trial.spike_length - radius) * np.sin(tip_angles(trial.spike_count, trajectory.theta))
+    rate = -arms * trajectory.omega[:, None] - trajectory.vy[:, None]
+    touching = depth > 0
+    if not touching.any():
+        return {"load": 0.0, "depth": 0.0, "speed": 0.0}
+    law, numbers = trial.surface.law, trial.surface.numbers
+    pairs = zip(depth[touching].tolist(), rate[touching].tolist(), strict=True)
+    load = max(law.force(z, v, numbers) for z, v in pairs) / spikes_per_row
+    return {"load": load, "depth": float(depth.max()), "speed": max(0.0, float(rate[touching].max()))}
+
+
+def range_warnings(
+    fitted: GroundFile | None, trajectory: Trajectory, *, gravity: float, diameter: float, count: float = SPIKES_PER_ROW
+) -> list[str]:
+    """One warning for each number of a tumble outside the range of the law; `gravity` [m/s2] is that of the grains.
+
+    `diameter` [m] is that of the tips, of which `count` press side by side. What stays below a range is not reported
+    for load, depth and speed: every landing begins there.
+    """
+    if fitted is None:
+        return []
+    most = {
+        name: max(value, fitted.range[name][0])
+        for name, value in reached(trajectory, spikes_per_row=count).items()
+    }  # fmt: skip
+    return [
+        say("beyond_range", sentence=sentence, fitted=fitted)
+        for sentence in fitted.beyond(**most, gravity=gravity, diameter=diameter)
+    ]

@@ -1,0 +1,123 @@
+"""`--ground ground.toml` of tumble, hop, paper and penetrate."""
+
+import numpy as np
+import pytest
+
+from experiments import hop, paper, penetrate, tumble
+from experiments.hop.numbers import plan_hop
+from experiments.paper.experiment import plan_jobs
+from experiments.platform.ground_file import reached
+from experiments.runs.folder import read_series
+from experiments.tumble.trial import plan_tumble
+from rigid.ground_file import GroundFile
+from rigid.planar.simulate import simulate
+
+WIDE = {"load": (0, 50), "depth": (0, 0.1), "speed": (0, 5), "gravity": (0, 10), "diameter": (0.01, 0.012)}
+SOFT = {"stiffness": 62.0, "damping": 0.5}
+CROSSLEY = {"stiffness": 2.1e5, "dissipation": 0.2, "exponent": 1.5}
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(law="spring-damper", values=SOFT, limits=WIDE, material="sand"):
+        made = GroundFile(
+            format="hedgebed-ground/1", law=law, material=material, source="a test", range=limits,
+            foot={"tip": "sphere", "diameter": 0.012},
+            parameters={name: {"value": value, "std": 0.1} for name, value in values.items()},
+        )  # fmt: skip
+        return str(made.write(tmp_path / "ground.toml"))
+
+    return write
+
+
+def test_a_tumble_on_a_file_of_one_spike_is_that_on_twice_its_k_and_c(written, tmp_path):
+    on_file = tumble.run(tumble.Settings(ground=written(), duration=0.5), tmp_path / "a")
+    given = tumble.Settings(surface="sand", stiffness=124.0, damping=1.0, duration=0.5)
+    tumble.run(given, tmp_path / "b")
+    paths = [read_series(tmp_path / name / "trajectory.csv") for name in "ab"]
+    np.testing.assert_array_equal(paths[0]["theta_rad"], paths[1]["theta_rad"])
+    assert on_file["ground"] == "spring-damper"
+    assert on_file["ground_file"]["material"] == "sand"
+
+
+def test_another_law_of_a_file_is_that_of_the_same_parameters(written):
+    fitted = plan_tumble(tumble.Settings(ground=written("hunt-crossley", CROSSLEY), surface="brick")).trial
+    given = tuple(f"{name}={value}" for name, value in CROSSLEY.items())
+    assert fitted == plan_tumble(tumble.Settings(ground="hunt-crossley", ground_parameters=given)).trial
+
+
+def test_a_tumble_that_leaves_the_range_says_which_number_and_how_far(written, tmp_path):
+    limits = WIDE | {"depth": (0, 1e-3), "gravity": (1e-3, 1e-3)}
+    result = tumble.run(tumble.Settings(ground=written(limits=limits), duration=0.3), tmp_path / "run")
+    said = [text.split(" ")[0] for text in result["warnings"] if "outside the range" in text]
+    assert said == ["depth", "gravity"]
+
+
+def test_what_a_tumble_reaches_at_rest_is_its_weight_on_four_spikes(written):
+    trial = plan_tumble(tumble.Settings(ground=written(), torque=0.0)).trial
+    found = reached(simulate(trial, duration=0.05))
+    # At rest K z of each of the four spikes bears a quarter of the weight, as the rows stand at the same depth.
+    assert found["load"] == pytest.approx(trial.weight / 4, rel=1e-3)
+    assert found["depth"] == pytest.approx(trial.weight / 4 / 62.0, rel=1e-3)
+    assert found["speed"] < 1e-6
+
+
+def test_the_friction_of_grains_without_a_surface_is_said_to_be_the_default_s(written):
+    plan = plan_tumble(tumble.Settings(ground=written(material="jsc-1a-dense-heights")))
+    assert plan.surface == "brick"
+    assert any("jsc-1a-dense-heights" in text for text in plan.warnings)
+
+
+def test_a_run_goes_on_with_its_copy_when_the_file_is_gone(written, tmp_path):
+    path = written()
+    settings = tumble.Settings(ground=path, duration=0.2)
+    first = tumble.run(settings, tmp_path / "run")
+    (tmp_path / "ground.toml").unlink()
+    again = tumble.resume(tmp_path / "run")
+    assert again["quantities"] == first["quantities"]
+
+
+def test_a_hop_from_a_file_is_that_from_twice_its_k_and_c(written):
+    fitted, given = (
+        plan_hop(hop.Settings(**options))
+        for options in ({"ground": written()}, {"surface": "sand", "stiffness": 124.0, "damping": 1.0})
+    )
+    assert (fitted.stiffness, fitted.damping, fitted.law) == (given.stiffness, given.damping, None)
+    assert fitted.numbers["mu_s"] == given.numbers["mu_s"]
+    law = plan_hop(hop.Settings(ground=written("hunt-crossley", CROSSLEY))).law
+    assert (law.name, law.spikes_per_row, dict(law.parameters)) == ("hunt-crossley", 2.0, CROSSLEY)
+
+
+def test_the_paper_s_trials_stand_on_the_law_where_the_surface_is_of_its_grains(written):
+    settings = paper.Settings(surfaces=("steel", "sand"), ground=written(), evidence=False, sweep=False)
+    stiffness = {job.surface: job.trial.stiffness for job in plan_jobs(settings) if job.variant == "nominal"}
+    assert stiffness == {"steel": 1.5e4, "sand": 124.0}
+    with pytest.raises(ValueError, match="none of surfaces"):
+        plan_jobs(paper.Settings(surfaces=("steel",), ground=written()))
+
+
+def test_a_spike_set_down_on_the_law_of_a_file_rests_at_load_over_stiffness(written, tmp_path):
+    settings = penetrate.Settings(ground=written(limits=WIDE | {"speed": (0.2, 0.3)}), load=0.2)
+    result = penetrate.run(settings, tmp_path / "run")
+    # A set-down ends within 0.3 % of its load.
+    assert result["quantities"]["sinkage_law"]["value"] == pytest.approx(0.2 / 62.0, rel=4e-3)
+    said = [text for text in result["warnings"] if "speed =" in text]
+    assert [float(text.split("speed = ")[1].split(" ")[0]) for text in said] == [0.4, 0.1]
+
+
+def test_what_cannot_stand_beside_a_file_is_refused(written):
+    path = written()
+    for kind, options, named in (
+        (tumble.Settings, {"stiffness": 10.0}, "stiffness"),
+        (tumble.Settings, {"ground_parameters": ("stiffness=10",)}, "ground_parameters"),
+        (hop.Settings, {"damping": 1.0}, "damping"),
+        (penetrate.Settings, {"model": "model.toml"}, "model"),
+    ):
+        with pytest.raises(ValueError, match=named):
+            kind(ground=path, **options)
+    for kind in (tumble, hop, paper, penetrate):
+        with pytest.raises(ValueError, match="ground"):
+            kind.Settings(ground="sandy")
+    for kind in (tumble, hop, paper, penetrate):
+        with pytest.raises(ValueError, match=r"nowhere\.toml: cannot be read"):
+            kind.check(kind.Settings(ground="nowhere.toml"))
