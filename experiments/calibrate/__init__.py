@@ -2,7 +2,7 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed bed calibrate`; calling one imports what computes.
 
-Imports `dem`, `experiments.bed`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `vis`.
+Imports `dem`, `experiments.bed`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 
 from dem.grains.materials import Material, material
 from experiments.penetrate.settings import STANDARD_GRAVITY, Spread
-from experiments.runs.reading import nearest
 from experiments.runs.strict import Positive, SeedNumber, StrictSettings, Threads
 from experiments.runs.types import Json
+from rigid.checks import nearest
 from vis.page.sentences import Sentences
 
 __all__ = ["FIGURES", "FREE", "CalibrateSettings", "Figure", "Target", "material_at"]

@@ -22,7 +22,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from experiments.runs.folder import toml_value, write_text
-from experiments.runs.reading import nearest
+from rigid.checks import nearest
 
 from .recording import Recording, read_recording, write_recording
 from .tables import (

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from experiments.runs.reading import nearest
+from rigid.checks import nearest
 
 __all__ = ["benchmark_options", "goes_on", "load_benchmark", "spelled_out"]
 

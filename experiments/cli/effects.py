@@ -8,7 +8,7 @@ from functools import partial
 from rich.console import Console
 from rich.table import Column, Table
 
-from experiments.runs.reading import nearest
+from rigid.checks import nearest
 from rigid.terms import EFFECTS, Term
 
 __all__ = ["show_effects"]
@@ -30,8 +30,8 @@ def show_effects(names: Sequence[str] = ()) -> None:
         given = "\n".join(f"{term.id}.{p.name}" + ("" if p.unit == "1" else f" ({p.unit})") for p in term.parameters)
         table.add_row(term.id, term.summary + (" (rig only)" if term.needs_rig else ""), given)
     console.print(table, markup=False)
-    print("\nhedgebed tumble --effects pendulum.length=2.2 com-offset.x=2e-4   takes several, in SI units")
-    print("hedgebed effects pendulum                                         says more of one")
+    print("\nhedgebed tumble --effects pendulum.length=2.2 com-offset.x=2e-4   sets several, in SI units")
+    print("hedgebed effects pendulum                                         shows one in detail")
 
 
 def _show_one(console: Console, term: Term) -> None:

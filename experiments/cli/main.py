@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Group, Parameter
 
 from experiments.cli.benching import spelled_out
 from experiments.cli.options import as_typed, option_of, reserved_option
@@ -36,7 +36,19 @@ from experiments.runs.streams import (
 from experiments.runs.version import __version__
 from hedgebed_taichi import chosen
 
-__all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "build_app", "main"]
+__all__ = ["BAD_INPUT", "DONE", "FAILED", "GROUPS", "STOPPED", "build_app", "main"]
+
+GROUPS = {
+    name: Group(title, sort_key=place)
+    for place, (name, title) in enumerate({
+        "simulate": "Simulate",
+        "measure": "Explain measured trials",
+        "compare": "Compare and verify",
+        "prepare": "Prepare beds",
+        "keep": "Manage runs and installation",
+    }.items())
+}  # fmt: skip
+"""Headings of ``hedgebed --help``, by the name that registry.toml gives to the group of an experiment."""
 
 
 def main(tokens: Sequence[str] | None = None) -> int:
@@ -68,6 +80,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     """
     settings_class, presets = experiment.settings_class(), experiment.presets
     fields = settings_class.model_fields
+    below = [name.split(" ")[-1] for name in registry.EXPERIMENTS if name.startswith(f"{experiment.name} ")]
     pair = bool(experiment.subject) and get_origin(fields[experiment.subject].annotation) is tuple
 
     def command(
@@ -90,7 +103,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
                 several = "; to try several values, --sweep KEY=FROM:TO:STEP" if "sweep" in fields else ""
                 raise ValueError(f"{case} belongs to no option: an option that describes one number takes one{several}")
             layers = [read_case(registry.CASES / preset.case) for preset in presets if given.pop(preset.option, False)]
-            layers += [read_case(find_case(case, registry.CASES))] if case is not None else []
+            layers += [read_case(find_case(case, registry.CASES, below))] if case is not None else []
             typed = Layer(None, as_typed(given, fields))
             settings = settings_from(settings_class, [*layers, typed])
             with stdout_to_stderr():
@@ -130,7 +143,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
 
 _Json = Annotated[bool, Parameter(help="Print the result as JSON on stdout and nothing else.", negative="")]
 _Quiet = Annotated[bool, Parameter(help="Show no progress.", negative="")]
-_Verbose = Annotated[bool, Parameter(help="Print every number and finding, as the report has them.", negative="")]
+_Verbose = Annotated[bool, Parameter(help="Print every number and finding of the report.", negative="")]
 
 
 def _resume(
@@ -141,7 +154,7 @@ def _resume(
     quiet: _Quiet = False,
     verbose: _Verbose = False,
 ) -> int:
-    """Finish a run that was stopped, failed or killed, from its last checkpoint."""
+    """Continue a run that was stopped, failed or killed from its last checkpoint."""
     with refusing():
         run = RunFolder.open(folder)
         experiment = find_experiment(run.command)
@@ -164,15 +177,15 @@ def _resume(
 
 
 def _bench(
-    what: Annotated[str, Parameter(help="What to measure: the name of a module in benchmarks/.")] = "bed",
+    what: Annotated[str, Parameter(help="What to measure: bed, answer, diagnose or planar.")] = "bed",
     /,
     *,
     out: Annotated[Path | None, Parameter(help="Folder for bench.json; runs/bench-<time> if not given.")] = None,
     json: _Json = False,
     quiet: _Quiet = False,
-    **options: Annotated[str, Parameter(help="What else this benchmark takes: docs say it.")],
+    **options: Annotated[str, Parameter(help="Options of the benchmark: docs/commands.md.")],
 ) -> int:
-    """Measure how fast or how good it is, beside others where they are installed (from a checkout)."""
+    """Measure speed or reliability, also of other codes that are installed (needs a checkout)."""
     from experiments.cli.benching import benchmark_options, goes_on, load_benchmark
 
     with refusing():
@@ -202,9 +215,9 @@ def _campaign_new(
     folder: Annotated[Path, Parameter(help="Where to write it; must be new or empty.")],
     /,
     *,
-    kind: Annotated[Literal["tumble", "penetration"], Parameter(help="What kind of trials.", show_default=False)],
+    kind: Annotated[Literal["tumble", "penetration"], Parameter(help="Kind of trials.", show_default=False)],
 ) -> int:
-    """Write an annotated template: campaign.toml with every key explained, and short recordings to be replaced."""
+    """Write a template: campaign.toml with every key explained, and short recordings to replace."""
     from experiments.campaign.files import new_campaign
 
     with refusing():
@@ -245,7 +258,7 @@ def _campaign_from_run() -> Callable[..., int]:
             else:
                 campaign = write_run_campaign(run, folder, sensors=sensors)
         print(f"campaign: {folder / 'campaign.toml'}")
-        say(f"{len(campaign.tables.trial)} trials; `hedgebed diagnose {folder}` says what the spring-damper lacks")
+        say(f"{len(campaign.tables.trial)} trials; `hedgebed diagnose {folder}` finds what the spring-damper omits")
         return DONE
 
     places = {"run": "Folder of a finished run of penetrate, or of tumble."}
@@ -265,11 +278,11 @@ def _with_parameters(command: Callable[..., int], parameters: list[inspect.Param
 
 def _effects(
     names: Annotated[
-        tuple[str, ...], Parameter(help="Only these; with all their parameters, source and limits.", negative="")
+        tuple[str, ...], Parameter(help="Effects to show in detail: parameters, source, limits.", negative="")
     ] = (),
     /,
 ) -> int:
-    """List the terms beyond the base model, as `tumble` and `campaign` take them with --effects."""
+    """List the effects that --effects of `tumble` and `campaign` adds to the base model."""
     from experiments.cli.effects import show_effects
 
     with refusing():
@@ -278,7 +291,7 @@ def _effects(
 
 
 def _doctor(*, json: _Json = False) -> int:
-    """Say what this machine has and what to install where something lacks."""
+    """Check this machine and state what to install."""
     from experiments.cli.doctor import examine, show
 
     findings = examine()
@@ -290,42 +303,50 @@ def build_app() -> App:
     """The command line as a cyclopts App; a command returns its exit status."""
     app = App(
         name="hedgebed",
-        help="Robots that hop and tumble on asteroids: their spikes in beds of grains, the spring-damper that stands "
-        "in for those, the platform's tumbles and hops, and what measured trials lack. SI units throughout; a number "
-        "may have another unit behind it, as 16mm and 1e-3g.",
+        help="Simulate robots that hop and tumble on asteroids: spikes in beds of grains, the spring-damper that "
+        "replaces such a bed, tumbles and hops of the platform, and the diagnosis of measured trials. "
+        "Each command has its own --help; docs/commands.md describes all.",
+        help_epilogue="Numbers are in the unit in brackets, or have a unit of their own: 16mm, 0.5N, 1e-3g.",
         help_format="plaintext",
+        group_commands=Group("Other", sort_key=len(GROUPS)),
         version=__version__,
         result_action="return_value",
     )
     if "bed make" in registry.EXPERIMENTS:
         from experiments.cli.bed_commands import add_bed_commands
 
-        app.command(App(name="bed", help="Beds prepared as in a laboratory: made, listed, shown, shared, refined."))
+        about = "Prepare, list, show, share, refine, test and calibrate beds of grains."
+        app.command(App(name="bed", help=about, group=GROUPS["prepare"]))
         add_bed_commands(app["bed"])
-        app["bed"].command(App(name="test", help="Tests as a laboratory makes them of a bed."))
-    for experiment in registry.EXPERIMENTS.values():
+        app["bed"].command(App(name="test", help="Test beds as in a laboratory: shear, repose, cone, vertical cut."))
+    for place, experiment in enumerate(registry.EXPERIMENTS.values()):
         *above, name = experiment.name.split(" ")
         home = app
         for word in above:
             home = home[word]
-        home.command(_experiment_command(experiment), name=name, help=experiment.summary)
+        group = GROUPS.get(experiment.group)
+        command = _experiment_command(experiment)
+        home.command(command, name=name, help=experiment.summary, group=group, sort_key=place)
     if "campaign" in registry.EXPERIMENTS:
         app["campaign"].command(_campaign_new, name="new")
         app["campaign"].command(
             _campaign_from_run(),
             name="from-run",
-            help="Write finished runs of penetrate, or of tumble, as a campaign of trials.",
+            help="Write finished runs of penetrate or tumble as a campaign of trials.",
         )
-    app.command(_resume, name="resume")
+    app.command(_resume, name="resume", group=GROUPS["keep"])
     if "tumble" in registry.EXPERIMENTS:
         from experiments.cli.render import render
 
-        app.command(render, name="render")
+        app.command(render, name="render", group=GROUPS["keep"])
         from experiments.suite.commands import add_suite_commands
 
-        app.command(App(name="experiments", help="The platform on grains: the cases that ship, and doing them."))
+        about = "List and run the cases that ship: the platform on beds of grains."
+        app.command(App(name="experiments", help=about, group=GROUPS["simulate"]))
         add_suite_commands(app["experiments"])
-    app.command(_bench, name="bench")
-    app.command(_effects, name="effects")
-    app.command(_doctor, name="doctor")
+    app.command(_bench, name="bench", group=GROUPS["compare"])
+    app.command(_effects, name="effects", group=GROUPS["measure"])
+    app.command(_doctor, name="doctor", group=GROUPS["keep"])
+    about = "Install the completion of commands and options by Tab, for bash, zsh, fish or PowerShell."
+    app.register_install_completion_command(help=about)
     return app

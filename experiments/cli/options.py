@@ -16,11 +16,11 @@ from experiments.runs.units import find_unit, has_unit
 __all__ = ["as_typed", "option_of", "reserved_option"]
 
 _RESERVED = {
-    "case": (Path | None, None, "A TOML file of settings, or the name of a case that ships; options win over it."),
-    "out": (Path | None, None, "The run's folder; runs/<command>-<time> if not given."),
+    "case": (Path | None, None, "TOML file of settings, or the name of a case that ships; options override it."),
+    "out": (Path | None, None, "Folder of the run; runs/<command>-<time> if not given."),
     "json": (bool, False, "Print result.json on stdout and nothing else."),
     "quiet": (bool, False, "Show no progress."),
-    "verbose": (bool, False, "Print every number and finding in the end, as the report has them."),
+    "verbose": (bool, False, "Print every number and finding of the report at the end."),
 }
 
 

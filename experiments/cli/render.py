@@ -15,18 +15,18 @@ __all__ = ["render"]
 
 
 def render(
-    run: Annotated[Path, Parameter(help="The folder of a finished run.")],
+    run: Annotated[Path, Parameter(help="Folder of a finished run.")],
     /,
     *,
     colour: Annotated[
         Literal["displacement", "speed", "force", "coordination"],
-        Parameter(help="What grains are coloured by, of a tumble.", negative=""),
+        Parameter(help="Quantity that colours the grains of a tumble.", negative=""),
     ] = "displacement",
-    film: Annotated[bool, Parameter(help="Whether to make the film of a tumble too.")] = True,
+    film: Annotated[bool, Parameter(help="Draw the film of a tumble too.")] = True,
     json: Annotated[bool, Parameter(help="Print the files that were drawn as JSON on stdout.", negative="")] = False,
     quiet: Annotated[bool, Parameter(help="Show no progress.", negative="")] = False,
 ) -> int:
-    """Draw the stills and the film of a run again, and its report: a tumble's from a camera that follows it."""
+    """Draw pictures, film and report of a finished run again."""
     with refusing():
         folder = RunFolder.open(run)
         if not (run / "result.json").exists():

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from experiments.runs.reading import nearest
 from hedgebed_renamed import material_of_today
+from rigid.checks import nearest
 
 __all__ = ["DEFAULT_SURFACE", "Surface", "find_surface", "surface_names", "surface_of_grains"]
 

@@ -17,8 +17,9 @@ from pydantic_core import ErrorDetails
 from experiments.runs.folder import RUN_FORMATS, settings_in
 from experiments.runs.strict import may_be_empty
 from experiments.runs.units import find_unit, in_both
+from rigid.checks import nearest
 
-__all__ = ["Layer", "find_case", "gravities_told", "nearest", "option", "read_case", "settings_from"]
+__all__ = ["Layer", "find_case", "gravities_told", "option", "read_case", "settings_from"]
 
 Settings = TypeVar("Settings", bound=BaseModel)
 
@@ -42,17 +43,11 @@ def option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def nearest(word: str, words: Iterable[str]) -> str:
-    """``; did you mean 'x'?`` for the word most like `word`, or where none is like it, all there are."""
-    words = list(words)
-    close = get_close_matches(word, words, n=1) or get_close_matches(word.replace("-", "_").lower(), words, n=1)
-    return f"did you mean {close[0]!r}?" if close else f"there is {', '.join(words)}"
-
-
-def find_case(given: Path, shipped: Path) -> Path:
+def find_case(given: Path, shipped: Path, commands: Iterable[str] = ()) -> Path:
     """The case file that `given` means: a path, or the name of one in the folder `shipped`.
 
-    Raises ValueError naming those that ship and are spelt like it, or where none is, those of the folder itself.
+    Raises ValueError naming those that ship and are spelt like it, or where none is, those of the folder itself; first
+    of all the one of `commands`, whose words may stand in the same place, that is spelt like it.
     """
     if given.is_file():
         return given
@@ -60,6 +55,8 @@ def find_case(given: Path, shipped: Path) -> Path:
         for named in (shipped / f"{given}.toml", *sorted(shipped.glob(f"*/{given.name}.toml"))):
             if named.is_file():
                 return named
+    if meant := get_close_matches(str(given), list(commands), n=1):
+        raise ValueError(f"{str(given)!r} is neither a command nor a file; did you mean {meant[0]!r}?")
     names = sorted(path.stem for path in shipped.glob("*.toml"))
     below = sorted(path.stem for path in shipped.glob("*/*.toml"))
     if close := get_close_matches(given.name.removesuffix(".toml"), [*names, *below], n=_NEAR):

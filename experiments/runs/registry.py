@@ -69,6 +69,7 @@ class Experiment:
     summary: str
     settings: str  # "module:Class", a frozen pydantic model; every field with a description that gives the unit
     module: str
+    group: str = ""  # Of a command of one word: the group of `hedgebed --help`, a key of cli.main.GROUPS
     presets: tuple[Preset, ...] = ()
     subject: str = ""  # Setting that the first argument is (the first two, of a setting of two)
     example: str = ""  # File in experiments/cases, of an experiment whose case has no default

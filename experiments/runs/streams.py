@@ -9,6 +9,7 @@ from contextlib import contextmanager, redirect_stdout
 from types import FrameType
 
 from cyclopts import CoercionError, MissingArgumentError
+from cyclopts.exceptions import UnusedCliTokensError
 
 __all__ = ["RefusedError", "fault_words", "is_number", "refusing", "say", "stdout_to_stderr", "terminate_like_ctrl_c"]
 
@@ -32,6 +33,8 @@ def fault_words(error: Exception) -> str:
             typed = " ".join(error.tokens_so_far) or "nothing"
             about = f" ({error.argument.parameter.help.rstrip('.')})" if error.argument.parameter.help else ""
             return f"{error.argument.name} = {typed} will not do: it takes {count} values, not {got}{about}"
+    if isinstance(error, UnusedCliTokensError):
+        return f"{' '.join(error.unused_tokens or [])} belongs to no option and to no argument; --help lists them"
     if isinstance(error, CoercionError) and error.target_type is float and error.token and error.argument:
         unit = re.findall(r"\[([^\[\]]+)\]", error.argument.parameter.help or "")[-1:]
         if unit and unit[0] != "1":

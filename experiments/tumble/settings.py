@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from experiments.grains.settings import OF_THE_MASTER, TumbleBedSettings
 from experiments.platform.settings import NotNegative, PlatformSettings, Positive
-from experiments.runs.reading import nearest
+from rigid.checks import nearest
 from rigid.ground.laws import GROUNDS
 from rigid.ground_file import is_ground_file
 from rigid.terms import EFFECTS

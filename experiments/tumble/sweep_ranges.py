@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from experiments.runs.reading import nearest
 from experiments.runs.units import find_unit, has_unit, in_both
+from rigid.checks import nearest
 from rigid.terms import EFFECTS
 
 __all__ = ["MOST_TRIALS", "SWEEPABLE", "SweepRange", "parse_sweep", "swept_gravities", "unit_of"]

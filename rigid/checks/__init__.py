@@ -4,8 +4,9 @@ Imports nothing of ours.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
+from difflib import get_close_matches
 from numbers import Real
 from typing import Any
 
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "Coulomb", "Parameter", "check_above_zero", "check_counterweight", "check_friction", "check_not_negative",
-    "check_parameters", "check_simulated_gravity", "is_number", "sample_times",
+    "check_parameters", "check_simulated_gravity", "is_number", "nearest", "sample_times",
 ]  # fmt: skip
 
 
@@ -58,6 +59,13 @@ def check_parameters(parameters: Sequence[Parameter], given: Mapping[str, Any], 
     return {
         key: parameter.check(given.get(key, parameter.default), f"{owner}.{key}") for key, parameter in known.items()
     }
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """``did you mean 'x'?`` for the word most like `word`; where none is like it, all `words`."""
+    words = list(words)
+    close = get_close_matches(word, words, n=1) or get_close_matches(word.replace("-", "_").lower(), words, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"there is {', '.join(words)}"
 
 
 def is_number(value: Any) -> bool:

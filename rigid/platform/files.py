@@ -2,12 +2,13 @@
 
 import tomllib
 from collections.abc import Callable
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from rigid.checks import nearest
 
 from .actuation import Flywheel
 from .inertia import Part, combine
@@ -115,7 +116,8 @@ def find_platform(name: str | Path) -> Platform:
     if path.parent == Path() and shipped.is_file():
         return read_platform(shipped)
     raise ValueError(
-        f"platform = {str(name)!r} is none that ships ({', '.join(platform_names())}), nor the path of a .toml file"
+        f"platform = {str(name)!r} is neither a platform that ships nor the path of a .toml file; "
+        f"{nearest(str(name), platform_names())}"
     )
 
 
@@ -147,9 +149,7 @@ def _sentence(path: Path, detail: Any) -> str:
         return f"{path}: {key} is missing: it must be given"
     if detail["type"] == "extra_forbidden":
         names = _keys_beside(detail["loc"])
-        close = get_close_matches(str(detail["loc"][-1]), names, n=1)
-        meant = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(names)}"
-        return f"{path}: {key} = {detail['input']!r} is no key of a platform; {meant}"
+        return f"{path}: {key} = {detail['input']!r} is no key of a platform; {nearest(str(detail['loc'][-1]), names)}"
     message = detail["msg"].removeprefix("Value error, ")
     found = detail["input"] if not isinstance(detail["input"], dict) else sorted(detail["input"])
     return f"{path}: {key} = {found!r} will not do: {message[:1].lower()}{message[1:]}"

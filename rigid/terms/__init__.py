@@ -16,6 +16,8 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
+from rigid.checks import nearest
+
 from .base import BASE
 from .candidate import Candidate
 from .term import FIXED_ARGUMENTS, STATE_FIELDS, Parameter, Term
@@ -57,7 +59,7 @@ def find_candidate(id: str) -> Candidate | None:
 def find_effect(id: str) -> Term:
     """The effect called `id`. Raises ValueError naming those there are."""
     if id not in EFFECTS:
-        raise ValueError(f"effect {id!r} is unknown; there is {', '.join(EFFECTS)}")
+        raise ValueError(f"effect {id!r} is unknown; {nearest(id, EFFECTS)}")
     return EFFECTS[id]
 
 

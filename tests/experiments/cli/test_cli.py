@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,8 +15,9 @@ from golden import golden
 
 import hedgebed
 import hedgebed_taichi
-from experiments.cli.main import main
+from experiments.cli.main import GROUPS, build_app, main
 from experiments.cli.runs import _number, show_folder
+from experiments.runs import registry
 from experiments.runs.folder import RunFolder
 from rigid.terms import EFFECTS
 
@@ -129,6 +131,44 @@ def test_bad_input_is_refused_in_a_sentence_that_names_it(dig, capsys, tokens, s
 def test_an_unknown_command_is_refused_with_the_nearest(dig, capsys):
     assert main(["dg"]) == 2
     assert '"dig"' in capsys.readouterr().err
+
+
+def test_every_command_stands_in_a_group_of_the_help(capsys, monkeypatch):
+    """An experiment without a group, or with one that does not exist, would be listed beside --help and --version."""
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(["--help"]) == 0
+    *grouped, other = re.split("╭─ ", capsys.readouterr().out)
+    assert [part.split(" ─")[0] for part in grouped[1:]] == [group.name for group in GROUPS.values()]
+    listed = set(re.findall(r"│ ([a-z][\w-]*)", "".join(grouped)))
+    assert {name.split(" ")[0] for name in registry.EXPERIMENTS} < listed
+    assert re.findall(r"│ ([\w-]+)", other) == ["--help", "--install-completion", "--version"]
+
+
+def test_completion_knows_commands_and_options():
+    script = build_app().generate_completion(shell="bash")
+    assert "penetrate" in script and "--tip-diameter" in script and "install-completion" in script
+
+
+@pytest.mark.parametrize(
+    "typed, meant",
+    [
+        (["penetrat"], "penetrate"),
+        (["bed", "mak"], "make"),
+        (["tumble", "spatail"], "spatial"),
+        (["tumble", "--tumbels", "2"], "--tumbles"),
+        (["tumble", "--platform", "hedghog"], "hedgehog"),
+        (["tumble", "--surface", "brik"], "brick"),
+        (["tumble", "--effects", "pendulm.length=2"], "pendulum"),
+        (["penetrate", "--tip", "flatt"], "flat"),
+        (["penetrate", "penetrate-ful"], "penetrate-full"),
+    ],
+)
+def test_a_misspelt_word_is_answered_with_the_nearest(typed, meant, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert main(typed) == 2
+    text = capsys.readouterr().err
+    assert re.search(rf"\b{meant.lstrip('-')}\b", text) and len(text) < 250, text
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_check_of_the_experiment_refuses_before_a_folder_is_made(dig, capsys):
