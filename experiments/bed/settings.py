@@ -34,7 +34,9 @@ GRADED = ("footprints", "fine_depth", "growth")
 SPREAD_OUT = ("deviation", "cut", "openings", "passing")
 """Settings of ``distribution``, each of some of them."""
 _OF = {"normal": ("deviation", "cut"), "log-normal": ("deviation", "cut"), "sieve": ("openings", "passing")}
-_NAME = "Name under which the bed is kept on the shelf (HEDGEBED_BEDS); in the run's folder alone if not given."
+_NAME = (
+    "Name under which the bed is kept in the folder HEDGEBED_BEDS; if not given, it is only in the folder of the run."
+)
 ShelfName = Annotated[str | None, Field(min_length=1, description=_NAME)]
 
 
@@ -43,33 +45,33 @@ class BedSettings(StrictSettings):
 
     material: GrainMaterial = "sand"
     stages: tuple[str, ...] = Field(("rain", "level"), min_length=1)
-    """What is done, in this order: rain[:dry|:FRICTION], stick, level[:HEIGHT], fluff[:TIMES], compact:PACKING[@lid],
-    compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES."""
+    """Stages of preparation, in this order: rain[:dry|:FRICTION], stick, level[:HEIGHT], fluff[:TIMES],
+    compact:PACKING[@lid], compact:densest, packing:PACKING, cut:WIDTH, tilt:DEGREES."""
     size: BedSize = (0.04, 0.04, 0.03)
     grain: Grain = 0.004
     spread: Spread = 0.15
     distribution: Distribution = "uniform"
-    """Of the diameters, about `grain`: uniform, normal or log-normal by number; sieve: a table by mass, enlarged until
-    its grains have that mean."""
+    """Distribution of grain diameters with the mean `grain`: uniform, normal or log-normal by number; sieve: a table by
+    mass, scaled to that mean."""
     deviation: Positive | None = None
-    """Standard deviation over the mean (normal), or of ln diameter (log-normal) [1]."""
+    """Relative standard deviation (normal), or standard deviation of ln diameter (log-normal) [1]."""
     cut: Positive | None = None
-    """Where normal and log-normal are cut off [standard deviations]; 2 if not given."""
-    openings: tuple[Positive, ...] = Field((), description="A sieve table: openings, ascending [m].")
+    """Truncation of normal and log-normal [standard deviations]; 2 if not given."""
+    openings: tuple[Positive, ...] = Field((), description="Sieve table: openings, ascending [m].")
     passing: tuple[Annotated[float, Field(ge=0, le=1)], ...] = ()
-    """A sieve table: share of the mass that passes each, from 0 to 1 [1]."""
+    """Sieve table: share of the mass that passes each opening, from 0 to 1 [1]."""
     keep: Kept = "strength"
-    """What stays the same of a material that sticks, in grains of another size than it was found for: their strength
-    (pull-off over d^2), their Bond number (pull-off over weight), or the surface energy."""
+    """Cohesive material in grains of another size than its file states: quantity that stays the same. strength:
+    pull-off force over d^2; bond: pull-off force over weight; or the surface energy."""
     coarse: Positive | None = None
-    """A graded bed: mean diameter of the coarsest grains, away from the footprints, under which it is `grain` [m]; one
-    size throughout if not given."""
+    """Graded bed: largest mean grain diameter, away from the footprints, under which it is `grain` [m]; one size
+    throughout if not given."""
     footprints: tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...] = ()
-    """A graded bed: along x, where each strip of fine grains begins and ends [m]."""
+    """Graded bed: begin and end of each strip of fine grains along x [m]."""
     fine_depth: Positive | None = None
-    """A graded bed: how deep the fine grains reach [m]; to the floor if not given."""
+    """Graded bed: depth of the fine grains [m]; the whole bed if not given."""
     growth: Positive | None = None
-    """A graded bed: growth of the mean diameter with distance [1]; 0.15 if not given."""
+    """Graded bed: growth of the mean diameter with distance [1]; 0.15 if not given."""
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
     seed: SeedNumber = Field(1, description="Seed of sizes and positions.")
     name: ShelfName = None
@@ -139,11 +141,11 @@ class BedSettings(StrictSettings):
 class BedRefineSettings(StrictSettings):
     """The same bed with smaller grains: the same material, size, gravity and stages, brought to the same packing."""
 
-    bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
-    grain: Positive | None = Field(None, description="Mean grain diameter [m]; half of the bed's own if not given.")
+    bed: str = Field(description="Bed: its file, the folder of its bed make run, or its name.")
+    grain: Positive | None = Field(None, description="Mean grain diameter [m]; half of that of the bed if not given.")
     keep: Kept = "strength"
-    """What stays the same of grains that stick: their strength (pull-off over d^2), their Bond number (pull-off over
-    weight), or the surface energy."""
-    seed: SeedNumber | None = Field(None, description="Seed of sizes and positions; the bed's own if not given.")
+    """Cohesive grains: quantity that stays the same. strength: pull-off force over d^2; bond: pull-off force over
+    weight; or the surface energy."""
+    seed: SeedNumber | None = Field(None, description="Seed of sizes and positions; that of the bed if not given.")
     name: ShelfName = None
     threads: Threads = None

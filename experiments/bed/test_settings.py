@@ -18,14 +18,14 @@ class BedTestSettings(StrictSettings):
     """Which beds are tested: one that is there, or beds prepared (or taken from the cache) for the test."""
 
     bed: str | None = Field(None, min_length=1)
-    """The bed: a file, the folder of a run of bed make, or a name on the shelf. Decides material, size, grain, spread,
-    packing, gravity and seed; beds are prepared, or taken from the cache, if not given."""
+    """Bed: its file, the folder of its bed make run, or its name. It sets material, size, grain, spread, packing,
+    gravity and seed. If not given, beds are prepared or taken from the cache."""
     material: GrainMaterial = "sand"
     size: BedSize = (0.16, 0.024, 0.04)
     grain: Grain = 0.004
     spread: Spread = 0.15
     packing: float | None = Field(None, gt=0.1, le=0.74)
-    """Packing fraction to prepare the bed to [1]; as it settles if not given."""
+    """Packing fraction of the bed [1]; that after settling if not given."""
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
     seeds: Seeds = (1, 2, 3)
     threads: Threads = None
@@ -54,29 +54,30 @@ class BedConeSettings(BedTestSettings):
     diameter: Positive = Field(0.016, description="Diameter of the cone's base [m].")
     angle: float = Field(60.0, ge=10, le=150, description="Full angle of the cone [degrees].")
     depth: Positive | None = None
-    """How deep the tip goes below the surface [m]; half the bed's depth if not given."""
+    """Depth of the tip below the surface [m]; half the depth of the bed if not given."""
     speed: Positive | None = None
-    """Speed of the cone [m/s]; if not given 30 mm/s for a cone of 20.27 mm on Earth (ASAE S313.3), and as sqrt(g D) for
-    others."""
-    shaft: Positive | None = Field(None, description="Diameter of the shaft [m]; 0.783 of the cone's if not given.")
+    """Speed of the cone [m/s]. If not given: 30 mm/s for a cone of 20.27 mm on Earth (ASAE S313.3), otherwise scaled
+    with sqrt(g D)."""
+    shaft: Positive | None = Field(
+        None, description="Diameter of the shaft [m]; 0.783 of the diameter of the cone if not given."
+    )
     friction: float | None = Field(None, ge=0, le=10)
-    """Friction of grains on the cone [1]; the grains' own if not given."""
+    """Friction coefficient between grains and cone [1]; that of the grains if not given."""
     max_overlap: float | None = Field(None, ge=0.01, le=0.15)
-    """Largest overlap of grains under the cone [of a diameter]; the bed's own bound, for which its grains were made, if
-    not given."""
-    pushes: int = Field(2, ge=1, le=20, description="Pushes into each bed, each into a fresh copy, in another place.")
+    """Largest overlap of grains under the cone [of a diameter]; the bound of the bed if not given."""
+    pushes: int = Field(2, ge=1, le=20, description="Pushes into each bed, each into a new copy at another place.")
 
 
 class BedCutSettings(BedTestSettings):
     """A vertical cut: gravity rises until a face falls; critical height and cohesion."""
 
     size: BedSize = (0.128, 0.024, 0.04)
-    width: Positive | None = Field(None, description="Width of the cut [m]; the bed's height if not given.")
+    width: Positive | None = Field(None, description="Width of the cut [m]; the height of the bed if not given.")
     most: float = Field(4.0, ge=0.2, le=100)
-    """Gravity to which it rises if no face falls [of the bed's own]."""
+    """Largest gravity [of that of the bed]."""
     friction_angle: float | None = Field(None, ge=0, lt=80)
-    """Friction angle for the cohesion [degrees], of Mohr's circle (bed calibrate, plane = 'mohr'): that of the plane of
-    shear, as bed test shear gives it, is smaller and tells too large a cohesion; none is told if not given."""
+    """Friction angle by Mohr's circle, with which the cohesion is computed [degrees] (bed calibrate, plane = 'mohr').
+    The smaller angle of bed test shear gives too large a cohesion. Without it no cohesion is stated."""
 
 
 class BedShearSettings(StrictSettings):
@@ -84,10 +85,10 @@ class BedShearSettings(StrictSettings):
 
     bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
     pressures: tuple[Positive, ...] = Field((1.0, 2.0, 4.0), min_length=2)
-    """Pressures on the lid, over what lies on the bed's floor [1]; at most 4."""
-    way: Positive = Field(8.0, ge=2, le=200, description="How far the lid goes sideways [mean diameters].")
+    """Pressures on the lid, over the pressure at the floor of the bed [1]; at most 4."""
+    way: Positive = Field(8.0, ge=2, le=200, description="Horizontal travel of the lid [mean diameters].")
     inertial_number: Positive = Field(5e-3, le=0.05)
-    """Speed of the lid, as speed / height d sqrt(density / pressure) [1]."""
+    """Inertial number, speed / height x d sqrt(density / pressure), which sets the speed of the lid [1]."""
     threads: Threads = None
 
     @model_validator(mode="after")

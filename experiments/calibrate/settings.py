@@ -88,53 +88,58 @@ class CalibrateSettings(StrictSettings):
     """Grain parameters found from bulk figures: a response surface over simulated shear tests, and the fit to it."""
 
     name: str = Field("calibrated", pattern=r"^[a-z0-9][a-z0-9._+-]*$")
-    """Name of the material: small letters, digits, '.', '_', '+', '-'."""
+    """Name of the material: lower-case letters, digits, '.', '_', '+', '-'."""
     material: str = "sand"
-    """The material whose numbers it has where they are neither fixed nor free."""
+    """Material that gives all numbers that are neither fixed nor free."""
     fixed: dict[str, float | str] = Field({})
-    """Numbers of its own that are not free, as [fixed] density = 2900.0; keys of a material file."""
-    sources: dict[str, str] = Field({}, description="Where the fixed numbers come from, in words, key by key.")
+    """Fixed numbers, by the keys of a material file: [fixed] density = 2900.0."""
+    sources: dict[str, str] = Field({}, description="Source of each fixed number, by the same keys.")
     free: dict[str, tuple[float, float]] = Field({})
-    """What is found, with its range: [free] rolling_friction = [0.05, 0.8]; friction, rolling_friction [1],
-    surface_energy [J/m2] or bond_number (pull-off force of two grains over the weight of one) [1]."""
+    """Numbers to be fitted, with their ranges: [free] rolling_friction = [0.05, 0.8]. Possible are friction,
+    rolling_friction [1], surface_energy [J/m2] and bond_number (pull-off force of two grains over the weight of one)
+    [1]."""
     targets: dict[str, Json] = Field({})
-    """The figures: [targets.critical_friction_angle] value = 31.5, tolerance = 1.5, source = '...'; also figure = '...'
-    where it has another name, plane = 'shear', 'triaxial' or 'mohr', through = 'tests' or 'origin', state = 'loose'
-    or 'dense', fit = false to compare only."""
-    grain: Positive = Field(0.004, description="Mean grain diameter [m]; surface energies hold for it.")
+    """Measured bulk properties: [targets.critical_friction_angle] value = 31.5, tolerance = 1.5, source = '...'.
+    Optional: figure = '...' if the table has another name; plane = 'shear', 'triaxial' or 'mohr'; through = 'tests' or
+    'origin'; state = 'loose' or 'dense'; fit = false to compare only."""
+    grain: Positive = Field(0.004, description="Mean grain diameter [m], to which surface energies belong.")
     spread: Spread = 0.15
     max_overlap: float = Field(0.05, ge=0.005, le=0.1)
-    """Overlap [of a diameter] to which the grains of a sheared sample are softened; the worst of its contacts go past
-    it, to three times as much at most. Soft grains count their overlaps in the density."""
+    """Overlap for which the grains of a sheared sample are softened [of a diameter]. The largest of a sample is up to
+    three times that. The density of soft samples includes their overlaps."""
     size: tuple[Positive, Positive, Positive] = (10.0, 8.0, 10.0)
-    """Sample that is sheared: both periods and the height [mean diameters]."""
+    """Size of a sheared sample: both periodic lengths and the height [mean diameters]."""
     dense_friction: float = Field(0.1, ge=0, le=1)
-    """Friction of the grains while a dense sample is pressed [1]; 0: as dense as can be."""
+    """Friction of the grains while a dense sample is compressed [1]; 0 gives the densest."""
     loose_friction: float | None = Field(None, ge=0, le=10)
-    """Friction of the grains while a loose sample is pressed, without rolling friction [1]; their own, rolling friction
-    as well, if not given."""
+    """Friction of the grains while a loose sample is compressed, without rolling friction [1]; if not given, their own
+    friction and rolling friction."""
     pressures: tuple[Positive, ...] = Field((500.0, 1000.0), min_length=1)
-    """Normal stresses of the shear tests [Pa]; without cohesion the last alone: strength goes with it."""
-    strain: float = Field(1.2, ge=0.2, le=20, description="Shear strain of a test [1]; critical: its second half.")
-    inertial_number: Positive = Field(5e-3, le=0.05, description="Rate of shear times d sqrt(density / pressure) [1].")
-    gravity: Positive = Field(STANDARD_GRAVITY, description="Of bond_number and of laboratory beds [m/s2].")
+    """Normal stresses of the shear tests [Pa]. Without cohesion only the last: strength is then proportional to it."""
+    strain: float = Field(
+        1.2, ge=0.2, le=20, description="Shear strain of a test [1]; its second half gives the critical state."
+    )
+    inertial_number: Positive = Field(
+        5e-3, le=0.05, description="Inertial number: shear rate x d sqrt(density / pressure) [1]."
+    )
+    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity for bond_number and laboratory beds [m/s2].")
     points: int = Field(6, ge=3, le=200)
-    """Points simulated first: an even design, or a Latin hypercube [1]."""
-    most_points: int = Field(10, ge=3, le=500, description="Points simulated at most, before the check [1].")
+    """Number of points simulated first: a regular design, or a Latin hypercube [1]."""
+    most_points: int = Field(10, ge=3, le=500, description="Largest number of points before the check [1].")
     enough: float = Field(0.5, gt=0, le=10)
-    """No further points once the surface is known to this share of every tolerance [1]."""
-    samples: int = Field(1, ge=1, le=100, description="Samples of each point, of seeds that follow one another [1].")
+    """Stop when the standard error of the response surface is below this share of every tolerance [1]."""
+    samples: int = Field(1, ge=1, le=100, description="Samples of each point, with successive seeds [1].")
     seed: SeedNumber = 1
-    """Seed of the design and of the first sample explored; those of the other points have this and thousands more."""
+    """Seed of the design and of the first sample; samples of later points add thousands to it."""
     check_seeds: tuple[SeedNumber, ...] = Field((2, 3), min_length=1)
-    """Seeds of the samples with which the parameters found are checked."""
+    """Seeds of the samples that check the fitted parameters."""
     checks: int = Field(2, ge=1, le=10)
-    """Checks at most: another one where a figure is off by more than half its tolerance [1]."""
+    """Largest number of checks; a further one follows if a property is off by more than half its tolerance [1]."""
     bed_size: tuple[Positive, Positive, Positive] = (0.04, 0.04, 0.035)
-    """Laboratory beds, for packing fractions: widths and depth [m]."""
+    """Size of laboratory beds for packing fractions: widths and depth [m]."""
     repose_size: tuple[Positive, Positive, Positive] = (92.0, 6.0, 20.0)
-    """Bed that is drained for an angle of repose: widths (periodic; slopes along the first) and depth [mean
-    diameters]. Parameters are fitted to one at least 20 deep."""
+    """Size of a bed drained for the angle of repose: widths (periodic; slopes along the first) and depth [mean
+    diameters]. A fit needs a depth of at least 20."""
     threads: Threads = None
 
     @model_validator(mode="after")

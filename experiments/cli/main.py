@@ -177,7 +177,7 @@ def _resume(
 
 
 def _bench(
-    what: Annotated[str, Parameter(help="What to measure: bed, answer, diagnose or planar.")] = "bed",
+    what: Annotated[str, Parameter(help="What to measure: bed, answer, diagnose, planar or gpu.")] = "bed",
     /,
     *,
     out: Annotated[Path | None, Parameter(help="Folder for bench.json; runs/bench-<time> if not given.")] = None,

@@ -18,5 +18,5 @@ class CompareSettings(StrictSettings):
     runs: tuple[str, str]
     """Folders of two finished runs of one kind: tumble, tumble spatial or penetrate."""
     colour: Literal["displacement", "speed", "force", "coordination"] = "displacement"
-    """What grains are coloured by in pictures."""
-    pictures: bool = Field(True, description="Whether to draw the runs side by side, stills and film; only of tumbles.")
+    """Quantity that colours the grains in pictures."""
+    pictures: bool = Field(True, description="Draw pictures and film of the runs side by side (only tumbles).")

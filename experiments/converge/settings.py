@@ -29,40 +29,40 @@ class ConvergeSettings(PenetrateSettings):
     # The base, where it is not as in `penetrate`
     seeds: Seeds = (1, 2, 3, 4, 5)
     max_overlap: MaxOverlap = 0.04
-    """Largest overlap of grains that the modulus of the base is chosen for [of a diameter]. A run ends
-    at twice that."""
+    """Largest overlap of two grains for which the modulus of the base case is chosen [of a diameter]. A run ends at
+    twice that."""
     other_speeds: tuple[Positive, ...] = ()
-    """Not used: every bed is driven at all of speeds [m/s]."""
+    """Not used: every bed has all pushes of speeds [m/s]."""
     other_drop_speeds: tuple[Positive, ...] = ()
     """Not used: every bed has all drops of drop_speeds [m/s]."""
-    frame_count: int = Field(0, ge=0, le=2000, description="Frames of each shown run of each member [1]; 0 for none.")
+    frame_count: int = Field(0, ge=0, le=2000, description="Frames of each pictured run of each member [1]; 0: none.")
 
     # What is varied, one thing at a time
     ratios: tuple[Positive, ...] = (5.0, 7.0, 10.0)
-    """Grain sizes: tip diameters over mean grain diameters [1]. That of the base is tip_diameter / grain."""
+    """Grain sizes of the sweep, as tip diameter over mean grain diameter [1]. The base case has tip_diameter /
+    grain."""
     widths: tuple[Positive, ...] = (6.0, 9.0)
-    """Widths of the bed, both ways [tip diameters]. That of the base is the smaller width of bed_size."""
+    """Widths of the bed [tip diameters]. The base case has the smaller width of bed_size."""
     bed_depths: tuple[Positive, ...] = (6.0,)
-    """Depths of the bed [tip diameters]. That of the base is the third of bed_size."""
+    """Depths of the bed [tip diameters]. The base case has the third number of bed_size."""
     overlaps: tuple[MaxOverlap, ...] = (0.02,)
-    """Overlaps that the modulus is chosen for [of a diameter]. That of the base is max_overlap."""
+    """Largest overlaps for which the modulus is chosen [of a diameter]. The base case has max_overlap."""
     paces: tuple[Positive, ...] = (0.5,)
-    """Factors on speeds and lowering_speed [1]. That of the base is 1; the speeds of drops stay."""
+    """Factors on speeds and lowering_speed [1]. The base case has 1; speeds of drops do not change."""
 
     # Speeds and sizes
     speed_grain: Positive | None = None
-    """Mean grain diameter that speeds and lowering_speed are meant for [m]: grains of diameter d are driven at
-    speed_grain / d times these, which is the same inertial number; the finest of the sweep if not given."""
+    """Mean grain diameter to which speeds and lowering_speed belong [m]. In grains of diameter d they are multiplied by
+    speed_grain / d, so that the inertial number stays the same. The finest of the sweep if not given."""
     life_grain: Positive = 0.0002
-    """Mean diameter of the real grains [m]: the line through the sizes is followed to it."""
+    """Mean diameter of the real grains [m], to which the results are extrapolated."""
 
     # The work
     budget: Positive | None = None
-    """Time of one core that the sweep may take by its estimate [h]: runs that go beyond are left out, and told; all are
-    made if not given."""
+    """Most time of one core, by estimate [h]. Further runs are left out and listed. No limit if not given."""
     members: str | None = Field(None, min_length=1)
-    """Folder where member runs are kept, each found again by its settings, so that sweeps share them; 'members' in the
-    run's folder if not given."""
+    """Folder of the single runs. Sweeps share it and find runs by their settings. 'members' in the folder of the run if
+    not given."""
 
     @model_validator(mode="after")
     def _varied(self) -> Self:

@@ -12,13 +12,14 @@ class DiagnoseSettings(StrictSettings):
 
     campaign: str = Field(min_length=1, description="Folder of the measured trials, with campaign.toml.")
     thorough: bool = False
-    """Calibrate the gate by full refits to made-up data; kept for campaigns of the same design."""
+    """Calibrate the test for a missing effect with full refits of simulated campaigns (slow; kept for campaigns of the
+    same design)."""
     effect_file: tuple[str, ...] = Field((), json_schema_extra={"option_alias": "--effects-from"})
-    """Python file with an effect of one's own, to stand among the candidates; several may be given."""
-    seed: int = Field(0, ge=0, description="Seed of the made-up data by which the gate is calibrated.")
+    """Python files with effects of your own, added to the candidates (docs/diagnose.md)."""
+    seed: int = Field(0, ge=0, description="Seed of the simulated campaigns that calibrate this test.")
 
 
 class CheckSettings(StrictSettings):
     """What is checked."""
 
-    campaign: str = Field(min_length=1, description="Folder of the trials, with campaign.toml.")
+    campaign: str = Field(min_length=1, description="Folder of the measured trials, with campaign.toml.")

@@ -30,40 +30,44 @@ class GrainsSettings(StrictSettings):
     """What a bed of grains under any platform is made of, and how it is coupled; SI units."""
 
     bed_size: tuple[Positive, Positive, Positive] = (0.7, 0.7, 0.05)
-    """On a bed: its size along x and y (both periodic) and its depth [m]."""
-    grain: Positive = Field(0.003, description="On a bed: mean grain diameter [m].")
-    spread: float = Field(0.15, ge=0, le=0.5, description="On a bed: grain diameters are uniform within 1 +- this [1].")
-    seed: int = Field(1, ge=0, lt=2**31, description="On a bed: seed of its grains.")
+    """Bed: size along x and y (both periodic) and depth [m]."""
+    grain: Positive = Field(0.003, description="Bed: mean grain diameter [m].")
+    spread: float = Field(
+        0.15, ge=0, le=0.5, description="Bed: relative half width of the uniform distribution of grain diameters [1]."
+    )
+    seed: int = Field(1, ge=0, lt=2**31, description="Bed: seed of its grains.")
     young: Positive | None = None
-    """On a bed: Young's modulus of the softened grains [Pa]; from max_overlap if not given."""
+    """Bed: Young's modulus of the grains [Pa]; as soft as max_overlap allows if not given."""
     max_overlap: float = Field(0.05, gt=0, le=0.2)
-    """On a bed: overlap over diameter that the step is made for [1]; past twice it, or 0.2, a run ends."""
-    spike_friction: NotNegative = Field(0.5, description="On a bed: friction of spike and grains [1].")
-    spike_restitution: float = Field(0.5, ge=0.01, le=1, description="On a bed: restitution of spike and grains [1].")
+    """Bed: expected largest overlap of two grains, over their diameter [1]. A run ends at twice this value, at most at
+    0.2."""
+    spike_friction: NotNegative = Field(0.5, description="Bed: friction coefficient between spike and grains [1].")
+    spike_restitution: float = Field(
+        0.5, ge=0.01, le=1, description="Bed: coefficient of restitution between spike and grains [1]."
+    )
     lowering_speed: Positive | None = None
-    """On a bed: speed at which the platform is set down [m/s]; sqrt(g grain) if not given."""
+    """Bed: speed at which the platform is set down [m/s]; sqrt(g grain) if not given."""
     substeps: int = Field(10, ge=1, le=200)
-    """On a bed, or coupled: steps of the ground from one exchange of forces to the next [1]."""
+    """Bed or method coupled: time steps of the ground between two exchanges of forces [1]."""
     body_steps: int = Field(1, ge=1, le=200)
-    """On a bed, or coupled: steps of the platform from one exchange of forces to the next; it divides substeps [1]."""
+    """Bed or method coupled: time steps of the platform between two exchanges of forces; a divisor of substeps [1]."""
     extrapolation: int = Field(0, ge=0, le=2)
-    """On a bed, or coupled: order of the guess at the next force [1]."""
+    """Bed or method coupled: order of the extrapolation of the force [1]."""
     iterations: int = Field(1, ge=1, le=50)
-    """On a bed, or coupled: how often a step is computed at most; 1: explicit."""
+    """Bed or method coupled: most iterations of a step; 1: explicit coupling."""
     sleep: bool = False
-    """On a bed: whether quiet grains are computed every so many steps only, and those at rest not at all
-    (docs/bed.md)."""
+    """Bed: compute slow grains less often and grains at rest not at all (docs/bed.md, Sleep)."""
     sleep_pace: int = Field(Sleep.pace, ge=1, le=64)
-    """Of sleep: steps of the bed for one of a quiet grain; above 4 its mass counts (pace / 4)^2 times, and sand bears
-    too much (docs/bed.md); 1: there are no such grains [1]."""
+    """Sleep: a slow grain is computed every so many steps [1]. Above 4 its mass is scaled by (sleep_pace / 4)^2, and
+    sand supports too much load (docs/bed.md, Sleep). 1: no slow grains [1]."""
     sleep_force: Positive = 1.0
-    """Of the rules of sleep before 2026-11-26; no longer used [1]."""
-    sleep_share: Positive = Field(0.5, description="Likewise [1].")
-    frame_count: int = Field(30, ge=0, le=1000, description="On a bed: frames for ParaView; 0: none.")
-    checkpoint_interval: Positive = Field(60.0, description="On a bed: time between checkpoints [s].")
-    arch: Literal["cpu", "cuda"] = Field("cpu", description="On a bed: where it is computed.")
-    threads: int | None = Field(None, ge=1, description="On a bed: threads; all cores if not given.")
-    cache: bool = Field(True, description="On a bed: whether prepared beds are kept and used again.")
+    """No longer used; accepted at its default so that older run.toml files can be read [1]."""
+    sleep_share: Positive = Field(0.5, description="No longer used, as sleep_force [1].")
+    frame_count: int = Field(30, ge=0, le=1000, description="Bed: number of frames for ParaView; 0: none.")
+    checkpoint_interval: Positive = Field(60.0, description="Bed: time between two checkpoints, of your clock [s].")
+    arch: Literal["cpu", "cuda"] = Field("cpu", description="Bed: processor that computes it.")
+    threads: int | None = Field(None, ge=1, description="Bed: CPU threads; all cores if not given.")
+    cache: bool = Field(True, description="Bed: keep prepared beds on disk and use them again.")
 
     def stepping(self) -> Mapping[str, Any]:
         """How the master steps the run."""
@@ -93,40 +97,40 @@ class TumbleBedSettings(GrainsSettings):
     """The same of a tumble in the plane, whose bed is a slice as wide as one spike has for itself."""
 
     bed_size: tuple[Positive, Positive, Positive] = (0.5, 0.06, 0.046)
-    """On a bed: its length along the motion, its width for one spike (both periodic) and its depth [m]."""
+    """Bed: length along the motion, width for one spike (both periodic) and depth [m]."""
     bed_repeats: int = Field(1, ge=1, le=100)
-    """On a bed: how often the prepared bed is laid end to end along the motion [1]."""
+    """Bed: number of copies of the prepared bed, end to end along the motion [1]."""
     coarse: Positive | None = None
-    """On a bed: graded: `grain` is the mean diameter under the expected footprints, this the largest away from them
-    [m]; one size throughout if not given."""
+    """Graded bed: largest mean grain diameter, away from the expected footprints, under which it is `grain` [m]; one
+    size throughout if not given."""
     fine_radius: Positive | None = None
-    """Of a graded bed: how far beside where the axis of a tip is expected grains are fine [m]; 1.5 spike diameters if
-    not given."""
+    """Graded bed: half width of a fine region, from the expected axis of a tip [m]; 1.5 spike diameters if not
+    given."""
     fine_depth: Positive | None = None
-    """Of a graded bed: how far down from the surface grains are fine [m]; two spike diameters below the deepest tip
-    expected, or to the floor, if not given."""
+    """Graded bed: depth of the fine region [m]; if not given, two spike diameters below the deepest expected tip, or
+    the whole bed."""
     bed_stages: tuple[str, ...] | None = None
-    """On a bed: how it is prepared, as `hedgebed bed make --stages` has it (rain:dry compact:0.57 stick level, for
-    grains that stick); rained and levelled if not given."""
+    """Bed: stages of preparation, as for `hedgebed bed make --stages` (of cohesive grains: rain:dry compact:0.57 stick
+    level); rain and level if not given."""
     place: float = Field(0.0, allow_inf_nan=False)
-    """On a bed: how far along it from its middle the platform is set down [m]; the bed goes on periodically, so other
-    grains lie there."""
+    """Bed: place where the platform is set down, along the bed from its middle [m]. The bed is periodic; another place
+    has other grains."""
     spike_diameter: Positive | None = None
-    """On a bed: diameter of shaft and ball tip of a spike [m]; the platform's if not given (hedgehog: 0.012)."""
+    """Bed: diameter of shaft and spherical tip of a spike [m]; the platform's if not given (hedgehog: 0.012)."""
     spike_clear: Positive | None = None
-    """On a bed: how far a spike stands out of the hull [m]; the platform's if not given (hedgehog: 0.04)."""
+    """Bed: length by which a spike extends beyond the hull [m]; the platform's if not given (hedgehog: 0.04)."""
     settle_gravity: Positive | None = None
-    """On a bed, in flight: gravity under which the bed is rained and the platform set down, lowered to `gravity` before
-    the torque begins [m/s2]: the same sooner; `gravity` itself if not given."""
+    """Bed, without a rig: gravity in which bed and platform settle, lowered to `gravity` before the torque begins, to
+    save time [m/s2]; `gravity` if not given."""
     tumbles: int = Field(1, ge=1, le=20)
-    """On a bed, or coupled: tumbles in a row; a torque begins when the platform lies [1]."""
+    """Bed or method coupled: number of successive tumbles; the next torque begins when the platform is at rest [1]."""
     tumble_turn: Positive = Field(1.0, le=4)
-    """On a bed, or coupled: where each torque of a row of tumbles ends, over pi / rows [1]."""
+    """Bed or method coupled: rotation at which each torque of successive tumbles ends, over pi / rows [1]."""
     drop_speed: Positive | None = None
-    """On a bed, or coupled: a landing in place of a tumble, at this speed downwards [m/s]."""
-    drop_along: float = Field(0.0, allow_inf_nan=False, description="Of a landing: speed along the surface [m/s].")
-    drop_spin: float = Field(0.0, allow_inf_nan=False, description="Of a landing: spin, clockwise [rad/s].")
-    drop_theta: float = Field(0.0, allow_inf_nan=False, description="Of a landing: theta at the first touch [rad].")
+    """Bed or method coupled: simulate a landing instead of a tumble, with this downward speed [m/s]."""
+    drop_along: float = Field(0.0, allow_inf_nan=False, description="Landing: speed along the surface [m/s].")
+    drop_spin: float = Field(0.0, allow_inf_nan=False, description="Landing: angular velocity, clockwise [rad/s].")
+    drop_theta: float = Field(0.0, allow_inf_nan=False, description="Landing: angle theta at the first touch [rad].")
 
     @property
     def bed_length(self) -> float:

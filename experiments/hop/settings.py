@@ -22,16 +22,17 @@ class _Question(StrictSettings):
 
     gravity: Positive = Field(1e-3, description="Gravity at the surface [m/s2].")
     distance: Positive | None = None
-    """How far to hop, along the ground [m]; 5 if neither it nor wheel_speed_0, nor a motor's torque, is given."""
+    """Distance of the hop along the ground [m]; 5 if neither distance, wheel_speed_0 nor the torque of a motor is
+    given."""
     wheel_speed_0: Positive | None = None
-    """In place of a distance: speed of the wheel before the brake [rad/s]; says how far that goes."""
+    """Speed of the wheel before braking [rad/s], instead of a distance; the distance is computed."""
     body_radius: Positive | None = None
-    """Radius of the body [m]; a flat ground, and nothing said of escape, if not given."""
+    """Radius of the asteroid [m]; if not given, the ground is flat and escape is not examined."""
     actuator: Literal["brake", "motor"] = "brake"
-    """A brake on a spinning wheel, or a motor from rest."""
+    """Source of the torque: a brake on a spinning wheel, or a motor that starts at rest."""
     torque: Positive | None = None
-    """Torque on the platform [N m]: of a brake its largest if not given; of a motor, given in place of a distance, says
-    how far that goes."""
+    """Torque on the platform [N m]. Of a brake: its largest if not given. Of a motor: instead of a distance, which is
+    then computed."""
 
 
 class HopSettings(PlatformSettings, _Question):

@@ -18,39 +18,42 @@ class PaperSettings(StrictSettings):
 
     # The trials
     rigs: tuple[Positive, ...] = Field((0.0085, 0.015), min_length=1)
-    """g_sim of the rig [9.80665 m/s2]; the first is that of Figures 5 and 6."""
-    motor_torques: tuple[Positive, ...] = Field((0.125, 0.22), min_length=1, description="Torques of motors [N m].")
-    brake_torques: tuple[Positive, ...] = Field((6.0,), description="Torques of brakes [N m].")
+    """Simulated gravities g_sim of the rig, in g [9.80665 m/s2]; Figures 5 and 6 use the first."""
+    motor_torques: tuple[Positive, ...] = Field(
+        (0.125, 0.22), min_length=1, description="Torques of trials with the motor [N m]."
+    )
+    brake_torques: tuple[Positive, ...] = Field((6.0,), description="Torques of trials with the brake [N m].")
     surfaces: tuple[str, ...] = Field(("steel", "brick", "sand", "jsc1a"), min_length=1)
-    """Materials; Figures 5 to 7 take steel and brick."""
+    """Surfaces; Figures 5 to 7 use steel and brick."""
     ground: str | None = None
-    """A ground.toml of one spike, whose law stands under the trials on surfaces of its grains; K and C of each surface
-    if not given."""
-    friction_band: float = Field(0.1, gt=0, lt=1, description="Friction is varied by this, relative, up and down [1].")
+    """A ground.toml of one spike: its law replaces K and C on surfaces of its grains."""
+    friction_band: float = Field(0.1, gt=0, lt=1, description="Relative variation of friction, up and down [1].")
     measured_angles: tuple[str, ...] = ()
-    """Transition angles read off Figure 6, SURFACE-TORQUE-STATE=DEGREES with slip or hop for the state
-    (steel-0.125-hop=18), to be compared with ours; the paper prints none as a number."""
-    rig_reading: Literal["pair", "weight"] = Field("pair", description="What rig means; see tumble.")
+    """Transition angles that you read from Figure 6, compared with the computed ones: SURFACE-TORQUE-STATE=DEGREES,
+    with slip or hop as state (steel-0.125-hop=18). The paper states none as a number."""
+    rig_reading: Literal["pair", "weight"] = Field("pair", description="Meaning of rig; see hedgebed tumble --help.")
 
     # What the paper does not give
     torque_rise: NotNegative = 0.25
-    """Time constant [s] of a motor's torque in a second column beside every statement; 0: no such column."""
+    """Time constant of a motor's torque in a second set of trials [s]; 0: no second set."""
     evidence: bool = True
-    """Weigh what may explain what the text states of hard surfaces: a torque that rises, and its rivals; where there
-    are both surfaces, two rigs and two motors."""
-    platform: str = Field("hedgehog", description="Platform: one that ships, or its TOML file.")
+    """Compare explanations for the statements about hard surfaces: a torque that rises slowly, and others. It needs
+    steel and brick, two rigs and two torques of the motor."""
+    platform: str = Field(
+        "hedgehog", description="Platform: hedgehog, cubli, mascot, minerva, or a TOML file (docs/platform.md)."
+    )
     brake_wheel_speed: Positive = 300.0
-    """Speed of the wheel at the start of a brake trial [rad/s]; ours, the paper gives none."""
+    """Initial speed of the wheel in trials with the brake [rad/s]. The paper states none; the default is ours."""
     sweep: bool = True
-    """Halve and double the numbers that the paper does not give, one at a time, vary mu_d / mu_s too, and put other
-    grounds under the brake trials on grains."""
+    """Also vary the numbers that the paper does not state (half, double; mu_d / mu_s), and the law of the ground in
+    trials with the brake on sand."""
 
     # How it is computed
-    duration: Positive = Field(5.0, le=60, description="How long a motor trial lasts [s].")
-    brake_duration: Positive = Field(2.0, le=60, description="How long a brake trial lasts [s].")
+    duration: Positive = Field(5.0, le=60, description="Duration of a trial with the motor [s].")
+    brake_duration: Positive = Field(2.0, le=60, description="Duration of a trial with the brake [s].")
     trusted: Positive = 0.04
-    """Speeds are the largest before the centre is this far away [m]; the paper trusts 40 mm."""
-    workers: int | None = Field(None, ge=1, le=256, description="Processes; as many as there are cores if not given.")
+    """Speeds are the largest within this displacement of the centre [m]; the paper uses 40 mm."""
+    workers: int | None = Field(None, ge=1, le=256, description="Number of processes; all cores if not given.")
 
     @property
     def weighs(self) -> bool:

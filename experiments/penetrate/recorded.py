@@ -44,10 +44,10 @@ _FEWEST = 12
 class SpikeSensors(StrictSettings):
     """What records a spike: one rate, and the noise of each sensor (white, standard deviation)."""
 
-    rate: Positive = Field(1000.0, description="Rate of the samples [Hz]; at most one a macro step of the run.")
+    rate: Positive = Field(1000.0, description="Sampling rate [Hz]; at most one sample per exchange of forces.")
     depth_std: Positive = Field(5e-5, description="Noise of the depth [m].")
-    force_std: Positive = Field(0.02, description="Noise of the force of driven spikes [N].")
-    accel_std: Positive = Field(0.2, description="Noise of the acceleration of dropped spikes [m/s2].")
+    force_std: Positive = Field(0.02, description="Noise of the force of pushes [N].")
+    accel_std: Positive = Field(0.2, description="Noise of the acceleration of drops [m/s2].")
     seed: SeedNumber = Field(1, description="Seed of the noise.")
 
 

@@ -22,21 +22,23 @@ __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
 
 say = Sentences(__package__)
 
-_MATERIALS = "sand, sand-weak, jsc-1a-loose-heights or another that ships (docs/materials.md), or a material.toml"
-_SOFTENED = "Young's modulus of the grains [Pa]; softened to `max_overlap` if not given."
-_STEP = "Step of the grains [s]; from the contact time if not given."
+_MATERIALS = "sand, sand-weak, jsc-1a-loose-heights, another that ships (docs/materials.md), or a material.toml"
+_SOFTENED = "Young's modulus of the grains [Pa]; if not given, as soft as max_overlap allows."
+_STEP = "Time step of the grains [s]; a share of the contact time if not given."
 GrainMaterial = Annotated[str, Field(description=f"Grain material: {_MATERIALS}.")]
 Grain = Annotated[Positive, Field(description="Mean grain diameter [m].")]
-Spread = Annotated[float, Field(ge=0, le=0.5, description="Grain diameters are uniform within 1 +- this [1].")]
-BedSize = Annotated[
-    tuple[Positive, Positive, Positive], Field(description="Bed: both widths (periodic) and depth of grains [m].")
+Spread = Annotated[
+    float, Field(ge=0, le=0.5, description="Relative half width of the uniform distribution of grain diameters [1].")
 ]
-Seeds = Annotated[tuple[SeedNumber, ...], Field(min_length=1, description="Seeds: one bed each.")]
-MaxOverlap = Annotated[float, Field(gt=0, le=0.1, description="Largest overlap of grains [of a diameter].")]
+BedSize = Annotated[
+    tuple[Positive, Positive, Positive], Field(description="Size of the bed: both widths (periodic) and depth [m].")
+]
+Seeds = Annotated[tuple[SeedNumber, ...], Field(min_length=1, description="Seeds; each prepares one bed.")]
+MaxOverlap = Annotated[float, Field(gt=0, le=0.1, description="Largest overlap of two grains [of a diameter].")]
 Young = Annotated[Positive | None, Field(description=_SOFTENED)]
 TimeStep = Annotated[Positive | None, Field(description=_STEP)]
-Precision = Annotated[Literal["float64", "float32"], Field(description="Arithmetic of the bed.")]
-Arch = Annotated[Literal["cpu", "cuda"], Field(description="Where the bed is computed.")]
+Precision = Annotated[Literal["float64", "float32"], Field(description="Floating-point precision of the bed.")]
+Arch = Annotated[Literal["cpu", "cuda"], Field(description="Processor that computes the bed.")]
 
 
 class PenetrateSettings(StrictSettings):
@@ -44,100 +46,111 @@ class PenetrateSettings(StrictSettings):
 
     # The bed
     bed: str | None = Field(None, min_length=1)
-    """A bed of `hedgebed bed make`: its file, its run's folder, or its name on the shelf. Decides material, bed_size,
-    grain, spread, gravity, seeds and softness; a bed is prepared if not given."""
+    """A bed of `hedgebed bed make`: its file, the folder of its run, or its name. It sets material, bed_size, grain,
+    spread, gravity, seeds and young. If not given, a bed is prepared."""
     material: GrainMaterial = "sand"
     bed_size: BedSize = (0.072, 0.072, 0.0508)
     grain: Grain = 0.0024
     spread: Spread = 0.15
     coarse: Positive | None = None
-    """Graded: `grain` is the mean diameter around the spike, this the largest away from it [m]; one size throughout if
-    not given."""
+    """Graded bed: largest mean grain diameter, away from the spike, around which it is `grain` [m]; one size throughout
+    if not given."""
     fine_radius: Positive | None = None
-    """Of a graded bed: how far to both sides of the spike's axis, along x, grains are fine [m]; 1.5 tips if not
+    """Graded bed: half width of the fine region along x, from the axis of the spike [m]; 1.5 tip diameters if not
     given."""
     fine_depth: Positive | None = None
-    """Of a graded bed: how far down from the surface grains are fine [m]; two tips below `depth`, or to the floor, if
-    not given."""
+    """Graded bed: depth of the fine region [m]; if not given, two tip diameters below `depth`, or the whole bed."""
     packing: float | None = Field(None, gt=0.5, le=0.64)
-    """Packing fraction to prepare the bed to [1]; as it settles if not given."""
+    """Packing fraction of the bed [1]; that after settling if not given."""
     bed_stages: tuple[str, ...] | None = None
-    """How the bed is prepared, as `hedgebed bed make --stages` takes it, `level` last. If not given, rained and
-    levelled, and where grains stick by their material's recipe: poured dry, brought to its packing, then they stick."""
+    """Stages of preparation, as for `hedgebed bed make --stages`, `level` last. If not given: rain and level; cohesive
+    materials use a recipe of their own (rain without cohesion, compact, switch cohesion on)."""
     gravity: Positive = STANDARD_GRAVITY
-    """Gravity of the grains [m/s2]; 1 g even in the rig. Speeds go with its root and times with the inverse, and there
-    is no rig but on Earth, where they are not given."""
+    """Gravity of the grains [m/s2]; 1 g also in the rig. Speeds, times and modulus that are not given are scaled with
+    it, and off Earth no rig is used unless it is given."""
     seeds: Seeds = (1, 2, 3)
 
     # The spike
     tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip.")
     tip_diameter: Positive = Field(0.012, description="Diameter of the tip [m].")
     shaft_diameter: Positive | None = None
-    """Diameter of the shaft [m]: at most the tip's and at least a grain, with a flat tip the tip's own; the tip's if
-    not given."""
+    """Diameter of the shaft [m], from one grain to tip_diameter; a flat tip needs tip_diameter itself, which is the
+    default."""
     shaft_length: Positive = Field(0.06, description="Length of the shaft above the tip's widest point [m].")
     cone_angle: float = Field(60.0, ge=1, lt=180, description="Full angle of a conical tip [degrees].")
-    spike_friction: NotNegative = Field(0.5, description="Friction coefficient of spike and grains [1].")
-    spike_restitution: float = Field(0.5, ge=0.01, le=1, description="Restitution of spike and grains [1].")
+    spike_friction: NotNegative = Field(0.5, description="Friction coefficient between spike and grains [1].")
+    spike_restitution: float = Field(
+        0.5, ge=0.01, le=1, description="Coefficient of restitution between spike and grains [1]."
+    )
 
     # What rests on it
-    platform_mass: Positive = Field(5.3, description="Mass of the platform [kg]; a spike carries a quarter.")
+    platform_mass: Positive = Field(5.3, description="Mass of the platform [kg]; one spike carries a quarter.")
     rig: NotNegative = Field(0.0085, lt=1)
-    """Simulated gravity of the offloading rig [9.80665 m/s2]; 0: no rig, `gravity` rules."""
+    """Simulated gravity of the offloading rig, in g [9.80665 m/s2]; 0 means no rig: `gravity` sets the weight."""
     load: Positive | None = None
-    """Weight on the spike, set down and dropped [N]. If not given, a quarter of the platform's: in the rig (m + m_b)
-    g_sim / 4, which is (5.3 kg platform + 5.2 kg counterweight) x 0.0085 g / 4 = 0.219 N by default; without a rig m
-    g / 4."""
+    """Weight on a spike that is set down or dropped [N]. If not given, a quarter of the platform's weight: m g / 4, or
+    in the rig (m + m_b) g_sim / 4, by default (5.3 kg + 5.2 kg counterweight) x 0.0085 g / 4 = 0.219 N."""
     mass: Positive = 0.1
-    """Mass that a drop moves, under `load` [kg]. The shipped 0.1 kg stops within a shallow bed; the platform's own
-    share in the rig, (m + m_b) / 4, is 2.63 kg, and a free drop in a laboratory has load = m g."""
+    """Mass that moves in a drop, under the weight `load` [kg]. The default stops within a shallow bed. A quarter of the
+    platform in the rig, (m + m_b) / 4, is 2.63 kg. A free drop in a laboratory has load = mass x g."""
 
     # What is done with it
-    speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of driven runs [m/s].")
-    depth: Positive = Field(0.012, description="Depth of driven runs [m].")
-    hold: NotNegative = Field(0.01, description="How long a driven spike is held at depth [s].")
-    retreat_speed: Positive = Field(0.4, description="Speed of the pull-out [m/s].")
+    speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of pushes [m/s].")
+    depth: Positive = Field(0.012, description="Depth of pushes [m].")
+    hold: NotNegative = Field(0.01, description="Time for which a pushed spike is held at depth [s].")
+    retreat_speed: Positive = Field(0.4, description="Speed of withdrawal [m/s].")
     drop_speeds: tuple[Positive, ...] = (0.1, 0.15, 0.2)
-    """Speeds at the surface of dropped runs [m/s]; none: no drops, on no seed unless other_drop_speeds is given."""
-    after_stop: Positive = Field(0.03, description="How long a drop is followed after its first stop [s].")
-    drop_time: Positive = Field(0.8, description="A drop that has not come to rest ends after this [s].")
-    lowering_speed: Positive = Field(0.1, description="Speed at which a spike is lowered to be set down [m/s].")
-    rest_time: Positive = Field(0.04, description="For how long the signs of rest must hold [s].")
-    other_speeds: tuple[Positive, ...] = Field((0.4,), description="Speeds driven on the seeds after the first [m/s].")
-    other_drop_speeds: tuple[Positive, ...] = Field((0.15,), description="Drops on the seeds after the first [m/s].")
+    """Speeds of drops at the surface [m/s]; none: no drops on any bed, unless other_drop_speeds is given."""
+    after_stop: Positive = Field(0.03, description="Time for which a drop is followed after its first stop [s].")
+    drop_time: Positive = Field(0.8, description="Longest time of a drop [s].")
+    lowering_speed: Positive = Field(0.1, description="Speed at which a spike is set down [m/s].")
+    rest_time: Positive = Field(0.04, description="Time for which a spike must stand still to count as at rest [s].")
+    other_speeds: tuple[Positive, ...] = Field(
+        (0.4,), description="Speeds of pushes into the second and further beds [m/s]."
+    )
+    other_drop_speeds: tuple[Positive, ...] = Field(
+        (0.15,), description="Speeds of drops onto the second and further beds [m/s]."
+    )
 
     # Beside it
     ground: str = "bed"
-    """What the spike goes into: bed, or without a bed spring-damper, that of `model`, or the law in a ground.toml."""
+    """Ground of the spike: bed (of grains), spring-damper (that of `model`, without grains), or the law of a
+    ground.toml."""
     model: str | None = Field(None, min_length=1)
-    """A model.toml of penetration, as diagnose writes it: its law, effects and all, is run beside bed and
-    spring-damper. Without a bed its spike, mass and load are taken where they are not given."""
+    """A model.toml that `diagnose` wrote for pushes. Its law, with all effects, is compared with bed and spring-damper.
+    With ground = spring-damper it also gives tip, mass and load that are not given here."""
     campaign: str | None = Field(None, min_length=1)
-    """Folder for the bed's runs as a campaign of measured trials, seen through noisy sensors."""
-    campaign_rate: Positive = Field(1000.0, description="Rate of the campaign's samples [Hz].")
-    campaign_depth_std: Positive = Field(5e-5, description="Noise of the campaign's depth [m].")
-    campaign_force_std: Positive = Field(0.02, description="Noise of the campaign's force, driven [N].")
-    campaign_accel_std: Positive = Field(0.2, description="Noise of the campaign's acceleration, dropped [m/s2].")
-    campaign_seed: SeedNumber = Field(1, description="Seed of the campaign's noise.")
+    """Folder in which the runs are also written as a campaign of measured trials, with sensor noise."""
+    campaign_rate: Positive = Field(1000.0, description="Campaign: sampling rate [Hz].")
+    campaign_depth_std: Positive = Field(5e-5, description="Campaign: noise of the depth, standard deviation [m].")
+    campaign_force_std: Positive = Field(0.02, description="Campaign: noise of the force of pushes [N].")
+    campaign_accel_std: Positive = Field(0.2, description="Campaign: noise of the acceleration of drops [m/s2].")
+    campaign_seed: SeedNumber = Field(1, description="Campaign: seed of the noise.")
 
     # How it is computed
     max_overlap: MaxOverlap = 0.05
     young: Young = None
     time_step: TimeStep = None
-    substeps: int = Field(10, ge=1, le=1000, description="Steps of the grains in one macro step of the spike [1].")
+    substeps: int = Field(10, ge=1, le=1000, description="Time steps of the grains for each step of the spike [1].")
     precision: Precision = "float64"
     arch: Arch = "cpu"
     threads: Threads = None
-    sleep: bool = Field(False, description="Compute quiet grains less often, those at rest not at all (docs/bed.md).")
-    allow_coarse: bool = Field(False, description="Take a tip of less than five grains across, for a quick look.")
-    cache: bool = Field(True, description="Keep prepared beds and use those kept.")
+    sleep: bool = Field(
+        False, description="Compute slow grains less often and grains at rest not at all (docs/bed.md, Sleep)."
+    )
+    allow_coarse: bool = Field(
+        False, description="Accept a tip of less than five grains across, for a fast run of low resolution."
+    )
+    cache: bool = Field(True, description="Keep prepared beds on disk and use them again.")
 
     # What is kept
-    frame_count: int = Field(30, ge=0, le=2000, description="Frames of each shown run [1]; 0 for none.")
-    checkpoint_interval: Positive = Field(20.0, description="Time between checkpoints [s of waiting].")
+    frame_count: int = Field(30, ge=0, le=2000, description="Frames of each pictured run [1]; 0: none.")
+    checkpoint_interval: Positive = Field(
+        20.0, description="Time between two checkpoints, of your clock [s of waiting]."
+    )
     reference: str | None = None
-    """A result.json to compare stiffness, damping and sinkage with, or 'shipped' for that of the case that ships; none
-    if not given."""
+    """A result.json whose stiffness, damping and sinkage are compared with these, or 'shipped' for the kept result of
+    the default case."""
 
     @model_validator(mode="before")
     @classmethod

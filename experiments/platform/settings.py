@@ -19,32 +19,38 @@ class PlatformSettings(StrictSettings):
 
     # The surface
     surface: str | None = None
-    """Material: steel, brick, sand, sand-weak or jsc1a; brick if not given."""
+    """Surface: steel, brick, sand, sand-weak or jsc1a; brick if not given."""
     stiffness: Positive | None = None
-    """K of a row of spikes [N/m]; the surface's if not given (brick: 1.5e4)."""
+    """Stiffness K under a row of spikes [N/m]; that of the surface if not given (brick: 1.5e4)."""
     damping: NotNegative | None = None
-    """C of a row of spikes, while going in [N s/m]; the surface's if not given (brick: 60)."""
-    mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (brick: 0.5).")
+    """Damping C under a row of spikes that moves in [N s/m]; that of the surface if not given (brick: 60)."""
+    mu_s: NotNegative | None = Field(
+        None, description="Coefficient of static friction [1]; that of the surface if not given (brick: 0.5)."
+    )
     mu_d: NotNegative | None = None
-    """Sliding friction [1]; the surface's if not given (brick: 0.25), half of mu_s where that is."""
+    """Coefficient of sliding friction [1]; if not given, half of a given mu_s, else that of the surface (brick:
+    0.25)."""
 
     # The platform
     platform: str = "hedgehog"
-    """Platform that gives what is not given here: one that ships, or its TOML file."""
-    mass: Positive | None = Field(None, description="Mass [kg]; the platform's if not given (hedgehog: 5.3).")
+    """Platform: hedgehog, cubli, mascot, minerva, or a TOML file (docs/platform.md). It gives the numbers below that
+    are not given."""
+    mass: Positive | None = Field(
+        None, description="Mass of the platform [kg]; from its file if not given (hedgehog: 5.3)."
+    )
     inertia: Positive | None = None
-    """Inertia about the axis of rotation, without the wheel's own [kg m2]; the platform's if not given (hedgehog:
-    0.06)."""
+    """Moment of inertia about the axis of rotation, without that of the wheel [kg m2]; from the platform's file if not
+    given (hedgehog: 0.06)."""
     spike_length: Positive | None = None
-    """Centre to tip of a spike [m]; the platform's if not given (hedgehog: 0.2)."""
+    """Distance from the centre to the tip of a spike [m]; from the platform's file if not given (hedgehog: 0.2)."""
     wheel_inertia: Positive | None = None
-    """Inertia of the flywheel [kg m2]; the platform's if not given (hedgehog: 1.2e-3)."""
+    """Moment of inertia of the flywheel [kg m2]; from the platform's file if not given (hedgehog: 1.2e-3)."""
     max_wheel_speed: Annotated[float, Field(gt=0)] | None = None
-    """Largest speed of the wheel [rad/s]: a motor's torque ends there; the platform's if not given (hedgehog: 1050),
-    unknown for another wheel_inertia and for a model."""
+    """Largest speed of the wheel [rad/s], at which a motor's torque ends; from the platform's file if not given
+    (hedgehog: 1050). Unknown if wheel_inertia or a model is given."""
     max_motor_torque: Annotated[float, Field(gt=0)] | None = None
-    """Largest torque of the motor [N m]; the platform's if not given (hedgehog: 0.22), unknown for another
-    wheel_inertia and for a model."""
+    """Largest torque of the motor [N m]; from the platform's file if not given (hedgehog: 0.22). Unknown if
+    wheel_inertia or a model is given."""
 
     @model_validator(mode="after")
     def _friction_fits_together(self) -> Self:

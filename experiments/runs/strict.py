@@ -14,7 +14,7 @@ __all__ = ["NotNegative", "Positive", "SeedNumber", "StrictSettings", "Threads",
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
-Threads = Annotated[int | None, Field(ge=1, le=1024, description="CPU threads; all there are if not given.")]
+Threads = Annotated[int | None, Field(ge=1, le=1024, description="CPU threads; all cores if not given.")]
 
 
 class StrictSettings(BaseModel):

@@ -26,23 +26,29 @@ class SpatialSettings(GrainsSettings):
 
     # The surface
     surface: str | None = None
-    """Material: steel, brick, sand, sand-weak or jsc1a; brick if not given."""
+    """Surface: steel, brick, sand, sand-weak or jsc1a; brick if not given."""
     ground: Literal["spring-damper", "bed"] = "spring-damper"
-    """What computes the surface's force: the spring-damper, or a bed of grains."""
+    """Law of the force of the ground: spring-damper, or bed (of grains)."""
     stiffness: Positive | None = None
-    """K of one spike [N/m]; half of the surface's, which are of a row of two, if not given."""
+    """Stiffness K under one spike [N/m]; if not given, half of the surface's, which is for a row of two."""
     damping: NotNegative | None = None
-    """C of one spike, while going in [N s/m]; half of the surface's if not given."""
-    mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (brick: 0.5).")
+    """Damping C under one spike that moves in [N s/m]; half of the surface's if not given."""
+    mu_s: NotNegative | None = Field(
+        None, description="Coefficient of static friction [1]; that of the surface if not given (brick: 0.5)."
+    )
     mu_d: NotNegative | None = None
-    """Sliding friction [1]; the surface's if not given (brick: 0.25), half of mu_s where that is."""
+    """Coefficient of sliding friction [1]; if not given, half of a given mu_s, else that of the surface (brick:
+    0.25)."""
 
     # The platform, and what carries part of it
-    platform: str = Field("hedgehog", description="The platform: one that ships, or its TOML file.")
+    platform: str = Field(
+        "hedgehog", description="Platform: hedgehog, cubli, mascot, minerva, or a TOML file (docs/platform.md)."
+    )
     rig: Positive | None = None
-    """g_sim of the offloading rig [9.80665 m/s2]; 0.0085 if neither it nor gravity is given."""
+    """Simulated gravity g_sim of the offloading rig, in g [9.80665 m/s2]; 0.0085 if neither rig nor gravity is
+    given."""
     rig_reading: Literal["pair", "weight"] = "pair"
-    """What rig means: free-fall acceleration of platform and counterweight (pair), or the weight left per mass of the
+    """Meaning of rig: free-fall acceleration of platform and counterweight (pair), or remaining weight over mass of the
     platform (weight)."""
     gravity: Positive | None = Field(None, description="Gravity of a free platform, without a rig [m/s2].")
 
@@ -51,21 +57,21 @@ class SpatialSettings(GrainsSettings):
     """Torque on the platform about its own x, y and z, while a spike touches [N m]; 0.22 about y, or the motor's most,
     if neither it nor a motion at the start is given."""
     torque_until: Positive | None = Field(None, description="End of the torques [s]; they do not end if not given.")
-    torque_in_flight: bool = Field(False, description="Whether the wheels are driven while nothing touches, too.")
+    torque_in_flight: bool = Field(False, description="Drive the wheels also while nothing touches the ground.")
     actuator: Literal["motor", "brake"] = "motor"
-    """What makes the torques: motors that speed wheels up, or brakes that slow them to rest."""
+    """Source of the torques: motors that accelerate the wheels, or brakes that stop them."""
     wheel_speed_0: tuple[NotNegative, NotNegative, NotNegative] = ZERO
-    """Speeds of the wheels about x, y and z at the start [rad/s]; a brake must be given its own."""
+    """Initial speeds of the wheels about x, y and z [rad/s]; each brake needs one."""
 
     # How it starts
     turn: Vector = ZERO
-    """How it is turned at the start: about this vector, by its length, from level [rad]."""
-    velocity: Vector = Field(ZERO, description="Velocity of the centre of mass at the start [m/s].")
-    angular_velocity: Vector = Field(ZERO, description="Angular velocity at the start, axes of the ground [rad/s].")
+    """Initial attitude: rotation vector from level; its direction is the axis, its length the angle [rad]."""
+    velocity: Vector = Field(ZERO, description="Initial velocity of the centre of mass [m/s].")
+    angular_velocity: Vector = Field(ZERO, description="Initial angular velocity, in axes of the ground [rad/s].")
     height: NotNegative | None = None
-    """Height of the lowest tip over the surface at the start [m]: it is let fall. If not given it is put just clear of
-    the ground, and set down by a hand where it has no motion."""
-    duration: Positive = Field(1.0, le=3600, description="How long it is followed [s].")
+    """Initial height of the lowest tip above the surface, from which the platform falls [m]. If not given, it starts
+    just above the ground; without an initial motion it is first lowered slowly until it rests."""
+    duration: Positive = Field(1.0, le=3600, description="Simulated time [s].")
 
     @property
     def placed(self) -> bool:

@@ -39,11 +39,11 @@ FEWEST = 0.1  # A shorter run has too few rows of the camera to be diagnosed [s]
 class TumbleRecording(StrictSettings):
     """What goes into a campaign made of tumbles beside the first run, and how noisy it is."""
 
-    also: tuple[str, ...] = Field((), description="Of tumbles: folders of further runs, each a trial of the campaign.")
+    also: tuple[str, ...] = Field((), description="Tumbles: folders of further runs; each becomes a trial.")
     fitted: str | None = None
-    """Of tumbles: folder of a run of penetrate in the same grains, whose K and C are stated."""
+    """Tumbles: folder of a penetrate run in the same grains, whose K and C are stated in the campaign."""
     noise: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
-    """Of tumbles: noise of the sensors over that of `hedgebed campaign` [1]."""
+    """Tumbles: noise of the sensors, relative to that of `hedgebed campaign` [1]."""
 
 
 def write_tumbles_campaign(

@@ -31,35 +31,38 @@ class TrialSettings(PlatformSettings):
 
     # The surface
     surface: str | None = None
-    """Material: steel, brick, sand, sand-weak or jsc1a; of the model, else brick, if not given."""
+    """Surface: steel, brick, sand, sand-weak or jsc1a; if not given, that of the model, else brick."""
     ground: str = Field(
         "spring-damper",
-        description="Law that computes the surface's force: "
-        f"{' or '.join(', '.join(GROUNDS).rsplit(', ', 1))}, or a ground.toml of one spike; for tumble also bed, a "
-        "bed of grains.",
+        description="Law of the force of the ground: "
+        f"{' or '.join(', '.join(GROUNDS).rsplit(', ', 1))}, or a ground.toml of one spike; for tumble also bed (of "
+        "grains).",
     )
     ground_parameters: tuple[str, ...] = ()
-    """Parameters of another law than the spring-damper, of one spike, as name=value in SI."""
+    """Parameters of a law other than the spring-damper, for one spike, as name=value in SI units."""
 
     # The rig
     rig_reading: Literal["pair", "weight"] = "pair"
-    """What rig means: free-fall acceleration of platform and counterweight (pair), or the weight left per mass of the
+    """Meaning of rig: free-fall acceleration of platform and counterweight (pair), or remaining weight over mass of the
     platform (weight)."""
     counterweight: Positive | None = None
-    """m_b of the rig [kg]; m (g - g_sim) / (g + g_sim) if not given; g_sim rules the weight."""
+    """Counterweight m_b of the rig [kg]; m (g - g_sim) / (g + g_sim) if not given. The weight always follows g_sim."""
 
     # Beyond the base model
     model: str | None = None
-    """A model.toml: its tables stand under what is given here, its effects are added."""
+    """A model.toml: it gives the numbers that are not given here, and its effects are added."""
     effects: tuple[str, ...] = ()
-    """Terms beyond the base model, as id.parameter=value in SI (pendulum.length=2.2); `hedgebed effects` lists them."""
+    """Effects added to the base model, as id.parameter=value in SI units (pendulum.length=2.2); `hedgebed effects`
+    lists them."""
 
     # How long
-    torque_until: NotNegative | None = Field(None, description="End of the torque [s]; it does not end if not given.")
+    torque_until: NotNegative | None = Field(
+        None, description="Time at which the torque ends [s]; no end if not given."
+    )
     duration: Positive = Field(
         3.0,
         le=3600,
-        description=f"How long the trial lasts [s]; {ON_GRAINS:g} of a tumble on a bed in the rig, if not given.",
+        description=f"Duration of the trial [s]; if not given, {ON_GRAINS:g} for a tumble on a bed in the rig.",
     )
 
     @model_validator(mode="after")
@@ -88,35 +91,38 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
 
     # The gravity
     rig: Positive | None = None
-    """g_sim of the offloading rig [9.80665 m/s2]; 0.0085 if neither it nor gravity is given."""
+    """Simulated gravity g_sim of the offloading rig, in g [9.80665 m/s2]; 0.0085 if neither rig nor gravity is
+    given."""
     gravity: Positive | None = Field(None, description="Gravity of a free platform, without a rig [m/s2].")
 
     # What turns it
     torque: NotNegative | None = None
-    """Torque on the platform while a spike touches [N m]; 0.22 if not given."""
+    """Torque on the platform while a spike is in contact [N m]; 0.22 if not given."""
     actuator: Literal["motor", "brake"] = "motor"
-    """What makes the torque: a motor that speeds the wheel up, or a brake that slows it to rest."""
+    """Source of the torque: a motor that accelerates the wheel, or a brake that stops it."""
     wheel_speed_0: NotNegative | None = None
-    """Speed of the wheel at the start [rad/s]; 0 for a motor; a brake must be given one."""
+    """Initial speed of the wheel [rad/s]; 0 for a motor if not given; a brake needs one."""
 
     # Over a range
     sweep: tuple[str, ...] = ()
-    """Do it over a range of one number, or of two: KEY=FROM:TO:STEP, such as mu_s=0.3:0.6:0.1 or
+    """Repeat the trial over a range of one or two numbers: KEY=FROM:TO:STEP, such as mu_s=0.3:0.6:0.1 or
     pendulum.length=2:2.4:0.1."""
 
     # How it is computed
     method: Literal["located", "paper", "coupled"] = "located"
-    """Integrator: transitions located in time, the paper's fixed step of 1 ms, or the coupling's master, which steps
-    the spring-damper as it does grains."""
-    sample_interval: float = Field(1e-3, gt=0, le=1e-3, description="Time between rows of trajectory.csv [s].")
+    """Integrator: contact transitions located in time; the fixed step of 1 ms of the paper; or the coupling that grains
+    use."""
+    sample_interval: float = Field(1e-3, gt=0, le=1e-3, description="Time between two rows of trajectory.csv [s].")
 
     # Trials made up from it
     campaign: str | None = Field(None, min_length=1)
-    """Folder for made-up trials of this tumble, seen through noisy sensors, as a campaign; what is true of them,
-    effects and all, stays in the run's folder (truth.toml)."""
-    campaign_trials: int = Field(8, ge=1, le=999, description="Trials of the campaign [1].")
-    campaign_seed: int = Field(1, ge=0, lt=2**31, description="Seed of what is true and of the noise.")
-    campaign_noise: Positive = Field(1.0, description="Noise of the sensors over that of `hedgebed campaign` [1].")
+    """Folder for simulated trials of this tumble with sensor noise, as a campaign. The true numbers and effects are
+    written to truth.toml in the folder of the run."""
+    campaign_trials: int = Field(8, ge=1, le=999, description="Campaign: number of trials [1].")
+    campaign_seed: int = Field(1, ge=0, lt=2**31, description="Campaign: seed of true numbers and noise.")
+    campaign_noise: Positive = Field(
+        1.0, description="Campaign: noise of the sensors, relative to that of `hedgebed campaign` [1]."
+    )
 
     @model_validator(mode="before")
     @classmethod
