@@ -150,7 +150,7 @@ class Master:
     def guess(self) -> Wrench:
         """The wrench expected in the step to come."""
         if not self._wrenches:
-            return Wrench.none()
+            return Wrench.none(self.body.pose.position.size)
         weights = _WEIGHTS[min(self.extrapolation, len(self._wrenches) - 1)]
         rows = (w * _row(past) for w, past in zip(weights, self._wrenches, strict=False))
         return _unpack(np.asarray(sum(rows)))
@@ -240,14 +240,14 @@ class Master:
     def state(self) -> State:
         """All that the next steps depend on, body and ground included: a flat dict of numpy arrays."""
         past = [_row(wrench) for wrench in self._wrenches]
-        held = self._held
+        held, width = self._held, len(_row(self.wrench))
         own: State = {
             "count": np.array(self.count),
-            "wrenches": np.array(past).reshape(-1, 6),
+            "wrenches": np.array(past).reshape(-1, width),
             "wrench": _row(self.wrench),
             "held": np.concatenate([held.velocity, held.spin]) if held is not None else np.zeros(0),
             "exchange": np.array(astuple(self.exchange), dtype=float),
-            "learnt": np.array(self._changes, dtype=float).reshape(-1, 2, 6),
+            "learnt": np.array(self._changes, dtype=float).reshape(-1, 2, width),
         }
         return prefixed("master", own) | prefixed("body", self.body.state()) | prefixed("ground", self.ground.state())
 
@@ -259,8 +259,9 @@ class Master:
         self._wrenches.extend(_unpack(row) for row in np.asarray(own["wrenches"], dtype=float))
         self.wrench = _unpack(np.asarray(own["wrench"], dtype=float))
         held = np.asarray(own["held"], dtype=float)
-        self._held = Twist(held[:3].copy(), held[3:].copy()) if held.size else None
-        learnt = np.asarray(own.get("learnt", ()), dtype=float).reshape(-1, 2, 6)
+        half = held.size // 2
+        self._held = Twist(held[:half].copy(), held[half:].copy()) if half else None
+        learnt = np.asarray(own.get("learnt", ()), dtype=float).reshape(-1, 2, np.size(own["wrench"]))
         self._changes = [(into.copy(), out.copy()) for into, out in learnt]
         exchange = own["exchange"] if "exchange" in own else own["books"]  # as an earlier version has it
         given, taken, worst, largest, *counts = (float(number) for number in exchange)
@@ -281,9 +282,9 @@ def _unchanged(last: tuple[Vector, Vector], known: list[tuple[Vector, Vector]]) 
     if not known:
         return out
     # Torques over the arm that they have, so that they weigh as forces do.
-    wrenches = np.abs([out, *(change for _, change in known)])
-    force, torque = wrenches[:, :3].max(), wrenches[:, 3:].max()
-    scale = np.repeat([1.0, force / torque if force > 0 and torque > 0 else 1.0], 3)
+    wrenches, half = np.abs([out, *(change for _, change in known)]), len(out) // 2
+    force, torque = wrenches[:, :half].max(), wrenches[:, half:].max()
+    scale = np.repeat([1.0, force / torque if force > 0 and torque > 0 else 1.0], half)
     change = np.array([scale * (of_out - of_in) for of_in, of_out in known]).T
     share = np.linalg.lstsq(change, scale * (into - out), rcond=1e-10)[0]
     return np.asarray(out + sum(c * of_out for c, (_, of_out) in zip(share, known, strict=True)))
@@ -294,7 +295,8 @@ def _row(wrench: Wrench) -> Vector:
 
 
 def _unpack(row: np.ndarray) -> Wrench:
-    return Wrench(row[:3].copy(), row[3:].copy())
+    half = len(row) // 2  # of several bodies in one, forces come first
+    return Wrench(row[:half].copy(), row[half:].copy())
 
 
 def _mean_wrench(wrenches: list[Wrench]) -> Wrench:

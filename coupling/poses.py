@@ -55,9 +55,9 @@ class Wrench:
         return cls(reaction.force, reaction.torque)
 
     @classmethod
-    def none(cls) -> "Wrench":
-        """No force."""
-        return cls(np.zeros(3), np.zeros(3))
+    def none(cls, size: int = 3) -> "Wrench":
+        """No force; `size` numbers of several bodies in one."""
+        return cls(np.zeros(size), np.zeros(size))
 
     def power(self, twist: Twist) -> float:
         """Its power on a body that moves so [W]."""

@@ -35,6 +35,7 @@ class _LawGround(Coulomb):
     time_step: float = 1e-4  # The step it is to be driven at [s]: the law itself is exact at any
     centre: tuple[float, float] = (0.0, 0.0)  # Where a body is put by default [m]; the surface is the same everywhere
     name: str = ""  # What a report calls it; the law's name if not given
+    count: float = 1.0  # How many times the law it is, as of several spikes side by side [1]
     lag: ClassVar[float] = 0.0  # The mean force over a step belongs to the step's middle
     gives_friction: ClassVar[bool] = False  # The horizontal force is a Coulomb bound, which the body resolves
     clearance: ClassVar[float] = 0.0  # How far above `surface` a body touches nothing [m]: the surface is flat
@@ -50,7 +51,9 @@ class _LawGround(Coulomb):
         law = find_law(law_name)
         check_friction(self.mu_s, self.mu_d)
         check_above_zero("in s", time_step=self.time_step)
-        values = {"_law": law, "_numbers": law.numbers(parameters), "_rebound": law.rebound(parameters) or 1.0}
+        check_above_zero("1", count=self.count)
+        numbers = law.numbers(parameters, count=self.count)
+        values = {"_law": law, "_numbers": numbers, "_rebound": law.rebound(parameters) or 1.0}
         for key, value in (values | {"_deepest": [0.0], "_depth": [0.0], "name": self.name or law.name}).items():
             object.__setattr__(self, key, value)
 

@@ -1,0 +1,450 @@
+"""A robot of MuJoCo as a body that a ground pushes at its feet: `MujocoRobot`.
+
+MuJoCo computes joints, motors, controllers and the robot's own contacts, in its own steps h; the ground's wrench on
+each foot goes in by ``xfrc_applied``. In a macro step H = k h the scheme is that of `coupling.spatial_body`, with the
+mass matrix M(q) and the Jacobian J of the feet in place of a mass:
+
+    q' after k steps of MuJoCo under the guess F~: the ground follows the feet along this path, and answers F
+    v' = v(F~) + (H - (h + s) / 2) M^-1 J^T (F - F~)
+
+so that the impulse is exactly H F. MuJoCo steps q' = q + h v' with the new velocity: its velocities belong to a time
+h / 2 before its positions. Those of the feet that are given here belong to s / 2 after the positions (s: the ground's
+lag), w = v + h / 2 a + s / 2 M^-1 J^T F, a all accelerations. The given start velocity counts as w.
+
+Under a Coulomb bound the points of a foot that stick share what holds them in proportion to their loads, so that their
+mean slip and their turning about the vertical are zero at the step's end, as in `coupling.spatial_body`; here for all
+feet at once, by J M^-1 J^T.
+"""
+
+import copy
+import math
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coupling.poses import Pose, Twist, Vector, Wrench
+from rigid.ground.reaction import Reaction, State
+from rigid.spatial.quaternions import multiply, to_matrix
+
+from .feet import Foot, find_feet, refuse_missing
+from .friction import FeetFriction
+
+__all__ = ["Controller", "MujocoRobot", "load_model"]
+
+Controller = Callable[[Any, Any], None]  # Called with MjModel and MjData; sets data.ctrl
+
+
+def load_model(path: str | Path) -> Any:
+    """The MuJoCo model in an MJCF or URDF file. Raises ValueError for a file that is not there or no model."""
+    mujoco, path = refuse_missing(), Path(path)
+    if not path.is_file():
+        raise ValueError(f"model = {str(path)!r}: there is no such file; an MJCF or URDF file would do")
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise ValueError(f"model = {str(path)!r} is no model that MuJoCo reads: {said}") from None
+
+
+class MujocoRobot:
+    """A robot of MuJoCo with feet; a `coupling.Body` whose poses, twists and wrenches have its feet one behind another.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel (a copy is used), or the path of its MJCF or URDF file.
+    feet : names of geoms, or of sites, or patterns of them (``spike_*``).
+    keyframe : name of the keyframe where it starts; None: where the model has it.
+    controller : called with model and data once per time step of the model as given; sets ``data.ctrl``. What it
+        remembers must be in ``data.userdata``, for a stopped run to go on to the same bits. None: the keyframe's ctrl.
+    height : height of its lowest foot over the surface at the start [m]; None: as the model has it.
+
+    Its world has z upwards and the undisturbed surface at z = 0. Planes and height fields of MuJoCo's world no longer
+    touch anything (`floors`): the ground here takes their place. Raises ValueError, naming what is wrong, for a missing
+    foot, gravity that is not straight down, the integrator RK4, and a height where nothing is free to move up.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        feet: Sequence[str],
+        *,
+        keyframe: str | None = None,
+        controller: Controller | None = None,
+        height: float | None = None,
+    ) -> None:
+        mujoco = self._mujoco = refuse_missing()
+        self.model = copy.copy(load_model(model) if isinstance(model, str | Path) else model)
+        self.controller = controller
+        self.control_step = float(self.model.opt.timestep)  # Between two calls of the controller [s]
+        self._check_model()
+        self.data = mujoco.MjData(self.model)
+        if keyframe is not None:
+            self._start_at(keyframe)
+        mujoco.mj_forward(self.model, self.data)
+        self.feet: list[Foot] = find_feet(self.model, self.data, [feet] if isinstance(feet, str) else feet)
+        self.floors = self._switch_off_floors()
+        self._bodies = np.array([foot.body for foot in self.feet])
+        self.owners = np.repeat(np.arange(len(self.feet)), [len(foot.centres) for foot in self.feet])
+        """Foot of each point on a law, shape (point,)."""
+        self.time = self.torque_work = self.actuator_work = 0.0  # [s], [J]; works of all but gravity, springs, ground
+        self.sliding: dict[int, Vector] = {}  # Point under a Coulomb bound that slides -> unit vector of its slip
+        self.sticking: frozenset[int] = frozenset()
+        self._last = np.zeros((len(self.feet), 6))  # The wrench of the last step
+        self._guess = self._last
+        self._step = 0.0  # MuJoCo's [s]; 0: it has not begun
+        self._lag = 0.0
+        self._own = np.zeros(self.model.nv)  # Accelerations but for the ground's
+        self._calls = 0  # Of the controller
+        self._works = np.zeros(3)  # Steps of MuJoCo so far; all work and that of actuators [J], half a step behind
+        self._rates: Vector  # w
+        if height is not None:
+            self.lift(height - self.clearance)
+        self.start()
+
+    # What it is -------------------------------------------------------------------------------------------------------
+
+    def _check_model(self) -> None:
+        model, mujoco = self.model, self._mujoco
+        if int(model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4):
+            raise ValueError(
+                "the model's integrator is RK4, which cannot be stepped in halves: implicitfast or Euler would do"
+            )
+        gravity = np.asarray(model.opt.gravity)
+        if gravity[0] or gravity[1] or gravity[2] > 0:
+            raise ValueError(f"the model's gravity is {gravity.tolist()} m/s2: only straight down (0, 0, -g) would do")
+
+    def _start_at(self, keyframe: str) -> None:
+        mujoco, model = self._mujoco, self.model
+        k = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
+        if k < 0:
+            names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_KEY, each) for each in range(model.nkey)]
+            raise ValueError(
+                f"keyframe = {keyframe!r}: the model has {', '.join(filter(None, names)) or 'no keyframes'}"
+            )
+        mujoco.mj_resetDataKeyframe(model, self.data, k)
+
+    def _switch_off_floors(self) -> tuple[str, ...]:
+        """Planes and height fields of the world touch nothing from now on; their names."""
+        model, mujoco = self.model, self._mujoco
+        flat = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+        found = []
+        for k in range(model.ngeom):
+            if int(model.geom_type[k]) in flat and (model.geom_contype[k] or model.geom_conaffinity[k]):
+                model.geom_contype[k] = model.geom_conaffinity[k] = 0
+                found.append(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k) or f"geom {k}")
+        return tuple(found)
+
+    def __repr__(self) -> str:
+        names = ", ".join(foot.name for foot in self.feet)
+        return f"MujocoRobot({self.name} of {self.mass:g} kg on {names} at {self.time:g} s)"
+
+    @property
+    def name(self) -> str:
+        """As the model says."""
+        return bytes(self.model.names).split(b"\0")[0].decode() or "robot"
+
+    @property
+    def gravity(self) -> float:
+        """Downwards [m/s2]."""
+        return -float(self.model.opt.gravity[2])
+
+    @cached_property
+    def moving(self) -> Vector:
+        """Which MuJoCo bodies can move, shape (body,), bool."""
+        return np.asarray(self.model.body_weldid != 0)
+
+    @cached_property
+    def mass(self) -> float:
+        """Of all that moves [kg]."""
+        return float(self.model.body_mass[self.moving].sum())
+
+    @property
+    def floats(self) -> bool:
+        """Whether nothing but gravity and the ground can change its momentum."""
+        model, free = self.model, int(self._mujoco.mjtJoint.mjJNT_FREE)
+        roots = [
+            k for k in range(1, model.nbody) if model.body_weldid[k] and not model.body_weldid[model.body_parentid[k]]
+        ]
+        held = any(model.jnt_type[model.body_jntadr[k]] != free for k in roots)
+        medium = bool(model.opt.density or model.opt.viscosity or np.any(model.body_gravcomp))
+        walls = any(model.geom_contype[k] or model.geom_conaffinity[k] for k in np.flatnonzero(self._static_geoms))
+        return not (held or medium or model.neq or walls)
+
+    @property
+    def _static_geoms(self) -> Vector:
+        return np.asarray(self.model.body_weldid[self.model.geom_bodyid] == 0)
+
+    @property
+    def clearance(self) -> float:
+        """Height of its lowest foot over the surface [m]."""
+        turns = self.data.xquat[self._bodies]
+        heights = [
+            float(at[2]) + foot.bottom(to_matrix(turn))
+            for foot, at, turn in zip(self.feet, self.data.xipos[self._bodies], turns, strict=True)
+        ]
+        return min(heights)
+
+    def lift(self, height: float) -> None:
+        """Raise it by `height` [m]. Raises ValueError where it is not free to move up."""
+        model, free = self.model, int(self._mujoco.mjtJoint.mjJNT_FREE)
+        joints = np.flatnonzero(model.jnt_type == free)
+        if not len(joints):
+            raise ValueError("height is given, but the robot has no free joint that could be raised: leave it out")
+        self.data.qpos[model.jnt_qposadr[joints] + 2] += height
+        self.start()
+
+    def start(self) -> None:
+        """Take positions and velocities of `data` as those that it starts with; they may be changed before."""
+        self._mujoco.mj_forward(self.model, self.data)
+        self._rates = np.array(self.data.qvel)
+        self._read_pose()
+
+    # Stepping ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def pose(self) -> Pose:
+        """Of its feet: positions [m], shape (3 foot,), and unit quaternions, shape (4 foot,)."""
+        return self._pose
+
+    @property
+    def twist(self) -> Twist:
+        """Of its feet, half a lag after the pose."""
+        return self._twist
+
+    def twist_now(self, lag: float) -> Twist:
+        """Of its feet at the time of the pose."""
+        return self._twist_of(self._rates - 0.5 * lag * self.response(self._last))
+
+    def begin(self, dt: float, lag: float) -> None:
+        """Get ready for macro steps of `dt` [s] on a ground of this lag [s]: the velocity is that of its pose."""
+        count = max(1, math.ceil(dt / self.control_step * (1 - 1e-9)))
+        self._count, self._lag = count, lag
+        step = dt / count
+        if step != self._step:
+            self.model.opt.timestep = step
+            if not self._step:
+                self._mujoco.mj_forward(self.model, self.data)
+                self._own = np.array(self.data.qacc)
+                self.data.qvel[:] = self._rates - 0.5 * step * self._own
+            self._step = step
+
+    def predict(self, dt: float, guess: Wrench, lag: float) -> Twist:
+        """Step MuJoCo by `dt` [s] under the guess at the wrenches; the mean twist of its feet on the way."""
+        self.begin(dt, lag)
+        mujoco, model, data = self._mujoco, self.model, self.data
+        rows = np.hstack([guess.force.reshape(-1, 3), guess.torque.reshape(-1, 3)])
+        if np.any(rows != self._last):
+            data.qvel[:] -= 0.5 * (self._step + lag) * self.response(rows - self._last)
+        self._guess = rows
+        data.xfrc_applied[self._bodies] = rows
+        for _ in range(self._count):
+            before = np.array(data.qvel)
+            mujoco.mj_step1(model, data)
+            if self.controller is not None and data.time >= (self._calls - 1e-6) * self.control_step:
+                self.controller(model, data)
+                self._calls += 1
+            mujoco.mj_step2(model, data)
+            self._count_work(before)
+        mujoco.mj_fwdPosition(model, data)
+        if not np.isfinite(data.qpos).all():
+            raise RuntimeError(
+                f"the robot's state is no number at {data.time:g} s: its own step or gains are too large"
+            )
+        start = self._pose
+        self._end = self._pose_now()
+        turns = [
+            _turn_between(a, b) / dt
+            for a, b in zip(start.turn.reshape(-1, 4), self._end.turn.reshape(-1, 4), strict=True)
+        ]
+        return Twist((self._end.position - start.position) / dt, np.concatenate(turns))
+
+    def _count_work(self, before: Vector) -> None:
+        """Work of what is neither gravity nor springs nor ground in the step just made: M dv / h less the others.
+
+        The forces of now act along the way before and along the way just made, half on each.
+        """
+        data, step = self.data, self._step
+        gained = np.zeros(self.model.nv)
+        self._mujoco.mj_mulM(self.model, data, gained, data.qvel - before)
+        other = gained / step - data.qfrc_smooth + data.qfrc_passive - data.qfrc_spring + data.qfrc_applied
+        way = 0.5 * step * (data.qvel + before if self._works[0] else data.qvel)
+        self._works += (1.0, (other + data.qfrc_actuator) @ way, data.qfrc_actuator @ way)
+
+    def _read_works(self) -> None:
+        """The works up to the time of the pose: half a step more than has been counted."""
+        data, way = self.data, 0.5 * self._step * self.data.qvel
+        other = data.qfrc_passive - data.qfrc_spring + data.qfrc_applied + data.qfrc_constraint + data.qfrc_actuator
+        self.torque_work = float(self._works[1] + other @ way)
+        self.actuator_work = float(self._works[2] + data.qfrc_actuator @ way)
+
+    def resolve(self, dt: float, twist: Twist, reaction: Reaction) -> Wrench:
+        """The ground's whole wrench: `reaction` over `dt` [s] plus the friction that its Coulomb bounds allow."""
+        bounded = [contact for contact in reaction.contacts if contact.tangential_force is None]
+        self._next_sliding, self._next_sticking = dict[int, Vector](), frozenset[int]()
+        if not bounded:
+            return Wrench.of(reaction)
+        normal = np.hstack([reaction.force.reshape(-1, 3), reaction.torque.reshape(-1, 3)])
+        free = self.data.qvel + 0.5 * self._step * self._own + self.response(
+            dt * (normal - self._guess) + 0.5 * (self._step + self._lag) * self._guess
+        )  # fmt: skip
+        friction = FeetFriction(self, dt, twist, free, bounded)
+        rows = friction.solve()
+        self._next_sliding, self._next_sticking = friction.sliding, frozenset(friction.sticking)
+        return Wrench(reaction.force + rows[:, :3].ravel(), reaction.torque + rows[:, 3:].ravel())
+
+    def advance(self, dt: float, twist: Twist, wrench: Wrench) -> None:
+        """Take the step that `predict` made, with the impulse of `wrench` in place of the guess's."""
+        mujoco, model, data = self._mujoco, self.model, self.data
+        rows = np.hstack([wrench.force.reshape(-1, 3), wrench.torque.reshape(-1, 3)])
+        data.qvel[:] += (dt - 0.5 * (self._step + self._lag)) * self.response(rows - self._guess)
+        data.xfrc_applied[self._bodies] = rows
+        self._last, self._pose = rows, self._end
+        self.sliding, self.sticking = self._next_sliding, self._next_sticking
+        self.time += dt
+        mujoco.mj_forward(model, data)
+        by_ground = self.response(rows)
+        self._own = data.qacc - by_ground
+        self._read_works()
+        self._rates = data.qvel + 0.5 * self._step * data.qacc + 0.5 * self._lag * by_ground
+        self._twist = self._twist_of(self._rates)
+
+    def response(self, rows: Vector) -> Vector:
+        """M^-1 J^T of wrenches on the feet [N, N m], shape (foot, 6): accelerations [m/s2, rad/s2], shape (nv,)."""
+        pushed = np.zeros(self.model.nv)
+        for body, row in zip(self._bodies, rows, strict=True):
+            if row.any():
+                linear, angular = self.jacobian(body)
+                pushed += linear.T @ row[:3] + angular.T @ row[3:]
+        return self.solve(pushed)
+
+    def solve(self, forces: Vector) -> Vector:
+        """M^-1 of generalised forces, shape (nv,) or (n, nv)."""
+        rows = np.ascontiguousarray(np.atleast_2d(forces))
+        found = np.zeros_like(rows)
+        self._mujoco.mj_solveM(self.model, self.data, found, rows)
+        return found.reshape(np.shape(forces))
+
+    def jacobian(self, body: int) -> tuple[Vector, Vector]:
+        """Of a MuJoCo body's centre of mass and of its turning, shape (3, nv) both."""
+        linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        self._mujoco.mj_jacBodyCom(self.model, self.data, linear, angular, int(body))
+        return linear, angular
+
+    _pose: Pose
+
+    def _read_pose(self) -> None:
+        self._pose = self._end = self._pose_now()
+        self._twist = self._twist_of(self._rates)
+
+    def _pose_now(self) -> Pose:
+        return Pose(self.data.xipos[self._bodies].ravel(), self.data.xquat[self._bodies].ravel())
+
+    def _twist_of(self, rates: Vector) -> Twist:
+        found = [self.jacobian(body) for body in self._bodies]
+        return Twist(
+            np.concatenate([linear @ rates for linear, _ in found]),
+            np.concatenate([angular @ rates for _, angular in found]),
+        )
+
+    # What it has ------------------------------------------------------------------------------------------------------
+
+    @property
+    def rates(self) -> Vector:
+        """Generalised velocities half a lag after the pose, shape (nv,)."""
+        return self._rates
+
+    def kinetic_energy(self, lag: float) -> float:
+        """At the time of the pose [J]."""
+        rates = self._rates - 0.5 * lag * self.response(self._last)
+        moved = np.zeros_like(rates)
+        self._mujoco.mj_mulM(self.model, self.data, moved, rates)
+        return 0.5 * float(rates @ moved)
+
+    @property
+    def potential_energy(self) -> float:
+        """Of gravity and of the springs in it [J]."""
+        self._mujoco.mj_energyPos(self.model, self.data)
+        return float(self.data.energy[0])
+
+    @property
+    def centre(self) -> Vector:
+        """Centre of mass [m], shape (3,)."""
+        return np.asarray(self._masses @ self.data.xipos / self.mass)
+
+    @cached_property
+    def _masses(self) -> Vector:
+        """Of the MuJoCo bodies that can move, 0 of the others [kg], shape (body,)."""
+        return np.where(self.moving, self.model.body_mass, 0.0)
+
+    @property
+    def momentum(self) -> Vector:
+        """[N s], shape (3,), half a lag after the pose."""
+        found = np.zeros(3)
+        for body in np.flatnonzero(self.moving).tolist():
+            found += self.model.body_mass[body] * (self.jacobian(body)[0] @ self._rates)
+        return found
+
+    @property
+    def angular_momentum(self) -> Vector:
+        """About (0, 0, 0) [N m s], shape (3,), half a lag after the pose."""
+        found, data = np.zeros(3), self.data
+        for body in np.flatnonzero(self.moving).tolist():
+            linear, angular = (jacobian @ self._rates for jacobian in self.jacobian(body))
+            axes = data.ximat[body].reshape(3, 3)
+            found += np.cross(data.xipos[body], self.model.body_mass[body] * linear)
+            found += axes @ (self.model.body_inertia[body] * (axes.T @ angular))
+        return found
+
+    def state(self) -> State:
+        """All that its next steps depend on."""
+        kind = self._mujoco.mjtState.mjSTATE_INTEGRATION
+        inner = np.zeros(self._mujoco.mj_stateSize(self.model, kind))
+        self._mujoco.mj_getState(self.model, self.data, inner, kind)
+        slides = sorted(self.sliding)
+        counts = (self.time, self.torque_work, self.actuator_work, self._step, self._lag, self._calls)
+        return {
+            "inner": inner,
+            "works": self._works.copy(),
+            "last": self._last.copy(),
+            "own": self._own.copy(),
+            "rates": self._rates.copy(),
+            "numbers": np.array(counts),
+            "sliding": np.array([[point, *self.sliding[point]] for point in slides], dtype=float).reshape(-1, 3),
+            "sticking": np.array(sorted(self.sticking), dtype=np.int64),
+        }
+
+    def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
+        mujoco, kind = self._mujoco, self._mujoco.mjtState.mjSTATE_INTEGRATION
+        inner = np.array(state["inner"], dtype=float)
+        numbers = [float(number) for number in state["numbers"]]
+        self.time, self.torque_work, self.actuator_work, self._step, self._lag, calls = numbers
+        self._calls = int(calls)
+        if self._step:
+            self.model.opt.timestep = self._step
+        mujoco.mj_setState(self.model, self.data, inner, kind)
+        mujoco.mj_fwdPosition(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, inner, kind)
+        kept = (np.array(state[name], dtype=float) for name in ("last", "own", "rates", "works"))
+        self._last, self._own, self._rates, self._works = kept
+        rows = np.asarray(state["sliding"], dtype=float).reshape(-1, 3)
+        self.sliding = {int(row[0]): row[1:].copy() for row in rows}
+        self.sticking = frozenset(int(point) for point in np.asarray(state["sticking"]))
+        self._read_pose()
+
+    _next_sliding: dict[int, Vector]
+    _next_sticking: frozenset[int]
+    _count = 1
+
+
+def _turn_between(before: Vector, after: Vector) -> Vector:
+    """The one turn from a unit quaternion to another [rad], shape (3,), by less than half a turn."""
+    w, *axis = multiply(after, before * (1.0, -1.0, -1.0, -1.0))
+    if w < 0:
+        w, axis = -w, [-part for part in axis]
+    size = math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+    share = 2.0 * math.atan2(size, w) / size if size > 1e-12 else 2.0
+    return np.array(axis) * share

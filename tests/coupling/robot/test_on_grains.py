@@ -1,0 +1,126 @@
+"""A robot of MuJoCo on a bed of grains: as the master's own body in space, momentum, restarts, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from spatial_runs import ball, grain_bed, model_of, moving
+
+from coupling import BedGround, LeftTheBedError, Master, SpatialBody
+from coupling.members import HULL, ball_member
+from coupling.robot import BedFeet, MujocoRobot, RobotRun
+from rigid.platform.platform import Platform
+from rigid.platform.solids import box_vertices
+from rigid.spatial.spatial import SpatialTrial
+
+pytest.importorskip("mujoco")
+pytestmark = pytest.mark.long
+
+MIDDLE = (0.048, 0.048)
+RADIUS, MASS = 0.015, 0.1
+WALKER = """<mujoco><option timestep="5e-4" integrator="implicitfast"/><worldbody>
+<body name="trunk" pos="0 0 .075"><freejoint/><geom type="box" size=".03 .03 .005" mass=".2"/>
+<body pos="-.018 0 -.03"><joint name="left" axis="0 1 0" stiffness="2" damping=".01"/>
+<geom name="left_shank" type="capsule" fromto="0 0 0 0 0 -.02" size=".004" mass=".01" contype="0" conaffinity="0"/>
+<geom name="left_foot" type="box" size=".012 .012 .006" pos="0 0 -.024" mass=".05"/></body>
+<body pos=".018 0 -.03"><joint name="right" axis="0 1 0" stiffness="2" damping=".01"/>
+<geom name="right_foot" type="capsule" fromto="0 -.01 -.018 0 .01 -.018" size=".012" mass=".05"/></body>
+</body></worldbody><actuator><motor joint="left"/></actuator></mujoco>"""
+
+
+def dropped(height=0.0165, *, gravity=-9.81, **options):
+    robot = MujocoRobot(ball("sphere", f"{RADIUS}", mass=MASS, height=height, gravity=gravity), "foot")
+    ground = BedFeet(grain_bed(), robot.feet, origin=MIDDLE, friction=0.5, restitution=0.5)
+    return robot, ground
+
+
+def test_a_ball_on_grains_moves_as_the_masters_own_body_in_space():
+    """The same ball, thrown askew, as a `SpatialBody` under the same explicit exchange of second order."""
+    robot, ground = dropped()
+    moving(robot, 0.1, -0.05, -0.4, 0, 3, 0)
+    run = RobotRun(robot, ground, duration=0.03, substeps=4)
+    run.run()
+    inertia = 0.4 * MASS * RADIUS**2
+    platform = Platform(
+        name="ball",
+        mass=MASS,
+        inertia=inertia * np.eye(3),
+        tips=box_vertices([0.02, 0.02, 0.02]),
+        hull_vertices=box_vertices([0.02, 0.02, 0.02]),
+        wheels=(),
+    )
+    trial = SpatialTrial(platform=platform, gravity=9.81)
+    body = SpatialBody(
+        trial, position=(0.0, 0.0, 0.0165), velocity=(0.1, -0.05, -0.4), angular_velocity=(0.0, 3.0, 0.0)
+    )
+    bed = BedGround(
+        grain_bed(),
+        [replace(ball_member(RADIUS), row=HULL)],
+        origin=MIDDLE,
+        friction=0.5,
+        restitution=0.5,
+        bounded_across=True,
+    )
+    body.start(bed.lag)
+    master = Master(body, bed, substeps=4)
+    for _ in range(run.master.count):
+        master.step()
+    assert run.columns["fz"].max() > 5.0
+    assert np.abs(robot.data.qpos[:3] - body.place).max() < 1e-5
+    assert robot.rates[:3] == pytest.approx(body.twist.velocity, abs=2e-3)
+    assert run.energy_residual < 0.01 and run.balance_numbers["momentum_residual"][0] < 1e-14
+
+
+def test_momentum_and_angular_momentum_of_robot_and_grains_are_kept_and_energy_is_accounted_for():
+    """A walker with two feet of other shapes, one of its joints driven.
+
+    Its own momentum MuJoCo keeps to second order in its step: 2e-6 of 0.14 N s here.
+    """
+    robot = MujocoRobot(
+        model_of(WALKER), ["left_foot", "right_foot"], height=0.004,
+        controller=lambda model, data: data.ctrl.__setitem__(0, 0.02),
+    )  # fmt: skip
+    ground = BedFeet(grain_bed(), robot.feet, origin=MIDDLE, friction=0.5, restitution=0.5)
+    run = RobotRun(robot, ground, duration=0.03)
+    run.run()
+    numbers = run.balance_numbers
+    assert run.columns["touching"].max() == 2 and run.columns["fz"].max() > 3.0
+    assert numbers["momentum_residual"][0] < 1e-5
+    assert numbers["angular_momentum_residual"][0] < 1e-5
+    assert run.energy_residual < 0.01 and numbers["dissipated_friction"][0] > 0
+
+
+def test_a_run_on_grains_goes_on_from_its_state_to_the_same_bits():
+    def fresh():
+        robot, ground = dropped()
+        return RobotRun(robot, ground, duration=0.02)
+
+    whole, half, other = fresh(), fresh(), fresh()
+    for _ in range(20):
+        half.advance()
+    other.restore({key: np.array(value) for key, value in half.state().items()})
+    expected, found = whole.run(), other.run()
+    assert all((expected[name] == found[name]).all() for name in expected)
+    assert (whole.feet == other.feet).all() and whole.samples["kinetic"][-1] == other.samples["kinetic"][-1]
+
+
+def test_a_foot_among_the_grains_is_refused_with_the_height_that_would_do():
+    robot, ground = dropped(0.010)
+    with pytest.raises(
+        ValueError, match=r"'foot' starts in the sand, .* mm into a grain: .* ([\d.]+) mm higher"
+    ) as found:
+        ground.place(robot.pose)
+    higher = float(str(found.value).rsplit(" mm higher", 1)[0].rsplit(" ", 1)[1])
+    robot.lift(1e-3 * higher)
+    ground.place(robot.pose)
+
+
+def test_a_foot_that_comes_down_beyond_the_bed_or_on_its_floor_ends_the_run():
+    robot, ground = dropped()
+    ground.origin[0] = 0.0955
+    with pytest.raises(LeftTheBedError, match=r"foot 'foot' came down .* m beyond the bed along x"):
+        RobotRun(moving(robot, 0.5, 0, -0.3, 0, 0, 0), ground, duration=0.05).run()
+    robot, ground = dropped()
+    ground._height = 0.005
+    with pytest.raises(LeftTheBedError, match=r"foot 'foot' sank .* to within a grain of the floor"):
+        RobotRun(robot, ground, duration=0.05).run()

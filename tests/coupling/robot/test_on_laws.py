@@ -1,0 +1,205 @@
+"""A robot of MuJoCo on surface laws: closed forms, `rigid.spatial` again, energy, stability, restarts."""
+
+import math
+
+import numpy as np
+import pytest
+from spatial_runs import EXAMPLES, LEG, ball, model_of, moving
+
+from coupling import LawGround, SpatialRun
+from coupling.robot import LawFeet, MujocoRobot, RobotRun, load_model
+from rigid.platform.actuation import TorqueHistory
+from rigid.platform.files import find_platform
+from rigid.spatial.quaternions import from_turn, to_matrix
+from rigid.spatial.spatial import SpatialTrial, simulate, standing
+
+pytest.importorskip("mujoco")
+
+HEDGEHOG = EXAMPLES / "mujoco-hedgehog" / "hedgehog.xml"
+SPRING = {"stiffness": 2000.0, "damping": 0.0}
+BRICK = {"stiffness": 7500.0, "damping": 30.0}  # of one spike
+
+
+def on_law(robot, step=4e-4, duration=0.5, *, parameters=SPRING, mu_s=0.5, **options):
+    ground = LawFeet(robot.feet, parameters=parameters, mu_s=mu_s, time_step=0.1 * step)
+    run = RobotRun(robot, ground, duration=duration, **options)
+    run.run()
+    return run
+
+
+def test_a_ball_that_falls_is_where_a_falling_body_is_whatever_the_step():
+    """z = h - g t^2 / 2: MuJoCo's velocity belongs to half a step before, and is started there."""
+    for step in (4e-4, 2e-3):
+        run = on_law(MujocoRobot(ball(height=2.0), "foot"), step, 0.4)
+        assert run.columns["z"][-1] == pytest.approx(2.0 - 0.5 * 9.81 * 0.16, abs=1e-12)
+
+
+def test_a_ball_swings_on_the_spring_as_an_oscillator_does_with_an_error_of_second_order():
+    """z = A cos(w t) about where it rests, w^2 = K / m."""
+    off = []
+    for step in (2e-3, 1e-3):
+        robot = MujocoRobot(ball(height=0.05 - 0.004), "foot")
+        run = on_law(robot, step, 0.5, checked=False)
+        rest, swing = 9.81 / 2000.0, 9.81 / 2000.0 - 0.004
+        expected = 0.05 - rest + swing * np.cos(math.sqrt(2000.0) * run.columns["time"])
+        off.append(float(np.abs(run.columns["z"] - expected).max()) / swing)
+    assert off[1] < 0.01 and off[0] / off[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_sliding_ball_comes_to_roll_at_five_sevenths_of_its_speed():
+    """Angular momentum about the point of contact is kept: v = 5 v0 / 7 (Landau and Lifshitz, section 38)."""
+    robot = moving(MujocoRobot(ball(height=0.05), "foot"), 0.3, 0, 0, 0, 0, 0)
+    run = on_law(robot, 4e-4, 0.5)
+    assert robot.rates[0] == pytest.approx(5 / 7 * 0.3, rel=1e-4)
+    assert robot.rates[4] * 0.05 == pytest.approx(robot.rates[0], rel=1e-4)
+    assert run.energy_residual < 1e-3
+
+
+def test_a_box_on_its_four_corners_stays_where_it_is_put_and_a_push_beyond_friction_moves_it():
+    """It sinks W / K; below mu_s W it sticks, above it slides at (F - mu_d W) / m."""
+    for push, moves in ((0.45, False), (0.55, True)):
+        robot = MujocoRobot(ball("box", "0.05 0.05 0.005", height=0.004, gravity=-2.0), "foot")
+        robot.data.qfrc_applied[0] = push * 2.0
+        run = on_law(robot, 4e-4, 0.2, parameters={"stiffness": 2000.0, "damping": 40.0}, checked=False)
+        way = float(run.columns["x"][-1])
+        if moves:
+            speed = float(robot.rates[0])
+            assert speed / 0.2 == pytest.approx((push - 0.25) * 2.0, rel=0.01) and way > 0.01
+        else:
+            assert abs(way) < 2e-5
+        assert run.columns["z"][-1] == pytest.approx(0.005 - 2.0 / 2000.0, rel=0.02)
+
+
+def test_the_hedgehog_as_mjcf_is_that_of_the_spatial_model_with_an_error_of_second_order():
+    """`rigid.simulate_spatial`, which locates its events: pivot and slip, 0.5 s; as the master's own body in space."""
+    platform = find_platform("hedgehog")
+    trial = SpatialTrial(
+        platform=platform, gravity=0.0834, mu_s=0.5, ground_parameters=BRICK,
+        torques=(TorqueHistory.constant(platform.wheel(), 0.22),), torque_in_flight=True,
+    )  # fmt: skip
+    position, quaternion = standing(trial)
+    model = simulate(trial, duration=0.5, sample_interval=0.5, tolerance=1e-9)
+    off = []
+    for step in (1e-3, 5e-4):
+        robot = MujocoRobot(load_model(HEDGEHOG), "tip_*", keyframe="tumble")
+        robot.data.qpos[:7] = [*position, *quaternion]
+        robot.lift(0.0)
+        run = on_law(robot, step, 0.5, parameters=BRICK, checked=False)
+        off.append(max(
+            np.abs(robot.data.qpos[:3] - model.position[-1]).max(),
+            np.abs(robot.data.qpos[3:7] - model.quaternion[-1]).max(),
+        ))  # fmt: skip
+        assert run.energy_residual < 1e-6
+    assert off[1] < 1e-6 and off[0] / off[1] > 3.4
+    assert robot.rates[7] + robot.rates[4] == pytest.approx(-0.22 * 0.5 / 1.2e-3, rel=1e-6)  # of the wheel, absolute
+
+
+def test_the_hedgehog_lands_on_one_corner_as_the_masters_own_body_in_space_does():
+    start = {
+        "position": (0.0, 0.0, 0.23), "quaternion": tuple(from_turn([0.3, -0.5, 0.2])), "velocity": (0.05, -0.03, -0.1),
+        "angular_velocity": (0.5, 0.8, -0.3),
+    }  # fmt: skip
+    trial = SpatialTrial(platform=find_platform("hedgehog"), gravity=0.0834, mu_s=0.5, ground_parameters=BRICK)
+    ours = SpatialRun(trial, LawGround.of_spatial(trial), duration=0.6, substeps=4, **start)
+    ours.run()
+    robot = MujocoRobot(load_model(HEDGEHOG), "tip_*")
+    robot.data.qpos[:7] = [*start["position"], *start["quaternion"]]
+    spin = to_matrix(start["quaternion"]).T @ start["angular_velocity"]
+    moving(robot, *start["velocity"], *spin, *-spin)  # the wheels stand still
+    robot.lift(0.0)
+    run = on_law(robot, 4e-4, 0.6, parameters=BRICK)
+    assert run.columns["fz"].max() > 1.0
+    assert np.abs(robot.data.qpos[:3] - ours.body.place).max() < 1e-6
+    assert np.abs(robot.data.qpos[3:7] - ours.body.turn).max() < 1e-6
+
+
+def test_the_work_at_the_interface_agrees_from_both_sides_with_an_error_of_second_order():
+    """A leg whose motor pushes in turn up and down: of the exchange alone, and with all that MuJoCo did."""
+    off = []
+    for step in (1e-3, 5e-4):
+        robot = MujocoRobot(model_of(LEG.format(foot_mass=0.2)), "foot", controller=pushing)
+        robot.data.qpos[0] = -0.0105
+        run = on_law(robot, step, 0.3, checked=False)
+        assert run.columns["actuator_work"][-1] > 0.02
+        numbers = run.balance_numbers
+        off.append([numbers["coupling_residual"][0], numbers["exchange_residual"][0]])
+    assert (np.array(off[1]) < [5e-4, 2e-3]).all() and np.array(off[0]) / off[1] == pytest.approx([4.0, 4.0], rel=0.15)
+
+
+def pushing(model, data):
+    """Up and down, five times a second."""
+    data.ctrl[0] = -3.0 * math.sin(2 * math.pi * 5 * data.time)
+
+
+@pytest.mark.parametrize("law", ["hunt-crossley", "power", "katsuragi-durian", "bekker", "rft"])
+def test_every_law_stops_the_robot_and_its_impulse_is_what_the_robot_gained(law):
+    robot = MujocoRobot(ball("sphere", "0.01", mass=0.05, height=0.0103), "foot")
+    ground = LawFeet(robot.feet, law=law, time_step=1e-5)
+    run = RobotRun(robot, ground, duration=0.1)
+    rows = run.run()
+    impulse = run.macro_step * float(rows["fz"].sum())
+    assert impulse - 0.05 * 9.81 * robot.time == pytest.approx(0.05 * robot.rates[2], abs=1e-12)
+    assert impulse > 0.01 and rows["z"].min() > -0.05
+    assert run.energy_residual < 0.02
+
+
+def test_a_foot_too_light_for_the_explicit_exchange_is_refused_or_iterated():
+    """K H^2 / 4 m = 1 is where explicit steps become unstable; iterated, the same foot follows the spring."""
+
+    def leg():
+        return MujocoRobot(model_of(LEG.format(foot_mass=0.01)), "foot", height=None)
+
+    stiff, step = {"stiffness": 2e5, "damping": 0.0}, 1e-3
+    with pytest.raises(ValueError, match=r"'foot' is too light .* substeps = 4, or iterations = 20, or a heavier foot"):
+        on_law(leg(), step, 0.1, parameters=stiff)
+    wild = on_law(leg(), step, 0.2, parameters=stiff, checked=False)
+    calm = on_law(leg(), step, 0.2, parameters=stiff, iterations=20)
+    fine = on_law(leg(), 2e-4, 0.2, parameters=stiff)
+    assert calm.load == pytest.approx(2e5 * step**2 / 4 / 0.01, rel=0.1) and calm.master.exchange.unsettled <= 3
+    assert calm.energy_residual < 0.1 * wild.energy_residual
+    assert float(calm.columns["fz"].mean()) == pytest.approx(float(fine.columns["fz"].mean()), rel=0.05)
+
+
+def test_a_foot_that_starts_in_the_ground_is_refused_by_name_and_a_height_lifts_it():
+    with pytest.raises(ValueError, match=r"'foot' starts 0.01 m below the surface"):
+        on_law(MujocoRobot(ball(height=0.04), "foot"))
+    robot = MujocoRobot(ball(height=0.04), "foot", height=0.003)
+    assert robot.clearance == pytest.approx(0.003)
+    with pytest.raises(ValueError, match="no free joint"):
+        MujocoRobot(model_of(LEG.format(foot_mass=0.2)), "foot", height=0.1)
+
+
+def test_floors_of_mujocos_own_world_touch_nothing():
+    robot = MujocoRobot(ball(height=0.06), "foot")
+    assert robot.floors == ("floor",)
+    run = on_law(robot, 4e-4, 0.2)
+    assert run.columns["z"].min() < 0.045  # it has gone through z = 0, where MuJoCo's floor was
+
+
+def test_the_controller_is_called_at_the_models_own_step_whatever_the_exchanges():
+    for step in (2e-4, 1e-3, 4e-3):
+        times: list[float] = []
+
+        def clocked(model, data, times=times):
+            times.append(data.time)
+
+        robot = MujocoRobot(model_of(LEG.format(foot_mass=0.2)), "foot", controller=clocked)
+        on_law(robot, step, 0.1)
+        assert len(times) == pytest.approx(0.1 / max(5e-4, min(step, 5e-4)), abs=1)
+        assert np.diff(times) == pytest.approx(5e-4, rel=0.41)
+
+
+def test_a_run_goes_on_from_its_state_to_the_same_bits():
+    def fresh():
+        robot = MujocoRobot(load_model(HEDGEHOG), "tip_*", keyframe="tumble", height=0.002)
+        return RobotRun(robot, LawFeet(robot.feet, parameters=BRICK), duration=0.2, iterations=3)
+
+    whole = fresh()
+    half = fresh()
+    for _ in range(90):
+        half.advance()
+    other = fresh()
+    other.restore({key: np.array(value) for key, value in half.state().items()})
+    expected, found = whole.run(), other.run()
+    assert all((expected[name] == found[name]).all() for name in expected)
+    assert (whole.feet == other.feet).all() and (whole.joints["qpos"] == other.joints["qpos"]).all()
