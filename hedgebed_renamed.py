@@ -165,7 +165,7 @@ _MODULES = {
         "experiments.tumble": "campaign_tables=synthesis on_grains_frames=on_grains_result words=result",
     },
     "experiments.validate": {
-        "experiments.validate": "document=experiment",
+        "experiments.validate": "document=pages",
         "experiments.validate.base": "case cloud drops energy kept=drops parts=drops peers spheres",
         "experiments.validate.beds": "dosta friction_angle intrusion low_gravity silo slump",
         "experiments.validate.measured": "impact",
@@ -299,6 +299,7 @@ _NAMES = {
         "experiments.grains.bed_result": "residual_warning reversal_warning unsettled_warning",
     },
     "experiments.validate.base.case": {"experiments.validate.base.case": "told=tracked"},
+    "experiments.validate.experiment": {"experiments.validate.pages": "markdown"},
     "experiments.validate.base.energy": {
         "experiments.validate.base.energy": "Book=EnergyRecord keep_book=record_energy",
     },

@@ -16,7 +16,7 @@ __all__ = ["write_validation_report"]
 
 _WIDTH, _HEIGHT, _DPI = 5.6, 3.6, 110
 _COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#D55E00", "#56B4E9", "#8a8a8a", "#222222", "#8C564B")
-_HEAD = ("wanted", "ours", "difference", "band", "")
+_HEAD = ("expected", "bed", "difference", "band", "")
 #: Entries of a legend that find room in the plot; more stand beneath it, in three columns up to so many characters.
 _INSIDE, _THREE_COLUMNS = 4, 24
 _LEGEND_ROW = 0.16
@@ -95,9 +95,9 @@ def _tiles(cases: Sequence[Result]) -> list[Tile]:
     numbers = [one for case in run for one in case["comparisons"]]
     return [
         Tile("cases that pass", str(many["pass"]), f"of {len(run)} that were run"),
-        Tile("cases that fail", str(many["fail"]), "each with what is known why", second=True),
+        Tile("cases that fail", str(many["fail"]), "each with its reason if known", second=True),
         Tile("numbers compared", str(len(numbers)), f"{sum(one['passes'] for one in numbers)} within their bands"),
-        Tile("not yet", str(many["not yet"]), "cases that the bed cannot run"),
+        Tile("not yet", str(many["not yet"]), "cases that the bed cannot compute yet"),
     ]
 
 
@@ -106,7 +106,7 @@ def _sections(cases: Sequence[Result], blocks: Mapping[str, Sequence[Block]]) ->
     sections = [_overview(run)]
     for status, title in (("fail", "What fails, and why"), ("informational", "Outside, and not counted")):
         if outside := [case for case in run if case["status"] == status]:
-            reasons = [f"{case['id']}: {case['reason'] or 'not looked into yet'}." for case in outside]
+            reasons = [f"{case['id']}: {case['reason'] or 'not examined yet'}." for case in outside]
             sections.append(Section(title, [listing(reasons)]))
     for family in dict.fromkeys(case["family"] for case in run):
         own = [block for case in run if case["family"] == family for block in _case(case, blocks)]
@@ -122,7 +122,7 @@ def _overview(run: Sequence[Result]) -> Section:
         wanted = f"{case['reference']} ({case['source']})"
         verdict = "FAIL" if case["status"] == "fail" else case["status"]
         rows.append((f"{case['id']}: {case['title']}", *cells, verdict, wanted))
-    lead = "A row shows the number of its case that takes the largest share of its band; all numbers follow below."
+    lead = "A row shows the number that takes the largest share of its band. All numbers follow below."
     head = ("case", *_HEAD, "closed form or figure (source)")
     return Section("Every case", [text(lead), table(head, rows)])
 

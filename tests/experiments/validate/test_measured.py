@@ -9,8 +9,8 @@ import pytest
 
 from experiments.validate import experiment
 from experiments.validate.base.case import Case, Comparison, Outcome
-from experiments.validate.experiment import markdown
 from experiments.validate.measured import plates
+from experiments.validate.pages import markdown
 from experiments.validate.settings import ValidateSettings
 from experiments.validate.suite import SUITE, chosen
 
@@ -40,7 +40,7 @@ def test_a_case_that_is_informational_does_not_count_as_failing(monkeypatch, tmp
     assert [row["status"] for row in result["cases"]] == ["informational", "fail"]
     assert result["quantities"]["cases_fail"]["value"] == 1
     text = markdown(result, command="hedgebed validate")
-    counted, told = text.index("**counted** (1 of 1"), text.index("**shown** (1 of 1")
+    counted, told = text.index("#counted)** (1 of 1"), text.index("#shown)** (1 of 1")
     assert text.index("What fails") < counted < text.index("not counted") < told
 
 

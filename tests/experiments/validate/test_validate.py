@@ -2,6 +2,8 @@
 
 import json
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -13,7 +15,7 @@ from experiments.cli.main import main
 from experiments.validate import experiment
 from experiments.validate.base.case import Case, Comparison, Curve, Outcome, Plot
 from experiments.validate.beds.friction_angle import mohr_angle
-from experiments.validate.experiment import markdown
+from experiments.validate.pages import KEPT, markdown, notebook
 from experiments.validate.settings import ValidateSettings
 from experiments.validate.suite import SUITE, chosen
 from vis.bed.validation import _COLOURS, _draw
@@ -77,7 +79,9 @@ def test_a_table_and_a_page_show_every_case(suite, tmp_path, capsys):
     assert result["quantities"]["cases_fail"]["value"] == 1
     text = document.read_text()
     assert text == (tmp_path / "run" / "validation.md").read_text()
-    golden("validate/table", text)
+    details = (tmp_path / "notes" / "validation.md").read_text()
+    assert details == (tmp_path / "run" / "notes" / "validation.md").read_text()
+    golden("validate/table", {"page": text, "details": details})
     page = (tmp_path / "run" / "report.html").read_text()
     golden("validate/page", page_lines(page))
     assert "A line, drawn" in page and "data:image/png" in page
@@ -133,8 +137,9 @@ def test_a_case_run_by_itself_goes_into_the_kept_table_with_its_own_code(suite, 
     experiment.run(ValidateSettings(only=("bad",), keep=True), tmp_path / "two")
     text = table.read_text()
     assert counts(table) == {"pass": 1, "fail": 1, "not run": 2, "not yet": 1}
-    assert "validate --only bad`" in text and text.index("### bad") < text.index("### long")
-    golden("validate/table_of_two", text)
+    details = (tmp_path / "docs" / "notes" / "validation.md").read_text()
+    assert "validate --only bad`" in details and details.index("### bad") < details.index("### long")
+    golden("validate/table_of_two", {"page": text, "details": details})
     experiment.run(ValidateSettings(), tmp_path / "all")
     assert table.read_text() == (tmp_path / "all" / "validation.md").read_text()
     with pytest.raises(ValueError, match="leave document out"):
@@ -146,8 +151,30 @@ def test_cases_run_together_are_kept_with_the_command_of_each(suite, tmp_path, m
     (tmp_path / "docs").mkdir()
     (tmp_path / "pyproject.toml").touch()
     experiment.run(ValidateSettings(only=("good", "bad"), keep=True), tmp_path / "both")
-    text = (tmp_path / "docs" / "validation.md").read_text()
+    text = (tmp_path / "docs" / "notes" / "validation.md").read_text()
     assert "--only good`" in text and "--only bad`" in text and "good bad" not in text
+
+
+def test_the_pages_are_made_again_from_the_kept_result_in_the_words_of_today(suite, tmp_path, monkeypatch):
+    monkeypatch.setattr(experiment, "_ROOT", tmp_path)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "pyproject.toml").touch()
+    experiment.run(ValidateSettings(), tmp_path / "all")
+    before, table = json.loads((tmp_path / KEPT).read_text()), tmp_path / "docs" / "validation.md"
+    monkeypatch.setattr(experiment, "SUITE", (replace(CASES[0], title="A better name"), *CASES[1:]))
+    computed = dict(suite)
+    experiment.keep(())
+    after = json.loads((tmp_path / KEPT).read_text())
+    assert suite == computed and "A better name" in table.read_text()
+    numbers = [[row.get("comparisons", []) for row in result["cases"]] for result in (before, after)]
+    assert numbers[0] == numbers[1] and any(numbers[0]) and before["date"] == after["date"]
+
+
+def test_the_pages_of_the_checkout_are_those_of_its_kept_result():
+    root = Path(experiment.__file__).resolve().parents[2]
+    kept = json.loads((root / KEPT).read_text())
+    assert (root / "docs" / "validation.md").read_text() == markdown(kept, command="hedgebed validate")
+    assert (root / "docs" / "notes" / "validation.md").read_text() == notebook(kept)
 
 
 def test_a_case_there_is_not_is_refused_with_the_nearest(tmp_path, capsys):
