@@ -27,16 +27,17 @@ from experiments.tumble.settings import TumbleSettings
 __all__ = ["EXPERIMENTS", "KEPT", "LONGEST", "Case", "Cost", "cases", "cost_of_tumble", "do_case", "estimate", "keep"]
 
 RATES = ((2.8e3, 3.8e6), (2e4, 9.52e6), (1e5, 7.09e6))
-"""Grain-steps a second, with rolling, by the count of grains computed: docs/performance.md, 2026-11-21, a quiet machine
-with 2 cores (a Xeon); the first from `grains3-row-seed1` (2,800 awake of 84,772), where one core does as well as two.
-On an EPYC the loops of 2026-11-26 made 26.2 and 22.8 million of 20,000 and 100,000 without sleep: there cases take
-less than is said here, by up to 2.7 times. With sleep that is not measured."""
+"""(grains computed, grain-steps a second with rolling friction): `hedgebed bench bed` of 2026-11-21 on a quiet Xeon
+with 2 cores (in the history of docs/performance.md, db093b66). The first pair is of `grains3-row-seed1`, 2,800 awake of
+84,772 grains, where one core is as fast as two. The loops of 2026-11-26 make 26.2 and 22.8 million for 20,000 and
+100,000 grains on an EPYC, all awake: there a case takes up to 2.7 times less than its estimate. With sleep this is not
+measured."""
 BOOK = 1.19
 """Time of a step with the balance of what grains lose over one without (docs/coupling.md, 2026-11-22)."""
 MACRO_STEP = 5e-3
 """Of the coupling beyond the grains, a macro step [s] (docs/coupling.md, 2026-11-21)."""
 SET_DOWN = 0.4 * 0.05
-"""Way of the placement in the rig, over its speed [m]: 0.39 s at 0.05 m/s in the first look of docs/coupling.md."""
+"""Placement in the rig: its time times its speed [m]; 0.39 s at 0.05 m/s (docs/notes/coupling.md, A first look)."""
 FALL_TIMES = 1.5
 """What rain and rest take, over the time of a fall from the column's top: 0.27 s to 0.2 s for the beds of 80 mm in
 docs/performance.md, rounded up."""
