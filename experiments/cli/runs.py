@@ -19,6 +19,7 @@ from experiments.runs.progress import Progress, make_progress
 from experiments.runs.registry import Headline
 from experiments.runs.result import Result
 from experiments.runs.streams import RefusedError, say, stdout_to_stderr
+from experiments.runs.whole_runs import draw_report, keeping_status
 from vis.page.numbers import digits_for
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "redraw_old_report", "show_folder"]
@@ -36,20 +37,11 @@ def carry_out(
     free_kernel_cache()
     with stdout_to_stderr():
         try:
-            with folder.lock():
-                folder.set_status("running")
-                try:
-                    with make_progress(quiet=quiet) as progress:
-                        result = work(progress)
-                except KeyboardInterrupt:
-                    folder.set_status("stopped", "interrupted")
-                    raise
-                except BaseException as error:
-                    folder.set_status("failed", f"{type(error).__name__}: {error}")
-                    raise
+            with keeping_status(folder):
+                with make_progress(quiet=quiet) as progress:
+                    result = work(progress)
                 if not (folder.path / "result.json").exists():
                     folder.write_result(result)
-                folder.set_status("done")
         except KeyboardInterrupt:
             say(f"stopped; `hedgebed resume {folder.path}` finishes it")
             return STOPPED
@@ -78,8 +70,6 @@ def redraw_old_report(folder: RunFolder, *, quiet: bool) -> None:
     result, report = folder.path / "result.json", folder.path / "report.html"
     if not report.exists() or report.stat().st_mtime_ns >= result.stat().st_mtime_ns:
         return
-    from experiments.runs.whole_runs import draw_report
-
     say("its report is older than result.json and is made anew")
     with folder.lock(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:
         draw_report(folder, progress)

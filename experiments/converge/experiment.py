@@ -16,7 +16,7 @@ from experiments.penetrate import experiment as penetrate
 from experiments.runs.folder import RunFolder, write_json
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
-from experiments.runs.whole_runs import draw_report, whole_run
+from experiments.runs.whole_runs import draw_report, keeping_status, whole_run
 
 from .analysis import numbers_of
 from .design import Member, affordable, members_of, variants_of
@@ -72,17 +72,12 @@ class _Work:
             path, "penetrate", member.settings, code=fingerprint()
         )  # fmt: skip
         try:
-            own.set_status("running")
-            penetrate.compute(member.settings, own, _Within(self.progress))
-        except KeyboardInterrupt:
-            own.set_status("stopped", "interrupted")
-            raise
+            with keeping_status(own):
+                penetrate.compute(member.settings, own, _Within(self.progress))
         except RuntimeError as error:
-            own.set_status("failed", str(error))
             self.failed[member.id] = str(error)
             self.progress.message(f"{member.id}: {error}")
             return
-        own.set_status("done")
         self.read(member)
 
     def read(self, member: Member) -> bool:

@@ -1,6 +1,8 @@
 """The skeleton of an experiment: `run` and `resume`, and how its result and its report come into the folder."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +14,10 @@ from .folder import RunFolder
 from .progress import Progress
 from .result import Result
 
-__all__ = ["PictureCosts", "computed_run", "draw_report", "publish", "whole_run", "write_report"]
+__all__ = [
+    "PictureCosts", "computed_run", "draw_report", "keeping_status", "publish", "whole_run", "without_reports",
+    "write_report",
+]  # fmt: skip
 
 # What the report of `penetrate` takes with OpenGL in software on two cores [s], by the files' times of two runs, of
 # 20,187 grains and 112 frames and of 51,850 grains and 190 frames.
@@ -25,6 +30,36 @@ _MOST_FRAMES = 48  # of an animation (vis.pictures.pictures)
 _SHARE_PLOTS, _SHARE_PICTURES, _SHARE_STILL = 0.1, 0.95, 4
 
 Settings = TypeVar("Settings", bound=BaseModel)
+_DRAWN = ContextVar("_DRAWN", default=True)  # whether runs draw their reports
+
+
+@contextmanager
+def without_reports(without: bool = True) -> Iterator[None]:
+    """Within, runs draw no report, if `without`: one of hundreds, which nobody opens."""
+    token = _DRAWN.set(_DRAWN.get() and not without)
+    try:
+        yield
+    finally:
+        _DRAWN.reset(token)
+
+
+@contextmanager
+def keeping_status(folder: RunFolder) -> Iterator[None]:
+    """Hold the folder and keep its status: running within, then done; stopped or failed where something is raised.
+
+    Raises ValueError where another process has the folder, and passes on what is raised within.
+    """
+    with folder.lock():
+        folder.set_status("running")
+        try:
+            yield
+        except KeyboardInterrupt:
+            folder.set_status("stopped", "interrupted")
+            raise
+        except BaseException as error:
+            folder.set_status("failed", f"{type(error).__name__}: {error}")
+            raise
+        folder.set_status("done")
 
 
 def publish(folder: RunFolder, result: Result, progress: Progress) -> Result:
@@ -88,7 +123,9 @@ def write_report(folder: Path, progress: Progress, costs: PictureCosts | None = 
 
 
 def draw_report(folder: RunFolder, progress: Progress, *costs: PictureCosts) -> None:
-    """The report of a folder that has its result, as the last stage of a run."""
+    """The report of a folder that has its result, as the last stage of a run; nothing `without_reports`."""
+    if not _DRAWN.get():
+        return
     progress.stage("report", total=1.0)
     write_report(folder.path, progress, *costs)
 

@@ -1,0 +1,38 @@
+"""A cluster of hedgebed's workers on SLURM, for `hedgebed sweep --scheduler`: a file to start from.
+
+    pip install 'hedgebed[sweep]' dask-jobqueue
+    python examples/sweep/slurm.py scheduler.json &        # on the login node; ends with Ctrl-C
+    hedgebed sweep sweep.toml --scheduler scheduler.json --out /shared/sweep
+
+Untested: no SLURM was at hand. Queue, account, memory and time are yours to change. Every worker must see the same
+/shared under the same path, and have the same version of hedgebed.
+"""
+
+import signal
+import sys
+
+JOBS = 16
+"""Jobs, each a worker that computes one run at a time."""
+
+
+def main(scheduler_file: str) -> None:
+    """Start the scheduler, ask for the jobs and wait."""
+    from dask_jobqueue import SLURMCluster  # no dependency of hedgebed
+
+    cluster = SLURMCluster(
+        queue="normal",
+        cores=1,
+        processes=1,
+        memory="4GB",
+        walltime="24:00:00",
+        local_directory="/tmp",
+        job_extra_directives=["--requeue"],  # a job that is taken away comes back, and its run goes on
+        scheduler_options={"scheduler_file": scheduler_file},
+    )
+    cluster.scale(jobs=JOBS)
+    print(f"scheduler at {cluster.scheduler_address}; Ctrl-C ends it")
+    signal.pause()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,204 @@
+"""What a sweep comes to: one table of all runs as CSV and netCDF, the spread of each quantity, and sensitivities.
+
+Sensitivities are shares of the variance: of Saltelli's design Sobol' indices, first order and total (Saltelli et al.,
+Computer Physics Communications 181, 2010, 259-270); of a Latin hypercube first order alone, by RBD-FAST (Tarantola,
+Gatelli and Mara, Reliability Engineering and System Safety 91, 2006, 717-727). Both are SALib's. Each sample counts by
+its mean over the lists that it is combined with.
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.runs.folder import RunFolder, write_series
+from experiments.runs.result import Result, Table, quantity
+from rigid.series import replacing
+
+from .design import Design, problem_of
+from .factors import unit_of
+from .settings import SweepSettings
+from .tasks import Outcome, Task
+from .tools import required
+
+__all__ = ["FEWEST_SAMPLES", "conclude"]
+
+FEWEST_SAMPLES = 64
+"""Of a Latin hypercube, below which RBD-FAST has no confidence interval [1]."""
+_INDICES = {"first": "S1", "first_conf": "S1_conf", "total": "ST", "total_conf": "ST_conf"}
+"""Names in result.json -> those of SALib."""
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One quantity of all runs, NaN where a run has none."""
+
+    name: str
+    unit: str
+    values: Array
+    stds: Array
+
+    @property
+    def head(self) -> str:
+        """Its name in table.csv, the unit at its end."""
+        unit = self.unit.replace("/", "_").replace(" ", "_")
+        return self.name if self.unit == "1" or not unit else f"{self.name}_{unit}"
+
+    @property
+    def varies(self) -> bool:
+        """Whether it is not the same in all runs that have it."""
+        there = self.values[np.isfinite(self.values)]
+        return there.size > 1 and bool(there.max() > there.min())
+
+
+def conclude(
+    settings: SweepSettings, design: Design, tasks: Sequence[Task], outcomes: Mapping[str, Outcome], folder: RunFolder
+) -> Result:
+    """The result of a sweep whose runs are over; writes table.csv and, where xarray is there, table.nc."""
+    columns, warnings = _columns(tasks, outcomes), []
+    faults = [outcomes[task.name].fault for task in tasks]
+    wanted = settings.quantities or tuple(column.name for column in columns if column.varies)
+    for name in set(wanted) - {column.name for column in columns}:
+        warnings.append(f"no run has a quantity {name!r}, which is asked for in quantities")
+    drawn = [column for column in columns if column.name in wanted]
+    _write_table(design, tasks, faults, columns, folder)
+    try:
+        _write_netcdf(design, tasks, columns, folder)
+    except ValueError as error:
+        warnings.append(f"there is no table.nc: {error}")
+    sensitive, left_out = _sensitivities(settings, design, drawn)
+    warnings += left_out
+    failed = sum(bool(fault) for fault in faults)
+    if failed:
+        warnings.append(f"{failed} of {len(tasks)} runs failed: table.csv says why, and plots leave them out")
+    rows = [_spread(column) for column in columns]
+    title = f"{len(tasks)} runs of {settings.experiment} over {', '.join(design.keys)}"
+    return Result.make(
+        "sweep", title=title,
+        quantities={"runs": quantity(len(tasks), "1"), "failed": quantity(failed, "1")},
+        tables=[Table(title="Over all runs", head=["quantity", "unit", "least", "median", "largest"], rows=rows),
+                *([_sensitivity_table(sensitive)] if sensitive else [])],
+        of=settings.experiment, factors=[
+            {"key": key, "unit": unit_of(key, design.experiment.settings_class())} for key in design.keys
+        ],
+        columns=[{"name": column.name, "unit": column.unit, "head": column.head} for column in drawn],
+        sensitivities=sensitive, warnings=warnings,
+    )  # fmt: skip
+
+
+def _columns(tasks: Sequence[Task], outcomes: Mapping[str, Outcome]) -> list[_Column]:
+    """Every quantity of the runs, in the order in which they are met."""
+    found = [json.loads(outcomes[task.name].result or "{}").get("quantities", {}) for task in tasks]
+    units = {name: str(entry["unit"]) for entries in found for name, entry in entries.items()}
+
+    def numbers(name: str, key: str) -> Array:
+        entries = [entries.get(name, {}).get(key) for entries in found]
+        return np.array([math.nan if entry is None else float(entry) for entry in entries])
+
+    return [_Column(name, unit, numbers(name, "value"), numbers(name, "std")) for name, unit in units.items()]
+
+
+def _write_table(
+    design: Design, tasks: Sequence[Task], faults: Sequence[str], columns: Sequence[_Column], folder: RunFolder
+) -> None:
+    """table.csv: a row for each run, what is varied before what came out; spreads where a quantity has one."""
+    table: dict[str, object] = {"run": [task.name for task in tasks]}
+    for key in design.keys:
+        table[key] = _plain([point.values.get(key, "") for point in design.points])
+    for column in columns:
+        table[f"{column.head}" if column.head not in table else f"{column.head}_result"] = column.values
+        if (column.stds > 0).any():
+            table[f"{column.head}_std"] = column.stds
+    if any(faults):
+        table["fault"] = faults
+    write_series(folder.path / "table.csv", table)
+
+
+def _plain(values: Sequence[object]) -> list[object]:
+    """Numbers as they are; where there is anything else, all as text."""
+    numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+    return list(values) if numbers else [str(value) for value in values]
+
+
+def _write_netcdf(design: Design, tasks: Sequence[Task], columns: Sequence[_Column], folder: RunFolder) -> None:
+    """table.nc: the same; an axis for each setting where all combinations of lists are there, else one of runs.
+
+    Raises ValueError where xarray or netCDF4 is not there.
+    """
+    xarray = required("xarray", "table.nc")
+    required("netCDF4", "table.nc")
+    units = {key: unit_of(key, design.experiment.settings_class()) for key in design.keys}
+    in_full = not design.sampled and design.rows == 1 and len(design.listed) == len(design.keys)
+    if in_full:
+        shape = {factor.key: len(factor.values) for factor in design.listed}
+        coords = {f.key: (f.key, np.array(_plain(f.values)), {"units": units[f.key]}) for f in design.listed}
+    else:
+        shape = {"run": len(tasks)}
+        varied = {key: _plain([point.values.get(key, "") for point in design.points]) for key in design.keys}
+        coords = {key: ("run", np.array(values), {"units": units[key]}) for key, values in varied.items()}
+    dims, sizes = tuple(shape), tuple(shape.values())
+    data: dict[str, tuple[object, ...]] = {"run_folder": (dims, np.array([task.name for task in tasks]).reshape(sizes))}
+    for column in columns:
+        data[column.name if column.name not in coords else f"{column.name}_result"] = (
+            dims, column.values.reshape(sizes), {"units": column.unit},
+        )  # fmt: skip
+    attributes = {"title": f"hedgebed sweep of {design.experiment.name}"}
+    with replacing(folder.path / "table.nc") as temporary:
+        xarray.Dataset(data, coords, attributes).to_netcdf(temporary, engine="netcdf4")
+
+
+def _spread(column: _Column) -> list[str]:
+    there = column.values[np.isfinite(column.values)]
+    three = (np.min(there), np.median(there), np.max(there)) if there.size else (math.nan,) * 3
+    return [column.name, column.unit, *(f"{number:.4g}" if math.isfinite(number) else "-" for number in three)]
+
+
+def _sensitivities(
+    settings: SweepSettings, design: Design, columns: Sequence[_Column]
+) -> tuple[list[Mapping[str, object]], list[str]]:
+    """For each quantity and sampled setting its share of the variance; and why there are none, where there are none."""
+    if not design.sampled:
+        return [], []
+    if design.rows > 1:
+        return [], ["sensitivities are not computed beside a table of several rows"]
+    if settings.sampling == "latin" and settings.samples < FEWEST_SAMPLES:
+        return [], [f"samples = {settings.samples} are too few for sensitivities: {FEWEST_SAMPLES} or more would do"]
+    found: list[Mapping[str, object]] = []
+    warnings, problem = [], problem_of(design.sampled)
+    for column in columns:
+        means = column.values.reshape(len(design.shares), -1).mean(axis=1)
+        whole = np.isfinite(means)
+        if whole.any() and np.ptp(means[whole]) == 0.0:
+            continue  # nothing of it hangs on what is sampled
+        if settings.sampling == "latin" and whole.sum() >= FEWEST_SAMPLES:
+            analysis = required("SALib.analyze.rbd_fast", "sampling")
+            indices = analysis.analyze(problem, design.shares[whole], means[whole], seed=settings.seed)
+        elif settings.sampling == "sobol" and whole.all():
+            analysis = required("SALib.analyze.sobol", "sampling")
+            # Standardised: the estimator of the first order loses digits to a mean far from 0.
+            scaled = (means - means.mean()) / (means.std() or 1.0)
+            indices = analysis.analyze(problem, scaled, calc_second_order=False, seed=settings.seed)
+        else:
+            missing = int((~whole).sum())
+            warnings.append(f"{missing} samples have no {column.name}: its sensitivities are left out")
+            continue
+        found += [
+            {"quantity": column.name, "key": factor.key}
+            | {name: float(indices[key][place]) if key in indices else None for name, key in _INDICES.items()}
+            for place, factor in enumerate(design.sampled)
+        ]
+    return found, warnings
+
+
+def _sensitivity_table(sensitive: Sequence[Mapping[str, object]]) -> Table:
+    def cell(entry: Mapping[str, object], name: str) -> str:
+        value, conf = entry[name], entry[f"{name}_conf"]
+        return "-" if value is None else f"{value:.2f} ± {conf:.2f}"
+
+    rows = [[e["quantity"], e["key"], cell(e, "first"), cell(e, "total")] for e in sensitive]
+    head = ["quantity", "setting", "first order", "total"]
+    return Table(title="Share of the variance [1], ± 95 % of its estimate", head=head, rows=rows)

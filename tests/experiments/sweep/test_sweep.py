@@ -1,0 +1,176 @@
+"""A sweep in one process: its table, sensitivities and page; what is done is not done twice; a run that fails."""
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from experiments.cli.main import main
+from experiments.runs.folder import RunFolder, write_json
+from experiments.sweep import Settings, design, result, tasks
+from rigid.series import read_series
+from vis.report import write_report
+
+pytestmark = pytest.mark.usefixtures("unreported")
+TUMBLES = ["--experiment", "tumble", "--fixed", "duration=0.3", "--workers", "1", "--quiet"]
+
+
+def sweep(out, *tokens):
+    return main(["sweep", *TUMBLES, *tokens, "--out", str(out)])
+
+
+def table(out):
+    return read_series(out / "table.csv")
+
+
+def test_the_table_has_what_the_runs_alone_have_to_the_bit(tmp_path):
+    assert sweep("swept", "--over", "torque=[0.15, 0.2]", "mu_s=[0.4, 0.5]") == 0
+    assert main(["tumble", "--duration", "0.3", "--torque", "0.2", "--mu-s", "0.4", "--out", "alone", "--quiet"]) == 0
+    found, alone = table(tmp_path / "swept"), json.loads((tmp_path / "alone" / "result.json").read_text())
+    place = np.flatnonzero((found["torque"] == 0.2) & (found["mu_s"] == 0.4))
+    assert len(found["run"]) == 4 and len(place) == 1
+    for name, head in (("max_speed", "max_speed_m_s"), ("slip_torque", "slip_torque_N_m")):
+        assert found[head][place[0]] == alone["quantities"][name]["value"]
+    member = tmp_path / "swept" / "members" / found["run"][place[0]]
+    assert (member / "result.json").read_bytes() == (tmp_path / "alone" / "result.json").read_bytes()
+
+
+def test_a_grid_is_a_netcdf_with_an_axis_for_each_setting(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("netCDF4")
+    assert sweep("swept", "--over", "torque=[0.15, 0.2]", "surface=['brick', 'sand', 'steel']") == 0
+    with xarray.open_dataset(tmp_path / "swept" / "table.nc") as found:
+        assert dict(found.sizes) == {"torque": 2, "surface": 3}
+        assert found.torque.units == "N m" and found.max_speed.units == "m/s"
+        rows = table(tmp_path / "swept")
+        assert found.max_speed.sel(torque=0.2, surface="sand") == rows["max_speed_m_s"][4]
+
+
+def test_what_is_done_is_not_done_twice_and_what_is_missing_is(tmp_path, monkeypatch):
+    done = []
+    compute = tasks._compute
+    monkeypatch.setattr(tasks, "_compute", lambda task, *rest: done.append(task.name) or compute(task, *rest))
+    members = ["--members", str(tmp_path / "members")]
+    assert sweep("one", "--over", "torque=[0.15, 0.2]", *members) == 0
+    assert sweep("two", "--over", "torque=[0.2, 0.15, 0.18]", *members) == 0
+    assert len(done) == 3
+    lost = tmp_path / "members" / done[0] / "result.json"
+    before = lost.read_bytes()
+    lost.write_bytes(before[:100])
+    assert sweep("three", "--over", "torque=[0.15, 0.2]", *members) == 0
+    assert done[3:] == [done[0]] and lost.read_bytes() == before
+
+
+def test_a_sweep_that_was_stopped_goes_on_with_the_run_it_was_in(tmp_path, monkeypatch):
+    """Interrupted in the third of four runs: two are done, one is taken up, the table is that of a whole one."""
+    compute, begun = tasks._compute, []
+
+    def interrupted(task, *rest):
+        begun.append(task.name)
+        if len(begun) == 3:
+            raise KeyboardInterrupt
+        return compute(task, *rest)
+
+    over = ["--over", "torque=0.14:0.2:0.02"]
+    monkeypatch.setattr(tasks, "_compute", interrupted)
+    assert sweep("broken", *over) == 3
+    assert main(["resume", "broken", "--quiet"]) == 0
+    assert len(begun) == 5 and begun[3] == begun[2]
+    assert sweep("whole", *over) == 0
+    for name in ("table.csv", "result.json"):
+        assert (tmp_path / "broken" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_run_that_fails_is_told_and_does_not_stop_the_others(tmp_path, monkeypatch, capsys):
+    from experiments.tumble import experiment as tumble
+
+    integrate = tumble._integrate
+
+    def breaks(settings, plan, *, duration):
+        if settings.torque == 0.15 and duration > 0.1:
+            raise RuntimeError("wheel\nlost")
+        return integrate(settings, plan, duration=duration)
+
+    monkeypatch.setattr(tumble, "_integrate", breaks)
+    assert sweep("swept", "--over", "torque=[0.15, 0.2]") == 1
+    said = capsys.readouterr().err
+    assert "1 of 2 runs" in said and "wheel lost" in said and "Traceback" not in said
+    found = table(tmp_path / "swept")
+    assert math.isnan(found["max_speed_m_s"][0]) and found["max_speed_m_s"][1] > 0
+    assert found["fault"].tolist() == ["RuntimeError: wheel lost", ""]
+    folder = RunFolder.open(tmp_path / "swept" / "members" / found["run"][0])
+    assert folder.status == "failed" and (folder.path / "traceback.txt").is_file()
+    monkeypatch.setattr(tumble, "_integrate", integrate)
+    assert main(["resume", "swept", "--quiet"]) == 0
+    assert "fault" not in table(tmp_path / "swept")
+
+
+def test_a_folder_is_named_by_what_the_result_hangs_on(tmp_path):
+    """Settings, the files that they name and the code; not threads, nor where the sweep is."""
+    mine = tmp_path / "mine.toml"
+    mine.write_text("name = 'a'\n")
+
+    def name(**given):
+        point = design.find_experiment("tumble").settings_class()(**given)
+        return tasks.task_of(design.find_experiment("tumble"), point, tmp_path, threads=1, reports=False).name
+
+    first = name(platform=str(mine))
+    assert name(platform=str(mine)) == first != name(platform=str(mine), torque=0.1)
+    mine.write_text("name = 'b'\n")
+    assert name(platform=str(mine)) != first
+    bed = {"ground": "bed"}
+    assert name(**bed, threads=3) == name(**bed) != name(**bed, seed=2)
+
+
+def test_sensitivities_are_those_of_the_closed_form():
+    """Ishigami and Homma (1990), a = 7, b = 0.1: first 0.314, 0.442, 0, total 0.558, 0.442, 0.244 (Saltelli 2008)."""
+    pytest.importorskip("SALib")
+    for sampling, samples, room in (("sobol", 1024, 0.06), ("latin", 2048, 0.04)):
+        made = Settings(experiment="tumble", over=[f"{key}=0:1" for key in ("torque", "mu_s", "mu_d")],
+                        sampling=sampling, samples=samples)  # fmt: skip
+        shares = design._shares(made, design.parse_over(made.over, design.find_experiment("tumble").settings_class()))
+        x = np.pi * (2 * shares - 1)
+        values = np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+        factors = design.parse_over(made.over, design.find_experiment("tumble").settings_class())
+        whole = design.Design(design.find_experiment("tumble"), factors, 1, shares, ())
+        column = result._Column("ishigami", "1", 1000 + values, np.zeros(len(values)))
+        entries, warnings = result._sensitivities(made, whole, [column])
+        assert not warnings
+        assert [entry["first"] for entry in entries] == pytest.approx([0.314, 0.442, 0.0], abs=room)
+        if sampling == "sobol":
+            assert [entry["total"] for entry in entries] == pytest.approx([0.558, 0.442, 0.244], abs=room)
+
+
+def test_too_few_samples_have_no_sensitivities(tmp_path):
+    pytest.importorskip("SALib")
+    assert sweep("swept", "--over", "torque=0.15:0.2", "--samples", "4") == 0
+    found = json.loads((tmp_path / "swept" / "result.json").read_text())
+    assert found["sensitivities"] == [] and any("samples = 4" in text for text in found["warnings"])
+
+
+@pytest.mark.usefixtures("reported")
+def test_the_page_shows_what_is_asked_for_over_every_setting(tmp_path):
+    """Figures of two quantities; sensitivities, here made up, have one of their own."""
+    swept = tmp_path / "swept"
+    asked = ["--quantities", "max_speed", "sinkage_largest"]
+    assert sweep("swept", "--over", "torque=[0.15, 0.2]", "surface=['brick', 'sand']", *asked) == 0
+    assert (swept / "report.html").read_text().count("<img") == 2
+    assert not list(swept.glob("members/*/report.html"))
+    found = json.loads((swept / "result.json").read_text())
+    entry = {"quantity": "max_speed", "first": 0.4, "first_conf": 0.1, "total": None, "total_conf": None}
+    found["sensitivities"] = [entry | {"key": "torque"}, entry | {"key": "mu_s", "total": 0.5, "total_conf": 0.2}]
+    write_json(swept / "result.json", found)
+    assert write_report(swept).read_text().count("<img") == 3
+    assert sorted(path.name for path in (swept / "figures").iterdir()) == [
+        "over-max_speed.png", "over-sinkage_largest.png", "sensitivities.png",
+    ]  # fmt: skip
+
+
+def test_what_is_not_installed_is_named_before_any_run(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main(["sweep", "sweep", "--workers", "2"]) == 2
+    assert "workers = 2" in (said := capsys.readouterr().err) and "hedgebed[sweep]" in said
+    assert main(["sweep", "sweep", "--scheduler", "tcp://nowhere:1"]) == 2
+    assert "hedgebed[sweep]" in capsys.readouterr().err
