@@ -19,8 +19,11 @@ import numpy as np
 
 from dem import BedFailure
 from dem.grains.materials import Material
+from dem.grains.sizes import Uniform
+from dem.measure import cutting
 from dem.measure.repose import check_width
-from dem.prepare.prepare import fingerprint
+from dem.prepare.prepare import check_options, fingerprint
+from dem.prepare.recipe import check_stages, parse_stage
 from experiments.grains.bed_progress import Stages
 from experiments.grains.kept_material import BASE_COPY, keep_material
 from experiments.runs.folder import RunFolder, write_text
@@ -32,7 +35,7 @@ from experiments.runs.whole_runs import publish, whole_run
 from .fit import Response, Wanted, design, find_best, next_point
 from .result import Simulated, calibration_result, material_toml
 from .settings import CalibrateSettings, Target, material_at, say
-from .tests import SampleTest, figures_of, laboratory_figure, run_test, tests_for
+from .tests import STRIP, SampleTest, figures_of, laboratory_figure, run_test, tests_for
 
 __all__ = ["check", "fingerprint", "resume", "run"]
 
@@ -44,7 +47,7 @@ _SEEDS = 1000
 
 
 def check(settings: CalibrateSettings) -> None:
-    """Raise ValueError for ranges with which no material can be, and a bed that tells no angle of repose."""
+    """Raise ValueError for ranges with which no material can be, and a bed that cannot be drained or cut as asked."""
     drained = [target for target in settings.wanted.values() if target.state == "drained"]
     if drained:
         length, _, depth = (settings.grain * side for side in settings.repose_size)
@@ -54,8 +57,25 @@ def check(settings: CalibrateSettings) -> None:
             raise ValueError(f"repose_size, times grain: {error}") from None
     if any(target.fit for target in drained) and settings.repose_size[2] < _LEAST_HEAP:
         raise ValueError(say("shallow_heap", s=settings, name=drained[0].name, least=_LEAST_HEAP))
+    if any(target.state == "cut" for target in settings.wanted.values()):
+        _check_cut(settings)
     for end in (0, 1):
         material_at(settings, {key: pair[end] for key, pair in settings.free.items()})
+
+
+def _check_cut(settings: CalibrateSettings) -> None:
+    """Raise ValueError for a bed in which no faces can be cut."""
+    size = [settings.grain * side for side in settings.cut_size]
+    try:
+        check_options(size, settings.grain, settings.gravity, settings.seed, 0.05)
+        cutting.check_width(STRIP * settings.grain, width=size[0], height=size[2], grain=settings.grain)
+    except ValueError as error:
+        raise ValueError(f"cut_size, times grain: {error}") from None
+    if settings.cut_stages[-1:] != ("level",):
+        raise ValueError(f"cut_stages = {' '.join(settings.cut_stages)}: 'level' must be the last")
+    stages = [parse_stage(stage) for stage in settings.cut_stages]
+    sizes, sticks = Uniform(settings.grain, settings.spread), settings.base.cohesion != "none"
+    check_stages(stages, size=size, grain=settings.grain, sizes=sizes, cohesive=sticks)
 
 
 @dataclass

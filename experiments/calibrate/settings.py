@@ -8,6 +8,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from dem.grains.materials import Material, material
+from experiments.grains.recipes import POURED_DRY
 from experiments.penetrate.settings import STANDARD_GRAVITY, Spread
 from experiments.runs.strict import Positive, SeedNumber, StrictSettings, Threads
 from experiments.runs.types import Json
@@ -26,7 +27,8 @@ class Figure:
     unit: str
     state: str
     """In which a sample is sheared for it, "loose" or "dense"; "drained" for that of a bed which drains through a slot;
-    "" for one of a laboratory bed, which takes minutes and is compared at the end but not fitted."""
+    "cut" for that of a bed in which vertical faces are cut; "" for one of a laboratory bed, which takes minutes and is
+    compared at the end but not fitted."""
     words: str  # what it is
 
 
@@ -37,6 +39,8 @@ FIGURES = {
     "peak_cohesion": Figure("Pa", "dense", "cohesion at the largest strength"),
     "sample_density": Figure("kg/m3", "loose", "bulk density of a sample under the lid before it is sheared"),
     "angle_of_repose": Figure("degrees", "drained", "angle of the slopes that stay where a bed drains through a slot"),
+    "cut_height": Figure("m", "cut", "height of the highest vertical face that stands"),
+    "cut_density": Figure("kg/m3", "cut", "bulk density of the bed in which faces are cut"),
     "packing_loose": Figure("1", "", "packing fraction of a bed rained in and fluffed"),
     "packing_dense": Figure("1", "", "packing fraction of a bed rained in and tapped until taps gain nothing"),
     "bulk_density_loose": Figure("kg/m3", "", "bulk density of a bed rained in and fluffed"),
@@ -62,7 +66,7 @@ class Target:
         plane: of a friction angle: "shear", stresses on the plane of shear as a shear box or a ring shear tester reads
             them, "triaxial", the angle of triaxial compression, or "mohr", Mohr's circle of the largest and least
             stress. Of a cohesion "shear" or "mohr", as a vertical cut has it.
-        state: in which the sample is sheared: "loose" or "dense"; "drained" of an angle of repose.
+        state: in which the sample is sheared: "loose" or "dense"; "drained" of an angle of repose; "cut" of a cut.
         fit: whether the parameters are fitted to it, or it is only compared at the end.
         through: of a friction angle: "tests", a straight line through the tests of all pressures, or "origin", one
             through the origin as well, as a laboratory has it that reports an angle and no cohesion.
@@ -140,6 +144,11 @@ class CalibrateSettings(StrictSettings):
     repose_size: tuple[Positive, Positive, Positive] = (92.0, 6.0, 20.0)
     """Size of a bed drained for the angle of repose: widths (periodic; slopes along the first) and depth [mean
     diameters]. A fit needs a depth of at least 20."""
+    cut_size: tuple[Positive, Positive, Positive] = (24.0, 8.0, 10.0)
+    """Size of a bed for vertical cuts: widths (periodic; the cut, 3 wide, is across the first) and depth [mean
+    diameters]. Heights from a tenth to four times the depth can be found; in beds 5 deep they scatter threefold."""
+    cut_stages: tuple[str, ...] = POURED_DRY
+    """Preparation of a bed for vertical cuts, as in `hedgebed bed make --stages`; the last stage is `level`."""
     threads: Threads = None
 
     @model_validator(mode="after")
@@ -155,7 +164,7 @@ class CalibrateSettings(StrictSettings):
             raise ValueError(say("few_figures", count=len(fitted), fitted=names, wanted=len(self.free), free=free))
         if base.cohesion != "none" and len(self.pressures) < 2:
             raise ValueError("pressures holds one value: with cohesion at least two would do, for a line through them")
-        if base.cohesion == "none" and (lost := [n for n in fitted if "cohesion" in wanted[n].figure]):
+        if base.cohesion == "none" and (lost := [n for n in fitted if _sticks(wanted[n].figure)]):
             raise ValueError(say("not_sticking", lost=lost[0]))
         if len(set(self.pressures)) < len(self.pressures) or len(set(self.check_seeds)) < len(self.check_seeds):
             raise ValueError("pressures and check_seeds hold each value once")
@@ -191,6 +200,11 @@ class CalibrateSettings(StrictSettings):
     def wanted(self) -> dict[str, Target]:
         """The targets by name. Raises ValueError for a bad one."""
         return {name: _target(name, given) for name, given in self.targets.items()}
+
+
+def _sticks(figure: str) -> bool:
+    """Whether only grains that stick have this figure."""
+    return "cohesion" in figure or figure == "cut_height"
 
 
 def _target(name: str, given: Json) -> Target:

@@ -1,4 +1,4 @@
-"""The tests behind a calibration: what a sheared sample or a drained bed says, and the bulk figures that follow.
+"""The tests behind a calibration: what a sheared sample, a drained or a cut bed says, and the bulk figures that follow.
 
 Stresses at large strain are means over the second half of the strain, their standard error that of five parts of it;
 the largest strength is that of the stress ratio averaged over a twentieth of strain.
@@ -10,6 +10,10 @@ I1 I2 / I3 = (9 - sin^2) / (1 - sin^2) (Matsuoka & Nakai 1974, Proc. JSCE 232:59
 cohesion c added to it as c / tan(angle). Those of Mohr's circle are of the straight line through the circles of the
 largest and least principal stress, radius = cohesion cos(angle) + sin(angle) centre: what Coulomb's wedge, and with it
 a vertical cut, is reckoned with. Where volume stays, the plane of shear has c cos(angle) and tan = sin(angle) instead.
+
+A cut height is no formula's: faces are cut in a bed, and gravity rises until one falls (`dem.measure.cutting`). The
+height lies anywhere between the last that stood and the first that fell, which has a standard deviation of the
+interval over sqrt(12).
 """
 
 import math
@@ -19,8 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from dem import Bed
+from dem import Bed, BedFailure
 from dem.grains.materials import Material
+from dem.measure.cutting import MOST, cut_and_load
 from dem.measure.element import ElementShear, shear_element
 from dem.measure.repose import angle_of_repose
 from experiments.bed.repose import BEARING
@@ -34,6 +39,10 @@ __all__ = ["SampleTest", "figures_of", "laboratory_figure", "mohr_circle", "run_
 Tell = Callable[[float], None]
 Kept = tuple[Json, dict[str, np.ndarray]]
 """What is kept of a test, and its series."""
+BEDS = ("drained", "cut")
+"""States of a bed; a sample is sheared in the others."""
+STRIP = 3.0
+"""Width of the strip that is cut out of a bed [mean diameters]."""
 _WINDOW = 0.05
 """Strain over which the largest strength is averaged."""
 _PARTS = 5
@@ -44,7 +53,8 @@ _COLUMNS = {"strain": "strain", "height": "height_m", "shear": "shear_Pa", "norm
 
 @dataclass(frozen=True)
 class SampleTest:
-    """One sample: in which state it is sheared, the pressure [Pa], the seed; a bed is "drained", without a pressure."""
+    """One sample: in which state it is sheared, the pressure [Pa], the seed; a bed is "drained" or "cut", without a
+    pressure."""
 
     state: str
     pressure: float
@@ -61,7 +71,7 @@ def tests_for(settings: CalibrateSettings, targets: Sequence[Target], *, seed: i
     """The tests that these targets need, of one set of parameters and one seed."""
     states = dict.fromkeys(target.state for target in targets if target.state)
     pressures = settings.pressures if settings.base.cohesion != "none" else settings.pressures[-1:]
-    return [SampleTest(state, p, seed) for state in states for p in ((0.0,) if state == "drained" else pressures)]
+    return [SampleTest(state, p, seed) for state in states for p in ((0.0,) if state in BEDS else pressures)]
 
 
 def run_test(stuff: Material, test: SampleTest, settings: CalibrateSettings, *, tell: Tell) -> Kept:
@@ -69,8 +79,8 @@ def run_test(stuff: Material, test: SampleTest, settings: CalibrateSettings, *, 
 
     Raises BedFailure.
     """
-    if test.state == "drained":
-        return _drain(stuff, test, settings, tell)
+    if test.state in BEDS:
+        return (_drain if test.state == "drained" else _cut)(stuff, test, settings, tell)
     run = shear_element(
         stuff, pressure=test.pressure, grain=settings.grain, size=settings.size,
         pressed_friction=settings.dense_friction if test.state == "dense" else settings.loose_friction,
@@ -116,6 +126,46 @@ def _drain(stuff: Material, test: SampleTest, settings: CalibrateSettings, tell:
     of_bed = {"size": list(bed.size), "packing_before": packing, "young": bed.material.young}
     summary = picked(found, "angle", "error", "flanks", "slot") | of_bed | picked(bed, "grain_count", "max_overlap")
     return summary, {"x_m": found.distance, "thickness_m": found.thickness}
+
+
+def _cut(stuff: Material, test: SampleTest, settings: CalibrateSettings, tell: Tell) -> Kept:
+    """The height to which faces stand in one bed, as ``hedgebed bed test cut`` has it."""
+    size = tuple(settings.grain * side for side in settings.cut_size)
+    of_bed = {"grain": settings.grain, "spread": settings.spread, "gravity": settings.gravity}
+    bed = Bed.prepare_as(
+        stuff,
+        stages=settings.cut_stages,
+        size=size,
+        **of_bed,
+        seed=test.seed,
+        young=stiff_enough(stuff, depth=size[2], **of_bed, bearing=1 + MOST),
+        threads=settings.threads,
+        progress=_Preparing(tell),
+    ).whole
+    packing, count = bed.packing_fraction, bed.grain_count
+    found = cut_and_load(bed, width=STRIP * settings.grain, tell=lambda share: tell(0.5 + 0.5 * share))
+    if found.fell is None:
+        raise BedFailure(
+            f"faces of {found.height:.3g} m stand even at {found.stood:.2g} times gravity: less surface_energy, or a "
+            f"greater depth in cut_size, would do"
+        )
+    low, high = found.bounds
+    summary = {
+        "cut_height": math.sqrt(low * high) if low else 0.5 * high,
+        "error": (high - low) / math.sqrt(12.0),
+        "stood": low,
+        "fell": high,
+        "bulk_density": packing * stuff.density,
+        "packing_before": packing,
+        "grain_count": count,
+        **picked(found, "height", "width", "trials"),
+        **picked(found.bed, "size", "max_overlap"),
+        "young": found.bed.material.young,
+    }
+    columns = {"x_m": found.after[0], "thickness_m": found.after[1]}
+    if found.before is not None:
+        columns["thickness_standing_m"] = found.before[1]
+    return summary, columns
 
 
 def summary_of(run: ElementShear, density: float) -> Json:
@@ -184,9 +234,13 @@ def figures_of(
         if not target.state:
             continue
         kept = [summary for test, summary in runs.items() if test.state == target.state]
-        if target.state == "drained":
-            angles, errors = ([summary[name] for summary in kept] for name in ("angle", "error"))
-            found[target.name] = (float(np.mean(angles)), float(np.linalg.norm(errors)) / len(errors))
+        if target.figure in ("sample_density", "cut_density"):
+            found[target.name] = (float(np.mean([summary["bulk_density"] for summary in kept])), 0.0)
+            continue
+        if target.state in BEDS:
+            name = "cut_height" if target.state == "cut" else "angle"
+            values, errors = ([summary[key] for summary in kept] for key in (name, "error"))
+            found[target.name] = (float(np.mean(values)), float(np.linalg.norm(errors)) / len(errors))
             continue
         key = "peak_" if target.figure.startswith("peak") else ""
         names = (f"{key}normal", f"{key}shear", "error")
@@ -201,9 +255,7 @@ def figures_of(
             cosine = math.sqrt(1 - sine**2)
             angle, angle_error = math.degrees(math.asin(sine)), math.degrees(slope_error / cosine)
             start, start_error = start / cosine, start_error / cosine
-        if target.figure == "sample_density":
-            found[target.name] = (float(np.mean([summary["bulk_density"] for summary in kept])), 0.0)
-        elif "cohesion" in target.figure:
+        if "cohesion" in target.figure:
             found[target.name] = (start, start_error)
         elif target.plane in ("shear", "mohr"):
             found[target.name] = (angle, angle_error)

@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from vis.bed.tests import flank_lines, quoted, thicknesses
+from vis.bed.tests import cut_profiles, flank_lines, quoted, thicknesses
 from vis.page.page import Block, Section, Tile, code, text
 from vis.page.plots import BED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
@@ -23,7 +23,13 @@ def write_calibration_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a calibration, and return the report."""
     result, quantities = report.result, report.result["quantities"]
     free = tomllib.loads((report.folder / "run.toml").read_text(encoding="utf-8"))["settings"]["free"]
-    drawn = [*(_response(report, key) for key in free), _residuals(report), *_tests(report), *_slopes(report)]
+    drawn = [
+        *(_response(report, key) for key in free),
+        _residuals(report),
+        *_tests(report),
+        *_slopes(report),
+        *_faces(report),
+    ]
 
     def tile(name: str, note: str, second: bool = False) -> Tile:
         entry = quantities[name]
@@ -113,7 +119,7 @@ def _checked(result: Result) -> list[Result]:
 
 def _tests(report: Report) -> list[Block]:
     """The stress ratio of the check's tests over strain."""
-    tests = [test for test in _checked(report.result) if test["state"] != "drained"]
+    tests = [test for test in _checked(report.result) if test["pressure"]]
     if not tests:
         return []
     states = list(dict.fromkeys(test["state"] for test in tests))
@@ -140,3 +146,12 @@ def _slopes(report: Report) -> list[Block]:
         return f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
 
     return thicknesses(report, [test for test in _checked(report.result) if test["state"] == "drained"], draw, "slopes")
+
+
+def _faces(report: Report) -> list[Block]:
+    """The faces that were cut in the check's beds."""
+
+    def title(test: Result) -> str:
+        return f"seed {test['seed']}: {1e3 * test['stood']:.3g} to {1e3 * test['fell']:.3g} mm"
+
+    return cut_profiles(report, [test for test in _checked(report.result) if test["state"] == "cut"], title, "faces")

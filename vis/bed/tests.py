@@ -20,7 +20,15 @@ from vis.page.report import Report, Result, again, report_of, tables
 from vis.page.sentences import Sentences
 from vis.pictures.frames import read_frames
 
-__all__ = ["FALLEN_SHARE", "flank_lines", "quoted", "thicknesses", "write_shear_report", "write_test_report"]
+__all__ = [
+    "FALLEN_SHARE",
+    "cut_profiles",
+    "flank_lines",
+    "quoted",
+    "thicknesses",
+    "write_shear_report",
+    "write_test_report",
+]
 
 say = Sentences(__package__)
 Grains = Mapping[str, NDArray[Any]]
@@ -194,14 +202,22 @@ def _cut_side(report: Report) -> list[Block]:
 
 
 def _cut_profiles(report: Report) -> list[Block]:
+    return cut_profiles(report, report.result["runs"], lambda run: str(run["id"]), "tests_profiles", name="profiles")
+
+
+def cut_profiles(
+    report: Report, runs: Sequence[Result], title: Callable[[Result], str], key: str, *, name: str = ""
+) -> list[Block]:
+    """Profiles of cut beds, before a face fell and at the end, a panel a run under its ``title``."""
+
     def draw(axis: Axes, run: Result, x: Array, thickness: Array, standing: Array | None) -> str:
         if standing is not None:
             axis.step(x, standing, where="mid", color=BED, lw=1.2)
         axis.step(x, thickness, where="mid", color=MODEL, lw=1.2, ls="--")
-        return str(run["id"])
+        return title(run)
 
     handles = [handle("stood last", BED, lw=1.2), handle("at the end", MODEL, ls="--", lw=1.2)]
-    return thicknesses(report, report.result["runs"], draw, "tests_profiles", name="profiles", handles=handles)
+    return thicknesses(report, runs, draw, key, name=name, handles=handles)
 
 
 def _trials(report: Report) -> list[Block]:

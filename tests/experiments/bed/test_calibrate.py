@@ -2,11 +2,13 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import vis
+from dem import BedFailure
 from dem.grains.materials import MATERIALS, material, read_material
 from dem.measure.element import ElementShear
 from experiments.calibrate import experiment as calibrate
@@ -18,6 +20,8 @@ from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.runs.folder import RunFolder
 
 ANGLE = {"value": 31.0, "tolerance": 1.0, "source": "made up"}
+CUT = {"value": 0.022, "tolerance": 0.005, "source": "made up"}
+DENSITY = {"value": 1637.0, "tolerance": 45.0, "source": "made up", "fit": False}
 COHESION = {"value": 200.0, "tolerance": 20.0, "source": "made up"}
 
 
@@ -133,6 +137,64 @@ def test_an_angle_of_repose_needs_one_bed_and_no_pressures():
     calibrate.check(shallow.model_copy(update={"targets": {"angle_of_repose": ANGLE | {"fit": False}}}))
 
 
+def test_a_cut_height_needs_one_bed_and_no_pressures():
+    settings = sticky(targets=sticky().targets | {"cut_height": CUT, "cut_density": DENSITY})
+    tests = calibrate_tests.tests_for(settings, list(settings.wanted.values()), seed=7)
+    assert [test.name for test in tests] == ["loose-500-seed7", "loose-1000-seed7", "cut-seed7"]
+    kept = {"cut_height": 0.020, "error": 0.001, "bulk_density": 1640.0}
+    found = figures_of([settings.wanted["cut_height"], settings.wanted["cut_density"]], {tests[-1]: kept})
+    assert found == {"cut_height": pytest.approx((0.020, 0.001)), "cut_density": (1640.0, 0.0)}
+    calibrate.check(settings)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"cut_size": (12.0, 6.0, 7.0)}, r"cut_size, times grain: width = 0\.012 m of the cut"),
+        ({"cut_size": (24.0, 3.0, 7.0)}, r"cut_size, times grain: size: y = 0\.012 m"),
+        ({"cut_stages": ("rain:dry", "stick")}, "cut_stages = rain:dry stick: 'level'"),
+        ({"cut_stages": ("rain:dry", "stik", "level")}, "'stik' is no stage"),
+        ({"cut_stages": ("rain:dry", "level")}, "'stick'"),
+    ],
+)
+def test_a_bed_in_which_nothing_can_be_cut_is_refused(options, said):
+    targets = sticky().targets | {"cut_height": CUT}
+    with pytest.raises(ValueError, match=said):
+        calibrate.check(sticky(targets=targets, **options))
+
+
+@pytest.mark.long
+def test_faces_of_grains_that_stick_more_stand_higher():
+    """H = 4 c / (rho g) tan(45 + phi / 2) (Terzaghi 1943), c in proportion to the surface energy: thirty times as much
+    of it stands at least eight times as high in one thin bed, whose grains decide by how much."""
+    settings = sticky(
+        fixed={"cohesion": "dmt", "rolling_friction": 1.2},
+        free={"surface_energy": (0.002, 0.3)},
+        targets={"cut_height": CUT},
+        cut_size=(17.0, 6.0, 5.0),
+        threads=1,
+    )
+    heights = []
+    for energy in (0.004, 0.12):
+        stuff = material_at(settings, {"surface_energy": energy})
+        found, series = calibrate_tests.run_test(stuff, SampleTest("cut", 0.0, 4), settings, tell=lambda share: None)
+        assert found["stood"] < found["cut_height"] < found["fell"] and found["bulk_density"] > 0.4 * stuff.density
+        assert found["error"] == pytest.approx((found["fell"] - found["stood"]) / math.sqrt(12))
+        assert series["thickness_m"].max() > 0.8 * found["height"]
+        heights.append(found["cut_height"])
+    assert heights[1] > 8 * heights[0]
+
+
+def test_a_face_that_never_falls_stops_the_calibration(monkeypatch):
+    bed = SimpleNamespace(packing_fraction=0.5, grain_count=9)
+    stood = SimpleNamespace(fell=None, stood=4.0, height=0.02)
+    monkeypatch.setattr(calibrate_tests.Bed, "prepare_as", lambda *_, **__: SimpleNamespace(whole=bed))
+    monkeypatch.setattr(calibrate_tests, "cut_and_load", lambda *_, **__: stood)
+    settings = sticky(targets=sticky().targets | {"cut_height": CUT})
+    with pytest.raises(BedFailure, match="less surface_energy, or a greater depth in cut_size"):
+        calibrate_tests.run_test(settings.base, SampleTest("cut", 0.0, 1), settings, tell=lambda share: None)
+
+
 def test_the_triaxial_angle_of_triaxial_compression_is_its_own():
     """sigma_1 / sigma_3 = (1 + sin) / (1 - sin); plane strain of the same invariants is stronger (Matsuoka & Nakai)."""
     sine = math.sin(math.radians(31))
@@ -220,6 +282,8 @@ def test_a_calibration_finds_the_grains_and_resumes(tmp_path, monkeypatch, capsy
         ({"targets": {"cohesion": COHESION | {"through": "origin"}}}, "through = 'origin' must be"),
         ({"targets": {"packing_loose": ANGLE | {"fit": True}}}, "takes minutes and is compared only"),
         ({"targets": {"cohesion": COHESION}}, "of grains that do not stick"),
+        ({"targets": {"cut_height": CUT}}, "of grains that do not stick"),
+        ({"targets": {"cut_height": CUT | {"state": "loose"}}}, "state = 'loose' must be"),
         ({"free": {"rolling": (0.1, 0.2)}}, "free.rolling is no parameter that can be found"),
         ({"free": {"rolling_friction": (0.5, 0.2)}}, "the smaller first"),
         ({"free": {"friction": (0.1, 0.5), "rolling_friction": (0.1, 0.5)}}, "1 figures to fit"),
