@@ -15,6 +15,7 @@ __all__ = ["write_report"]
 _REPORTS = {
     "tumble": ("vis.tumble.report", "write_tumble_report"),
     "tumble spatial": ("vis.spatial.report", "write_spatial_report"),
+    "mujoco": ("vis.robot.report", "write_robot_report"),
     "hop": ("vis.paper.hop", "write_hop_report"),
     "paper": ("vis.paper.report", "write_paper_report"),
     "campaign": ("vis.diagnose.campaign", "write_campaign_report"),

@@ -29,7 +29,7 @@ from coupling.poses import Pose, Twist, Vector, Wrench
 from rigid.ground.reaction import Reaction, State
 from rigid.spatial.quaternions import multiply, to_matrix
 
-from .feet import Foot, find_feet, refuse_missing
+from .feet import Foot, find_feet, mesh_of, refuse_missing
 from .friction import FeetFriction
 
 __all__ = ["Controller", "MujocoRobot", "load_model"]
@@ -98,6 +98,7 @@ class MujocoRobot:
         self._lag = 0.0
         self._own = np.zeros(self.model.nv)  # Accelerations but for the ground's
         self._calls = 0  # Of the controller
+        self._surfaces: dict[int, Vector] = {}  # Vertices of geoms that are no feet, once they come near the ground
         self._works = np.zeros(3)  # Steps of MuJoCo so far; all work and that of actuators [J], half a step behind
         self._rates: Vector  # w
         if height is not None:
@@ -186,6 +187,53 @@ class MujocoRobot:
             for foot, at, turn in zip(self.feet, self.data.xipos[self._bodies], turns, strict=True)
         ]
         return min(heights)
+
+    @cached_property
+    def other_geoms(self) -> list[int]:
+        """Numbers of the geoms of what moves that are no feet."""
+        named = {part.name for foot in self.feet for part in foot.parts}
+        mujoco, model = self._mujoco, self.model
+        return [
+            k
+            for k in np.flatnonzero(self.moving[self.model.geom_bodyid]).tolist()
+            if mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k) not in named
+        ]
+
+    def lowest_other(self) -> tuple[float, str]:
+        """Height of the lowest point of what is no foot [m], infinite where that is above the surface, and its geom."""
+        worst, data = (math.inf, ""), self.data
+        for k in self.other_geoms:
+            if float(data.geom_xpos[k, 2]) - float(self.model.geom_rbound[k]) < min(worst[0], 0.0):
+                if k not in self._surfaces:
+                    self._surfaces[k] = mesh_of(self.model, k)[0]
+                up = data.geom_xmat[k].reshape(3, 3)[2]
+                low = float(data.geom_xpos[k, 2]) + float((self._surfaces[k] @ up).min())
+                name = self._mujoco.mj_id2name(self.model, self._mujoco.mjtObj.mjOBJ_GEOM, k) or f"geom {k}"
+                worst = min(worst, (low, name))
+        return worst
+
+    @property
+    def step(self) -> float:
+        """Time step of MuJoCo here [s]; 0 before the first."""
+        return self._step
+
+    def joints(self) -> list[tuple[str, str, int, int]]:
+        """Name, kind (free, ball, slide, hinge) and first place in qpos and qvel of every joint."""
+        mujoco, model = self._mujoco, self.model
+        return [
+            (
+                mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, k) or f"joint_{k}",
+                mujoco.mjtJoint(int(model.jnt_type[k])).name.removeprefix("mjJNT_").lower(),
+                int(model.jnt_qposadr[k]),
+                int(model.jnt_dofadr[k]),
+            )
+            for k in range(model.njnt)
+        ]
+
+    def actuators(self) -> list[str]:
+        """Their names."""
+        mujoco, model = self._mujoco, self.model
+        return [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"actuator_{k}" for k in range(model.nu)]
 
     def lift(self, height: float) -> None:
         """Raise it by `height` [m]. Raises ValueError where it is not free to move up."""

@@ -73,6 +73,7 @@ class RobotRun(EnergyBalance, Stepper):
             self.load = check_exchange(robot, ground, substeps=substeps, iterations=int(options.get("iterations", 1)))
         self._every = max(1, round(energy_interval / self.macro_step))
         self.energy_interval = self._every * self.macro_step
+        self.lowest_other = (np.inf, "")  # Lowest height of what is no foot, when sampled [m], and its geom
         self._feet: list[Vector] = []
         self._joints: list[Vector] = []
         robot.begin(self.macro_step, ground.lag)
@@ -145,6 +146,15 @@ class RobotRun(EnergyBalance, Stepper):
         self._feet.append(np.hstack(parts).ravel())
         self._joints.append(np.concatenate([data.qpos, robot.rates, data.ctrl, data.actuator_force]))
 
+    def _sample(self) -> None:
+        super()._sample()
+        self.lowest_other = min(self.lowest_other, self.robot.lowest_other())
+
+    @property
+    def feet_now(self) -> Vector:
+        """The last row of `feet`, shape (foot, FOOT)."""
+        return self._feet[-1].reshape(-1, FOOT)
+
     @property
     def _turning(self) -> Vector:
         return self.robot.angular_momentum
@@ -174,7 +184,7 @@ class RobotRun(EnergyBalance, Stepper):
         """All that the rest of the run depends on: a flat dict of numpy arrays."""
         own: State = {
             "frames": np.array(self._frames), "rows": self._row_table, "feet": np.array(self._feet),
-            "joints": np.array(self._joints),
+            "joints": np.array(self._joints), "lowest": np.array([str(part) for part in self.lowest_other]),
         }  # fmt: skip
         return prefixed("run", own) | prefixed("balance", self._balance_state()) | self.master.state()
 
@@ -184,5 +194,7 @@ class RobotRun(EnergyBalance, Stepper):
         self._frames = int(own["frames"])
         self._rows = np.asarray(own["rows"]).tolist()
         self._feet, self._joints = (list(np.array(own[name], dtype=float)) for name in ("feet", "joints"))
+        lowest, name = (str(part) for part in np.asarray(own["lowest"]))
+        self.lowest_other = (float(lowest), name)
         self._restore_balance(part_of(state, "balance"))
         self.master.restore(state)

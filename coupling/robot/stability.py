@@ -15,7 +15,7 @@ import numpy as np
 from .bed_feet import BedFeet
 from .law_feet import LawFeet
 
-__all__ = ["ITERATED", "Load", "check_exchange", "exchange_loads"]
+__all__ = ["ITERATED", "Load", "check_exchange", "exchange_loads", "plan_area"]
 
 ITERATED = 10.0
 """Load up to which the iterated exchange settles: K H^2 / m = 40 is the largest that did (docs/coupling.md)."""
@@ -62,7 +62,7 @@ def exchange_loads(robot: Any, ground: LawFeet | BedFeet) -> list[Load]:
                 stiffness, damping = _of_law(law, weight * part.share)
                 stiffness, damping = stiffness / part.share, damping / part.share
             else:
-                stiffness, damping = _of_bed(ground.bed, _plan_area(part.vertices @ matrix.T)), 0.0
+                stiffness, damping = _of_bed(ground.bed, plan_area(part.vertices @ matrix.T)), 0.0
             loads.append(Load(foot.name, part.name, 1 / max(softest, 1e-300), stiffness, damping))
     return loads
 
@@ -90,7 +90,7 @@ def _of_bed(bed: Any, area: float) -> float:
     return max(1.0, COVER * area / (math.pi * radius**2)) * each
 
 
-def _plan_area(vertices: Any) -> float:
+def plan_area(vertices: Any) -> float:
     """Area of a part seen from above [m2]; 0 of a point."""
     from scipy.spatial import ConvexHull, QhullError
 

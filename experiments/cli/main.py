@@ -73,6 +73,10 @@ def main(tokens: Sequence[str] | None = None) -> int:
         return DONE
 
 
+_SUBJECTS = (".npz", ".xml", ".urdf", ".mjb")
+"""Files that are what an experiment is about, and no case file."""
+
+
 def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     """The function behind ``hedgebed <experiment>``, with one parameter per setting.
 
@@ -96,7 +100,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         with refusing():
             if pair and case is not None and other is not None:
                 case, given[experiment.subject] = None, (str(case), str(other))
-            elif experiment.subject and case is not None and (not case.is_file() or case.suffix == ".npz"):
+            elif experiment.subject and case is not None and (not case.is_file() or case.suffix in _SUBJECTS):
                 case, given[experiment.subject] = None, str(case)
             if case is not None and is_number(str(case)):
                 # As the second of ``--mu-s 0.4 0.5``.

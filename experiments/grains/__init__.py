@@ -1,6 +1,6 @@
 """Grains under a platform or a spike: the bed's size and preparation, softening, the run on it.
 
-Imports `coupling`, `dem`, `experiments.platform`, `experiments.runs`, `rigid`, `vis`.
+Imports `coupling`, `coupling.robot`, `dem`, `experiments.platform`, `experiments.runs`, `rigid`, `vis`.
 """
 
 from vis.page.sentences import Sentences

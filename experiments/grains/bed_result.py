@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from coupling import MOST_REVERSAL, CoupledTumble, Master, SpatialRun
+from coupling.robot import RobotRun
 from dem import Bed
 from dem.grains.materials import caveat
 from experiments.platform.surfaces import find_surface
@@ -19,6 +20,7 @@ __all__ = [
     "write_bed_series",
 ]  # fmt: skip
 
+AnyRun = CoupledTumble | SpatialRun | RobotRun
 PACKING_OFF = 0.02  # Difference of the packing from that of the grains' calibration that is worth a warning [1]
 MOST_RESIDUAL = 0.01  # A larger energy_residual is worth a warning [1]
 BED_COLUMNS = {
@@ -28,7 +30,7 @@ BED_COLUMNS = {
 """Sample of a run -> column of series/bed.csv, where it is no energy."""
 
 
-def write_bed_series(folder: Path, run: CoupledTumble | SpatialRun) -> None:
+def write_bed_series(folder: Path, run: AnyRun) -> None:
     """series/bed.csv: energies of the bed, what its grains lost, momentum that is not accounted for, grain steps."""
     samples = run.samples | {f"{name}_lost": values for name, values in run.losses.items()}
     columns = {BED_COLUMNS.get(name, f"{name}_J"): values for name, values in samples.items()}
@@ -36,7 +38,12 @@ def write_bed_series(folder: Path, run: CoupledTumble | SpatialRun) -> None:
 
 
 def bed_numbers(
-    settings: GrainsSettings, run: CoupledTumble | SpatialRun, bed: Bed, softening: Softening, *, in_rig: bool
+    settings: GrainsSettings,
+    run: AnyRun,
+    bed: Bed,
+    softening: Softening,
+    *,
+    in_rig: bool,
 ) -> Json:
     """What ``grains`` of result.json says of any bed under a platform, and how many grain steps were computed."""
     done = run.samples["grain_steps"]

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from coupling import BedGround, CoupledTumble, LeftTheBedError, SpatialRun
+from coupling.robot import RobotRun
 from coupling.stepper import Reporting
 from dem import BedFailure
 from experiments.runs.folder import RunFolder
@@ -22,7 +23,7 @@ __all__ = ["CHECKPOINT", "Followed", "Frames"]
 
 CHECKPOINT = "tumble"
 
-Run = TypeVar("Run", bound=CoupledTumble | SpatialRun)
+Run = TypeVar("Run", bound=CoupledTumble | SpatialRun | RobotRun)
 
 
 class Frames(Protocol):

@@ -6,6 +6,7 @@ vector `force` [N]; on a bed the grains, `contact_forces` (of each grain on a sp
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from coupling import BedGround, CoupledTumble, SpatialRun
 from coupling.members import HULL, Member
+from coupling.robot import RobotRun
 from dem import Grains
 from experiments.runs.types import Json
 from rigid.platform.solids import Mesh
@@ -29,7 +31,7 @@ __all__ = ["NAME", "PlatformFrames", "member_mesh"]
 NAME = "tumble"
 
 Array = NDArray[np.float64]
-Run = TypeVar("Run", bound=CoupledTumble | SpatialRun)
+Run = TypeVar("Run", bound=CoupledTumble | SpatialRun | RobotRun)
 
 
 class PlatformFrames(ABC, Generic[Run]):
@@ -59,8 +61,7 @@ class PlatformFrames(ABC, Generic[Run]):
 
     def write(self, run: Run) -> None:
         """One frame of what there is now; without a bed it has no grains."""
-        ground, pose = run.ground, run.body.pose
-        turn = to_matrix(pose.turn).T
+        ground = run.ground
         origin = ground.origin if isinstance(ground, BedGround) else np.zeros(3)
         grains: Json = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
         clouds: Json = {"row_forces": self.row_forces(run, origin)}
@@ -73,10 +74,14 @@ class PlatformFrames(ABC, Generic[Run]):
             clouds["contact_forces"] = (points + origin, {"force": pushes})
             maps["surface"] = self._surface(ground, seen)
         self.writer.write(
-            run.time, grains,
-            {name: (origin + pose.position + mesh.vertices @ turn, mesh.faces) for name, mesh in self.meshes.items()},
-            values=self.values(run), clouds=clouds, maps=maps,
+            run.time, grains, self.placed(run, origin), values=self.values(run), clouds=clouds, maps=maps,
         )  # fmt: skip
+
+    def placed(self, run: Run, origin: Array) -> Mapping[str, tuple[Array, NDArray[np.int64]]]:
+        """The meshes where they are now: name -> points [m], shape (n, 3), and triangles; `origin` of the bed."""
+        pose = run.body.pose
+        turn = to_matrix(pose.turn).T
+        return {name: (origin + pose.position + mesh.vertices @ turn, mesh.faces) for name, mesh in self.meshes.items()}
 
     def _surface(self, ground: BedGround, grains: Grains) -> HeightMap:
         """The height map of what there is now."""

@@ -20,10 +20,10 @@ from vis.page.states import States, draw_bands, draw_states, passages
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
 
-__all__ = ["write_spatial_report"]
+__all__ = ["AXES", "draw_energy", "pair", "say_grains", "write_spatial_report"]
 
 Columns = Mapping[str, Array]
-_AXES = {"x": BED, "y": "#009E73", "z": MODEL}
+AXES = {"x": BED, "y": "#009E73", "z": MODEL}
 _TURN = "turn from the start [degrees]"
 
 
@@ -45,7 +45,7 @@ def write_spatial_report(
     for key, drawing in (
         ("turning", _draw_turning(path, motion)),
         ("ground", _draw_ground(motion)),
-        ("energy", _draw_energy(motion)),
+        ("energy", draw_energy(motion)),
     ):
         drawn.append(report.draw(key, drawing))
     seen = []
@@ -54,7 +54,7 @@ def write_spatial_report(
         seen = [Section("Seen", [*shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)])]
     changes = result.get("transitions")  # an older folder has none
     sections = [
-        Section("", [listing(result["departures"]["sentences"]), *drawn, *_grains(result)]),
+        Section("", [listing(result["departures"]["sentences"]), *drawn, *say_grains(result)]),
         *seen,
         *([Section("Transitions", passages(changes, angle="turn", label="turn [degrees]"))] if changes else []),
         Section("The trial", [given(result["trial"])]),
@@ -72,7 +72,8 @@ def write_spatial_report(
     return report.write(sections, lead=lead, tiles=tiles)
 
 
-def _grains(result: Result) -> list[Block]:
+def say_grains(result: Result) -> list[Block]:
+    """The bed's numbers in a sentence; nothing on a law."""
     if "grains" not in result:
         return []
     grains = result["grains"]
@@ -100,7 +101,7 @@ def _states(report: Report, path: Columns, states: States) -> list[Block]:
     return drawn
 
 
-def _pair(left: str, right: str) -> tuple[Figure, Axes, Axes]:
+def pair(left: str, right: str) -> tuple[Figure, Axes, Axes]:
     """Two panels over time, with their labels."""
     drawing, ((one, other),) = sheet(1, 2, 3.2)
     one.set(xlabel="time [s]", ylabel=left)
@@ -109,8 +110,8 @@ def _pair(left: str, right: str) -> tuple[Figure, Axes, Axes]:
 
 
 def _draw_path(path: Columns) -> Figure:
-    drawing, way, speed = _pair("way of the centre of mass [mm]", "velocity [m/s]")
-    for axis, colour in _AXES.items():
+    drawing, way, speed = pair("way of the centre of mass [mm]", "velocity [m/s]")
+    for axis, colour in AXES.items():
         way.plot(path["t_s"], 1e3 * (path[f"{axis}_m"] - path[f"{axis}_m"][0]), color=colour, label=axis)
         speed.plot(path["t_s"], path[f"v{axis}_m_s"], color=colour)
     legend_above(drawing, way.lines, 3)
@@ -118,8 +119,8 @@ def _draw_path(path: Columns) -> Figure:
 
 
 def _draw_turning(path: Columns, motion: Columns) -> Figure:
-    drawing, spin, wheels = _pair("angular velocity [rad/s]", "wheels [rad/s]")
-    for axis, colour in _AXES.items():
+    drawing, spin, wheels = pair("angular velocity [rad/s]", "wheels [rad/s]")
+    for axis, colour in AXES.items():
         spin.plot(path["t_s"], path[f"w{axis}_rad_s"], color=colour, label=axis)
         wheels.plot(motion["t_s"], motion[f"wheel_{axis}_rad_s"], color=colour)
     legend_above(drawing, spin.lines, 3)
@@ -127,10 +128,10 @@ def _draw_turning(path: Columns, motion: Columns) -> Figure:
 
 
 def _draw_ground(motion: Columns) -> Figure:
-    drawing, force, depth = _pair("force of the ground [N]", "sinkage of the deepest spike [mm]")
+    drawing, force, depth = pair("force of the ground [N]", "sinkage of the deepest spike [mm]")
     time = motion["t_s"]
-    means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in _AXES))
-    for (axis, colour), mean in zip(_AXES.items(), means, strict=True):
+    means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in AXES))
+    for (axis, colour), mean in zip(AXES.items(), means, strict=True):
         force.plot(time, mean, color=colour, label=axis)
     depth.plot(time, 1e3 * motion["sinkage_m"], color=INK)
     depth.invert_yaxis()
@@ -138,14 +139,15 @@ def _draw_ground(motion: Columns) -> Figure:
     return drawing
 
 
-def _draw_energy(motion: Columns) -> Figure:
-    drawing, energy, left = _pair("energy [mJ]", "left over [µJ]")
+def draw_energy(motion: Columns, who: str = "the platform") -> Figure:
+    """What the torques gave, what `who` gained, what the ground took; and what is left over."""
+    drawing, energy, left = pair("energy [mJ]", "left over [µJ]")
     time = motion["t_s"]
     gained = 1e3 * (motion["kinetic_J"] + motion["potential_J"])
     gained = gained - gained[0]
     work, taken = 1e3 * motion["torque_work_J"], 1e3 * (motion["taken_J"] - motion["taken_J"][0])
-    energy.plot(time, work, color=BED, label="work of the torques")
-    energy.plot(time, gained, color=MODEL, ls=DASHED, label="gained by the platform")
+    energy.plot(time, work, color=BED, label="work of the torques" if who == "the platform" else f"work in {who}")
+    energy.plot(time, gained, color=MODEL, ls=DASHED, label=f"gained by {who}")
     energy.plot(time, taken, color=GREY, ls=DOTTED, label="taken by the ground")
     left.plot(time, 1e3 * (gained - work + taken), color=INK, lw=1.0)
     legend_above(drawing, energy.lines, 3)

@@ -1,0 +1,16 @@
+"""A robot of MuJoCo on a surface law or on a bed of grains.
+
+`Settings`, `check`, `run` and `resume` are those of `hedgebed mujoco`; calling one imports what computes.
+
+Imports `coupling`, `coupling.robot`, `dem`, `experiments.grains`, `experiments.platform`, `experiments.runs`, `rigid`,
+`vis`.
+"""
+
+from experiments.runs.registry import face
+
+from .settings import RobotSettings as Settings
+from .settings import say as say
+
+__all__ = ["Settings", "check", "resume", "run"]
+
+check, resume, run = face("mujoco", Settings)

@@ -1,0 +1,39 @@
+"""`hedgebed mujoco`: a robot of MuJoCo on a surface law or on a bed of grains."""
+
+from coupling.robot import RobotRun
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.result import Result
+from experiments.runs.whole_runs import whole_run
+
+from .on_grains import RobotFollowed, RobotOnBed
+from .plan import keep_files, plan_robot
+from .settings import RobotSettings
+
+__all__ = ["check", "resume", "run"]
+
+
+def check(settings: RobotSettings) -> None:
+    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    plan = plan_robot(settings)
+    if settings.ground == "bed":
+        RobotOnBed(settings, plan).check()
+    else:
+        RobotFollowed(settings, plan).run_on_law()
+
+
+def _carry_out(settings: RobotSettings, folder: RunFolder, progress: Progress) -> Result:
+    """In `folder`, from its checkpoint where there is one; the result."""
+    with folder.lock():
+        keep_files(settings, folder.path)
+        plan = plan_robot(settings, folder=folder.path)
+        if settings.ground == "bed":
+            return RobotOnBed(settings, plan).carry_out(folder, progress)
+        followed = RobotFollowed(settings, plan)
+        followed.announce(progress)
+        progress.plan({"tumble": settings.duration}, seconds={"report": 10.0})
+        run: RobotRun = followed.run_on_law()
+        return followed.finish(run, folder, progress)
+
+
+run, resume = whole_run("mujoco", RobotSettings, _carry_out, check=check)

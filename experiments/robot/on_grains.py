@@ -1,0 +1,175 @@
+"""A robot followed on a surface law, and on a bed of grains.
+
+On a bed the same robot on the spring-damper is stepped first: it says how far and how deep the bed must reach, and
+stands beside the result.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coupling.members import Member
+from coupling.robot import BedFeet, MujocoRobot, RobotRun
+from coupling.robot.stability import plan_area
+from dem import Bed
+from experiments.grains.following import Followed
+from experiments.grains.on_bed import Forecast, PlatformOnBed
+from experiments.runs.progress import Progress
+from experiments.runs.result import Result
+from rigid.spatial.quaternions import to_matrix
+
+from . import say
+from .plan import RobotPlan, width_of
+from .result import RobotFrames, conclude, deepest_at_start, write_series_of
+from .settings import RobotSettings
+
+__all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed"]
+
+FEWEST_ACROSS = 5.0  # Grains across the widest part of a foot, below which it is refused [1]
+
+
+class RobotFollowed(Followed[RobotRun]):
+    """A robot; its run on a surface law."""
+
+    settings: RobotSettings
+    frames, write_series = RobotFrames, staticmethod(write_series_of)
+    sinkage = staticmethod(deepest_at_start)
+
+    def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
+        self.settings, self.plan = settings, plan
+        self.weight = plan.numbers["weight"].value
+
+    def run_on_law(self, *, as_spring: bool = False) -> RobotRun:
+        """The robot on its surface law, ready to be stepped; `as_spring`: explicitly, on the spring-damper."""
+        s, robot = self.settings, self.plan.robot()
+        options: Mapping[str, Any] = {} if as_spring else _stepping(s)
+        ground = self.plan.law_feet(robot, as_spring=as_spring)
+        return RobotRun(robot, ground, duration=s.duration, **options)
+
+    def announce(self, progress: Progress) -> None:
+        """Every default, and the warnings."""
+        for sentence in self.plan.announcement():
+            progress.message(sentence)
+
+    def conclude(self, run: RobotRun, folder: Path) -> Result:
+        return conclude(self.settings, self.plan, run, folder)
+
+
+def _stepping(settings: RobotSettings) -> Mapping[str, Any]:
+    """How the master steps the run."""
+    return {name: getattr(settings, name) for name in ("substeps", "extrapolation", "iterations")}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotForecast(Forecast):
+    """What the same robot on the spring-damper says of the bed."""
+
+    run: RobotRun
+    low: tuple[float, float]
+    high: tuple[float, float]  # Corners of where feet come down, x and y from the robot's origin [m]
+
+
+class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotForecast]):
+    """A robot on a bed."""
+
+    def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
+        super().__init__(settings, plan)
+        self.duration, self.surface, self.counterweight = settings.duration, settings.surface, 0.0
+        self.gravity = plan.numbers["gravity"].value
+        robot = self._robot = plan.robot()
+        self.widths, self.areas = {}, {}
+        for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
+            matrix = to_matrix(turn)
+            self.widths[foot.name] = max(width_of(part, matrix) for part in foot.parts)
+            self.areas[foot.name] = sum(plan_area(part.vertices @ matrix.T) for part in foot.parts)
+        self.spike_diameter = min(self.widths.values())
+        self.reach = 2 * max(foot.reach for foot in robot.feet)
+
+    @cached_property
+    def forecast(self) -> RobotForecast:
+        run = self.run_on_law(as_spring=True)
+        rows = run.run()
+        feet = run.feet
+        places, depth = feet[:, :, :3], feet[:, :, -1]
+        speeds = np.linalg.norm(np.diff(places, axis=0), axis=2) / run.macro_step
+        near = depth > 0
+        if not near.any():  # it never comes down
+            near = np.ones_like(near)
+        reach = np.array([foot.reach for foot in self._robot.feet])
+        low, high = (
+            [float(found(places[..., axis] + sign * reach, where=near, initial=start)) for axis in range(2)]
+            for found, sign, start in ((np.min, -1, math.inf), (np.max, 1, -math.inf))
+        )
+        return RobotForecast(
+            run=run, low=(low[0], low[1]), high=(high[0], high[1]), deepest=float(depth.max()),
+            fastest=float(speeds.max(where=near[1:], initial=0.05)), rise=float(rows["z"].max() - rows["z"][0]),
+        )  # fmt: skip
+
+    def check(self) -> None:
+        """Raise ValueError, naming key, value and what would do, for a bed that does not suit this robot."""
+        s = self.settings
+        for foot in self._robot.feet:
+            if not foot.shapes:
+                raise ValueError(say("site_on_grains", name=foot.name))
+            if self.widths[foot.name] < FEWEST_ACROSS * s.grain * (1 - 1e-9):
+                across, most = self.widths[foot.name] / s.grain, self.widths[foot.name] / FEWEST_ACROSS
+                raise ValueError(say("small_foot", s=s, name=foot.name, width=self.widths[foot.name], across=across,
+                                     fewest=FEWEST_ACROSS, most=most))  # fmt: skip
+        if not self.gravity > 0:
+            raise ValueError(say("no_gravity", gravity=self.gravity))
+        try:
+            super().check()
+        except RuntimeError as error:
+            raise ValueError(say("forecast_fails", error=error)) from error
+
+    def check_extent(self) -> None:
+        s, forecast = self.settings, self.forecast
+        for axis, (name, low, high) in enumerate(zip("xy", forecast.low, forecast.high, strict=True)):
+            need = high - low + 2 * s.grain
+            if s.bed_size[axis] < need:
+                wanted = math.ceil(100 * need) / 100
+                raise ValueError(
+                    say("too_short", s=s, size=s.bed_size[axis], name=name, low=low, high=high, wanted=wanted)
+                )
+
+    @property
+    def pressure(self) -> float:
+        """Of the weight under the smallest foot alone [Pa]."""
+        return self.weight / max(min(self.areas.values()), 1e-12)
+
+    @property
+    def lowering_speed(self) -> float | None:
+        """None: a robot is not set down."""
+        return None
+
+    def members(self) -> list[Member]:
+        """None: its feet are not members of one platform."""
+        return []
+
+    def layout(self, bed: Bed) -> Mapping[str, Any]:
+        low, high = self.forecast.low, self.forecast.high
+        x, y = (0.5 * (float(bed.size[k]) - low[k] - high[k]) for k in range(2))
+        return {"origin": (x, y)}
+
+    def ground(self, bed: Bed) -> BedFeet:
+        """The robot's feet on the prepared bed."""
+        s = self.settings
+        return BedFeet(
+            bed, self._robot.feet, touch=1e-3 * self.weight, friction=s.spike_friction,
+            restitution=s.spike_restitution, **self.layout(bed),
+        )  # fmt: skip
+
+    def run_on(self, ground: Any) -> RobotRun:
+        robot: MujocoRobot = self.plan.robot()
+        return RobotRun(robot, ground, duration=self.duration, **_stepping(self.settings))
+
+    def conclude(self, run: RobotRun, folder: Path) -> Result:
+        return conclude(
+            self.settings, self.plan, run, folder, beside=self.forecast.run, softening=self.softening(),
+            across=self.spike_diameter / self.settings.grain,
+        )  # fmt: skip

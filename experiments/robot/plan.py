@@ -1,0 +1,194 @@
+"""A robot as it is settled: its model, where its numbers come from, and the surface law under its feet."""
+
+import importlib.util
+import math
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coupling.robot import LawFeet, MujocoRobot, load_model
+from coupling.robot.feet import Part, refuse_missing
+from coupling.robot.stability import plan_area
+from experiments.platform.settled import Number
+from experiments.platform.surfaces import Surface, find_surface
+from rigid.platform.rig import STANDARD_GRAVITY
+from rigid.spatial.quaternions import to_matrix
+
+from . import say
+from .settings import RobotSettings
+
+__all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "width_of"]
+
+LAW_STEP = 4e-5  # Of a surface law [s], ten of which make an exchange by default
+SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
+EXAMPLES = Path(__file__).parents[1] / "examples"
+MODEL, CONTROLLER = "model.mjb", "controller.py"  # Copies in the run folder
+
+Controller = Callable[[Any, Any], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotPlan:
+    """What is run."""
+
+    settings: RobotSettings
+    model: Any  # mujoco.MjModel
+    controller: Controller | None
+    surface: Surface
+    numbers: Mapping[str, Number]
+    scales: Mapping[str, float]  # Of the law under each part of a foot [1]
+    warnings: tuple[str, ...]
+
+    def robot(self) -> MujocoRobot:
+        """The robot where it starts."""
+        s = self.settings
+        return MujocoRobot(self.model, s.feet, keyframe=s.keyframe, controller=self.controller, height=s.height)
+
+    def law_feet(self, robot: MujocoRobot, *, as_spring: bool = False) -> LawFeet:
+        """The surface law under the robot's feet; `as_spring`: the spring-damper, whatever the settings say."""
+        s, value = self.settings, {name: number.value for name, number in self.numbers.items()}
+        law = "spring-damper" if as_spring or s.ground == "bed" else s.ground
+        if law == "spring-damper":
+            parameters, scales = {key: value[key] for key in ("stiffness", "damping")}, self.scales
+        else:
+            parameters, scales = dict(_assignment(text) for text in s.ground_parameters), {}
+        return LawFeet(
+            robot.feet, law=law, parameters=parameters, mu_s=value["mu_s"], mu_d=value["mu_d"], time_step=LAW_STEP,
+            scales=scales,
+        )  # fmt: skip
+
+    def announcement(self) -> list[str]:
+        """What was not given, then the warnings."""
+        told = [
+            f"{name} = {number.value:.6g}{'' if number.unit == '1' else f' {number.unit}'} ({number.origin})"
+            for name, number in self.numbers.items()
+            if number.origin != "given"
+        ]
+        return [*told, *(f"warning: {warning}" for warning in self.warnings)]
+
+
+def find_model(name: str) -> Path:
+    """The file of a model: a path, or the name of an example that ships. Raises ValueError for neither."""
+    path = Path(name)
+    shipped = {file.stem: file for file in sorted(EXAMPLES.glob("mujoco-*/*.xml"))}
+    if not path.suffix and not path.exists() and name in shipped:
+        return shipped[name]
+    if not path.is_file():
+        raise ValueError(say("no_model", name=name, shipped=", ".join(shipped)))
+    return path
+
+
+def keep_files(settings: RobotSettings, folder: Path) -> None:
+    """Copy the compiled model and the controller into the run folder, once, so that it goes on with the same."""
+    mujoco = refuse_missing()
+    if not (folder / MODEL).exists():
+        mujoco.mj_saveModel(load_model(find_model(settings.model)), str(folder / MODEL), None)
+    if settings.controller is not None and not (folder / CONTROLLER).exists():
+        shutil.copyfile(settings.controller.rpartition(":")[0], folder / CONTROLLER)
+
+
+def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotPlan:
+    """What `settings` describe; the files are those kept in `folder`, where it is given.
+
+    Raises ValueError, naming the setting, for what there is not and what cannot be.
+    """
+    mujoco = refuse_missing()
+    if folder is not None:
+        model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
+    else:
+        model = load_model(find_model(settings.model))
+    numbers: dict[str, Number] = {}
+    if settings.gravity is not None:
+        model.opt.gravity[:] = (0.0, 0.0, -settings.gravity)
+    robot = MujocoRobot(model, settings.feet, keyframe=settings.keyframe, height=settings.height)
+    of_model = f"model {robot.name}"
+    numbers["mass"] = Number(robot.mass, "kg", of_model)
+    numbers["gravity"] = Number(robot.gravity, "m/s2", "given" if settings.gravity is not None else of_model)
+    surface = find_surface(settings.surface)
+    warnings = [part.note for foot in robot.feet for part in foot.parts if part.note]
+    if robot.floors:
+        warnings.append(say("floors_off", floors=", ".join(robot.floors)))
+    scales = {}
+    for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
+        for part in foot.parts:
+            scales[part.name] = _scale(part, to_matrix(turn), surface, settings)
+    largest = max(scales.values())
+    for key in ("stiffness", "damping"):
+        given = getattr(settings, key)
+        unit = "N/m" if key == "stiffness" else "N s/m"
+        own = getattr(surface, key) / SPIKES_PER_ROW
+        times = f"; {largest:.3g} times under a foot" if largest > 1 else ""
+        origin = f"surface {surface.name}, of one spike{times}"
+        numbers[key] = Number(own, unit, origin) if given is None else Number(given, unit, "given")
+    if settings.ground not in ("spring-damper", "bed"):
+        del numbers["stiffness"], numbers["damping"]
+    _settle_friction(settings, surface, numbers)
+    if surface.guess:
+        warnings.append(say("guess", surface=surface))
+    if settings.ground == "spring-damper" and surface.granular and robot.gravity < 0.5 * STANDARD_GRAVITY:
+        warnings.append(say("of_earth", gravity=robot.gravity, less=STANDARD_GRAVITY / max(robot.gravity, 1e-9)))
+    numbers["weight"] = Number(max(robot.mass * robot.gravity, 1e-9), "N", "mass times gravity")
+    return RobotPlan(
+        settings=settings, model=model, controller=_controller(settings, folder), surface=surface, numbers=numbers,
+        scales=scales, warnings=tuple(warnings),
+    )  # fmt: skip
+
+
+def _settle_friction(settings: RobotSettings, surface: Surface, numbers: dict[str, Number]) -> None:
+    own = f"surface {surface.name}"
+    mu_s = surface.mu_s if settings.mu_s is None else settings.mu_s
+    numbers["mu_s"] = Number(mu_s, "1", own if settings.mu_s is None else "given")
+    if settings.mu_d is not None:
+        numbers["mu_d"] = Number(settings.mu_d, "1", "given")
+    elif settings.mu_s is not None:
+        numbers["mu_d"] = Number(0.5 * mu_s, "1", "default: half of mu_s")
+    else:
+        numbers["mu_d"] = Number(surface.mu_d, "1", own)
+    if numbers["mu_d"].value > mu_s:
+        raise ValueError(say("sliding_above", mu_d=numbers["mu_d"].value, mu_s=mu_s))
+
+
+def _scale(part: Part, matrix: Any, surface: Surface, settings: RobotSettings) -> float:
+    """How many times the numbers of one spike a part has: on sand by its area from above, as K goes with the area."""
+    if settings.stiffness is not None or not surface.granular or surface.spike is None or part.kind == "site":
+        return 1.0
+    return max(plan_area(part.vertices @ matrix.T) / (0.25 * math.pi * surface.spike**2), 1e-3)
+
+
+def width_of(part: Part, matrix: Any) -> float:
+    """The smaller of a part's two extents from above [m], turned by `matrix`."""
+    return float(np.ptp(part.vertices @ matrix.T, axis=0)[:2].min())
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise ValueError(say("no_number", text=text)) from None
+
+
+def _controller(settings: RobotSettings, folder: Path | None) -> Controller | None:
+    """The function that controls the robot. Raises ValueError for a file or function that there is not."""
+    if settings.controller is None:
+        return None
+    file, _, name = settings.controller.rpartition(":")
+    path = Path(file) if folder is None else folder / CONTROLLER
+    if not file or not path.is_file():
+        raise ValueError(say("no_controller", s=settings))
+    spec = importlib.util.spec_from_file_location("hedgebed_controller", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ValueError(say("broken_controller", s=settings, error=error)) from None
+    found = vars(module).get(name)
+    if not callable(found):
+        known = ", ".join(key for key, value in vars(module).items() if callable(value) and not key.startswith("_"))
+        raise ValueError(say("no_function", s=settings, name=name, known=known or "none"))
+    return found  # type: ignore[no-any-return]

@@ -1,0 +1,227 @@
+"""What a run of a robot leaves: its frames, its series and its result."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from coupling.robot import BedFeet, RobotRun
+from coupling.robot.feet import mesh_of
+from dem.prepare.prepare import fingerprint
+from experiments.grains import bed_result as grains
+from experiments.grains.softening import Softening
+from experiments.grains.spells import spells
+from experiments.grains.tracked_frames import PlatformFrames
+from experiments.runs.folder import write_series
+from experiments.runs.result import Result
+from experiments.runs.result import quantities_of as as_quantities
+from experiments.runs.types import Json
+from rigid.platform.solids import Mesh, merge
+from rigid.spatial.quaternions import to_matrix
+
+from . import say
+from .plan import RobotPlan
+from .settings import RobotSettings
+
+__all__ = ["RobotFrames", "conclude", "deepest_at_start", "write_series_of"]
+
+APART = 5e-3  # A flight lasts at least that long [s]
+BELOW = 1e-3  # What is no foot and goes deeper than this is worth a warning [m]
+UNITS = {
+    "time": "t_s", "x": "x_m", "y": "y_m", "z": "z_m", "kinetic_energy": "kinetic_J", "potential_energy": "potential_J",
+    "torque_work": "torque_work_J", "actuator_work": "actuator_work_J", "given": "given_J", "taken": "taken_J",
+    "fx": "fx_N", "fy": "fy_N", "fz": "fz_N", "touching": "touching", "sinkage": "sinkage_m",
+}  # fmt: skip
+FOOT = (
+    "x_m", "y_m", "z_m", "q0", "q1", "q2", "q3", "fx_N", "fy_N", "fz_N", "mx_N_m", "my_N_m", "mz_N_m", "depth_m",
+)  # fmt: skip
+"""Of each foot in series/feet.csv, as `RobotRun.feet` has them."""
+
+Array = np.ndarray
+
+
+class RobotFrames(PlatformFrames[RobotRun]):
+    """The feet (``spikes``) and the rest of the robot (``hull``), as frames of platforms call them."""
+
+    def body_meshes(self, run: RobotRun) -> dict[str, Mesh]:
+        return {}
+
+    def placed(self, run: RobotRun, origin: Array) -> Mapping[str, tuple[Array, Array]]:
+        robot = run.robot
+        pose = robot.pose
+        turns, places = pose.turn.reshape(-1, 4), pose.position.reshape(-1, 3)
+        feet = [
+            Mesh(origin + places[k] + part.vertices @ to_matrix(turns[k]).T, part.faces)
+            for k, foot in enumerate(robot.feet)
+            for part in foot.parts
+            if len(part.faces)
+        ]
+        data, others = robot.data, []
+        for k in robot.other_geoms:
+            vertices, faces = mesh_of(robot.model, k)
+            if len(faces):
+                matrix = data.geom_xmat[k].reshape(3, 3)
+                others.append(Mesh(origin + data.geom_xpos[k] + vertices @ matrix.T, faces))
+        found = {name: merge(meshes) for name, meshes in (("spikes", feet), ("hull", others or feet)) if meshes}
+        return {name: (mesh.vertices, mesh.faces) for name, mesh in found.items()}
+
+    def values(self, run: RobotRun) -> dict[str, float]:
+        """The ground's force on the robot [N]."""
+        force = run.feet_now[:, 7:10].sum(axis=0)
+        return {f"force_{axis}": float(force[k]) for k, axis in enumerate("xyz")}
+
+    def row_forces(self, run: RobotRun, origin: Array) -> tuple[Array, dict[str, Array]]:
+        """At the lowest point of every foot that is pushed."""
+        feet = run.feet_now
+        pushed = np.flatnonzero(np.abs(feet[:, 7:10]).max(axis=1) > 0)
+        points = []
+        for k in pushed:
+            low = run.robot.feet[k].bottom(to_matrix(feet[k, 3:7]))
+            points.append(origin + feet[k, :3] + np.array([0.0, 0.0, low]))
+        fields = {"force": feet[pushed, 7:10], "row": pushed.astype(float)}
+        return np.array(points).reshape(-1, 3), fields
+
+
+def deepest_at_start(run: RobotRun) -> float:
+    """Depth of the deepest foot when time begins [m]."""
+    return float(run.columns["sinkage"][0])
+
+
+def write_series_of(run: RobotRun, folder: Path) -> None:
+    """trajectory.csv and the series of a run, as far as it has come."""
+    rows = run.columns
+    write_series(folder / "trajectory.csv", {UNITS[name]: rows[name] for name in ("time", "x", "y", "z", "touching")})
+    stored = run.stored_by_row
+    named: dict[str, Array] = {UNITS[name]: values for name, values in rows.items()}
+    named |= {"stored_J": stored, "dissipated_J": run.dissipated_by_row}
+    write_series(folder / "series" / "motion.csv", named)
+    feet = run.feet
+    columns = {"t_s": rows["time"]}
+    for k, foot in enumerate(run.robot.feet):
+        columns |= {f"{foot.name}_{what}": feet[:, k, n] for n, what in enumerate(FOOT)}
+    write_series(folder / "series" / "feet.csv", columns)
+    write_series(folder / "series" / "joints.csv", {"t_s": rows["time"]} | joint_columns(run))
+    if isinstance(run.ground, BedFeet):
+        grains.write_bed_series(folder, run)
+
+
+def joint_columns(run: RobotRun) -> dict[str, Array]:
+    """Position and velocity of every joint, control and force of every actuator."""
+    robot, kept = run.robot, run.joints
+    found: dict[str, Array] = {}
+    for name, kind, at, speed in robot.joints():
+        if kind in ("hinge", "slide"):
+            unit = "rad" if kind == "hinge" else "m"
+            found |= {f"{name}_{unit}": kept["qpos"][:, at], f"{name}_{unit}_s": kept["qvel"][:, speed]}
+            continue
+        place = ["x_m", "y_m", "z_m"] if kind == "free" else []
+        found |= {f"{name}_{what}": kept["qpos"][:, at + k] for k, what in enumerate([*place, "q0", "q1", "q2", "q3"])}
+        rates = [*(f"v{axis}_m_s" for axis in "xyz" if place), *(f"w{axis}_rad_s" for axis in "xyz")]
+        found |= {f"{name}_{what}": kept["qvel"][:, speed + k] for k, what in enumerate(rates)}
+    for k, name in enumerate(robot.actuators()):
+        found |= {f"{name}_control": kept["ctrl"][:, k], f"{name}_force": kept["actuator_force"][:, k]}
+    return found
+
+
+def conclude(
+    settings: RobotSettings,
+    plan: RobotPlan,
+    run: RobotRun,
+    folder: Path,
+    *,
+    beside: RobotRun | None = None,
+    softening: Softening | None = None,
+    across: float = 0.0,
+) -> Result:
+    """The result, its series written. On grains `beside` is the robot on the spring-damper."""
+    write_series_of(run, folder)
+    robot = run.robot
+    what = f"a bed of {plan.surface.name}" if settings.ground == "bed" else f"{plan.surface.name} ({settings.ground})"
+    title = say("title", name=robot.name, what=what, gravity=robot.gravity)
+    warnings: list[str | None] = [
+        *plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master),
+        say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
+        if run.lowest_other[0] < -BELOW else None,
+    ]  # fmt: skip
+    result: Json = {
+        "title": title, "status": "done", "quantities": quantities_of(run),
+        "departures": {"sentences": _sentences(run)},
+        "trial": {name: vars(number) for name, number in plan.numbers.items()},
+        "surface": plan.surface.name, "ground": settings.ground, "duration": settings.duration,
+        "feet": [foot.name for foot in robot.feet], "warnings": warnings, "macro_step": run.macro_step,
+        "robot_step": robot.step, "steps": run.master.count,
+    }  # fmt: skip
+    if softening is not None and beside is not None and isinstance(run.ground, BedFeet):
+        rows = beside.columns
+        write_series(
+            folder / "series" / "spring-damper.csv",
+            {UNITS[name]: rows[name] for name in ("time", "x", "y", "z", "touching", "fz", "sinkage")},
+        )
+        bed = run.ground.bed
+        result["code"] = fingerprint()
+        result["grains"] = grains.bed_numbers(settings, run, bed, softening, in_rig=False) | {
+            "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
+        }  # fmt: skip
+        warnings += [
+            grains.reversal_warning(run.dissipation_reversal),
+            grains.overlap_warning(bed, softening, settings.max_overlap),
+            *grains.bed_warnings(bed, plan.surface.name, across=across),
+            say("one_bed"),
+        ]
+    result["warnings"] = [warning for warning in warnings if warning]
+    return Result.make("mujoco", **result)
+
+
+def quantities_of(run: RobotRun) -> dict[str, Json]:
+    """The numbers that every run of a robot has, as result.json holds them; a value is null where there is none."""
+    rows, balance = run.columns, run.balance_numbers
+    flights, touched = _flights(run)
+    longest = max((end - begin for begin, end in flights), default=0)
+    force = np.linalg.norm([rows[name] for name in ("fx", "fy", "fz")], axis=0)
+    found: dict[str, tuple[float | None, str, str]] = {
+        "displacement_x": (float(rows["x"][-1] - rows["x"][0]), "m", say("displacement")),
+        "displacement_y": (float(rows["y"][-1] - rows["y"][0]), "m", "likewise"),
+        "displacement_z": (float(rows["z"][-1] - rows["z"][0]), "m", "likewise, upwards"),
+        "highest": (float(rows["z"].max() - rows["z"][0]), "m", say("highest")),
+        "first_touch": (None if touched is None else float(rows["time"][touched]), "s", say("first_touch")),
+        "flights": (float(len(flights)), "1", say("flights", apart=1e3 * APART)),
+        "longest_flight": (longest * run.macro_step, "s", say("longest_flight")),
+        "sinkage_largest": (float(rows["sinkage"].max()), "m", "of the lowest point of any foot"),
+        "sinkage_end": (float(rows["sinkage"][-1]), "m", "likewise, at the end"),
+        "largest_force": (float(force.max()), "N", say("whole_force")),
+        "actuator_work": (float(rows["actuator_work"][-1]), "J", say("actuator_work")),
+        "ground_work": (float(rows["taken"][-1]), "J", say("ground_work")),
+        "stability": (run.load, "1", say("stability")),
+        "energy_residual": (run.energy_residual, "1", say("residual")),
+    }
+    notes = {"coupling_residual": say("coupling"), "exchange_residual": say("exchange")}
+    if isinstance(run.ground, BedFeet):
+        notes |= {"dissipation_reversal": say("reversal")}
+        if run.robot.floats:
+            notes |= {"momentum_residual": say("momentum"), "angular_momentum_residual": say("angular_momentum")}
+        notes |= {f"dissipated_{name}": say("by_grains") for name in run.losses}
+    found |= {name: (*balance[name], note) for name, note in notes.items()}
+    return as_quantities(found, std=None)
+
+
+def _flights(run: RobotRun) -> tuple[list[tuple[int, int]], int | None]:
+    """Rows from and to which nothing touches after the first touch, for `APART` at least; the row of that touch."""
+    free = run.columns["touching"] == 0
+    if free.all():
+        return [], None
+    touched, lasting = int(np.argmin(free)), max(1, round(APART / run.macro_step))
+    found = [(touched + low, touched + high) for low, high in spells(free[touched:]) if high - low >= lasting]
+    return found, touched
+
+
+def _sentences(run: RobotRun) -> list[str]:
+    """What happened, in words."""
+    rows = run.columns
+    flights, touched = _flights(run)
+    if touched is None:
+        return [say("touches_nothing")]
+    way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
+    told = [say("went", way=1e3 * way, rise=1e3 * float(rows["z"].max() - rows["z"][0]))]
+    told.append(say("flew", count=len(flights)) if flights else say("stayed"))
+    told.append(say("sank", depth=1e3 * float(rows["sinkage"].max()), end=1e3 * float(rows["sinkage"][-1])))
+    return told

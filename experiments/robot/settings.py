@@ -1,0 +1,90 @@
+"""Settings of `hedgebed mujoco`: a robot of one's own, its feet, and what they stand on."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from experiments.grains.settings import GrainsSettings
+from experiments.platform.settings import NotNegative, Positive
+from rigid.checks import nearest
+from rigid.ground.laws import GROUNDS
+from vis.page.sentences import Sentences
+
+__all__ = ["RobotSettings"]
+
+say = Sentences(__package__)
+
+ON_ANY_GROUND = ("substeps", "extrapolation", "iterations", "frame_count", "checkpoint_interval")
+"""Of `GrainsSettings`, those that a surface law takes too."""
+NOT_OURS = ("lowering_speed", "body_steps")
+"""Of `GrainsSettings`, those that a robot has no use for."""
+
+
+class RobotSettings(GrainsSettings):
+    """A robot of MuJoCo, its feet on a surface law or on a bed of grains."""
+
+    model: str = Field(min_length=1, description="The robot: an MJCF or URDF file, or an example that ships.")
+    feet: tuple[str, ...] = Field(min_length=1)
+    """Names of geoms of the model that stand on the ground, or of sites (points, on a surface law only); spike_* means
+    all whose name begins so."""
+    keyframe: str | None = None
+    """Keyframe of the model where the robot starts, with its controls; the model's own start if not given."""
+    height: NotNegative | None = None
+    """Height of the lowest foot over the surface at the start [m]; as the model has it if not given."""
+    controller: str | None = None
+    """Python file and function that control the robot, as my_robot.py:control; it is called as control(model, data) at
+    every time step of the model and sets data.ctrl. The controls of the start if not given."""
+    gravity: NotNegative | None = Field(None, description="Gravity, downwards [m/s2]; the model's if not given.")
+    duration: Positive = Field(2.0, le=3600, description="How long it is followed [s].")
+
+    surface: str = "sand"
+    """Material: steel, brick, sand, sand-weak or jsc1a."""
+    ground: str = "spring-damper"
+    """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, katsuragi-durian, bekker,
+    rft), or bed: grains."""
+    ground_parameters: tuple[str, ...] = ()
+    """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot."""
+    stiffness: Positive | None = None
+    """K of one foot [N/m]; that of one spike on the surface if not given, on sand times the area of the foot over the
+    spike's."""
+    damping: NotNegative | None = None
+    """C of one foot, while going in [N s/m]; likewise."""
+    mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (sand: 0.6).")
+    mu_d: NotNegative | None = None
+    """Sliding friction [1]; the surface's if not given (sand: 0.3), half of mu_s where that is."""
+
+    bed_size: tuple[Positive, Positive, Positive] = (0.3, 0.3, 0.08)
+    """On a bed: its size along x and y (both periodic) and its depth [m]; the feet start over its middle."""
+    grain: Positive = Field(0.006, description="On a bed: mean grain diameter [m].")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        for finding in (self._of_ground(), self._friction(), self._of_grains()):
+            if finding:
+                raise ValueError(finding)
+        return self
+
+    def _of_ground(self) -> str | None:
+        known = [*GROUNDS, "bed"]
+        if self.ground not in known:
+            return say("no_ground", s=self, known=nearest(self.ground, known))
+        if self.ground_parameters and self.ground in ("bed", "spring-damper"):
+            return say("no_parameters", s=self, given=" ".join(self.ground_parameters))
+        of_spring = self.stiffness is not None or self.damping is not None
+        return say("of_the_spring", s=self) if of_spring and self.ground not in ("bed", "spring-damper") else None
+
+    def _friction(self) -> str | None:
+        above = self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s
+        return say("mu_d_above_mu_s", s=self) if above else None
+
+    def _of_grains(self) -> str | None:
+        fields = type(self).model_fields
+        for name in NOT_OURS:
+            if getattr(self, name) != fields[name].default:
+                return say("not_ours", name=name, value=getattr(self, name))
+        if self.ground == "bed":
+            return self.sleep_fault()
+        for name in GrainsSettings.model_fields:
+            if name not in ON_ANY_GROUND and getattr(self, name) != fields[name].default:
+                return say("of_a_bed", name=name, value=getattr(self, name))
+        return None

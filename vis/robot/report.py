@@ -1,0 +1,120 @@
+"""Plots, pictures and report of a robot: reads trajectory.csv, series, frames and result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from vis.film.film import ARROWS, draw_runs, shown
+from vis.film.reel import NAME, SpaceReel
+from vis.page.numbers import quantity
+from vis.page.page import Section, Tile, listing, text
+from vis.page.plots import BED, DASHED, INK, MODEL, Array, legend_above, mean_over
+from vis.page.report import Report, given, report_of
+from vis.pictures.canvas import COLOURS
+from vis.pictures.frames import frame_names
+from vis.spatial.report import AXES, draw_energy, pair, say_grains
+
+__all__ = ["write_robot_report"]
+
+Columns = Mapping[str, Array]
+MOST_LINES = 10  # In one panel
+
+
+@report_of(dpi=130)
+def write_robot_report(
+    report: Report, *, pictures: bool = True, colour: str = "displacement", film: bool = True
+) -> Path:
+    """Make figures/, film.gif and report.html of the folder of a robot's run, and return the report.
+
+    ``pictures``: Whether to draw the robot on its ground, where there are frames. ``colour``: What grains are coloured
+    by, a key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make the film. Raises FileNotFoundError where the
+    folder has no series, ValueError for an unknown `colour`.
+    """
+    if colour not in COLOURS:
+        raise ValueError(f"colour is {colour!r}; it must be one of {', '.join(COLOURS)}")
+    home, result = report.folder, report.result
+    motion, feet, joints = (report.columns(f"series/{name}.csv") for name in ("motion", "feet", "joints"))
+    drawn = [report.draw("path", _draw_path(motion)), report.draw("ground", _draw_ground(motion, feet, result["feet"]))]
+    beside = home / "series" / "spring-damper.csv"
+    if beside.exists():
+        drawn.append(report.draw("beside", _draw_beside(motion, report.columns("series/spring-damper.csv"))))
+    drawn += [report.draw("joints", _draw_joints(joints)), report.draw("energy", draw_energy(motion, "the robot"))]
+    seen = []
+    if pictures and NAME in frame_names(home):
+        made = draw_runs([SpaceReel(home)], home, "robot", by=colour, film=film, progress=report.rest())
+        seen = [Section("Seen", [*shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)])]
+    quantities = result["quantities"]
+    sections = [
+        Section("", [listing(result["departures"]["sentences"])]),
+        *seen,
+        Section("In numbers over time", [*drawn, *say_grains(result)]),
+        Section("The trial", [given(result["trial"])]),
+        report.numbers(beside=(result.get("grains") or {}).get("beside") or {}),
+        report.again("hedgebed mujoco run.toml"),
+    ]
+    tiles = [
+        Tile("Highest", quantity(quantities["highest"]), "of the centre of mass over its start"),
+        Tile("Deepest", quantity(quantities["sinkage_largest"]), "of any foot"),
+        Tile("Largest force", quantity(quantities["largest_force"]), "of the ground"),
+        Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was", second=True),
+    ]
+    return report.write(sections, lead=["mujoco", f"{result['duration']:g} s"], tiles=tiles)
+
+
+def _draw_path(motion: Columns) -> Figure:
+    drawing, way, feet = pair("way of the centre of mass [mm]", "feet that touch")
+    for axis, colour in AXES.items():
+        way.plot(motion["t_s"], 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0]), color=colour, label=axis)
+    feet.step(motion["t_s"], motion["touching"], color=INK, where="post", lw=1.0)
+    feet.yaxis.set_major_locator(MaxNLocator(integer=True))
+    legend_above(drawing, way.lines, 3)
+    return drawing
+
+
+def _draw_ground(motion: Columns, feet: Columns, names: list[str]) -> Figure:
+    drawing, force, depth = pair("force of the ground [N]", "depth of the feet [mm]")
+    time = motion["t_s"]
+    means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in AXES))
+    for (axis, colour), mean in zip(AXES.items(), means, strict=True):
+        force.plot(time, mean, color=colour, label=axis)
+    for k, name in enumerate(names[:MOST_LINES]):
+        depth.plot(time, 1e3 * feet[f"{name}_depth_m"], color=colormaps["tab10"](k), label=name)
+    depth.invert_yaxis()
+    depth.legend(loc="best")
+    legend_above(drawing, force.lines, 3)
+    return drawing
+
+
+def _draw_beside(motion: Columns, other: Columns) -> Figure:
+    drawing, height, depth = pair("rise of the centre of mass [mm]", "depth of the deepest foot [mm]")
+    for columns, style in ((motion, {"color": BED, "label": "grains"}), (other, {"color": MODEL, "ls": DASHED})):
+        height.plot(columns["t_s"], 1e3 * (columns["z_m"] - columns["z_m"][0]), **style)
+        depth.plot(columns["t_s"], 1e3 * columns["sinkage_m"], **style)
+    height.lines[-1].set_label("spring-damper")
+    depth.invert_yaxis()
+    legend_above(drawing, height.lines, 2)
+    return drawing
+
+
+def _draw_joints(joints: Columns) -> Figure:
+    drawing, place, force = pair("position [rad, m]", "force [N, N m]")
+    time, ends = joints["t_s"], ("_rad", "_m")
+    moved = [
+        name for name in joints
+        if name.endswith(ends) and not name.endswith(("_x_m", "_y_m", "_z_m")) and np.ptp(joints[name]) > 0
+    ]  # fmt: skip
+    for k, name in enumerate(moved[:MOST_LINES]):
+        place.plot(time, joints[name], color=colormaps["tab10"](k), label=name.rpartition("_")[0])
+    driven = [name for name in joints if name.endswith("_force")]
+    for k, name in enumerate(driven[:MOST_LINES]):
+        force.plot(time, joints[name], color=colormaps["tab10"](k), label=name.removesuffix("_force"))
+    for axis in (place, force):
+        if axis.lines:
+            axis.legend(loc="best")
+    return drawing
