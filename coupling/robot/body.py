@@ -63,7 +63,8 @@ class MujocoRobot:
 
     Its world has z upwards and the undisturbed surface at z = 0. Planes and height fields of MuJoCo's world no longer
     touch anything (`floors`): the ground here takes their place. Raises ValueError, naming what is wrong, for a missing
-    foot, gravity that is not straight down, the integrator RK4, and a height where nothing is free to move up.
+    foot, gravity that is not straight down, the integrator RK4, and a height where the robot has neither a free joint
+    nor an upright rail.
     """
 
     def __init__(
@@ -236,12 +237,26 @@ class MujocoRobot:
         return [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"actuator_{k}" for k in range(model.nu)]
 
     def lift(self, height: float) -> None:
-        """Raise it by `height` [m]. Raises ValueError where it is not free to move up."""
-        model, free = self.model, int(self._mujoco.mjtJoint.mjJNT_FREE)
-        joints = np.flatnonzero(model.jnt_type == free)
-        if not len(joints):
-            raise ValueError("height is given, but the robot has no free joint that could be raised: leave it out")
-        self.data.qpos[model.jnt_qposadr[joints] + 2] += height
+        """Raise it by `height` [m], along its free joints or upright rails.
+
+        Raises ValueError where there are none at its root.
+        """
+        model, kinds = self.model, self._mujoco.mjtJoint
+        raised = False
+        for joint in range(model.njnt):
+            place = int(model.jnt_qposadr[joint])
+            rooted = model.body_weldid[model.body_parentid[model.jnt_bodyid[joint]]] == 0
+            up = float(self.data.xaxis[joint, 2])
+            if model.jnt_type[joint] == int(kinds.mjJNT_FREE):
+                self.data.qpos[place + 2] += height
+                raised = True
+            elif rooted and model.jnt_type[joint] == int(kinds.mjJNT_SLIDE) and abs(up) > 1 - 1e-9:
+                self.data.qpos[place] += height / up
+                raised = True
+        if not raised:
+            raise ValueError(
+                "height is given, but the robot has no free joint or upright rail to be raised by: leave it out"
+            )
         self.start()
 
     def start(self) -> None:

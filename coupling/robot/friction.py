@@ -15,6 +15,8 @@ from rigid.spatial.quaternions import from_turn, to_matrix
 
 __all__ = ["FeetFriction"]
 
+FIXED = 1e-9  # Mobility over that of the most mobile direction below which the robot cannot move that way [1]
+
 
 class FeetFriction:
     """Friction of `contacts` on the feet of `robot` in a step of `dt` [s].
@@ -80,6 +82,9 @@ class FeetFriction:
             for k in back:
                 del self.sliding[self.points[k]]
                 self.sticking.add(self.points[k])
+        else:  # not settled who sticks: nobody is held by more than the bound
+            size = np.maximum(np.hypot(force[:, 0], force[:, 1]), 1e-300)
+            force = force * np.minimum(1.0, self.mu_s * self.loads / size)[:, None]
         rows = np.zeros((self.count, 6))
         for foot, (x, y, z), (along, across) in zip(self.feet, self.arms, force, strict=True):
             rows[foot] += (along, across, 0.0, -z * across, z * along, x * across - y * along)
@@ -100,10 +105,16 @@ class FeetFriction:
             return force
         free = means @ self._slips(force).ravel()
         answers = means @ self.answer @ shapes.T
-        # Feet that nothing but a rigid body connects leave forces between them open: the smallest solution.
-        scale = np.sqrt(np.maximum(np.abs(np.diag(answers)), 1e-300))
-        size = np.linalg.lstsq(answers / np.outer(scale, scale), -free / scale, rcond=1e-10)[0] / scale
-        return np.asarray(force + (size @ shapes).reshape(-1, 2))
+        # Where the robot cannot move (a rail) no force is needed. Feet that nothing but a rigid body connects leave
+        # forces between them open: the smallest solution.
+        own = np.abs(np.diag(answers))
+        moves = own > FIXED * own.max()
+        if not moves.any():
+            return force
+        scale = np.sqrt(own[moves])
+        matrix = answers[np.ix_(moves, moves)] / np.outer(scale, scale)
+        size = np.linalg.lstsq(matrix, -free[moves] / scale, rcond=1e-10)[0] / scale
+        return np.asarray(force + (size @ shapes[moves]).reshape(-1, 2))
 
     def _shapes(self) -> tuple[Vector, Vector]:
         """Forces of one unit of each multiplier, and the mean slips that they make zero, shape (shape, 2 point)."""

@@ -120,6 +120,8 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
                 across, most = self.widths[foot.name] / s.grain, self.widths[foot.name] / FEWEST_ACROSS
                 raise ValueError(say("small_foot", s=s, name=foot.name, width=self.widths[foot.name], across=across,
                                      fewest=FEWEST_ACROSS, most=most))  # fmt: skip
+        if self._robot.clearance < s.grain * (1 - 1e-9):
+            raise ValueError(say("low_start", s=s, clearance=self._robot.clearance))
         if not self.gravity > 0:
             raise ValueError(say("no_gravity", gravity=self.gravity))
         try:
@@ -129,6 +131,9 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
 
     def check_extent(self) -> None:
         s, forecast = self.settings, self.forecast
+        least = forecast.deepest + 2 * self.spike_diameter
+        if s.bed_size[2] < least:
+            raise ValueError(say("too_shallow", s=s, f=forecast, width=self.spike_diameter, least=least))
         for axis, (name, low, high) in enumerate(zip("xy", forecast.low, forecast.high, strict=True)):
             need = high - low + 2 * s.grain
             if s.bed_size[axis] < need:

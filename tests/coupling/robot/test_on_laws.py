@@ -70,6 +70,15 @@ def test_a_box_on_its_four_corners_stays_where_it_is_put_and_a_push_beyond_frict
         assert run.columns["z"][-1] == pytest.approx(0.005 - 2.0 / 2000.0, rel=0.02)
 
 
+def test_a_wheel_on_rails_is_not_pushed_where_it_cannot_move_and_rolls_without_slip():
+    """Driven at 2 rad/s with twelve grousers, on an axle that has no way to go sideways."""
+    robot = MujocoRobot(load_model(EXAMPLES / "mujoco-wheel" / "wheel.xml"), ["wheel"], keyframe="drive")
+    run = on_law(robot, 4e-4, 0.3, parameters={"stiffness": 6000.0, "damping": 130.0})
+    assert np.abs(run.columns["fy"]).max() == 0.0 and run.columns["fz"].max() < 500.0
+    assert robot.rates[0] == pytest.approx(0.1 * robot.rates[2], rel=0.01)
+    assert run.energy_residual < 0.02
+
+
 def test_the_hedgehog_as_mjcf_is_that_of_the_spatial_model_with_an_error_of_second_order():
     """`rigid.simulate_spatial`, which locates its events: pivot and slip, 0.5 s; as the master's own body in space."""
     platform = find_platform("hedgehog")
@@ -94,6 +103,7 @@ def test_the_hedgehog_as_mjcf_is_that_of_the_spatial_model_with_an_error_of_seco
     assert robot.rates[7] + robot.rates[4] == pytest.approx(-0.22 * 0.5 / 1.2e-3, rel=1e-6)  # of the wheel, absolute
 
 
+@pytest.mark.long
 def test_the_hedgehog_lands_on_one_corner_as_the_masters_own_body_in_space_does():
     start = {
         "position": (0.0, 0.0, 0.23), "quaternion": tuple(from_turn([0.3, -0.5, 0.2])), "velocity": (0.05, -0.03, -0.1),
@@ -131,6 +141,7 @@ def pushing(model, data):
     data.ctrl[0] = -3.0 * math.sin(2 * math.pi * 5 * data.time)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", ["hunt-crossley", "power", "katsuragi-durian", "bekker", "rft"])
 def test_every_law_stops_the_robot_and_its_impulse_is_what_the_robot_gained(law):
     robot = MujocoRobot(ball("sphere", "0.01", mass=0.05, height=0.0103), "foot")
@@ -143,6 +154,7 @@ def test_every_law_stops_the_robot_and_its_impulse_is_what_the_robot_gained(law)
     assert run.energy_residual < 0.02
 
 
+@pytest.mark.long
 def test_a_foot_too_light_for_the_explicit_exchange_is_refused_or_iterated():
     """K H^2 / 4 m = 1 is where explicit steps become unstable; iterated, the same foot follows the spring."""
 
@@ -165,8 +177,11 @@ def test_a_foot_that_starts_in_the_ground_is_refused_by_name_and_a_height_lifts_
         on_law(MujocoRobot(ball(height=0.04), "foot"))
     robot = MujocoRobot(ball(height=0.04), "foot", height=0.003)
     assert robot.clearance == pytest.approx(0.003)
-    with pytest.raises(ValueError, match="no free joint"):
-        MujocoRobot(model_of(LEG.format(foot_mass=0.2)), "foot", height=0.1)
+    rail = MujocoRobot(model_of(LEG.format(foot_mass=0.2)), "foot", height=0.1)
+    assert rail.clearance == pytest.approx(0.1)
+    hinged = LEG.format(foot_mass=0.2).replace('type="slide" axis="0 0 1"/>', 'type="hinge" axis="0 1 0"/>')
+    with pytest.raises(ValueError, match="no free joint or upright rail"):
+        MujocoRobot(model_of(hinged), "foot", height=0.1)
 
 
 def test_floors_of_mujocos_own_world_touch_nothing():

@@ -1,0 +1,121 @@
+"""`hedgebed mujoco`: refusals by name, a run on a law and its report, a small bed stopped and taken up."""
+
+import json
+
+import numpy as np
+import pytest
+from spatial_runs import EXAMPLES, grain_bed
+from tumble_runs import stop_at
+
+from experiments.cli.main import main
+from experiments.robot import experiment as robot
+from experiments.robot.on_grains import RobotOnBed
+from experiments.robot.plan import plan_robot
+from experiments.robot.settings import RobotSettings
+from experiments.runs.folder import RunFolder, read_series
+from vis.page.folder import read_columns
+
+pytest.importorskip("mujoco")
+
+HOP = f"{EXAMPLES / 'mujoco-hopper' / 'hop.py'}:control"
+HOPPER = {"model": "hopper", "feet": ("foot",)}
+ON_BED = HOPPER | {"ground": "bed", "height": 0.012, "grain": 0.012, "bed_size": (0.2, 0.2, 0.16), "duration": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"ground": "bad"}, "ground = 'bad' is not known"),
+        ({"ground": "bekker", "stiffness": 1.0}, "ground = 'bekker' takes ground_parameters"),
+        ({"ground_parameters": ("exponent=1",)}, "ground_parameters = exponent=1 belongs to another"),
+        ({"mu_s": 0.1, "mu_d": 0.2}, "mu_d = 0.2 is above mu_s = 0.1"),
+        ({"lowering_speed": 0.1}, "lowering_speed = 0.1 is for platforms"),
+        ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
+        ({"feet": ()}, "feet"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_by_name(given, said):
+    with pytest.raises(ValueError, match=said):
+        RobotSettings(**HOPPER | given)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"model": "hoper"}, "model = 'hoper': there is no such file.* hedgehog, hopper, wheel"),
+        ({"feet": ("fot",)}, r"no geom or site 'fot' .did you mean 'foot'"),
+        ({"keyframe": "up"}, "keyframe = 'up': the model has no keyframes"),
+        ({"controller": "nothing.py:control"}, "controller = 'nothing.py:control': a Python file"),
+        ({"controller": HOP.replace("control", "go")}, r"no function 'go'; it has control"),
+        ({"ground": "bekker", "ground_parameters": ("exponent",)}, "ground_parameters = 'exponent': name=value"),
+        ({"stiffness": 1e7}, "'foot' is too light for this ground.* unstable with substeps = 10"),
+    ],
+)
+def test_what_there_is_not_and_what_would_be_unstable_is_refused_before_any_work(given, said):
+    with pytest.raises(ValueError, match=said):
+        robot.check(RobotSettings(**HOPPER | given))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"grain": 0.015}, r"grain = 0.015 m: foot 'foot' is 0.06 m wide, 4 grains; .* at most 0.012 m would do"),
+        ({"height": 0.002}, "starts 0.002 m over the surface.* height = 0.012 m would do"),
+        ({"bed_size": (0.2, 0.2, 0.1)}, r"bed_size = 0.1 m deep is too shallow: .* a foot goes"),
+        ({"bed_size": (0.04, 0.2, 0.16)}, r"bed_size = 0.04 m along x is too short"),
+        ({"surface": "steel"}, "surface = 'steel' has no grains"),
+        ({"gravity": 0.0}, "gravity = 0 m/s2: a bed of grains needs some"),
+        ({"model": "hedgehog", "feet": ("tip_*",)}, "is a site, a point, which grains do not touch"),
+    ],
+)
+def test_a_bed_that_does_not_suit_the_robot_is_refused_before_any_work(given, said):
+    with pytest.raises(ValueError, match=said):
+        robot.check(RobotSettings(**ON_BED | given))
+
+
+@pytest.mark.long
+def test_a_run_on_a_law_leaves_its_series_and_numbers(tmp_path):
+    settings = RobotSettings(**HOPPER, controller=HOP, duration=0.45, frame_count=0)
+    result = robot.run(settings, tmp_path)
+    motion, joints = (read_series(tmp_path / "series" / f"{name}.csv") for name in ("motion", "joints"))
+    feet, _ = read_columns(tmp_path / "series" / "feet.csv")
+    assert motion["t_s"][-1] == pytest.approx(0.45) and len(motion["t_s"]) == len(feet["t_s"]) == len(joints["t_s"])
+    assert motion["fz_N"] == pytest.approx(feet["foot_fz_N"], abs=1e-9)
+    assert np.ptp(joints["knee_m"]) > 0.01 and joints["push_control"].min() == -60.0
+    quantities = result.quantities
+    assert quantities["energy_residual"].value < 5e-3 and quantities["flights"].value == 1
+    assert quantities["sinkage_largest"].value == pytest.approx(float(motion["sinkage_m"].max()))
+    # K of the foot: that of a spike times the area of 60 mm over that of 12 mm, as its picture of 32 sides has it.
+    plan = plan_robot(settings)
+    assert plan.scales["foot"] == pytest.approx((60 / 12) ** 2, rel=0.01)
+    assert (tmp_path / "report.html").stat().st_size > 1e4
+    again = robot.resume(tmp_path)
+    assert again.quantities == result.quantities
+
+
+@pytest.mark.long
+def test_on_a_small_bed_a_stopped_run_goes_on_to_the_same_bits_and_is_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(RobotOnBed, "prepare", lambda *_: grain_bed())
+    monkeypatch.setattr(RobotOnBed, "check", lambda *_: None)
+    given = ON_BED | {"grain": 0.006, "bed_size": (0.096, 0.096, 0.05), "duration": 0.05, "height": 0.003}
+    given |= {"frame_count": 2, "checkpoint_interval": 1e-3}
+    whole = robot.run(RobotSettings(**given), tmp_path / "whole")
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        stop_at(patch, 60)
+        robot.run(RobotSettings(**given), tmp_path / "parts")
+    parts = robot.resume(tmp_path / "parts")
+    assert parts.quantities == whole.quantities
+    rows = [read_series(tmp_path / part / "series" / "bed.csv") for part in ("whole", "parts")]
+    assert all((rows[0][name] == rows[1][name]).all() for name in rows[0])
+    assert whole.quantities["largest_force"].value > 1.0 and whole.quantities["energy_residual"].value < 0.02
+    assert (tmp_path / "whole" / "figures" / "robot-end.png").exists()
+    assert json.loads((tmp_path / "whole" / "result.json").read_text())["grains"]["grain_count"] == 768
+
+
+def test_the_command_takes_the_model_as_its_first_word(tmp_path, capsys):
+    file = str(EXAMPLES / "mujoco-hopper" / "hopper.xml")
+    out = str(tmp_path / "run")
+    code = main(["mujoco", file, "--feet", "foot", "--duration", "20ms", "--frame-count", "0", "--out", out, "--quiet"])
+    assert code == 0 and RunFolder.open(tmp_path / "run").status == "done"
+    assert main(["mujoco", file, "--feet", "toe"]) == 2
+    assert "'toe'" in capsys.readouterr().err
