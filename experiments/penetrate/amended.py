@@ -134,7 +134,7 @@ class AmendedLaw:
         said = []
         if spike.diameter is not None and not math.isclose(spike.diameter, own.tip_diameter, rel_tol=0.01):
             several = self.pair != (self.model.surface.stiffness, self.model.surface.damping)
-            of_k = "K and C are those fitted to this diameter" if several else "K and C are that one's"
+            of_k = "K and C are those fitted to this diameter" if several else "K and C are those of that tip"
             sizes = {"model_mm": 1e3 * spike.diameter, "own_mm": 1e3 * own.tip_diameter}
             said.append(say("other_tip", **sizes, of_k=of_k, spike=spike))
         if spike.tip != own.tip:

@@ -164,7 +164,9 @@ def sentences(
             f"{foldable(quote(value, std, '1', significant=2))} at {speed:g} m/s ({_beds(count)})"
             for speed, (value, std, count) in exponents.items()
         )
-        said.append(f"Going in, the bed's force grows with depth to the power {shown}. The spring's: to the power 1.")
+        said.append(
+            f"On the way in the bed's force grows with depth to the power {shown}; the spring's to the power 1."
+        )
     if sinkage is not None:
         bed, law = sinkage
         against = f", {_deeper(law[0] / bed[0])}" if bed[0] > 0 else ""
@@ -175,10 +177,10 @@ def sentences(
         else:
             said.append(say("sinkage", bed=sunk, law=law_sunk, against=against))
     if returned is not None:
-        back = f"gives back {_share(returned[0])} of the work put in"
+        back = f"recovers {_share(returned[0])} of the work put in"
         if returned[0] < 0:
-            back = f"gives nothing back, that takes another {_share(-returned[0])} of the work put in"
-        said.append(f"Pulled out, the bed {back}; the spring-damper gives back {_share(returned[1])}.")
+            back = f"recovers no work, and withdrawal takes another {_share(-returned[0])} of the work put in"
+        said.append(f"On withdrawal the bed {back}; the spring-damper recovers {_share(returned[1])}.")
     if drops:
         said += _of_drops(drops)
     return said
@@ -200,7 +202,7 @@ def _of_drops(drops: Sequence[tuple[Penetration, Penetration]]) -> list[str]:
     if stopped:
         deeper = float(np.mean([model.max_depth / bed.max_depth - 1 for bed, model in stopped]))
         gap = _compared(deeper, "deeper", "less deep", "as deep as the bed's")
-        parts.append(f"{'its' if peaks else _WHOSE} deepest point is {gap}")
+        parts.append(f"{'its' if peaks else _WHOSE} largest depth is {gap}")
     said = [f"In drops {', and '.join(parts)}."] if parts else []
     calmed = [[smoothed_peak(run, pair[0].stop_time / 10) for run in pair] for pair in stopped if pair[0].stop_time]
     calm = [law / bed - 1 for bed, law in calmed if bed > 0]

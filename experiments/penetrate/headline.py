@@ -25,16 +25,16 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     load = f" under {quote(numbers['load']['value'], unit='N')}" if "load" in numbers else ""
     rows = [(f"sinkage at rest{load}", *(_quoted(numbers[f"sinkage_{side}"]) for side in ("dem", "spring_damper")))]
     if "depth_to_rest" in numbers:
-        rows[0] = (f"would rest{load}, about at", _quoted(numbers["depth_to_rest"]), rows[0][2])
+        rows[0] = (f"would rest{load} at about", _quoted(numbers["depth_to_rest"]), rows[0][2])
     rows += _drag(result.get("departures", {}).get("table", []))
     rows += _fastest_drop(result.get("runs", []))
     given, back = (numbers.get(f"work_returned_{side}") for side in ("dem", "spring_damper"))
     if given and back and given["value"] is not None:
-        rows.append(("work given back, pulled out", _quoted(given, "%"), _quoted(back, "%")))
-    for name, words in (("stiffness", "stiffness K, fitted"), ("damping", "damping C, fitted")):
+        rows.append(("work recovered on withdrawal", _quoted(given, "%"), _quoted(back, "%")))
+    for name, words in (("stiffness", "fitted stiffness K"), ("damping", "fitted damping C")):
         rows.append((words, "", _quoted(numbers[name])))
     if "drag_gap" in numbers:
-        rows.append(("its drag is off by (rms, way in)", "", _quoted(numbers["drag_gap"], "%")))
+        rows.append(("error of its drag (rms, way in)", "", _quoted(numbers["drag_gap"], "%")))
     warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
     rest = list(result.get("rest", {}).get("sentences", []))
     changes = result.get("reference", {}).get("moved", {})
@@ -86,8 +86,8 @@ def _fastest_drop(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str
         return _quoted({"value": fmean(values) if values else None, "std": std, "unit": unit})
 
     return [
-        (f"{words}, dropped at {speed:g} m/s", mean(name, unit), mean(f"model_{name}", unit))
-        for name, words, unit in (("peak_force", "peak force", "N"), ("max_depth", "deepest", "m"))
+        (f"{words} of the drop at {speed:g} m/s", mean(name, unit), mean(f"model_{name}", unit))
+        for name, words, unit in (("peak_force", "peak force", "N"), ("max_depth", "largest depth", "m"))
     ]
 
 

@@ -257,7 +257,7 @@ def _at_surface(findings: Findings) -> str | None:
     if force is None or force["value"] <= 0.1 * load:
         return None
     out = numbers.get("surface_roughness")
-    grains = f", because grains stick out of the surface by up to {_words(out)}" if out else ""
+    grains = f", because grains extend above the mean surface by up to {_words(out)}" if out else ""
     ratio = force["value"] / load
     share = f"{100 * ratio:.2g} % of the load" if ratio < 0.995 else f"{ratio:.2g} times the load"
     return say("at_surface", force=_words(force), share=share, grains=grains)

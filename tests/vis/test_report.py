@@ -91,7 +91,7 @@ def test_it_answers_first(report):
     text = Page(report.read_text()).text.replace("\N{NO-BREAK SPACE}", " ")
     for words in ("231 ± 12 N/m", "4.2 ± 0.3 N", "28 ± 2 %", "0.5934 ± 0.0011", "run.toml --out", "no OpenGL"):
         assert words in text, words
-    assert text.index("it sink?") < text.index("spring-damper, fitted") < text.index("Settings")
+    assert text.index("it sink?") < text.index("fitted spring-damper") < text.index("Settings")
     golden.golden("report/full", golden.page_lines(report.read_text()))
 
 
@@ -254,14 +254,14 @@ def test_what_the_ground_gives_back_is_read_from_the_data(tmp_path, make_run):
 
     run = edit_result(make_run(tmp_path, frames=0), elastic)
     assert "bed 50\N{NO-BREAK SPACE}%" in plot_called("work", run).caption
-    answer = next(item["answer"] for item in summarise(run)["answers"] if "push back" in item["question"])
-    assert "back 50\N{NO-BREAK SPACE}%" in answer
+    answer = next(item["answer"] for item in summarise(run)["answers"] if "force of the sand" in item["question"])
+    assert "withdrawal, 50\N{NO-BREAK SPACE}%" in answer
 
     def costly(result):
         result["quantities"]["work_returned_dem"] = {"value": -0.006, "std": None, "unit": "1"}
 
     run = edit_result(run.path, costly)
-    taken = next(item["answer"] for item in summarise(run)["answers"] if "push back" in item["question"])
+    taken = next(item["answer"] for item in summarise(run)["answers"] if "force of the sand" in item["question"])
     assert "another 0.60" in taken
     golden.golden("report/gives_back", {"half of it": answer, "less than nothing": taken})
 
@@ -321,7 +321,7 @@ def test_the_headline_says_what_the_grains_are_which_k_holds_and_what_a_set_down
 
 def test_the_worst_place_is_named_in_newtons_and_at_the_top(made_once):
     answer = next(
-        item["answer"] for item in summarise(read_folder(made_once))["answers"] if "wrong" in item["question"]
+        item["answer"] for item in summarise(read_folder(made_once))["answers"] if "error" in item["question"]
     )
     answer = answer.replace("\N{NO-BREAK SPACE}", " ")
     assert "at 0.4 m/s" in answer and "At the top" in answer

@@ -75,7 +75,7 @@ def _figure(report: Report, name: str, told: Result) -> Block:
     if told["line"]:
         handles.insert(3, Patch(facecolor=MODEL, alpha=0.2, label="its 95 %"))
     legend_above(drawing, handles)
-    missing = f" In no error, for it was not measured: {', '.join(told['unknown'])}." if told["unknown"] else ""
+    missing = f" Not measured, and in no error: {', '.join(told['unknown'])}." if told["unknown"] else ""
     shown = {key: _plain(told[key], scale, unit) for key in ("chance", "grain", "rest")}
     value = quote(told["value"], told["total"] or told["chance"], told["unit"])
     return report.draw(

@@ -312,4 +312,4 @@ def _returned_words(runs: list[Run]) -> str:
         ]
         if works:
             shares.append(f"{what} {quote(float(np.mean(works)), None, '%', significant=2)}")
-    return f" Got back over put in, mean of the driven runs: {', '.join(shares)}." if shares else ""
+    return f" Share recovered, mean over the pushes: {', '.join(shares)}." if shares else ""

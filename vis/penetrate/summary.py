@@ -94,18 +94,18 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
             )
         )
     elif _restless(run, quantities):
-        note = f"no set-down came to rest in time; the spring-damper says {model}"
+        note = f"no set-down came to rest in time; the spring-damper predicts {model}"
         tiles.append(("Sinks to rest at", "unknown", note))
     if words.value_of(quantities, "sinkage_dem") is not None:
         load = words.value_of(quantities, "load")
         under = f"under {quantity(quantities['load'])}" if load is not None else "under its load"
-        note = f"{under}; the spring-damper says {model}"
+        note = f"{under}; the spring-damper predicts {model}"
         tiles.append(("Sinks to rest at", _rests_at(quantities), note))
     if push := _push(run):
-        tiles.append(("Sand pushes back with", *push))
+        tiles.append(("Largest force of the sand", *push))
     if words.value_of(quantities, "drag_gap") is not None:
-        note = "rms difference over rms drag, way in, all driven runs"
-        tiles.append(("Spring-damper wrong by", quantity(quantities["drag_gap"], unit="%"), note))
+        note = "rms difference over rms drag, way in, all pushes"
+        tiles.append(("Error of the spring-damper", quantity(quantities["drag_gap"], unit="%"), note))
     if words.value_of(quantities, "stiffness") is not None:
         tiles.append(("Fitted stiffness K", words.fitted(quantities, "stiffness"), _fitted_note(run, quantities)))
     return [{"label": label, "value": value, "note": note} for label, value, note in tiles]
@@ -117,7 +117,7 @@ def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
     depths = [float(r.bed.depth.max()) for r in (*run.of_kind("driven"), *drops) if r.bed is not None]
     parts[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
     if words.value_of(quantities, "stiffness_standing") is not None:
-        parts.append(f"for a foot that stands K = {quantity(quantities['stiffness_standing'])}")
+        parts.append(f"use K = {quantity(quantities['stiffness_standing'])} for a foot that stands")
     if words.std_of(quantities, "stiffness") is None and words.value_of(quantities, "stiffness_error") is not None:
         parts.append("± is the standard error of the fit")
     return "; ".join(parts)
@@ -139,7 +139,7 @@ def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
         parts.append(f"{plain(grain / real, 2)} times larger than real ones ({sizes})")
     if not parts:
         return ""
-    return f"The grains are {words.joined(parts)}: these are numbers of that bed, not of a material."
+    return f"The grains are {words.joined(parts)}: the numbers are those of this bed, not of a material."
 
 
 def _frames(run: RunFolder) -> list[str]:
@@ -158,8 +158,8 @@ def _push(run: RunFolder) -> tuple[str, str] | None:
     depth = max((float(r.bed.depth.max()) for r in run.of_kind("driven") if r.bed is not None), default=None)
     to = f" to {quote(depth, unit='m')}" if depth is not None else ""
     speed, high = max(by_speed, key=lambda peak: peak[1][0])
-    note = f"largest, driven in{to} at {speed:g}{words.NBSP}m/s"
-    note += " (mean of the beds' largest)" if high[1] is not None else ""
+    note = f"pushed{to} at {speed:g}{words.NBSP}m/s"
+    note += " (mean over beds of the largest)" if high[1] is not None else ""
     others = [f"{quote(*peak, 'N')} at {other:g}{words.NBSP}m/s" for other, peak in by_speed if other != speed]
     return quote(*high, "N"), f"{note}; {words.joined(others)}" if others else note
 
@@ -176,34 +176,34 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         drops = _peaks(run, "drop", "peak_force")
         if drops:
             peaks = [f"{quote(*peak, 'N')} at {speed:g}{words.NBSP}m/s" for speed, peak in drops]
-            text += f" Dropped, its force peaks at {words.joined(peaks)}."
+            text += f" In drops the force peaks at {words.joined(peaks)}."
         if words.value_of(quantities, "work_returned_dem") is not None:
             text += " " + _returned(quantities)
-        answers["What does the sand push back with?"] = text
+        answers["How large is the force of the sand?"] = text
     if words.value_of(quantities, "drag_gap") is not None:
         text = (
-            f"With K = {words.fitted(quantities, 'stiffness')} and C = {words.fitted(quantities, 'damping')} it misses "
-            f"the bed's drag on the way in by {quantity(quantities['drag_gap'], unit='%')} (rms difference over rms "
-            "drag)."
+            f"With K = {words.fitted(quantities, 'stiffness')} and C = {words.fitted(quantities, 'damping')} its "
+            f"error on the way in is {quantity(quantities['drag_gap'], unit='%')} of the bed's drag (rms difference "
+            "over rms drag)."
         )
         if worst := _worst(run.result):
             text += f" {worst}"
         gap = _peak_gap(run)
         if gap is not None:
-            text += f" In drops its peak force is {words.more_or_less(gap, 'above', 'below')} the bed's on average."
-        answers["How wrong is the spring-damper?"] = text
-        answers["Which K, and when?"] = also("which_stiffness").strip()
+            text += f" In drops its mean peak force is {words.more_or_less(gap, 'above', 'below')} the bed's."
+        answers["How large is the error of the spring-damper?"] = text
+        answers["Which K is to be used?"] = also("which_stiffness").strip()
     return [{"question": question, "answer": answer} for question, answer in answers.items() if answer]
 
 
 def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
     """How far it sinks, and `more`; "" where it was not set down."""
     sunk, law = words.value_of(quantities, "sinkage_dem"), words.value_of(quantities, "sinkage_spring_damper")
-    model = f" The fitted spring-damper says {quantity(quantities.get('sinkage_spring_damper'))}"
+    model = f" The fitted spring-damper predicts {quantity(quantities.get('sinkage_spring_damper'))}"
     if sunk is not None:
         load = f" of {quantity(quantities['load'])}" if words.value_of(quantities, "load") is not None else ""
         text = f"Set down under its load{load}, the spike comes to rest {_rests_at(quantities)}"
-        text += " deep." if sunk >= 0 else ": grains that stick out carry it."
+        text += " deep." if sunk >= 0 else ": it stands on grains that extend above the mean surface."
         if law is not None:
             text += model + (f", {_deeper(law / sunk)}." if sunk > 0 else ".")
         return text + more
@@ -211,7 +211,7 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
         return " ".join(rest["sentences"])
     if not _restless(run, quantities):
         return ""
-    text = "Not known: set down under its load, the spike did not come to rest in the time that was followed."
+    text = "Not known: set down under its load, the spike did not come to rest in the simulated time."
     return text + (f"{model}." if law is not None else "") + more
 
 
@@ -231,11 +231,11 @@ def _restless(run: RunFolder, quantities: Mapping[str, Any]) -> bool:
 def _returned(quantities: Mapping[str, Any]) -> str:
     """The share of the work of loading that the bed recovers; where it is negative, pulling out takes work as well."""
     share, entry = words.value_of(quantities, "work_returned_dem"), quantities["work_returned_dem"]
-    model = f"(spring-damper: {quantity(quantities.get('work_returned_spring_damper'), unit='%')} given back)"
+    model = f"(spring-damper: {quantity(quantities.get('work_returned_spring_damper'), unit='%')} recovered)"
     if share is not None and share < 0.0:
         more = quote(-share, words.std_of(quantities, "work_returned_dem"), "%", significant=2)
-        return f"Pulled out, it gives nothing back: that takes another {more} of the work put in {model}."
-    return f"Pulled out, it gives back {quantity(entry, unit='%')} of the work put in {model}."
+        return f"No work is recovered on withdrawal, which takes another {more} of the work put in {model}."
+    return f"On withdrawal, {quantity(entry, unit='%')} of the work put in is recovered {model}."
 
 
 def _worst(result: Mapping[str, Any]) -> str:

@@ -28,7 +28,7 @@ def test_a_run_ends_with_a_short_table_and_what_matters(tmp_path, capsys, monkey
     assert len(lines) < 25 and lines[-1] == f"report: {folder.path / 'report.html'}"
     assert all(len(line) <= 80 for line in lines[:-2])
     table = [line for line in lines[2:] if "  " in line.strip()][:9]
-    for words in ("sinkage at rest", "drag at 0.1 m/s", "drag at 0.4 m/s", "dropped at 0.2 m/s", "stiffness K"):
+    for words in ("sinkage at rest", "drag at 0.1 m/s", "drag at 0.4 m/s", "drop at 0.2 m/s", "stiffness K"):
         assert any(line.startswith(words) or words in line for line in table), words
     assert main(["resume", str(folder.path), "--verbose"]) == 0
     whole = capsys.readouterr().out

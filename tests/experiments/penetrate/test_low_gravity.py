@@ -274,7 +274,7 @@ def test_a_foot_that_grains_above_the_surface_carry_rests_above_it(fake, tmp_pat
     result = penetrate.run(settings, tmp_path / "run")
     assert result["quantities"]["sinkage_dem"]["value"] < 0
     said = summarise(read_folder(tmp_path / "run"))
-    on_top = [text for text in [*result["departures"]["sentences"], *result["warnings"]] if "stick out of the" in text]
+    on_top = [text for text in [*result["departures"]["sentences"], *result["warnings"]] if "extend above the" in text]
     answer = said["answers"][0]["answer"].split(" A set-down")[0]
     golden("penetrate/rests_on_top", [said["tiles"][0]["value"], answer, *on_top, result["departures"]["drop"]])
 
@@ -292,7 +292,7 @@ def test_the_load_that_a_refusal_proposes_is_not_refused_and_rests(monkeypatch):
     from experiments.penetrate.refusals import check
 
     monkeypatch.setattr(beds, "find_material", lambda settings: WEAK)
-    with pytest.raises(ValueError, match="load = 4 N puts") as refused:
+    with pytest.raises(ValueError, match="load = 4 N would put") as refused:
         check(PenetrateSettings(load=4.0, threads=1))
     most = float(str(refused.value).split("a load of at most ")[1].split(" N")[0])
     own = PenetrateSettings(load=most, threads=1)
@@ -335,7 +335,7 @@ def test_others_are_poured_dry_where_they_stick_and_rained_where_they_do_not():
 
 @pytest.mark.parametrize("other", [{"packing": 0.58}])
 def test_stages_beside_a_packing_are_refused(other):
-    with pytest.raises(ValueError, match="bed_stages = 'rain level' beside packing"):
+    with pytest.raises(ValueError, match="bed_stages = 'rain level' and packing"):
         PenetrateSettings(bed_stages=("rain", "level"), **other)
 
 
