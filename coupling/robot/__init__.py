@@ -8,9 +8,10 @@ Imports `coupling`, `dem`, `rigid`.
 """
 
 from .bed_feet import BedFeet
-from .body import MujocoRobot, load_model
+from .body import MujocoRobot
 from .feet import Foot, Part, find_feet
 from .law_feet import LawFeet
+from .models import load_model
 from .run import RobotRun
 from .stability import check_exchange
 

@@ -31,22 +31,11 @@ from rigid.spatial.quaternions import multiply, to_matrix
 
 from .feet import Foot, find_feet, mesh_of, refuse_missing
 from .friction import FeetFriction
+from .models import check_model, keyframe_of, load_model, switch_off_floors
 
-__all__ = ["Controller", "MujocoRobot", "load_model"]
+__all__ = ["Controller", "MujocoRobot"]
 
 Controller = Callable[[Any, Any], None]  # Called with MjModel and MjData; sets data.ctrl
-
-
-def load_model(path: str | Path) -> Any:
-    """The MuJoCo model in an MJCF or URDF file. Raises ValueError for a file that is not there or no model."""
-    mujoco, path = refuse_missing(), Path(path)
-    if not path.is_file():
-        raise ValueError(f"model = {str(path)!r}: there is no such file; an MJCF or URDF file would do")
-    try:
-        return mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        said = " ".join(str(error).split())
-        raise ValueError(f"model = {str(path)!r} is no model that MuJoCo reads: {said}") from None
 
 
 class MujocoRobot:
@@ -80,13 +69,13 @@ class MujocoRobot:
         self.model = copy.copy(load_model(model) if isinstance(model, str | Path) else model)
         self.controller = controller
         self.control_step = float(self.model.opt.timestep)  # Between two calls of the controller [s]
-        self._check_model()
+        check_model(self.model)
         self.data = mujoco.MjData(self.model)
         if keyframe is not None:
-            self._start_at(keyframe)
+            mujoco.mj_resetDataKeyframe(self.model, self.data, keyframe_of(self.model, keyframe))
         mujoco.mj_forward(self.model, self.data)
         self.feet: list[Foot] = find_feet(self.model, self.data, [feet] if isinstance(feet, str) else feet)
-        self.floors = self._switch_off_floors()
+        self.floors = switch_off_floors(self.model)
         self._bodies = np.array([foot.body for foot in self.feet])
         self.owners = np.repeat(np.arange(len(self.feet)), [len(foot.centres) for foot in self.feet])
         """Foot of each point on a law, shape (point,)."""
@@ -107,37 +96,6 @@ class MujocoRobot:
         self.start()
 
     # What it is -------------------------------------------------------------------------------------------------------
-
-    def _check_model(self) -> None:
-        model, mujoco = self.model, self._mujoco
-        if int(model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_RK4):
-            raise ValueError(
-                "the model's integrator is RK4, which cannot be stepped in halves: implicitfast or Euler would do"
-            )
-        gravity = np.asarray(model.opt.gravity)
-        if gravity[0] or gravity[1] or gravity[2] > 0:
-            raise ValueError(f"the model's gravity is {gravity.tolist()} m/s2: only straight down (0, 0, -g) would do")
-
-    def _start_at(self, keyframe: str) -> None:
-        mujoco, model = self._mujoco, self.model
-        k = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
-        if k < 0:
-            names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_KEY, each) for each in range(model.nkey)]
-            raise ValueError(
-                f"keyframe = {keyframe!r}: the model has {', '.join(filter(None, names)) or 'no keyframes'}"
-            )
-        mujoco.mj_resetDataKeyframe(model, self.data, k)
-
-    def _switch_off_floors(self) -> tuple[str, ...]:
-        """Planes and height fields of the world touch nothing from now on; their names."""
-        model, mujoco = self.model, self._mujoco
-        flat = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-        found = []
-        for k in range(model.ngeom):
-            if int(model.geom_type[k]) in flat and (model.geom_contype[k] or model.geom_conaffinity[k]):
-                model.geom_contype[k] = model.geom_conaffinity[k] = 0
-                found.append(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k) or f"geom {k}")
-        return tuple(found)
 
     def __repr__(self) -> str:
         names = ", ".join(foot.name for foot in self.feet)
@@ -217,24 +175,6 @@ class MujocoRobot:
     def step(self) -> float:
         """Time step of MuJoCo here [s]; 0 before the first."""
         return self._step
-
-    def joints(self) -> list[tuple[str, str, int, int]]:
-        """Name, kind (free, ball, slide, hinge) and first place in qpos and qvel of every joint."""
-        mujoco, model = self._mujoco, self.model
-        return [
-            (
-                mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, k) or f"joint_{k}",
-                mujoco.mjtJoint(int(model.jnt_type[k])).name.removeprefix("mjJNT_").lower(),
-                int(model.jnt_qposadr[k]),
-                int(model.jnt_dofadr[k]),
-            )
-            for k in range(model.njnt)
-        ]
-
-    def actuators(self) -> list[str]:
-        """Their names."""
-        mujoco, model = self._mujoco, self.model
-        return [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"actuator_{k}" for k in range(model.nu)]
 
     def lift(self, height: float) -> None:
         """Raise it by `height` [m], along its free joints or upright rails.

@@ -10,7 +10,7 @@ S = r: the ball at the end of a capsule; S = r (1 - a a^T): the rim of a wheel a
 import difflib
 import fnmatch
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -141,17 +141,17 @@ def find_feet(model: Any, data: Any, names: Sequence[str]) -> list[Foot]:
     return feet
 
 
-def _no_such(name: str, known: dict[str, Any], count: int) -> str:
-    near = difflib.get_close_matches(name, known, n=1)
+def _no_such(name: str, known: Iterable[str], count: int) -> str:
+    near = difflib.get_close_matches(name, list(known), n=1)
     meant = f" (did you mean {near[0]!r}?)" if near else ""
-    if not known:
+    if not list(known):
         return f"feet: there is no geom {name!r}: none of the model's {count} geoms has a name; give it one in the file"
     return f"feet: there is no geom or site {name!r}{meant}; {_listed(known)}"
 
 
-def _listed(known: dict[str, Any]) -> str:
-    shown = ", ".join(list(known)[:20])
-    return f"the model has {shown}" + (f" and {len(known) - 20} more" if len(known) > 20 else "")
+def _listed(known: Iterable[str]) -> str:
+    names = list(known)
+    return f"the model has {', '.join(names[:20])}" + (f" and {len(names) - 20} more" if len(names) > 20 else "")
 
 
 def _site(model: Any, k: int, name: str) -> Part:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,7 +46,6 @@ class LawFeet:
         scales: Mapping[str, float] | None = None,
     ) -> None:
         self.feet, scales = list(feet), scales or {}
-        options: dict[str, Any] = {"law": law, "parameters": parameters or {}, "mu_s": mu_s, "mu_d": mu_d}
         self.grounds: list[list[SurfaceGround]] = []
         for foot in feet:
             own = []
@@ -58,7 +56,12 @@ class LawFeet:
                         f"do, or a sphere, capsule, cylinder, box or ellipsoid"
                     )
                 count = part.share * scales.get(part.name, 1.0)
-                own += [SurfaceGround(**options, count=count, time_step=time_step) for _ in part.centres]
+                own += [
+                    SurfaceGround(
+                        law=law, parameters=parameters or {}, mu_s=mu_s, mu_d=mu_d, count=count, time_step=time_step
+                    )
+                    for _ in part.centres
+                ]
             self.grounds.append(own)
         self._first = np.cumsum([0, *(len(own) for own in self.grounds)])
         self._depths = np.full(int(self._first[-1]), -math.inf)

@@ -7,6 +7,7 @@ import numpy as np
 
 from coupling.robot import BedFeet, RobotRun
 from coupling.robot.feet import mesh_of
+from coupling.robot.models import actuators_of, joints_of
 from dem.prepare.prepare import fingerprint
 from experiments.grains import bed_result as grains
 from experiments.grains.softening import Softening
@@ -109,7 +110,7 @@ def joint_columns(run: RobotRun) -> dict[str, Array]:
     """Position and velocity of every joint, control and force of every actuator."""
     robot, kept = run.robot, run.joints
     found: dict[str, Array] = {}
-    for name, kind, at, speed in robot.joints():
+    for name, kind, at, speed in joints_of(robot.model):
         if kind in ("hinge", "slide"):
             unit = "rad" if kind == "hinge" else "m"
             found |= {f"{name}_{unit}": kept["qpos"][:, at], f"{name}_{unit}_s": kept["qvel"][:, speed]}
@@ -118,7 +119,7 @@ def joint_columns(run: RobotRun) -> dict[str, Array]:
         found |= {f"{name}_{what}": kept["qpos"][:, at + k] for k, what in enumerate([*place, "q0", "q1", "q2", "q3"])}
         rates = [*(f"v{axis}_m_s" for axis in "xyz" if place), *(f"w{axis}_rad_s" for axis in "xyz")]
         found |= {f"{name}_{what}": kept["qvel"][:, speed + k] for k, what in enumerate(rates)}
-    for k, name in enumerate(robot.actuators()):
+    for k, name in enumerate(actuators_of(robot.model)):
         found |= {f"{name}_control": kept["ctrl"][:, k], f"{name}_force": kept["actuator_force"][:, k]}
     return found
 

@@ -1,0 +1,74 @@
+"""Models of MuJoCo: reading them, what is refused of them, the names in them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .feet import refuse_missing
+
+__all__ = ["actuators_of", "check_model", "joints_of", "keyframe_of", "load_model", "switch_off_floors"]
+
+
+def load_model(path: str | Path) -> Any:
+    """The MuJoCo model in an MJCF or URDF file. Raises ValueError for a file that is not there or no model."""
+    mujoco, path = refuse_missing(), Path(path)
+    if not path.is_file():
+        raise ValueError(f"model = {str(path)!r}: there is no such file; an MJCF or URDF file would do")
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise ValueError(f"model = {str(path)!r} is no model that MuJoCo reads: {said}") from None
+
+
+def check_model(model: Any) -> None:
+    """Raise ValueError for an integrator that cannot be stepped in halves and for gravity that is not straight down."""
+    if int(model.opt.integrator) == int(refuse_missing().mjtIntegrator.mjINT_RK4):
+        raise ValueError(
+            "the model's integrator is RK4, which cannot be stepped in halves: implicitfast or Euler would do"
+        )
+    gravity = np.asarray(model.opt.gravity)
+    if gravity[0] or gravity[1] or gravity[2] > 0:
+        raise ValueError(f"the model's gravity is {gravity.tolist()} m/s2: only straight down (0, 0, -g) would do")
+
+
+def keyframe_of(model: Any, name: str) -> int:
+    """The number of a keyframe. Raises ValueError, naming those there are, for another."""
+    mujoco = refuse_missing()
+    names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_KEY, k) for k in range(model.nkey)]
+    if name not in names:
+        raise ValueError(f"keyframe = {name!r}: the model has {', '.join(filter(None, names)) or 'no keyframes'}")
+    return names.index(name)
+
+
+def switch_off_floors(model: Any) -> tuple[str, ...]:
+    """Planes and height fields of the world touch nothing from now on; their names."""
+    mujoco = refuse_missing()
+    flat = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    found = []
+    for k in range(model.ngeom):
+        if int(model.geom_type[k]) in flat and (model.geom_contype[k] or model.geom_conaffinity[k]):
+            model.geom_contype[k] = model.geom_conaffinity[k] = 0
+            found.append(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k) or f"geom {k}")
+    return tuple(found)
+
+
+def joints_of(model: Any) -> list[tuple[str, str, int, int]]:
+    """Name, kind (free, ball, slide, hinge) and first place in qpos and qvel of every joint."""
+    mujoco = refuse_missing()
+    return [
+        (
+            mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, k) or f"joint_{k}",
+            mujoco.mjtJoint(int(model.jnt_type[k])).name.removeprefix("mjJNT_").lower(),
+            int(model.jnt_qposadr[k]),
+            int(model.jnt_dofadr[k]),
+        )
+        for k in range(model.njnt)
+    ]
+
+
+def actuators_of(model: Any) -> list[str]:
+    """The names of the actuators."""
+    mujoco = refuse_missing()
+    return [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"actuator_{k}" for k in range(model.nu)]
