@@ -124,6 +124,27 @@ class GroundFile(_Table):
                 )
         return said
 
+    def tangent(self, *, load: float, speed: float = 0.0) -> tuple[float, float, float]:
+        """K = dF/dz [N/m], C = dF/d(dz/dt) [N s/m] and the depth [m] where the law bears `load` [N] at `speed` [m/s].
+
+        K and C are the spring-damper that is right at this load and speed. Of another law they change with both. Raises
+        ValueError for a load that no depth down to a hundred tips bears, or that the surface bears at this speed.
+        """
+        law, p = self.surface_law, self.surface_law.numbers(self.values)
+        deepest = 100 * self.foot.diameter
+        low, high = 1e-6 * self.foot.diameter, deepest
+        if not law.force(low, speed, p) < load <= law.force(high, speed, p):
+            raise ValueError(f"load = {load:g} N at speed = {speed:g} m/s: no depth from 0 to {deepest:g} m bears it")
+        for _ in range(80):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if law.force(middle, speed, p) >= load else (middle, high)
+        depth = 0.5 * (low + high)
+        by, fast = 1e-4 * depth, 1e-4 * max(speed, 1e-3)
+        stiffness = (law.force(depth + by, speed, p) - law.force(depth - by, speed, p)) / (2 * by)
+        slow = max(speed - fast, 0.0)
+        damping = (law.force(depth, speed + fast, p) - law.force(depth, slow, p)) / (speed + fast - slow)
+        return stiffness, damping, depth
+
     def to_toml(self) -> str:
         """The text of the file; it reads back as the same."""
         lines = [

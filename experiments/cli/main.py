@@ -11,7 +11,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
@@ -85,12 +85,13 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     settings_class, presets = experiment.settings_class(), experiment.presets
     fields = settings_class.model_fields
     below = [name.split(" ")[-1] for name in registry.EXPERIMENTS if name.startswith(f"{experiment.name} ")]
-    pair = bool(experiment.subject) and get_origin(fields[experiment.subject].annotation) is tuple
+    hint = fields[experiment.subject].annotation if experiment.subject else None
+    many = get_origin(hint) is tuple and get_args(hint)[-1] is Ellipsis
+    pair = get_origin(hint) is tuple and not many
 
     def command(
         case: Path | None = None,
-        other: Path | None = None,
-        *,
+        *others: Path | None,
         out: Path | None = None,
         json: bool = False,
         quiet: bool = False,
@@ -98,8 +99,9 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         **given: Any,
     ) -> int:
         with refusing():
-            if pair and case is not None and other is not None:
-                case, given[experiment.subject] = None, (str(case), str(other))
+            named = tuple(str(path) for path in (case, *others) if path is not None)
+            if (pair and len(named) == 2) or (many and named and (len(named) > 1 or not Path(named[0]).is_file())):
+                case, given[experiment.subject] = None, named
             elif experiment.subject and case is not None and (not case.is_file() or case.suffix in _SUBJECTS):
                 case, given[experiment.subject] = None, str(case)
             if case is not None and is_number(str(case)):
@@ -138,6 +140,10 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     if pair:
         about = Parameter(help="The other of the two.", negative="", show_default=False)
         parameters.append(first.replace(name="other", annotation=Annotated[Path | None, about]))
+    if many:
+        about = Parameter(help="Further ones.", negative="", show_default=False)
+        further = inspect.Parameter("others", inspect.Parameter.VAR_POSITIONAL, annotation=Annotated[Path, about])
+        parameters.append(further)
     parameters += [option_of(name, field) for name, field in fields.items() if name != experiment.subject]
     parameters += [*flags, *map(reserved_option, ("out", "json", "quiet"))]
     parameters += [reserved_option("verbose")] if experiment.headline else []

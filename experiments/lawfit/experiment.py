@@ -1,0 +1,263 @@
+"""`hedgebed calibrate RUN ...`: laws fitted to finished runs, compared, and written as ground files.
+
+result.json holds the numbers; series/bins.csv what was fitted with what each law says there; ground.toml the
+spring-damper and laws/NAME.toml every law that a ground can be.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from experiments.platform.surfaces import surface_of_grains
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.result import Result
+from experiments.runs.types import Json
+from experiments.runs.whole_runs import computed_run
+from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
+
+from .data import Data
+from .fit import Estimated, LawFit, fit_law, interval
+from .identify import identified, influences
+from .laws import ADDED_MASS, Candidate, candidates_for
+from .reading import read_data
+from .settings import LawFitSettings, say
+from .trust import error_map, held_out, sinkage_check, sinkage_range, within
+from .words import closing, law_rows, ranked
+
+__all__ = ["check", "ground_file", "resume", "run"]
+
+PAIR = "spring-damper"
+_LOADS = (0.1, 0.25, 0.5, 0.75, 1.0)
+"""Loads of the table of tangents, over the largest mean force of a bin [1]."""
+
+
+def check(settings: LawFitSettings) -> None:
+    """Raise ValueError for runs that cannot be read, or not be fitted together."""
+    read_data(settings)
+
+
+def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) -> Result:
+    data = read_data(settings)
+    names = tuple(dict.fromkeys((PAIR, *settings.laws)))
+    candidates, left = candidates_for(data, names)
+    progress.message(say("read", data=data, beds=len(data.beds), runs=len(data.runs), f=data.foundation))
+    progress.stage("laws", total=float(len(candidates)))
+    fits: dict[str, LawFit] = {}
+    laws: list[Json] = []
+    for done, candidate in enumerate(candidates, 1):
+        fits[candidate.name] = fit_law(candidate, data)
+        laws.append(_law_entry(settings, fits[candidate.name]))
+        progress.update(done)
+    laws = ranked(laws)
+    best = laws[0]["name"]
+    pair, entries = fits[PAIR], {law["name"]: law for law in laws}
+    told = identified(pair)
+    beyond = {name: text for name, fit in fits.items() for text in _beyond_the_law(fit)}
+    for name, fit in fits.items():
+        if name != ADDED_MASS and name not in beyond:
+            ground_file(fit, data, entries[name], told).write(folder.path / "laws" / f"{name}.toml")
+    ground_file(pair, data, entries[PAIR], told).write(folder.path / "ground.toml")
+    folder.write_series("bins", _columns(data, fits))
+    others = [law["name"] for law in laws if law["name"] not in (PAIR, ADDED_MASS)]
+    tangents = _tangents(fits, data, (PAIR, *others[:1]))
+    contributed = influences(pair)
+    warnings = [*told, *data.notes, *(say(why, name=name, f=data.foundation) for name, why in left.items())]
+    warnings += [say("few_beds", beds=len(data.beds))] if len(data.beds) < 3 else []
+    warnings += [f"{law['name']}: {text}" for law in laws for text in law["notes"]] + list(beyond.values())
+    return Result.make(
+        "calibrate",
+        title=say("title", f=data.foundation, mm=1e3 * data.foundation.diameter),
+        quantities=_quantities(settings, pair, entries[PAIR], entries[best]),
+        departures={"sentences": closing(settings, data, entries, best)},
+        foundation=asdict(data.foundation),
+        best=best,
+        laws=laws,
+        placements=[asdict(place) for place in data.placements],
+        tangents=tangents,
+        contributions=contributed,
+        sources=list(data.sources),
+        tables=[{"title": say("table_laws"), **law_rows(laws)}],
+        surface=surface_of_grains(data.foundation.material),
+        warnings=warnings,
+    )  # fmt: skip
+
+
+def _law_entry(settings: LawFitSettings, fitted: LawFit) -> Json:
+    """What result.json says of one law."""
+    candidate, found = fitted.candidate, error_map(fitted)
+    parameters = {name: _estimate_entry(candidate, name, fitted) for name in candidate.free}
+    notes = [text for name in candidate.free for text in _bound_notes(fitted, name)]
+    rebound = _rebound(fitted) if candidate.law.has_memory else None
+    entry: Json = {
+        "name": candidate.name, "summary": candidate.law.summary, "parameters": parameters,
+        "fixed": dict(candidate.fixed) | ({"rebound": rebound.value} if rebound else {}),
+        "bed_spread": fitted.bed_spread, "sigma": fitted.sigma, "information": fitted.information,
+        "log_likelihood": fitted.log_likelihood, "held_out": held_out(fitted), "rebound": rebound,
+        "sinkage": [asdict(one) for one in sinkage_check(fitted)], "notes": notes,
+        "map": None, "within": [], "sinkage_range": None,
+    }  # fmt: skip
+    entry["rebound"] = None if rebound is None else asdict(rebound)
+    if found is not None:
+        entry["map"] = {
+            "speeds": list(found.speeds), "depth": found.depth.tolist(), "force": found.force.tolist(),
+            "error": found.error.tolist(),
+        }  # fmt: skip
+        entry["within"] = [asdict(one) for one in within(found, settings.force_error)]
+        entry["sinkage_range"] = sinkage_range(fitted, found, settings.sinkage_error)
+    return entry
+
+
+def _unit(candidate: Candidate, name: str) -> str:
+    return next(parameter.unit for parameter in candidate.law.parameters if parameter.name == name)
+
+
+def _estimate_entry(candidate: Candidate, name: str, fitted: LawFit) -> Json:
+    return asdict(fitted.parameter(name)) | {"unit": _unit(candidate, name), "at_bound": fitted.at_bound(name)}
+
+
+def _bound_notes(fitted: LawFit, name: str) -> list[str]:
+    found = fitted.parameter(name)
+    if name == fitted.candidate.rate_parameter and found.value < 0:
+        return [say("negative_rate", key=name, found=found, unit=_unit(fitted.candidate, name))]
+    return [say("at_bound", key=name, found=found, unit=_unit(fitted.candidate, name))] if fitted.at_bound(name) else []
+
+
+def _beyond_the_law(fitted: LawFit) -> list[str]:
+    """Why a law cannot be a ground with these parameters; a rate below 0 becomes 0 instead."""
+    candidate, said = fitted.candidate, []
+    for parameter in candidate.law.parameters:
+        if parameter.name in candidate.free and fitted.parameter(parameter.name).value > parameter.highest:
+            found = fitted.parameter(parameter.name)
+            unit = f" {parameter.unit}".removesuffix(" 1")
+            about = {"key": parameter.name, "unit": unit, "most": parameter.highest}
+            said.append(say("not_a_ground", name=candidate.name, found=found, **about))
+    return said
+
+
+def _rebound(fitted: LawFit) -> Estimated | None:
+    """The share of the depth that springs back, as seen when drives were pulled out; None where none was."""
+    data = fitted.data
+    of_beds = {
+        bed: [run.rebound for run in data.runs if run.bed == bed and run.rebound is not None] for bed in data.beds
+    }
+    means = np.array([np.mean(values) for values in of_beds.values() if values])
+    if len(means) < 2:
+        return None
+    whole = float(means.mean())
+    left_out = (len(means) * whole - means) / (len(means) - 1)
+    return interval(whole, left_out)
+
+
+def ground_file(fitted: LawFit, data: Data, entry: Json, told: Sequence[str]) -> GroundFile:
+    """The law as a file: parameters within what a law may have, the range of the runs, and what a reader must know."""
+    candidate, foundation = fitted.candidate, data.foundation
+    known = {parameter.name: parameter for parameter in candidate.law.parameters}
+    parameters = {}
+    for name, parameter in known.items():
+        if name in candidate.free:
+            found = fitted.parameter(name)
+        elif name == "rebound" and entry["rebound"] is not None:
+            found = Estimated(**entry["rebound"])
+        else:
+            parameters[name] = Estimate(value=candidate.fixed[name], std=0.0, note=say("fixed"))
+            continue
+        low, high = parameter.lowest, parameter.highest
+        value = float(np.clip(found.value, low, high))
+        ends = [float(np.clip(end, low, high)) for end in (found.low, found.high)]
+        note = "" if value == found.value else say("clipped", value=found.value)
+        limits = (min(ends[0], value), max(ends[1], value))
+        parameters[name] = Estimate(value=value, std=found.std, interval=limits, note=note)
+    drops = any(run.kind == "drop" for run in data.runs)
+    slowest = 0.0 if drops or data.placements else min(data.speeds)
+    tall = [float(run.depth.max()) for run in data.runs]
+    return GroundFile(
+        format=GROUND_FORMAT, law=candidate.law.name, material=foundation.material, source=say("source"),
+        runs=data.sources, notes=tuple(told),
+        foot=Foot(tip=foundation.tip, diameter=foundation.diameter, cone_angle=foundation.cone_angle),
+        parameters=parameters,
+        range={
+            "load": (0.0, float(data.force.max())), "depth": (0.0, max(tall)),
+            "speed": (slowest, max(data.speeds)), "gravity": (foundation.gravity, foundation.gravity),
+            "diameter": (foundation.diameter, foundation.diameter),
+        },
+    )  # fmt: skip
+
+
+def _columns(data: Data, fits: dict[str, LawFit]) -> dict[str, Any]:
+    """The rows that were fitted, and each law's force there."""
+    columns: dict[str, Any] = {
+        "run": data.run_of_row, "bed": data.bed_of_row, "depth_m": data.depth, "rate_m_s": data.rate,
+        "acceleration_m_s2": data.acceleration, "force_N": data.force,
+    }  # fmt: skip
+    return columns | {f"{name}_N": fit.predicted for name, fit in fits.items()}
+
+
+def _tangents(fits: dict[str, LawFit], data: Data, names: Sequence[str]) -> list[Json]:
+    """K and C of the spring-damper that is right at a load and a speed, by the laws `names`, each with its spread."""
+    largest = float(np.mean([run.force[-1] for run in data.runs if run.kind == "driven"] or [data.force.max()]))
+    deepest = max(float(run.depth.max()) for run in data.runs)
+    speeds = sorted({run.speed for run in data.runs})
+    rows: list[Json] = []
+    for name in dict.fromkeys(names):
+        fitted = fits[name]
+        for share in _LOADS:
+            for speed in speeds:
+                load = float(f"{share * largest:.2g}")
+                parts = _tangent_parts(fitted, load, speed)
+                if parts and parts[2].value <= deepest:
+                    kinds = zip(("stiffness", "damping", "depth"), parts, strict=True)
+                    rows.append(
+                        {"law": name, "load": load, "speed": speed} | {kind: asdict(one) for kind, one in kinds}
+                    )
+    return rows
+
+
+def _tangent_parts(fitted: LawFit, load: float, speed: float) -> list[Estimated]:
+    """K, C and depth at a load [N] and a speed [m/s], each with its uncertainty over beds; none where one has none."""
+    found = [_tangent(fitted, theta, load, speed) for theta in (fitted.theta, *fitted.left_out)]
+    if any(None in one for one in found):
+        return []
+    return [interval(float(column[0]), column[1:]) for column in np.array(found, dtype=float).T]
+
+
+def _tangent(fitted: LawFit, theta: Any, load: float, speed: float) -> tuple[float | None, float | None, float | None]:
+    """dF/dz, dF/dv and the depth where the law bears `load`; three None where it bears it at once, or never."""
+    candidate, deepest = fitted.candidate, 10 * float(fitted.data.depth.max())
+    depth = candidate.depth_at(theta, load, speed, deepest=deepest)
+    if not depth:
+        return None, None, None
+    by, fast = 1e-4 * depth, 1e-4 * speed
+    z = np.array([depth + by, depth - by, depth, depth])
+    v = np.array([speed, speed, speed + fast, speed - fast])
+    above, below, faster, slower = (float(force) for force in candidate.force(theta, z, v))
+    return (above - below) / (2 * by), (faster - slower) / (2 * fast), depth
+
+
+def _quantities(settings: LawFitSettings, pair: LawFit, own: Json, best: Json) -> dict[str, Json]:
+    """The numbers that a person would quote."""
+    found: dict[str, Json] = {}
+    for name in ("stiffness", "damping"):
+        one = pair.parameter(name)
+        value = max(one.value, 0.0)
+        note = say("of_pair", found=one, bound=say("is_bound") if one.value < 0 else "")
+        found[name] = {"value": value, "std": one.std, "unit": _unit(pair.candidate, name), "note": note}
+    load = list(own["sinkage"])
+    found["bed_spread"] = {"value": own["bed_spread"], "std": None, "unit": "1", "note": say("of_bed_spread")}
+    for key, entry in (("held_out_error", own), ("held_out_error_best", best)):
+        note = say("of_held_out", law=entry["name"])
+        found[key] = {"value": entry["held_out"]["beds"], "std": None, "unit": "1", "note": note}
+    if load:
+        note = say("of_sinkage_error", one=load[0])
+        found["held_out_sinkage_error"] = {"value": load[0]["error"], "std": None, "unit": "1", "note": note}
+    if own["sinkage_range"] is not None:
+        for key, value in zip(("load_least", "load_largest"), own["sinkage_range"], strict=True):
+            note = say("of_load", percent=100 * settings.sinkage_error)
+            found[key] = {"value": value, "std": None, "unit": "N", "note": note}
+    return {name: one for name, one in found.items() if not math.isnan(one["value"])}
+
+
+run, resume = computed_run("calibrate", LawFitSettings, _compute, check=check)

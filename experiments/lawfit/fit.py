@@ -1,0 +1,165 @@
+"""A law fitted to runs in several beds, each bed with a random factor of its own.
+
+The force of bin k in bed b is F = (1 + u_b) f(z, dz/dt; theta) + e, with u_b of variance tau^2 and e of variance
+sigma^2, both normal and independent: beds differ in strength as a whole. The covariance within a bed is then
+sigma^2 (I + lambda f f^T) with lambda = tau^2 / sigma^2 (Laird and Ware, Biometrics 38 (1982), 963). lambda is that of
+the largest likelihood at the present theta, theta that of generalised least squares at the present lambda and f, and
+both are repeated.
+
+Bins of one run are not independent, as grains are larger than bins. So standard deviations do not come from that
+likelihood but from leaving out one bed at a time, with the largest of the usual three forms of the variance,
+(G - 1) / G sum (theta_(-g) - theta)^2, and intervals from Student's t of G - 1 degrees of freedom for G beds
+(MacKinnon, Nielsen and Webb, J. Applied Econometrics 38 (2023), 671). `experiments.lawfit.synthetic` checks that.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares, minimize_scalar
+from scipy.stats import t as student_t
+
+from .data import Array, Data
+from .laws import Candidate
+
+__all__ = ["CONFIDENCE", "Estimated", "LawFit", "fit_law", "interval", "solve_law"]
+
+CONFIDENCE = 0.9
+"""Of all intervals."""
+_ROUNDS = 8
+"""How often theta and lambda are repeated at most; two to four are enough."""
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """A number with its standard deviation and its 90 % interval."""
+
+    value: float
+    std: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """A candidate fitted to `data`."""
+
+    candidate: Candidate
+    data: Data
+    theta: Array  # Free parameters, shape [parameter_count]
+    left_out: Array  # theta without each bed, shape [bed_count, parameter_count]; empty where it was not asked for
+    share: float  # lambda [1/N2]
+    sigma: float  # [N]
+    log_likelihood: float
+
+    @property
+    def bed_spread(self) -> float:
+        """tau, the standard deviation of the factors of beds [1]."""
+        return math.sqrt(self.share) * self.sigma
+
+    @property
+    def predicted(self) -> Array:
+        """Force of the law at every bin [N], shape [row_count]."""
+        return self.candidate.force(self.theta, self.data.depth, self.data.rate, self.data.acceleration)
+
+    @property
+    def information(self) -> float:
+        """Akaike's information criterion, corrected for few rows: smaller is better [1]."""
+        count, size = len(self.theta) + 2, len(self.data.force)
+        return -2 * self.log_likelihood + 2 * count + 2 * count * (count + 1) / max(1, size - count - 1)
+
+    def parameter(self, name: str) -> Estimated:
+        """The parameter `name` with its uncertainty."""
+        place = self.candidate.free.index(name)
+        return interval(float(self.theta[place]), self.left_out[:, place])
+
+    def at_bound(self, name: str) -> bool:
+        """Whether the parameter came out at the end of what it may be."""
+        place = self.candidate.free.index(name)
+        low, high = (ends[place] for ends in self.candidate.bounds())
+        value = float(self.theta[place])
+        return any(math.isfinite(end) and math.isclose(value, end, rel_tol=1e-3, abs_tol=1e-6) for end in (low, high))
+
+
+def interval(value: float, left_out: Array) -> Estimated:
+    """The uncertainty of `value` from those that leave out one bed each (see the module), shape [bed_count >= 2]."""
+    count = len(left_out)
+    std = math.sqrt((count - 1) / count * float(np.sum((left_out - value) ** 2)))
+    half = float(student_t.ppf(0.5 + 0.5 * CONFIDENCE, count - 1)) * std
+    return Estimated(value, std, value - half, value + half)
+
+
+def fit_law(candidate: Candidate, data: Data, *, jackknife: bool = True) -> LawFit:
+    """Fit `candidate` to `data`; with `jackknife` also without each bed.
+
+    Raises ValueError for fewer than two beds with `jackknife`, and RuntimeError where the fit does not converge.
+    """
+    if jackknife and len(data.beds) < 2:
+        raise ValueError(f"{len(data.beds)} bed: at least two are needed for an uncertainty")
+    theta, share = solve_law(candidate, data, candidate.start(data), None)
+    left_out = np.empty((0, len(theta)))
+    if jackknife:
+        left_out = np.array([solve_law(candidate, data.without_bed(bed), theta, share)[0] for bed in data.beds])
+    force = candidate.force(theta, data.depth, data.rate, data.acceleration)
+    size, (square, spread) = len(data.force), _moments(data, force)
+    best = float(np.sum(square - share * spread[0] ** 2 / (1 + share * spread[1])))
+    sigma = math.sqrt(max(best, 1e-300) / size)
+    log_likelihood = -0.5 * (size * (1 + math.log(2 * math.pi * sigma**2)) + float(np.log1p(share * spread[1]).sum()))
+    return LawFit(candidate, data, theta, left_out, share, sigma, log_likelihood)
+
+
+def _moments(data: Data, force: Array) -> tuple[Array, tuple[Array, Array]]:
+    """Of each bed: r.r, and f.r and f.f, shapes [bed_count]; r = F - f."""
+    left, beds, count = data.force - force, data.bed_of_row, len(data.beds)
+
+    def sums(values: Array) -> Array:
+        return np.asarray(np.bincount(beds, weights=values, minlength=count), dtype=float)
+
+    return sums(left * left), (sums(force * left), sums(force * force))
+
+
+def _best_share(data: Data, force: Array) -> float:
+    """lambda of the largest likelihood at this force [1/N2]; 0 where a factor of beds does not help."""
+    size, (square, (cross, own)) = len(data.force), _moments(data, force)
+    scale = float(own.mean()) or 1.0
+
+    def cost(log_share: float) -> float:
+        share = math.exp(log_share) / scale
+        rest = float(np.sum(square - share * cross**2 / (1 + share * own)))
+        return size * math.log(max(rest, 1e-300)) + float(np.log1p(share * own).sum())
+
+    found = minimize_scalar(cost, bounds=(-14.0, 14.0), method="bounded")
+    none = size * math.log(max(float(square.sum()), 1e-300))
+    return math.exp(float(found.x)) / scale if float(found.fun) < none - 1e-9 else 0.0
+
+
+def solve_law(candidate: Candidate, data: Data, theta: Array, share: float | None) -> tuple[Array, float]:
+    """theta and lambda; `share`: a lambda that is kept."""
+    size = np.where(theta != 0, np.abs(theta), 1.0)
+    low, high = candidate.bounds()
+    theta = np.clip(theta, low + 1e-9 * size, high - 1e-9 * size)
+    beds, count = data.bed_of_row, len(data.beds)
+    force = candidate.force(theta, data.depth, data.rate, data.acceleration)
+    kept = 0.0 if share is None else share
+    for turn in range(_ROUNDS):
+        own = np.bincount(beds, weights=force * force, minlength=count)
+        # (I + lambda f f^T)^(-1/2) r = r - (1 - (1 + lambda s)^(-1/2)) f (f.r) / s with s = f.f
+        pull = (1 - 1 / np.sqrt(1 + kept * own)) / np.where(own > 0, own, 1.0)
+
+        def whitened(x: Array, frozen: Array = force, pull: Array = pull) -> Array:
+            left = data.force - candidate.force(x * size, data.depth, data.rate, data.acceleration)
+            cross = np.bincount(beds, weights=frozen * left, minlength=count)
+            return left - (pull * cross)[beds] * frozen
+
+        found = least_squares(
+            whitened, theta / size, bounds=(low / size, high / size), x_scale="jac", xtol=1e-10, ftol=1e-12
+        )
+        if not found.success:
+            raise RuntimeError(f"the fit of {candidate.name} did not converge: {found.message}")
+        moved = float(np.max(np.abs(found.x - theta / size) / np.maximum(np.abs(found.x), 1e-3)))
+        theta = found.x * size
+        force = candidate.force(theta, data.depth, data.rate, data.acceleration)
+        before, kept = kept, _best_share(data, force) if share is None else share
+        if turn and moved < 1e-5 and abs(kept - before) <= 1e-3 * max(kept, before):
+            break
+    return theta, kept

@@ -1,0 +1,185 @@
+"""From run folders of penetrate to the `Data` of a fit; what cannot be fitted together is refused by name."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from coupling import Penetration
+from dem.grains.materials import material
+from experiments.penetrate.settings import PenetrateSettings
+from experiments.runs.folder import RunFolder
+from experiments.runs.types import Json
+from hedgebed_renamed import material_of_today
+
+from .data import Data, Foundation, Placement, PushRun, binned
+from .settings import LawFitSettings, say
+
+__all__ = ["read_data"]
+
+_OF_BED = (
+    "bed", "seed", "bed_size", "grain", "spread", "coarse", "fine_radius", "fine_depth", "packing", "bed_stages",
+    "gravity", "young", "max_overlap", "time_step",
+)  # fmt: skip
+"""Settings that decide which bed a run begins in."""
+_SHARED = {
+    "material": "grains", "tip": "tip", "tip_diameter": "diameter of the tip [m]", "cone_angle": "cone_angle [degrees]",
+    "gravity": "gravity [m/s2]", "grain": "grain [m]", "spike_friction": "friction of spike and grains [1]",
+}  # fmt: skip
+"""Settings that all runs of one fit must have in common, and what they are."""
+_MAY_DIFFER = {
+    "bed_size": "bed_size [m]",
+    "young": "Young's modulus [Pa]",
+    "packing": "packing",
+    "bed_stages": "stages",
+}
+"""Settings that may differ between the beds; a note says so."""
+
+
+@dataclass(frozen=True)
+class _Source:
+    """One run folder."""
+
+    name: str  # as the user wrote it, or the name below the folder that he gave
+    folder: RunFolder
+    settings: PenetrateSettings
+    result: Json
+
+
+def read_data(settings: LawFitSettings) -> Data:
+    """All runs of `settings` as the data of one fit.
+
+    Raises ValueError, naming the folder and what was found: for no finished run of penetrate in a bed, for a kept
+    result without series, for runs of different grains, tips or gravities, for a run that is there twice, for fewer
+    than two beds, and for runs at one speed, which cannot tell C from K.
+    """
+    sources = [_read(name, path) for given in settings.runs for name, path in _folders(given)]
+    _refuse_mixed(sources)
+    runs: list[PushRun] = []
+    placements: list[Placement] = []
+    seen: dict[tuple[str, str, float], str] = {}
+    for source in sources:
+        for entry in source.result["runs"]:
+            run = _series(source, entry)
+            bed, speed = _bed_of(source.settings, int(entry["seed"])), float(entry["speed"])
+            key = (bed, str(entry["kind"]), speed)
+            if key in seen:
+                raise ValueError(say("twice", name=source.name, other=seen[key], kind=key[1], speed=speed))
+            seen[key] = source.name
+            if run.kind == "set_down":
+                if run.resting_depth is not None and run.resting_depth > 0:
+                    placements.append(Placement(bed, source.settings.weight, run.resting_depth))
+                continue
+            found = binned(run, id=f"{source.name}/{entry['id']}", bed=bed, speed=speed, bins=settings.bins)
+            if found is not None:
+                runs.append(found)
+    data = Data(
+        _foundation(sources), tuple(runs), tuple(placements), tuple(source.name for source in sources),
+        tuple(_notes(sources)),
+    )  # fmt: skip
+    _refuse_few(data)
+    return data
+
+
+def _folders(given: str) -> Iterator[tuple[str, Path]]:
+    """The run folders that a setting names: the folder itself, or those within it, in the order of their names."""
+    path = Path(given)
+    if not path.is_dir():
+        raise ValueError(f"runs = {given!r} is no folder: the folder of a run of penetrate was expected")
+    if (path / "run.toml").is_file():
+        yield path.name or given, path
+        return
+    inside = [below for below in sorted(path.iterdir()) if (below / "run.toml").is_file()]
+    done = [below for below in inside if RunFolder.open(below).status == "done"]
+    if not done:
+        raise ValueError(f"runs = {given!r} holds no finished run: the folder of a run of penetrate was expected")
+    for below in done:
+        yield below.name, below
+
+
+def _read(name: str, path: Path) -> _Source:
+    folder = RunFolder.open(path)
+    if folder.command != "penetrate":
+        raise ValueError(f"runs = {str(path)!r} is a run of {folder.command!r}: one of 'penetrate' was expected")
+    if not (path / "result.json").exists() or folder.status not in ("done", None):
+        raise ValueError(
+            f"runs = {str(path)!r} is not finished ({folder.status or 'no result.json'}): "
+            f"`hedgebed resume {path}` finishes it"
+        )
+    if not (path / "series").is_dir():
+        raise ValueError(f"runs = {str(path)!r} has no series, only numbers: {_again(path)}")
+    settings = PenetrateSettings(**folder.settings)
+    if settings.ground != "bed":
+        raise ValueError(f"runs = {str(path)!r} is a run on ground = {settings.ground!r}: one in a bed was expected")
+    return _Source(name, folder, settings, folder.read_result())
+
+
+def _again(path: Path) -> str:
+    return f"`hedgebed penetrate {path / 'run.toml'}` computes it again"
+
+
+def _series(source: _Source, entry: Json) -> Penetration:
+    """The run of one entry of result.json. Raises ValueError, naming the file, for one that cannot be read."""
+    path = source.folder.path / str(entry["series"])
+    facts = {"kind": str(entry["kind"]), "ended": str(entry["ended"]), "macro_step": 0.0}
+    try:
+        run = Penetration.from_columns(source.folder.read_series(path.stem), facts)
+    except (OSError, KeyError, ValueError) as error:
+        raise ValueError(f"{path} cannot be read ({error}): {_again(source.folder.path)}") from None
+    if not len(run.time):
+        raise ValueError(f"{path} holds no row: {_again(source.folder.path)}")
+    return run
+
+
+def _bed_of(settings: PenetrateSettings, seed: int) -> str:
+    """The same text for runs that begin in the same bed."""
+    values = [seed if name == "seed" else getattr(settings, name) for name in _OF_BED]
+    return f"seed {seed} " + " ".join(str(value) for value in values)
+
+
+def _shared(settings: PenetrateSettings, name: str) -> Any:
+    value = getattr(settings, name)
+    if name == "material" and not value.endswith(".toml"):
+        return material_of_today(value)
+    return 60.0 if name == "cone_angle" and settings.tip != "cone" else value
+
+
+def _refuse_mixed(sources: Sequence[_Source]) -> None:
+    first = sources[0]
+    for source in sources[1:]:
+        for name, what in _SHARED.items():
+            one, other = _shared(first.settings, name), _shared(source.settings, name)
+            if one != other:
+                values = {"one": one, "first": first.name, "other": other, "name": source.name}
+                raise ValueError(say("mixed", what=what, key=name, **values))
+
+
+def _refuse_few(data: Data) -> None:
+    if not data.runs:
+        raise ValueError(say("nothing", count=len(data.sources)))
+    if len(data.beds) < 2:
+        raise ValueError(say("one_bed"))
+    if len(data.speeds) < 2:
+        (speed,) = data.speeds
+        raise ValueError(say("one_speed", speed=speed, more=4 * speed))
+
+
+def _foundation(sources: Sequence[_Source]) -> Foundation:
+    first = sources[0].settings
+    stuff = material(first.material)
+    packings = [float(source.result["quantities"]["packing_fraction"]["value"]) for source in sources]
+    return Foundation(
+        material=stuff.name, tip=first.tip, diameter=first.tip_diameter, tip_height=first.tip_height,
+        cone_angle=first.cone_angle, gravity=first.gravity, grain=first.grain,
+        bulk_density=stuff.density * sum(packings) / len(packings), surface_friction=first.spike_friction,
+    )  # fmt: skip
+
+
+def _notes(sources: Sequence[_Source]) -> Iterator[str]:
+    for name, what in _MAY_DIFFER.items():
+        values = {str(getattr(source.settings, name)) for source in sources}
+        if len(values) > 1:
+            yield say("differs", what=what, values=", ".join(sorted(values)))
+    codes = {source.result.get("code") for source in sources}
+    if len(codes) > 1:
+        yield say("codes", count=len(codes))

@@ -1,0 +1,139 @@
+"""Plots and report of `hedgebed calibrate`: laws beside the runs, the map of trust, what each run contributed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import TwoSlopeNorm
+
+from vis.page.numbers import quote
+from vis.page.page import Block, Section, Tile, listing, table
+from vis.page.plots import BED, GREY, INK, handle, legend_above, line_styles, new_panels, sheet
+from vis.page.report import Report, Result, report_of, tables
+
+__all__ = ["write_lawfit_report"]
+
+_MOST = 4
+"""Speeds that have a panel of their own at most: the slowest, the fastest and those between."""
+_FULL = 0.5
+"""Error at which the colour of the map of trust is full [1]."""
+
+
+@report_of()
+def write_lawfit_report(report: Report) -> Path:
+    """Make figures/ and report.html of the folder of a calibration, and return the report."""
+    result = report.result
+    laws: list[Result] = result["laws"]
+    (ranked,) = tables(result)
+    drawn = [block for block in (_laws(report, laws), _trust(report, laws)) if block is not None]
+    sections = [
+        Section("", [listing(result["departures"]["sentences"]), ranked, *drawn]),
+        Section("Parameters", [_parameters(laws)]),
+        Section("The spring-damper that is right at a load and a speed", [_tangents(result)]),
+        Section("What each run contributed", [_contributions(result)]),
+        report.numbers(std=True),
+        report.again("hedgebed calibrate run.toml", "numbers"),
+    ]
+    numbers = result["quantities"]
+    tiles = [
+        Tile(name, quote(numbers[key]["value"], numbers[key]["std"], numbers[key]["unit"]), "one standard deviation")
+        for name, key in (("K", "stiffness"), ("C", "damping"))
+    ]
+    own = numbers["held_out_error"]["value"]
+    tiles.append(Tile("Force in other beds", f"{100 * own:.2g} %", "rms error of the spring-damper"))
+    counted = f"{len(result['contributions'])} runs in {len({one['bed'] for one in result['contributions']})} beds"
+    return report.write(sections, lead=["calibrate", counted], tiles=tiles)
+
+
+def _laws(report: Report, laws: list[Result]) -> Block | None:
+    """Mean force over beds of each speed's drives, with every law."""
+    first = next((law["map"] for law in laws if law["map"] is not None), None)
+    if first is None:
+        return None
+    speeds = first["speeds"]
+    places = np.unique(np.linspace(0, len(speeds) - 1, min(_MOST, len(speeds))).round().astype(int))
+    drawing, axes = new_panels(len(places), height=3.4, sharey=True)
+    styles = line_styles([law["name"] for law in laws])
+    columns = report.columns("series/bins.csv")
+    for axis, place in zip(axes, places, strict=True):
+        rows = np.isclose(columns["rate_m_s"], speeds[place], rtol=1e-3)
+        axis.plot(1e3 * columns["depth_m"][rows], columns["force_N"][rows], ".", color=BED, ms=3, alpha=0.4)
+        depth, force = 1e3 * np.array(first["depth"]), np.array(first["force"][place])
+        axis.plot(depth, force, "o", color=INK, ms=4)
+        for law in laws:
+            law_force = force * (1 + np.array(law["map"]["error"][place]))
+            axis.plot(depth, law_force, lw=1.5, **styles[law["name"]])
+        axis.set(title=f"{speeds[place]:.3g} m/s", xlabel="depth of the tip [mm]")
+        axis.axhline(0.0, color=GREY, lw=0.8)
+    axes[0].set_ylabel("force on the spike [N]")
+    marks = [
+        handle("a run", BED, marker=".", ls="", alpha=0.5),
+        handle("mean of the beds", INK, marker="o", ms=4, ls=""),
+    ]
+    lines = [handle(law["name"], lw=1.5, **styles[law["name"]]) for law in laws]
+    legend_above(drawing, [*marks, *lines], 3)
+    return report.draw("laws", drawing)
+
+
+def _trust(report: Report, laws: list[Result]) -> Block | None:
+    """Error of the spring-damper and of the best other law over depth and speed."""
+    pair = next(law for law in laws if law["name"] == "spring-damper")
+    other = next((law for law in laws if law is not pair), None)
+    shown = [law for law in (pair, other) if law is not None and law["map"] is not None]
+    if not shown:
+        return None
+    drawing, grid = sheet(1, len(shown), 0.6 * len(pair["map"]["speeds"]) + 2.0, sharey=True)
+    image: Any = None
+    for axis, law in zip(grid[0], shown, strict=True):
+        found = law["map"]
+        error = 100 * np.array(found["error"])
+        depth = 1e3 * np.array(found["depth"])
+        edges = np.concatenate([[0.0], 0.5 * (depth[1:] + depth[:-1]), [1.5 * depth[-1] - 0.5 * depth[-2]]])
+        rows = np.arange(len(found["speeds"]) + 1) - 0.5
+        norm = TwoSlopeNorm(0.0, -100 * _FULL, 100 * _FULL)
+        image = axis.pcolormesh(edges, rows, error, cmap="RdBu_r", norm=norm)
+        for row, values in enumerate(error):
+            for place, value in zip(depth, values, strict=True):
+                dark = abs(value) > 60 * _FULL
+                axis.text(place, row, f"{value:+.0f}", ha="center", va="center", fontsize=7.5,
+                          color="white" if dark else INK)  # fmt: skip
+        axis.set_yticks(range(len(found["speeds"])), [f"{speed:.3g}" for speed in found["speeds"]])
+        axis.set(title=law["name"], xlabel="depth of the tip [mm]")
+        axis.grid(visible=False)
+    grid[0][0].set_ylabel("speed [m/s]")
+    drawing.colorbar(image, ax=grid[0].tolist(), label="law less grains [%]", extend="both", shrink=0.9)
+    return report.draw("trust", drawing)
+
+
+def _parameters(laws: list[Result]) -> Block:
+    rows = [
+        (law["name"], name, f"{one['value']:.4g}", f"{one['std']:.2g}", f"{one['low']:.4g} to {one['high']:.4g}",
+         one["unit"].removesuffix("1") or "")
+        for law in laws for name, one in law["parameters"].items()
+    ]  # fmt: skip
+    rows += [
+        (law["name"], name, f"{value:.4g}", "-", "not fitted", "")
+        for law in laws
+        for name, value in law["fixed"].items()
+    ]
+    return table(("law", "parameter", "value", "std", "90 %", "unit"), rows)
+
+
+def _tangents(result: Result) -> Block:
+    rows = [
+        (row["law"], f"{row['load']:.3g} N", f"{row['speed']:.3g} m/s", f"{1e3 * row['depth']['value']:.3g} mm",
+         *(f"{row[key]['value']:.3g} ± {row[key]['std']:.2g}" for key in ("stiffness", "damping")))
+        for row in result["tangents"]
+    ]  # fmt: skip
+    head = ("law", "load", "speed", "depth", "K = dF/dz [N/m]", "C = dF/d(dz/dt) [N s/m]")
+    return table(head, rows)
+
+
+def _contributions(result: Result) -> Block:
+    rows = [
+        (one["run"], f"{100 * one['misfit']:.3g} %", f"{one['stiffness']:.4g}", f"{one['damping']:.3g}")
+        for one in result["contributions"]
+    ]
+    return table(("run", "rms error", "K without it [N/m]", "C without it [N s/m]"), rows)
