@@ -16,10 +16,11 @@ from experiments.penetrate import experiment as penetrate
 from experiments.runs.folder import RunFolder, write_json
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
-from experiments.runs.whole_runs import draw_report, keeping_status, whole_run
+from experiments.runs.whole_runs import draw_report, whole_run
 
 from .analysis import numbers_of
 from .design import Member, affordable, members_of, variants_of
+from .members import finished_member, make_member
 from .result import conclude, doubts, plan_told
 from .settings import ConvergeSettings, say
 
@@ -68,23 +69,17 @@ class _Work:
         """Carry out a member, or go on with it."""
         path = self.home / member.folder
         self.progress.stage(member.id, total=1.0)
-        own = RunFolder.open(path) if (path / "run.toml").is_file() else RunFolder.create(
-            path, "penetrate", member.settings, code=fingerprint()
-        )  # fmt: skip
-        try:
-            with keeping_status(own):
-                penetrate.compute(member.settings, own, _Within(self.progress))
-        except RuntimeError as error:
-            self.failed[member.id] = str(error)
-            self.progress.message(f"{member.id}: {error}")
+        failed = make_member(member.settings, path, self.progress)
+        if failed is not None:
+            self.failed[member.id] = failed
+            self.progress.message(f"{member.id}: {failed}")
             return
         self.read(member)
 
     def read(self, member: Member) -> bool:
         """Take the numbers of a member that is done, and say whether it is."""
-        path = self.home / member.folder
-        own = RunFolder.open(path) if (path / "run.toml").is_file() else None
-        if own is None or own.status != "done" or not (path / "result.json").is_file():
+        own = finished_member(self.home / member.folder)
+        if own is None:
             return False
         self.numbers[member.id] = numbers_of(own.read_result())
         self.spent[member.id] = own.processor_time
@@ -98,21 +93,6 @@ class _Work:
         costs = {name: {"processor_time": spent, "expected": expected[name]} for name, spent in self.spent.items()}
         write_json(self.folder.path / "cost.json", costs)
         return result
-
-
-class _Within(Progress):
-    """The progress of one member as a stage of the sweep's."""
-
-    def __init__(self, whole: Progress) -> None:
-        super().__init__()
-        self._whole = whole
-
-    def show_grains(self, *, grain_count: int, awake_count: int, grain_steps: int) -> None:
-        self._whole.show_grains(grain_count=grain_count, awake_count=awake_count, grain_steps=grain_steps)
-
-    def update(self, done: float) -> None:
-        super().update(done)
-        self._whole.update(self.fraction or 0.0)
 
 
 def _carry_out(settings: ConvergeSettings, folder: RunFolder, progress: Progress) -> Result:

@@ -3,8 +3,8 @@
 `Settings`, `check`, `run` and `resume` are those of `hedgebed calibrate`; calling one imports what computes. (`hedgebed
 bed calibrate`, which fits the grains, is `experiments.calibrate`.)
 
-Imports `coupling`, `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.platform`, `experiments.runs`,
-`rigid`, `vis.page`.
+Imports `coupling`, `dem`, `experiments.converge`, `experiments.grains`, `experiments.penetrate`,
+`experiments.platform`, `experiments.runs`, `rigid`, `vis.page`.
 """
 
 from experiments.runs.registry import face

@@ -11,15 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.platform.surfaces import surface_of_grains
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import computed_run
+from experiments.runs.whole_runs import publish, whole_run
 from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
 
 from .data import Data
+from .design import check_design, compute_runs
 from .fit import Estimated, LawFit, fit_law, interval
 from .identify import identified, influences
 from .laws import ADDED_MASS, Candidate, candidates_for
@@ -36,12 +38,16 @@ _LOADS = (0.1, 0.25, 0.5, 0.75, 1.0)
 
 
 def check(settings: LawFitSettings) -> None:
-    """Raise ValueError for runs that cannot be read, or not be fitted together."""
-    read_data(settings)
+    """Raise ValueError for runs that cannot be read, be fitted together or be computed within the budget."""
+    if settings.runs:
+        read_data(settings)
+    else:
+        check_design(settings)
 
 
 def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) -> Result:
-    data = read_data(settings)
+    designed = None if settings.runs else compute_runs(_with_material(settings, folder), folder, progress)
+    data = read_data(settings) if designed is None else designed.data
     names = tuple(dict.fromkeys((PAIR, *settings.laws)))
     candidates, left = candidates_for(data, names)
     progress.message(say("read", data=data, beds=len(data.beds), runs=len(data.runs), f=data.foundation))
@@ -65,7 +71,12 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
     others = [law["name"] for law in laws if law["name"] not in (PAIR, ADDED_MASS)]
     tangents = _tangents(fits, data, (PAIR, *others[:1]))
     contributed = influences(pair)
-    warnings = [*told, *data.notes, *(say(why, name=name, f=data.foundation) for name, why in left.items())]
+    warnings = [
+        *(designed.notes if designed else []),
+        *told,
+        *data.notes,
+        *(say(why, name=name, f=data.foundation) for name, why in left.items()),
+    ]
     warnings += [say("few_beds", beds=len(data.beds))] if len(data.beds) < 3 else []
     warnings += [f"{law['name']}: {text}" for law in laws for text in law["notes"]] + list(beyond.values())
     return Result.make(
@@ -80,10 +91,16 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
         tangents=tangents,
         contributions=contributed,
         sources=list(data.sources),
+        design=[] if designed is None else designed.steps,
         tables=[{"title": say("table_laws"), **law_rows(laws)}],
         surface=surface_of_grains(data.foundation.material),
         warnings=warnings,
     )  # fmt: skip
+
+
+def _with_material(settings: LawFitSettings, folder: RunFolder) -> LawFitSettings:
+    """`settings` whose material, if it is a file, is the copy in the folder."""
+    return settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
 
 
 def _law_entry(settings: LawFitSettings, fitted: LawFit) -> Json:
@@ -260,4 +277,11 @@ def _quantities(settings: LawFitSettings, pair: LawFit, own: Json, best: Json) -
     return {name: one for name, one in found.items() if not math.isnan(one["value"])}
 
 
-run, resume = computed_run("calibrate", LawFitSettings, _compute, check=check)
+def _carry_out(settings: LawFitSettings, folder: RunFolder, progress: Progress) -> Result:
+    with folder.lock():
+        return publish(folder, _compute(settings, folder, progress), progress)
+
+
+run, resume = whole_run(
+    "calibrate", LawFitSettings, _carry_out, check=check, material_copy=MATERIAL_COPY, as_given=False
+)  # fmt: skip

@@ -15,7 +15,7 @@ from hedgebed_renamed import material_of_today
 from .data import Data, Foundation, Placement, PushRun, binned
 from .settings import LawFitSettings, say
 
-__all__ = ["read_data"]
+__all__ = ["read_data", "read_folders"]
 
 _OF_BED = (
     "bed", "seed", "bed_size", "grain", "spread", "coarse", "fine_radius", "fine_depth", "packing", "bed_stages",
@@ -53,16 +53,24 @@ def read_data(settings: LawFitSettings) -> Data:
     result without series, for runs of different grains, tips or gravities, for a run that is there twice, for fewer
     than two beds, and for runs at one speed, which cannot tell C from K.
     """
-    sources = [_read(name, path) for given in settings.runs for name, path in _folders(given)]
+    return read_folders([pair for given in settings.runs for pair in _folders(given)], settings)
+
+
+def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) -> Data:
+    """The runs in `folders` (name, path) as the data of one fit; raises as `read_data`."""
+    sources = [_read(name, path) for name, path in folders]
     _refuse_mixed(sources)
     runs: list[PushRun] = []
     placements: list[Placement] = []
-    seen: dict[tuple[str, str, float], str] = {}
+    seen: dict[tuple[Any, ...], str] = {}
     for source in sources:
         for entry in source.result["runs"]:
             run = _series(source, entry)
             bed, speed = _bed_of(source.settings, int(entry["seed"])), float(entry["speed"])
-            key = (bed, str(entry["kind"]), speed)
+            free = () if run.kind == "driven" else (source.settings.weight, source.settings.mass)
+            key = (bed, run.kind, speed, *free)
+            if key in seen and run.kind == "set_down":
+                continue  # every run of penetrate has one: the same again
             if key in seen:
                 raise ValueError(say("twice", name=source.name, other=seen[key], kind=key[1], speed=speed))
             seen[key] = source.name

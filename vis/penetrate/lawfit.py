@@ -32,7 +32,7 @@ def write_lawfit_report(report: Report) -> Path:
         Section("", [listing(result["departures"]["sentences"]), ranked, *drawn]),
         Section("Parameters", [_parameters(laws)]),
         Section("The spring-damper that is right at a load and a speed", [_tangents(result)]),
-        Section("What each run contributed", [_contributions(result)]),
+        Section("What each run contributed", [*_design(result), _contributions(result)]),
         report.numbers(std=True),
         report.again("hedgebed calibrate run.toml", "numbers"),
     ]
@@ -129,6 +129,16 @@ def _tangents(result: Result) -> Block:
     ]  # fmt: skip
     head = ("law", "load", "speed", "depth", "K = dF/dz [N/m]", "C = dF/d(dz/dt) [N s/m]")
     return table(head, rows)
+
+
+def _design(result: Result) -> list[Block]:
+    """Which runs were computed and why; nothing where they were there before."""
+    rows = [
+        (str(number), step["why"], ", ".join(step["runs"]), f"{step['cost']:.3g} s", f"{100 * step['sure']:.2g} %")
+        for number, step in enumerate(result["design"], 1)
+    ]
+    head = ("step", "why", "runs", "cost by estimate, one core", "90 % interval of the force, half")
+    return [table(head, rows, words=True)] if rows else []
 
 
 def _contributions(result: Result) -> Block:

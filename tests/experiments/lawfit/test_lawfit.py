@@ -82,6 +82,7 @@ def test_the_ground_file_holds_the_pair_with_its_interval_and_the_range_of_the_r
     assert {"laws", "trust"} <= {path.stem for path in (tmp_path / "run" / "figures").iterdir()}
 
 
+@pytest.mark.long
 def test_runs_of_another_law_rank_that_law_first_and_say_how_wrong_the_pair_is(tmp_path):
     run = made_up_run(
         tmp_path / "kd", law="katsuragi-durian", parameters={"stiffness": 40.0, "drag": 4.0},
@@ -144,6 +145,7 @@ def test_slow_runs_cannot_tell_c_and_a_speed_that_would_is_named():
     assert identified(fit_law(CANDIDATES["spring-damper"](FOUNDATION), told)) == []
 
 
+@pytest.mark.long
 def test_a_rate_that_lowers_the_force_is_labelled_and_becomes_0_in_the_file(tmp_path):
     path = tmp_path / "falling"
     made_up_run(path, parameters={"stiffness": K, "damping": 0.0}, seeds=(1, 2, 3))
@@ -211,6 +213,7 @@ def test_runs_that_cannot_be_fitted_together_are_refused_by_name(of_three_beds, 
     assert "no series" in refused(str(copy))
 
 
+@pytest.mark.long
 def test_the_command_takes_several_folders_and_a_run_toml_does_the_same_again(of_three_beds, tmp_path, capsys):
     other = made_up_run(tmp_path / "more", seeds=(4, 5))
     out = [str(tmp_path / name) for name in ("a", "b")]

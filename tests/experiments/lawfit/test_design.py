@@ -1,0 +1,96 @@
+"""`hedgebed calibrate --budget`: which runs are computed on stand-in beds whose K and C are known, and when it ends."""
+
+import pytest
+from fake_bed import FakeBed
+
+from experiments import lawfit
+from experiments.penetrate import beds
+
+K, C, STEP = 100.0, 0.5, 5e-5
+SPREAD = {1: -1.0, 2: 1.0, 3: 0.0, 4: 0.5, 5: -0.5, 6: 0.0, 7: 0.0, 8: 0.0}
+QUICK = {
+    "budget": 3600.0, "tip_diameter": 0.012, "bed_size": (0.06, 0.06, 0.04), "grain": 0.0024, "seeds": (1, 2, 3),
+    "speeds": (0.2, 0.8), "drop_speeds": (), "mass": 0.3, "load": 0.4, "depth": 0.01, "young": 2e7,
+    "laws": ("spring-damper",),
+}  # fmt: skip
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Seeds of the beds that were made, in order; `made.spread` and `made.rate` [N s/m] say how they differ."""
+
+    class Made(list):
+        spread, rate = 2.0, C
+
+    found = Made()
+
+    def prepare(settings, seed, young, progress):
+        found.append(seed)
+        hardness = K + found.spread * SPREAD[seed]
+        return FakeBed(size=settings.bed_size, time_step=STEP, seed=seed, hardness=hardness, rate=found.rate)
+
+    monkeypatch.setattr(beds, "prepare_bed", prepare)
+    monkeypatch.setattr(beds, "bed_step", lambda settings, young: STEP)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
+    return found
+
+
+def calibrate(folder, **changed):
+    return lawfit.run(lawfit.Settings(**(QUICK | changed)), folder)
+
+
+def test_beds_are_added_until_the_force_is_as_sure_as_asked_for(made, tmp_path):
+    result = calibrate(tmp_path / "run", tolerance=0.03)
+    sure = [step["sure"] for step in result["design"]]
+    assert made == [1, 2, 3, 4][: len(made)] and len(made) > 2
+    assert sure[-1] <= 0.03 < sure[-2]
+    assert result["quantities"]["stiffness"]["value"] == pytest.approx(K, rel=0.02)
+    assert result["quantities"]["damping"]["value"] == pytest.approx(C, rel=0.1)
+    assert [len(step["runs"]) for step in result["design"]] == [2] + [1] * (len(sure) - 1)
+
+
+@pytest.mark.long
+def test_the_budget_bounds_what_is_computed_and_too_small_a_one_is_refused(made, tmp_path):
+    whole = calibrate(tmp_path / "a", tolerance=0.001, most_beds=6)
+    costs = [step["cost"] for step in whole["design"]]
+    assert len(set(made)) == 6
+    made.clear()
+    some = calibrate(tmp_path / "b", tolerance=0.001, most_beds=6, budget=sum(costs[:2]) * 1.01)
+    assert some["design"] == whole["design"][:2]
+    with pytest.raises(ValueError, match="budget") as error:
+        lawfit.check(lawfit.Settings(**(QUICK | {"budget": 0.9 * costs[0]})))
+    assert f"{costs[0]:.3g}" in str(error.value)
+
+
+@pytest.mark.long
+def test_a_faster_drive_is_added_where_c_is_what_is_not_known(made, tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.lawfit.design._sure", lambda fitted: (0.5, 0.9))
+    made.rate = 0.0
+    result = calibrate(tmp_path / "run", most_beds=3)
+    runs = [{one["speed"] for one in result["contributions"] if one["bed"].startswith(f"seed {s}")} for s in (1, 2, 3)]
+    assert runs == [{0.2, 0.8, 1.6}] * 3
+
+
+@pytest.mark.long
+def test_what_is_computed_is_found_again(made, tmp_path):
+    first = calibrate(tmp_path / "a", members=str(tmp_path / "kept"), tolerance=0.05)
+    made.clear()
+    second = calibrate(tmp_path / "b", members=str(tmp_path / "kept"), tolerance=0.05)
+    assert made == []
+    assert second["quantities"] == first["quantities"]
+    again = lawfit.resume(tmp_path / "b")
+    assert again["quantities"] == first["quantities"]
+
+
+def test_settings_that_contradict_each_other_are_refused():
+    for given, named in (
+        ({}, "budget"),
+        ({"runs": ("a",), "budget": 60.0}, "budget"),
+        ({"runs": ("a",), "gravity": 1.0}, "gravity"),
+        ({"runs": ("a", "a")}, "twice"),
+        ({"budget": 60.0, "bed": "mine"}, "bed"),
+        ({"budget": 60.0, "laws": ("springs",)}, "springs"),
+        ({"budget": 60.0, "speeds": (0.1,)}, "speeds"),
+    ):
+        with pytest.raises(ValueError, match=named):
+            lawfit.Settings(**given)
