@@ -73,9 +73,12 @@ def _check_cut(settings: CalibrateSettings) -> None:
         raise ValueError(f"cut_size, times grain: {error}") from None
     if settings.cut_stages[-1:] != ("level",):
         raise ValueError(f"cut_stages = {' '.join(settings.cut_stages)}: 'level' must be the last")
-    stages = [parse_stage(stage) for stage in settings.cut_stages]
     sizes, sticks = Uniform(settings.grain, settings.spread), settings.base.cohesion != "none"
-    check_stages(stages, size=size, grain=settings.grain, sizes=sizes, cohesive=sticks)
+    try:
+        stages = [parse_stage(stage) for stage in settings.cut_stages]
+        check_stages(stages, size=size, grain=settings.grain, sizes=sizes, cohesive=sticks)
+    except ValueError as error:
+        raise ValueError(f"cut_stages: {error}") from None
 
 
 @dataclass

@@ -11,9 +11,9 @@ cohesion c added to it as c / tan(angle). Those of Mohr's circle are of the stra
 largest and least principal stress, radius = cohesion cos(angle) + sin(angle) centre: what Coulomb's wedge, and with it
 a vertical cut, is reckoned with. Where volume stays, the plane of shear has c cos(angle) and tan = sin(angle) instead.
 
-A cut height is no formula's: faces are cut in a bed, and gravity rises until one falls (`dem.measure.cutting`). The
-height lies anywhere between the last that stood and the first that fell, which has a standard deviation of the
-interval over sqrt(12).
+A cut height comes from no formula: vertical faces are cut in a bed, and gravity rises until one falls
+(`dem.measure.cutting`). The critical height is anywhere between the last height that stood and the first that fell.
+Its standard error is that of a uniform distribution, the interval over sqrt(12).
 """
 
 import math
@@ -129,25 +129,31 @@ def _drain(stuff: Material, test: SampleTest, settings: CalibrateSettings, tell:
 
 
 def _cut(stuff: Material, test: SampleTest, settings: CalibrateSettings, tell: Tell) -> Kept:
-    """The height to which faces stand in one bed, as ``hedgebed bed test cut`` has it."""
+    """The critical height of vertical faces in one bed [m], measured as by ``hedgebed bed test cut``.
+
+    Raises BedFailure: the bed cannot be prepared by ``cut_stages``, or its faces never fall.
+    """
     size = tuple(settings.grain * side for side in settings.cut_size)
     of_bed = {"grain": settings.grain, "spread": settings.spread, "gravity": settings.gravity}
-    bed = Bed.prepare_as(
-        stuff,
-        stages=settings.cut_stages,
-        size=size,
-        **of_bed,
-        seed=test.seed,
-        young=stiff_enough(stuff, depth=size[2], **of_bed, bearing=1 + MOST),
-        threads=settings.threads,
-        progress=_Preparing(tell),
-    ).whole
+    try:
+        bed = Bed.prepare_as(
+            stuff,
+            stages=settings.cut_stages,
+            size=size,
+            **of_bed,
+            seed=test.seed,
+            young=stiff_enough(stuff, depth=size[2], **of_bed, bearing=1 + MOST),
+            threads=settings.threads,
+            progress=_Preparing(tell),
+        ).whole
+    except ValueError as error:  # as a packing that taps do not reach
+        raise BedFailure(f"cut_stages: {error}") from error
     packing, count = bed.packing_fraction, bed.grain_count
     found = cut_and_load(bed, width=STRIP * settings.grain, tell=lambda share: tell(0.5 + 0.5 * share))
     if found.fell is None:
         raise BedFailure(
-            f"faces of {found.height:.3g} m stand even at {found.stood:.2g} times gravity: less surface_energy, or a "
-            f"greater depth in cut_size, would do"
+            f"a face {found.height:.3g} m high stands even at {found.stood:.2g} times gravity: choose a smaller "
+            f"surface_energy or a greater depth in cut_size"
         )
     low, high = found.bounds
     summary = {
