@@ -14,6 +14,10 @@ the numbers of the ground's law:
 - ``dry_friction(p, s)``: bounds on the vertical motion [N] and on the rotation [N m];
 - ``inner_start(p, s)``, ``inner(p, s)``: of the coordinate that a term has of its own, where there is one: at rest; its
   inertia, the force on it, and what is positive while its mode holds;
+- ``settle(p, s, depth, slip, lean)``, ``settled(p, s)``: how fast the ground under a tip gives way [m/s], and the share
+  of the depth at rest by which it has at the start;
+- ``added(p, depth)``: mass of ground that a tip carries along while it sinks [kg], its slope over depth [kg/m];
+- ``wall(p)``: slope of a crater's wall, 0 where craters are forgotten;
 - ``crater(p)``: share of the deepest depth at which a spike on the way up leaves the ground;
 - ``contact(p, s, q, depth, rate, slip, top, held)``: elastic normal force, dissipative normal force, stored energy,
   tangential drag, factors on mu_s and mu_d, load that friction sees beside the normal force.
@@ -83,6 +87,11 @@ class Model:
         return any(set(fields) & set(hook.__code__.co_names) for hook in hooks)
 
     @property
+    def settles(self) -> bool:
+        """Whether the ground under a tip may give way for good."""
+        return self.has("settle", "settled")
+
+    @property
     def has_memory(self) -> bool:
         """Whether the deepest depth of a spike matters."""
         return self.law.has_memory or self.has("crater", "hold", "unload", "rate_pull")
@@ -120,6 +129,20 @@ def _bent_energy(terms: Sequence[Term]) -> list[str]:
         out += [f"    part = {call}" for call in _calls(terms, "unload", "x, top, part")]
         out += [f"    stored = stored + {float(weight * u)!r} * z * part"]
     return out
+
+
+def _yielding(every: Sequence[Term]) -> list[str]:
+    """The functions of ground that gives way, is carried along, and keeps its craters."""
+    out = ["def wall(p):", "    slope = 0.0"]
+    out += [f"    slope = max(slope, {call})" for call in _calls(every, "wall", "")]
+    out += ["    return slope\n", "def settle(p, s, depth, slip, lean):", "    speed = 0.0"]
+    out += [f"    speed = speed + {call}" for call in _calls(every, "settle", "s, depth, slip, lean")]
+    out += ["    return speed\n", "def settled(p, s):", "    left = 1.0"]
+    out += [f"    left = left * (1.0 - {call})" for call in _calls(every, "settled", "s")]
+    out += ["    return 1.0 - left\n", "def added(p, depth):", "    mass = 0.0", "    slope = 0.0"]
+    for call in _calls(every, "added_mass", "depth"):
+        out += [f"    more, steeper = {call}", "    mass = mass + more", "    slope = slope + steeper"]
+    return [*out, "    return mass, slope\n"]
 
 
 def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
@@ -163,7 +186,8 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
     if law.has_memory:
         out += ["    f = f + (1.0 - f) * (1.0 - p.rebound)"]
     out += ["    if hollow(p) > 0.0:", "        f = 0.0", "    return f\n"]
-    out += ["def contact(p, s, q, depth, rate, slip, top, held):"]
+    out += _yielding(every)
+    out += ["def contact(p, s, q, depth, rate, slip, top, held):", "    whole = depth + s.given_way"]
     if _calls(every, "crater", ""):
         out += ["    f = plastic_share(p)", "    z = (depth - f * top) / (1.0 - f)", "    left = 1.0 - f"]
         out += ["    damped = z", "    if hollow(p) > 0.0:", "        z = max(z, 0.0)", "        damped = depth"]
@@ -183,10 +207,10 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
     for call in _calls(every, "hold", "s, depth, held"):
         out += [f"    pull, work = {call}", "    elastic = elastic - pull", "    stored = stored + work"]
     out += ["    lost = law_rate_force(damped, rate, q)"]
-    out += [f"    lost = lost + {call}" for call in _calls(every, "rate_force", "s, depth, rate")]
+    out += [f"    lost = lost + {call}" for call in _calls(every, "rate_force", "s, whole, rate")]
     out += [f"    lost = lost + {call}" for call in _calls(every, "rate_pull", "s, depth, rate, held")]
     out += ["    side = 0.0"]
-    out += [f"    side = side + {call}" for call in _calls(every, "side_force", "s, depth, slip")]
+    out += [f"    side = side + {call}" for call in _calls(every, "side_force", "s, whole, slip")]
     out += ["    factor_s = 1.0", "    factor_d = 1.0"]
     for call in _calls(every, "friction_factor", "s, slip"):
         out += [f"    more_s, more_d = {call}", "    factor_s = factor_s * more_s", "    factor_d = factor_d * more_d"]

@@ -39,6 +39,8 @@ class Modes:
     slip: list[int] = field(default_factory=list)  # Of each spike: 0 sticks, +1 and -1 slides towards +x and -x
     top: list[float] = field(default_factory=list)  # Deepest depth of each spike [m] since it entered the ground
     held: list[float] = field(default_factory=list)  # Deepest depth of each spike [m] since it touched; empty: as `top`
+    place: dict[int, float] = field(default_factory=dict)  # Where each spike last lifted off: x of the tip [m]
+    out: set[int] = field(default_factory=set)  # Spikes that have since been above the undisturbed surface
     dry: list[int] = field(default_factory=lambda: [0, 0])
     """Dry friction of the rig and of the bearing: 0 holds; +1 and -1 slides up and down, turns clockwise and back."""
     torque_over: bool = False  # Whether the torque has ended for good
@@ -48,8 +50,9 @@ class Modes:
     def copy(self) -> "Modes":
         """A copy that can be changed."""
         return replace(
-            self, touching=[*self.touching], slip=[*self.slip], top=[*self.top], held=[*self.held], dry=[*self.dry]
-        )
+            self, touching=[*self.touching], slip=[*self.slip], top=[*self.top], held=[*self.held], dry=[*self.dry],
+            place={**self.place}, out={*self.out},
+        )  # fmt: skip
 
     def deepest(self, spike: int, depth: float) -> tuple[float, float]:
         """Deepest depths [m] since the spike entered the ground, and since it touched, with `depth` reached now."""
@@ -92,6 +95,8 @@ class Contact:
     h: float
     d: float
     friction_bound: float  # mu_s load [N]
+    given_way: float  # How far the ground under it has given way [m], and how fast it does [m/s]; `depth` is the rest
+    settling: float
 
 
 class System:
@@ -126,8 +131,15 @@ class System:
         self.sheds = self.has_memory and (ground.law.has_memory or model.has("crater", "unload"))
         self.has_dry = model.has("vertical_friction", "rotation_friction")
         self.dry_axes: tuple[Triple, Triple] = ((s.up_x, s.up_y, 0.0), (0.0, 0.0, 1.0))
+        self.settles = model.settles
+        self.carries = model.has("added_mass")
+        self.wall = model.wall(self.p)
+        self.kept = max(self.crater, model.plastic_share(self.p))  # Of the deepest depth, in the crater that stays
         s.inner_mode = 1.0
         self.inner = bool(model.has("inner_mass") and model.inner(self.p, s)[0] > 0)
+        self.first = INNER_SPEED + 1 if self.inner else INNER  # Where in z the ground's givings way begin, one a spike
+        self.size = self.first + (trial.spike_count if self.settles else 0)
+        self.settled_share = model.settled(self.p, s)
         self.mu_s, self.mu_d = trial.mu_s, trial.sliding_friction
         self.wheel_sign = 1.0 if trial.actuator == "motor" else -1.0
         # What the last evaluation found.
@@ -138,6 +150,7 @@ class System:
         self.inner_holds = 1.0
         self.implicit: Any = None  # Makes implicit steps, where the ground asks for them (`rigid.planar.methods`)
         self.acceleration = (0.0, 0.0, 0.0)
+        self.mass = model.inertia(self.p, s)  # With what tips carry along
 
     def _remembers(self) -> bool:
         """Whether the deepest depth matters: not where the effects that look at it have no amplitude."""
@@ -155,14 +168,65 @@ class System:
         sine = s * self.cosines[spike] + c * self.sines[spike]
         return self.model.contact_arms(cosine, sine, self.s.length, self.radius)
 
+    def given_way(self, spike: int, z: Sequence[float]) -> float:
+        """How far the ground under the tip has given way [m]."""
+        return z[self.first + spike] if self.settles else 0.0
+
     def depth(self, spike: int, z: Sequence[float]) -> float:
-        """How deep the tip is below the undisturbed surface [m]."""
-        return self.arms(spike, z)[0] - z[Y]
+        """How deep the tip is below the surface [m], which is where it has given way to."""
+        return self.arms(spike, z)[0] - z[Y] - self.given_way(spike, z)
 
     def depth_and_slip(self, spike: int, z: Sequence[float]) -> tuple[float, float]:
         """Depth of the tip [m], and its speed along the ground [m/s]."""
         h, _ = self.arms(spike, z)
-        return h - z[Y], z[VX] - z[OMEGA] * h
+        return h - z[Y] - self.given_way(spike, z), z[VX] - z[OMEGA] * h
+
+    def _crater_left(self, spike: int, z: Sequence[float], modes: Modes) -> tuple[float, float]:
+        """What is left, at the tip's x, of the crater of a spike that left it: its depth there over the deepest one
+        [1], and the slope of that over x [1/m]. Its walls slope evenly to a point."""
+        deepest = self.kept * modes.top[spike] + self.given_way(spike, z)
+        if spike not in modes.out or deepest <= 0:
+            return 1.0, 0.0
+        aside = z[X] - self.arms(spike, z)[1] - modes.place[spike]
+        share = 1.0 - self.wall * abs(aside) / deepest
+        return (share, -math.copysign(self.wall, aside) / deepest) if share > 0 else (0.0, 0.0)
+
+    def bottom(self, spike: int, z: Sequence[float], modes: Modes) -> tuple[float, float]:
+        """Depth below the undisturbed surface at which a spike in the air touches [m], and its slope over x [1]."""
+        free = self.crater * modes.top[spike] + self.given_way(spike, z)
+        share, slope = self._crater_left(spike, z, modes)
+        return share * free, slope * free
+
+    def inside(self, spike: int, z: Sequence[float], modes: Modes) -> bool:
+        """Whether the tip is in the ground: below the bottom of its crater."""
+        depth = self.depth(spike, z)
+        if spike in modes.touching:
+            return depth > self.crater * max(modes.top[spike], depth)
+        return depth + self.given_way(spike, z) > self.bottom(spike, z, modes)[0]
+
+    def leave(self, spike: int, z: Sequence[float], modes: Modes) -> None:
+        """The spike lifts off; its crater stays at this place."""
+        modes.touching = [m for m in modes.touching if m != spike]
+        modes.slip[spike] = 0
+        modes.place[spike] = z[X] - self.arms(spike, z)[1]
+
+    def enter(self, spike: int, z: list[float], modes: Modes) -> None:
+        """The spike touches: of the crater that it left there stays what is left at the tip's x."""
+        share, _ = self._crater_left(spike, z, modes)
+        modes.top[spike] *= share
+        if self.settles:
+            z[self.first + spike] *= share
+        modes.out.discard(spike)
+        modes.touch(spike, *self.depth_and_slip(spike, z))
+
+    def forget(self, spike: int, z: list[float], modes: Modes) -> None:
+        """The tip is above the undisturbed surface: its crater is forgotten, unless it has walls."""
+        if self.wall > 0 and spike in modes.place:
+            modes.out.add(spike)
+        else:
+            modes.top[spike] = 0.0
+            if self.settles:
+                z[self.first + spike] = 0.0
 
     def dry_speeds(self, z: Sequence[float]) -> list[float]:
         """Speeds that the dry frictions resist: vertical [m/s], rotation [rad/s]."""
@@ -198,11 +262,13 @@ class System:
         c, sn, crater = s.cosine, s.sine, self.crater
         contacts: list[Contact] = []
         sticking: list[tuple[Contact, float, float, float]] = []
+        settling = [0.0] * (self.size - self.first)
         for n in modes.touching:
             cosine = c * self.cosines[n] - sn * self.sines[n]
             sine = sn * self.cosines[n] + c * self.sines[n]
             h, d = model.contact_arms(cosine, sine, s.length, self.radius)
-            depth, rate, slip = h - y, -(vy + omega * d), vx - omega * h
+            s.given_way = self.given_way(n, z)
+            depth, rate, slip = h - y - s.given_way, -(vy + omega * d), vx - omega * h
             top, held = modes.deepest(n, depth)
             at = max(depth, crater * top * (1 + 1e-15) + _SLIGHT)  # touching: on the ground's side of the surface
             top, held = max(top, at), max(held, at)
@@ -210,10 +276,21 @@ class System:
             normal = elastic + lost
             load = max(normal + grip, 0.0)
             power += lost * rate - side * slip
-            if self.sheds and at >= top and rate > 0:
-                power += self._shed(at, slip, elastic) * rate
+            into = rate  # the speed at which the spring is pressed
+            if self.settles:
+                settling[n] = model.settle(p, s, at + s.given_way, slip, d / s.length)
+                power += elastic * settling[n]
+                into = rate - settling[n]
+            if self.sheds and at >= top and into > 0:
+                power += self._shed(at, slip, elastic) * into
+            if self.carries and rate > 0:
+                more, slope = model.added(p, at - crater * top)
+                mass = _with_tip(mass, more, d)
+                down = more * omega * omega * (h - self.radius)
+                fy, ft = fy - down, ft - down * d
+                power -= 0.5 * slope * into * (1 - crater if at >= top else 1.0) * rate * rate
             fx, fy, ft = fx + side, fy + normal, ft + normal * d - side * h
-            contact = Contact(n, depth, rate, slip, load, h, d, self.mu_s * factor_s * load)
+            contact = Contact(n, depth, rate, slip, load, h, d, self.mu_s * factor_s * load, s.given_way, rate - into)
             contacts.append(contact)
             if modes.slip[n]:
                 friction = -modes.slip[n] * self.mu_d * factor_d * load
@@ -233,7 +310,7 @@ class System:
             elif bound > 0:
                 rows.append((axis, 0.0, axis))
         a, forces = self._constrained(mass, (fx, fy, ft), rows)
-        self.contacts, self.acceleration = contacts, a
+        self.contacts, self.acceleration, self.mass = contacts, a, mass
         found = iter(forces)
         self.stick_force = next(found) if sticking else 0.0
         self.dry_bounds = bounds
@@ -243,7 +320,7 @@ class System:
         if self.inner:
             own_mass, own_force, self.inner_holds = model.inner(p, s)
             rate += [s.inner_speed, own_force / own_mass]
-        return rate
+        return [*rate, *settling] if settling else rate
 
     def _stick_row(self, sticking: list[tuple[Contact, float, float, float]], omega: float) -> Row:
         """The constraint A a + b = 0 of the spikes that stick, and the direction B of its force: (A, b, B)."""
@@ -264,13 +341,14 @@ class System:
                     continue
                 ay -= by_rate
                 at -= by_rate * contact.d
-                b += by_depth * contact.rate - by_rate * omega * omega * (contact.h - self.radius)
+                b += by_depth * (contact.rate - contact.settling) - by_rate * omega * omega * (contact.h - self.radius)
         return (1.0, ay, at - mean), b, (1.0, 0.0, -mean)
 
     def _load_slopes(self, depth: float, contact: Contact, top: float, held: float) -> tuple[float, float]:
         """d load / d depth [N/m] and d load / d rate [N s/m], by differences; in depth on the side it moves to."""
         if contact.load == 0.0:
             return 0.0, 0.0
+        self.s.given_way = contact.given_way
 
         def load(z: float, rate: float) -> float:
             elastic, lost, *_, grip = self.model.contact(
@@ -327,6 +405,10 @@ class System:
         stored = 0.0
         for n in modes.touching:
             depth = max(self.depth(n, z), 0.0)
+            _, d = self.arms(n, z)
+            rate = -(vy + w * d)
+            if self.carries and rate > 0:
+                kinetic += 0.5 * model.added(p, depth - self.crater * modes.deepest(n, depth)[0])[0] * rate * rate
             stored += model.contact(p, s, self.q, depth, 0.0, 0.0, *modes.deepest(n, depth))[2]
         return kinetic, model.potential(p, s), stored
 
@@ -354,14 +436,19 @@ class System:
         excess = [sum(A[k] * v[k] for k in range(3)) for A in rows]
         if all(e == 0.0 for e in excess):
             return
-        mass = self.model.inertia(self.p, self.s)
-        answers = [self.model.divide_mass(*mass, *A) for A in rows]
+        answers = [self.model.divide_mass(*self.mass, *A) for A in rows]
         matrix = [[sum(A[k] * m[k] for k in range(3)) for m in answers] for A in rows]
         pushes = _solve(matrix, [-e for e in excess])
         for k in range(3):
             z[VX + k] += sum(push * m[k] for push, m in zip(pushes, answers, strict=True))
         # The impulse's work: push (u before + u after) / 2, and after it u = 0.
         z[LOST] -= 0.5 * sum(push * e for push, e in zip(pushes, excess, strict=True))
+
+
+def _with_tip(mass: tuple[float, ...], more: float, d: float) -> tuple[float, ...]:
+    """The mass matrix with `more` [kg] that moves down with a tip at `d`: it adds more J J^T, J = (0, -1, -d)."""
+    xx, xy, yy, xt, yt, tt = mass
+    return xx, xy, yy + more, xt, yt + more * d, tt + more * d * d
 
 
 def _solve(matrix: list[list[float]], right: list[float]) -> list[float]:

@@ -27,22 +27,26 @@ def monitors(system: System, z: Sequence[float], modes: Modes) -> Watch:
     omega = z[OMEGA]
     for contact in system.contacts:
         n, top = contact.spike, modes.top[contact.spike]
-        found["lift", n] = (contact.depth - system.crater * max(top, contact.depth), contact.rate)
+        into = contact.rate - contact.settling
+        found["lift", n] = (contact.depth - system.crater * max(top, contact.depth), into)
         if modes.slip[n]:
             slip_rate = ax - alpha * contact.h + omega * omega * contact.d
             found["slip", n] = (modes.slip[n] * contact.slip, modes.slip[n] * slip_rate)
         found["rate", n] = (contact.rate, math.nan)
+        if system.settles and system.sheds:  # from new ground to unloading, while the ground gives way
+            found["into", n] = (into, math.nan)
         if system.has_memory:
-            found["fresh", n] = (top - contact.depth, -contact.rate)
+            found["fresh", n] = (top - contact.depth, -into)
             held = modes.held[n] if modes.held else top
             if held < top:
-                found["again", n] = (held - contact.depth, -contact.rate)
+                found["again", n] = (held - contact.depth, -into)
     if any(modes.slip[n] == 0 for n in modes.touching):
         found["stick", -1] = (system.stick_bound - abs(system.stick_force), math.nan)
     for n in range(system.trial.spike_count):
         if n not in modes.touching:
             h, d = system.arms(n, z)
-            found["touch", n] = (z[Y] - h + system.crater * modes.top[n], z[VY] + omega * d)
+            bottom, slope = system.bottom(n, z, modes)
+            found["touch", n] = (z[Y] - h + bottom, z[VY] + omega * d + slope * (z[VX] - omega * h))
     for k, (bound, way, speed) in enumerate(zip(system.dry_bounds, modes.dry, system.dry_speeds(z), strict=True)):
         if bound > 0 and way:
             found["halt", k] = (way * speed, math.nan)
@@ -55,7 +59,7 @@ def monitors(system: System, z: Sequence[float], modes: Modes) -> Watch:
     return found
 
 
-KINKS = ("rate", "fresh", "again")  # where only a derivative jumps
+KINKS = ("rate", "into", "fresh", "again")  # where only a derivative jumps
 _KINK_SPEED, _KINK_DEPTH = 1e-8, 1e-12
 _STANDSTILL = 1e-13  # m/s or rad/s: what rounding makes of a speed that stays zero
 
@@ -64,7 +68,7 @@ def triggered(before: Watch, after: Watch) -> list[Monitor]:
     found = []
     for key, (value, _) in after.items():
         start = before.get(key, (math.inf, 0.0))[0]
-        if key[0] == "rate":
+        if key[0] in ("rate", "into"):
             if start * value < 0 and min(abs(start), abs(value)) > _KINK_SPEED and math.isfinite(start):
                 found.append(key)
         elif key[0] in ("fresh", "again"):
@@ -79,7 +83,7 @@ def precision(key: Monitor, system: System) -> float:
     """How near to zero a monitor must come: rounding of a length, a speed, a force."""
     if key[0] in ("lift", "touch", "fresh", "again", "inner"):
         return 1e-16 * system.s.length
-    if key[0] in ("slip", "rate"):
+    if key[0] in ("slip", "rate", "into"):
         return 1e-15
     if key[0] == "wheel":
         return 1e-12

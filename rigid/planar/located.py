@@ -282,17 +282,19 @@ def _scale(system: System) -> list[float]:
     energy = trial.weight * length
     wheel = max(trial.wheel_speed_0, 1.0)
     scale = [0.1 * length, 0.1 * length, 0.1, length * rate, length * rate, rate, 10 * wheel, energy, energy]
-    return [*scale, 0.1 * length, length * rate] if system.inner else scale
+    inner = [0.1 * length, length * rate] if system.inner else []
+    return [*scale, *inner, *([0.1 * length] * (system.size - system.first))]
 
 
 def _keep(system: System, z: list[float], modes: Modes) -> None:
-    if not system.has_memory:
+    if not (system.has_memory or system.settles):
         return
     for contact in system.contacts:
         modes.remember(contact.spike, contact.depth)
     for n in range(system.trial.spike_count):
-        if n not in modes.touching and modes.top[n] > 0 and system.depth(n, z) < 0:
-            modes.top[n] = 0.0
+        gone = system.given_way(n, z)
+        if n not in modes.touching and (modes.top[n] > 0 or gone > 0) and system.depth(n, z) + gone < 0:
+            system.forget(n, z, modes)
 
 
 def _switch(
@@ -302,9 +304,8 @@ def _switch(
     halted: list[int] = []
     for kind, n in event:
         if kind == "touch":
-            depth, slip = system.depth_and_slip(n, z)
-            modes.touch(n, depth, slip)
-            if abs(slip) < 1e-14:
+            system.enter(n, z, modes)
+            if abs(system.depth_and_slip(n, z)[1]) < 1e-14:
                 may_stick.append(n)
         elif kind == "lift":
             _lift(system, z, modes, n)
@@ -328,8 +329,7 @@ def _switch(
 def _lift(system: System, z: list[float], modes: Modes, n: int) -> None:
     """Spike `n` leaves the ground; what the ground still held when it let go is lost."""
     z[LOST] += max(system.stored(n, z, modes), 0.0)
-    modes.touching = [m for m in modes.touching if m != n]
-    modes.slip[n] = 0
+    system.leave(n, z, modes)
     if not system.sheds:
         modes.top[n] = 0.0
 
@@ -337,10 +337,9 @@ def _lift(system: System, z: list[float], modes: Modes, n: int) -> None:
 def _set_by_speeds(system: System, z: list[float], modes: Modes) -> None:
     """After a forced step: who touches and which way they slide, read from the state as it is."""
     for n in range(system.trial.spike_count):
-        depth, slip = system.depth_and_slip(n, z)
-        inside = depth > system.crater * modes.top[n]
+        slip, inside = system.depth_and_slip(n, z)[1], system.inside(n, z, modes)
         if inside and n not in modes.touching:
-            modes.touch(n, depth, slip)
+            system.enter(n, z, modes)
         elif not inside and n in modes.touching:
             _lift(system, z, modes, n)
         elif n in modes.touching and modes.slip[n]:

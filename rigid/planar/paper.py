@@ -53,6 +53,8 @@ def integrate_fixed(
         if system.inner:
             z[INNER_SPEED] += time_step * rate[INNER_SPEED]
             z[INNER] += time_step * z[INNER_SPEED]
+        for i in range(system.first, system.size):
+            z[i] += time_step * rate[i]
         # The energy balance takes the speeds' mean over the step.
         mean = 0.5 * (turning + z[OMEGA])
         z[WORK] += time_step * (rate[WORK] / turning * mean if turning else system.s.torque * mean)
@@ -77,22 +79,21 @@ def _read_modes(
     stopped = []
     for n in range(trial.spike_count):
         depth, slip = system.depth_and_slip(n, z)
-        inside = depth > system.crater * max(modes.top[n], depth)
+        inside = system.inside(n, z, modes)
         if system.has_memory and depth > 0:
             modes.remember(n, depth)
         if inside and n not in modes.touching:
-            modes.touch(n, depth, slip)
+            system.enter(n, z, modes)
         elif not inside and n in modes.touching:
             z[LOST] += system.stored(n, z, modes)
-            modes.touching = [m for m in modes.touching if m != n]
-            modes.slip[n] = 0
+            system.leave(n, z, modes)
         elif inside and modes.slip[n]:
             if before.get(n, slip) * slip <= 0:
                 stopped.append(n)
             else:
                 modes.slip[n] = 1 if slip > 0 else -1
-        if system.has_memory and depth <= 0:
-            modes.top[n] = 0.0
+        if n not in modes.touching and depth + system.given_way(n, z) <= 0:
+            system.forget(n, z, modes)
     if system.inner:
         system.derivative(time, z, modes)
         if system.inner_holds < 0:

@@ -25,6 +25,7 @@ _CLOSE = 1e-13  # of the weight, and of weight x length
 _EPS = 2.0**-52
 _REST = 1e-11  # accelerations below this share of g_sim (for the rotation g_sim / l) are rounding
 _BRIM = 1e-6  # forces above their bound by less than this share hold: dry friction often ends a motion at its bound
+_STILL = 1e-12  # lengths of a spike a second: ground that gives way more slowly is at rest
 _SLOW = 1e3  # accelerations above so many tolerances of g_sim are no rest, whatever the springs
 
 
@@ -36,11 +37,11 @@ def standing(system: System) -> tuple[list[float], Modes]:
     share = 0.5 * trial.weight * s.up_y
     if share <= 0:
         raise ValueError("slope.angle leaves no weight on the surface")
-    z = [0.0] * (11 if system.inner else 9)
+    z = [0.0] * system.size
     z[WHEEL] = trial.wheel_speed_0
-    z[Y] = s.stance - _sinkage(system, share)
+    _sink(system, z, s.stance, share)
     if system.radius:
-        z[Y] = system.arms(0, z)[0] - _sinkage(system, share)
+        _sink(system, z, system.arms(0, z)[0], share)
     scale = (trial.weight, trial.weight * trial.spike_length)
     best: tuple[float, float, float] | None = None
     for _ in range(60):
@@ -95,7 +96,7 @@ def leaning(system: System, lean: float) -> tuple[list[float], Modes]:
     z, modes = standing(system)
     front = system.trial.spike_count - 1
     z[THETA] = lean
-    z[Y] = system.arms(front, z)[0] - _sinkage(system, system.trial.weight)
+    _sink(system, z, system.arms(front, z)[0], system.trial.weight)
     depths = [system.depth(n, z) for n in range(front)]
     if not (lean > 0 and max(depths) < 0):
         deeper = max(depths) * 1e6
@@ -107,6 +108,18 @@ def leaning(system: System, lean: float) -> tuple[list[float], Modes]:
     modes.top = [*([0.0] * front), system.depth(front, z)]
     modes.held = list(modes.top)
     return z, modes
+
+
+def _sink(system: System, z: list[float], over: float, load: float) -> None:
+    """Put the platform so deep that a row whose arm is `over` [m] carries `load` [N], and the ground's givings way."""
+    z[Y] = over - _sinkage(system, load) / (1.0 - system.settled_share)
+    _give_way(system, z)
+
+
+def _give_way(system: System, z: list[float]) -> None:
+    """What the ground has given way under a platform at rest: a share of each tip's depth."""
+    for n in range(system.size - system.first):
+        z[system.first + n] = system.settled_share * max(system.arms(n, z)[0] - z[Y], 0.0)
 
 
 def _why_not(system: System, what: str) -> str:
@@ -128,6 +141,7 @@ def _offset_that_tips(trial: Trial) -> str:
 def _sinkage(system: System, load: float) -> float:
     """Depth [m] at which one row carries `load` [N]."""
     system._set(0.0, [0.0] * 11)
+    system.s.given_way = 0.0
 
     def force(depth: float) -> float:
         return float(system.model.contact(system.p, system.s, system.q, depth, 0.0, 0.0, depth, depth)[0])
@@ -154,6 +168,7 @@ def _sinkage(system: System, load: float) -> float:
 
 def _residual(system: System, z: list[float], modes: Modes) -> tuple[float, float]:
     """Force along the normal [N] and moment [N m] that are left, friction holding x."""
+    _give_way(system, z)
     modes.top = [max(system.depth(n, z), 0.0) for n in range(system.trial.spike_count)]
     if system.inner:
         z[INNER] = system.inner_at_rest(z)
@@ -206,6 +221,8 @@ def _may_rest(system: System, modes: Modes) -> bool:
     if not modes.touching or any(modes.slip[n] != 0 for n in modes.touching):
         return False
     if system.model.reads("time", but="torque_factor"):
+        return False
+    if any(contact.settling > _STILL * system.s.length for contact in system.contacts):
         return False
     return modes.torque_over or not system.model.reads("time", "wheel_speed")
 

@@ -28,6 +28,13 @@ parameters, by name, in any number.
 | `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
 | `rate_pull`          | s, depth, rate, held      | the same of a term that depends on unloading, too            |
 | `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
+| `settle`             | s, depth, slip, lean      | speed at which the ground under a touching tip gives way     |
+|                      |                           | for good [m/s]; lean: sine of the spike's angle              |
+| `settled`            | s                         | share of the depth at rest that has given way at the start   |
+| `added_mass`         | depth                     | mass of ground [kg] that a tip carries along while it sinks, |
+|                      |                           | and its slope over depth [kg/m]; depth: since it touched     |
+| `wall`               |                           | slope of a crater's wall [1]; 0: a crater is forgotten once  |
+|                      |                           | the tip is above the undisturbed surface                     |
 | `friction_factor`    | s, slip                   | factors on mu_s and mu_d [1]                                 |
 | `inner_mass`         | s                         | inertia of a coordinate of the term's own; 0: it has none    |
 | `inner_start`        | s                         | that coordinate in static equilibrium, its force then is 0   |
@@ -36,6 +43,10 @@ parameters, by name, in any number.
 | `clock`              | written                   | true time [s] of a time on the IMU's clock                   |
 | `lens`               | square                    | x and y as the camera sees them over the true ones [1];      |
 |                      |                           | square: of the distance from the start [m2]                  |
+
+`settle` moves the undisturbed surface under one tip: the ground's law, and what stands on it (`crater`, `unload`,
+`hold`), read the depth below the surface that is left, depth - s.given_way; `rate_force`, `side_force` and `settle`
+get the whole depth. What gives way takes the elastic force's work with it, so it never gives energy.
 
 The four of `inner` go together and are for a term with something inside that moves: one coordinate `s.inner`, its rate
 `s.inner_speed` and one of two modes, `s.inner_mode` = 1 at the start, else 0. It is integrated beside the platform's
@@ -73,6 +84,10 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "rate_force": ("s", "depth", "rate"),
     "rate_pull": ("s", "depth", "rate", "held"),
     "side_force": ("s", "depth", "slip"),
+    "settle": ("s", "depth", "slip", "lean"),
+    "settled": ("s",),
+    "added_mass": ("depth",),
+    "wall": (),
     "friction_factor": ("s", "slip"),
     "inner_mass": ("s",),
     "inner_start": ("s",),
@@ -86,12 +101,12 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
 STATE_FIELDS = (
     "time", "x", "y", "theta", "vx", "vy", "omega", "wheel_speed", "cosine", "sine", "up_x", "up_y",
     "mass", "inertia", "length", "stance", "counterweight", "gravity", "weight", "torque",
-    "inner", "inner_speed", "inner_mode",
+    "inner", "inner_speed", "inner_mode", "given_way",
 )  # fmt: skip
 """What `s` holds, SI units: the state of the platform; cosine and sine of theta; the vertical's direction; then the
 trial's own numbers: mass, inertia, spike length, height of the centre over tips that only just touch at theta = 0,
-counterweight, gravity that pulls at the centre of mass, weight on the surface, and the torque that acts now; last the
-coordinate of a term that has one of its own."""
+counterweight, gravity that pulls at the centre of mass, weight on the surface, and the torque that acts now; then the
+coordinate of a term that has one of its own; last how far the ground under the tip in question has given way [m]."""
 
 INNER_HOOKS = ("inner_mass", "inner_start", "inner_force", "inner_holds")
 

@@ -20,6 +20,33 @@ def make_advance(parts: SimpleNamespace) -> Any:
     find_events, switch = make_events(parts)
     record, follow, enter, summarise = make_records(parts)
 
+    @ti.func
+    def remember(
+        m: ti.template(), spikes: ti.template(), dt, top: ti.template(), held: ti.template(), gone: ti.template(),
+        settling: ti.template(), c: ti.template(),
+    ):  # fmt: skip
+        """What the ground keeps of a step: deepest depths, and how far it has given way."""
+        if ti.static(parts.MEMORY or parts.SETTLES):
+            for j in ti.static(range(3)):
+                n = (m.lowest + j - 1 + parts.count) % parts.count
+                whole = spikes.depth[j]
+                if ti.static(parts.SETTLES):
+                    whole += gone[n] + dt * settling[n]
+                    gone[n] += 0.5 * dt * (settling[n] + spikes.settling[j])
+                if (m.touch & (1 << n)) != 0:
+                    if ti.static(parts.MEMORY):
+                        top[n] = ti.max(top[n], spikes.depth[j])
+                    if ti.static(parts.HOLDS):
+                        held[n] = ti.max(held[n], spikes.depth[j])
+                elif whole < 0.0:  # forgotten above the surface, unless the crater has walls
+                    if c.wall > 0.0:
+                        m.out |= 1 << n
+                    else:
+                        if ti.static(parts.MEMORY):
+                            top[n] = 0.0
+                        if ti.static(parts.SETTLES):
+                            gone[n] = 0.0
+
     @ti.kernel
     def advance(
         numbers: ti.types.ndarray(dtype=ti.f64, ndim=2),
@@ -41,6 +68,10 @@ def make_advance(parts: SimpleNamespace) -> Any:
             c = parts.trial_numbers(numbers, i, s, p)
             top = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.MEMORY else 1))])
             held = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.HOLDS else 1))])
+            # How far the ground under each tip has given way, how fast it does, and where the tip was last in it.
+            gone = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.SETTLES else 1))])
+            settling = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.SETTLES else 1))])
+            place = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.WALLS else 1))])
             y_start = poses[i, 0]
             now = parts.Motion(y=y_start, theta=poses[i, 1], wheel=numbers[i, 11])
             then = parts.Motion(y=y_start)
@@ -55,10 +86,14 @@ def make_advance(parts: SimpleNamespace) -> Any:
             )
             if c.nominal == 0.0 or c.until <= 0.0:
                 m.over = 1
-            if ti.static(parts.MEMORY):
-                for n in ti.static((0, parts.count - 1)):
-                    angle = now.theta + parts.HALF + n * parts.BETA
-                    top[n] = ti.max((s.length - c.radius) * ti.cos(angle) + c.radius - now.y, 0.0)
+            share_gone = parts.settled(p, s)
+            for n in ti.static((0, parts.count - 1)):
+                angle = now.theta + parts.HALF + n * parts.BETA
+                depth = ti.max((s.length - c.radius) * ti.cos(angle) + c.radius - now.y, 0.0)
+                if ti.static(parts.SETTLES):
+                    gone[n] = share_gone * depth
+                if ti.static(parts.MEMORY):
+                    top[n] = (1.0 - share_gone) * depth
                     if ti.static(parts.HOLDS):
                         held[n] = top[n]
             time = 0.0
@@ -110,7 +145,7 @@ def make_advance(parts: SimpleNamespace) -> Any:
                     parts.set_mass(c, p, s)
                 e = parts.Event(ahead=1.0)
                 spikes = parts.Spikes()
-                status = push_spikes(s, p, q, c, then, dt, f, m, e, spikes, top, held, status)
+                status = push_spikes(s, p, q, c, then, dt, f, m, e, spikes, top, held, gone, settling, place, status)
                 hold(s, p, c, then, f, m, hx, hy, ht, dt)
                 find_events(s, c, now, then, f, last, m, e, spikes, dt, driving, pull)
                 kind, which = e.kind, e.which
@@ -137,15 +172,10 @@ def make_advance(parts: SimpleNamespace) -> Any:
                         record(series, i, sample, share, dt, now, then, parts.state_of(m.touch, m.stick))
                         sample += 1
                     follow(t, now, then, y_start, launch)
-                    if ti.static(parts.MEMORY):
-                        for j in ti.static(range(3)):
-                            n = (m.lowest + j - 1 + parts.count) % parts.count
-                            if (m.touch & (1 << n)) != 0:
-                                top[n] = ti.max(top[n], spikes.depth[j])
-                                if ti.static(parts.HOLDS):
-                                    held[n] = ti.max(held[n], spikes.depth[j])
-                            elif spikes.depth[j] < 0.0:
-                                top[n] = 0.0  # forgotten above the surface
+                    remember(m, spikes, dt, top, held, gone, settling, c)
+                if ti.static(parts.SETTLES):
+                    for j in ti.static(range(3)):
+                        settling[(m.lowest + j - 1 + parts.count) % parts.count] = spikes.settling[j]
                 # -- accept --
                 now = then
                 last = f
@@ -155,7 +185,7 @@ def make_advance(parts: SimpleNamespace) -> Any:
                 again = False
                 if kind != 0:
                     again = True
-                    switch(kind, which, m, now, s, c, f, spikes, top, held)
+                    switch(kind, which, m, now, s, c, f, spikes, top, held, gone, place)
                 elif settle_only:
                     m.fresh = 0
                 if m.over == 0 and time >= c.until:

@@ -85,13 +85,24 @@ def make_events(parts: SimpleNamespace) -> Any:
     @ti.func
     def switch(
         kind, which, m: ti.template(), now: ti.template(), s: ti.template(), c: ti.template(), f: ti.template(),
-        spikes: ti.template(), top: ti.template(), held: ti.template(),
+        spikes: ti.template(), top: ti.template(), held: ti.template(), gone: ti.template(), place: ti.template(),
     ):  # fmt: skip
         bit = 1 << which
         newcomers = m.fresh & m.stick
         m.fresh = 0
         if kind == 1:
             m.touch |= bit
+            if ti.static(parts.WALLS):
+                angle = now.theta + parts.HALF + which * parts.BETA
+                given_way = 0.0
+                if ti.static(parts.SETTLES):
+                    given_way = gone[which]
+                x = now.x - (s.length - c.radius) * ti.sin(angle)
+                left, fall = parts.crater_left(c, m.out & bit, x, top[which], given_way, place[which])
+                top[which] *= left
+                if ti.static(parts.SETTLES):
+                    gone[which] *= left
+                m.out &= ~bit
             if ti.static(parts.HOLDS):
                 held[which] = 0.0
             reach = (s.length - c.radius) * ti.cos(now.theta + parts.HALF + which * parts.BETA) + c.radius
@@ -104,6 +115,9 @@ def make_events(parts: SimpleNamespace) -> Any:
         elif kind == 2:
             m.touch &= ~bit
             m.stick &= ~bit
+            if ti.static(parts.WALLS):
+                angle = now.theta + parts.HALF + which * parts.BETA
+                place[which] = now.x - (s.length - c.radius) * ti.sin(angle)
             if ti.static(parts.MEMORY and not parts.SHEDS):
                 top[which] = 0.0
         elif kind == 3:

@@ -17,11 +17,13 @@ def make_contacts(parts: SimpleNamespace) -> Any:
     """
     from hedgebed_taichi import ti
 
+    crater_left = parts.crater_left
+
     @ti.func
     def push_spikes(
         s: ti.template(), p: ti.template(), q: ti.template(), c: ti.template(), then: ti.template(), dt,
         f: ti.template(), m: ti.template(), e: ti.template(), spikes: ti.template(), top: ti.template(),
-        held: ti.template(), given,
+        held: ti.template(), gone: ti.template(), settling: ti.template(), place: ti.template(), given,
     ):  # fmt: skip
         status = given
         turned = then.theta + parts.HALF
@@ -39,7 +41,11 @@ def make_contacts(parts: SimpleNamespace) -> Any:
             sine = low_sin * parts.TURN_COS[j] + low_cos * parts.TURN_SIN[j]
             h, d = parts.arms(cosine, sine, s.length, c.radius)
             depth = h - then.y
+            if ti.static(parts.SETTLES):  # the depth that the ground's law reads
+                s.given_way = gone[n] + dt * settling[n]
+                depth -= s.given_way
             spikes.depth[j] = depth
+            spikes.settling[j] = 0.0
             deepest = depth
             if ti.static(parts.MEMORY):
                 deepest = ti.max(top[n], depth)
@@ -53,6 +59,19 @@ def make_contacts(parts: SimpleNamespace) -> Any:
                 elastic, lost, stored, side, factor_s, factor_d, grip = parts.contact(
                     p, s, q, at, rate, slip, ti.max(deepest, at), ti.max(since, at)
                 )
+                into = rate
+                if ti.static(parts.SETTLES):
+                    spikes.settling[j] = parts.settle(p, s, at + s.given_way, slip, d / s.length)
+                    into -= spikes.settling[j]
+                if ti.static(parts.CARRIES):
+                    if rate > 0.0:
+                        more, slope = parts.added(p, at - c.crater * deepest)
+                        c.myy += more
+                        c.myt += more * d
+                        c.mtt += more * d * d
+                        down = more * then.omega * then.omega * (h - c.radius)
+                        f.fy -= down
+                        f.ft -= down * d
                 normal = elastic + lost
                 press = ti.max(normal + grip, 0.0)
                 f.fx += side
@@ -74,13 +93,19 @@ def make_contacts(parts: SimpleNamespace) -> Any:
                 spikes.d[j] = d
                 if dt > 0.0 and depth < c.crater * deepest:  # gone since depth / (rate of leaving)
                     ago = ti.max(c.crater * deepest - depth, 0.0)
-                    share = 1.0 - ti.min(ago / ti.max(-rate * dt, 1e-300), 1.0)
+                    share = 1.0 - ti.min(ago / ti.max(-into * dt, 1e-300), 1.0)
                     parts.earlier(e, share, 2, n)
-            elif dt > 0.0 and depth > c.crater * deepest:
-                rate = -(then.vy + then.omega * d)
-                if rate > 0.0:
-                    share = 1.0 - ti.min((depth - c.crater * deepest) / (rate * dt), 1.0)
-                    parts.earlier(e, share, 1, n)
+            elif dt > 0.0:
+                bottom, steep = c.crater * deepest, 0.0
+                if ti.static(parts.WALLS):
+                    left, fall = crater_left(c, m.out & bit, then.x - d, deepest, s.given_way, place[n])
+                    bottom = left * (bottom + s.given_way) - s.given_way
+                    steep = fall * (c.crater * deepest + s.given_way)
+                if depth > bottom:
+                    rate = -(then.vy + then.omega * d) - steep * (then.vx - then.omega * h)
+                    if rate > 0.0:
+                        share = 1.0 - ti.min((depth - bottom) / (rate * dt), 1.0)
+                        parts.earlier(e, share, 1, n)
         m.touch &= near
         m.stick &= m.touch
         if ti.static(parts.count > 3):  # the fourth lowest tip

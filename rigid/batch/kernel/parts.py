@@ -29,11 +29,11 @@ _FORCES = (
 )  # fmt: skip
 """Applied force and torque; load, bound and mean arm of the spikes that stick; what holds them and what is left of it.
 Pairs of the same of the dry frictions, pulleys and bearing, are `dry_hold`, `dry_bound` and `dry_margin`."""
-_MODES = ("touch", "stick", "backwards", "fresh", "over", "lowest")
-"""Bits of the spikes that touch, stick, slide towards -x, may stick from now; whether the torque is over; the lowest
+_MODES = ("touch", "stick", "backwards", "fresh", "over", "lowest", "out")
+"""Bits of the spikes that touch, stick, slide towards -x, may stick from now, left a crater with walls (`out`); whether the torque is over; the lowest
 spike. `slide`: directions in which pulleys and bearing slide."""
 _NUMBERS = (
-    "nominal", "until", "spin_up", "braking", "mu_s", "mu_d", "radius", "crater", "mxx", "mxy", "myy", "mxt", "myt",
+    "nominal", "until", "spin_up", "braking", "mu_s", "mu_d", "radius", "crater", "kept", "wall", "mxx", "mxy", "myy", "mxt", "myt",
     "mtt", "inverse_x", "inverse_y", "inverse_t",
 )  # fmt: skip
 """A trial's torque and when it ends, the wheel's acceleration under 1 N m, friction, tips, mass matrix."""
@@ -57,6 +57,8 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     inertia, applied, dry_friction = model.inertia, model.applied, model.dry_friction
     inner_start, inner, crater_of = model.inner_start, model.inner, model.crater
     contact, arms, divide_mass = model.contact, model.contact_arms, model.divide_mass
+    settle, settled, added = model.settle, model.settled, model.added
+    plastic_share, wall_of = model.plastic_share, model.wall
     Motion, Tally, Numbers = (
         ti.types.struct(**dict.fromkeys(fields, ti.f64)) for fields in (_MOTION, _TALLY, _NUMBERS)
     )
@@ -64,10 +66,13 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     Forces = ti.types.struct(**dict.fromkeys(_FORCES, ti.f64), **pair)
     Modes = ti.types.struct(**dict.fromkeys(_MODES, ti.i32), slide=ti.types.vector(2, ti.i32))
     Event = ti.types.struct(ahead=ti.f64, kind=ti.i32, which=ti.i32)  # at this share of the step; 0: none (`events`)
-    Spikes = ti.types.struct(**dict.fromkeys(("h", "d", "depth"), ti.types.vector(3, ti.f64)))
+    Spikes = ti.types.struct(**dict.fromkeys(("h", "d", "depth", "settling"), ti.types.vector(3, ti.f64)))
     MEMORY = model.has_memory
     SHEDS = model.law.has_memory or model.has("crater", "unload")
     HOLDS = model.has("hold", "rate_pull")
+    SETTLES = model.settles
+    CARRIES = model.has("added_mass")
+    WALLS = model.has("wall")
     DRY = model.has("vertical_friction", "rotation_friction")
     INNER = model.has("inner_mass")
     BETA = 2 * math.pi / count
@@ -75,7 +80,7 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     TURN_COS = [math.cos(k * BETA) for k in (-1, 0, 1)]
     TURN_SIN = [math.sin(k * BETA) for k in (-1, 0, 1)]
     TWICE_COS, TWICE_SIN = math.cos(2 * BETA), math.sin(2 * BETA)
-    DIAGONAL = not model.has("mass", "up")  # then the mass matrix is the base model's, constant and diagonal
+    DIAGONAL = not model.has("mass", "up", "added_mass")  # then the mass matrix is the base model's, constant and diagonal
     SINE = [(-1) ** k / math.factorial(2 * k + 1) for k in range(8)]
     COSINE = [(-1) ** k / math.factorial(2 * k) for k in range(9)]
     NAN = math.nan
@@ -111,6 +116,20 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
             e.ahead, e.kind, e.which = share, kind, which
 
     @ti.func
+    def crater_left(c: ti.template(), out, x, deepest, given_way, place):
+        """As `System._crater_left` has it: what is left of a crater at x, and its slope."""
+        share, slope = 1.0, 0.0
+        bottom = c.kept * deepest + given_way
+        if out != 0 and bottom > 0.0:
+            share = 1.0 - c.wall * ti.abs(x - place) / bottom
+            slope = -c.wall / bottom
+            if x < place:
+                slope = -slope
+            if share <= 0.0:
+                share, slope = 0.0, 0.0
+        return share, slope
+
+    @ti.func
     def state_of(touch, stick):
         state = 3
         if touch != 0:
@@ -136,6 +155,8 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
             c.braking = 1.0
         c.radius = tip_radius(p)
         c.crater = crater_of(p)
+        c.kept = ti.max(c.crater, plastic_share(p))
+        c.wall = wall_of(p)
         set_mass(c, p, s)
         c.inverse_x, c.inverse_y, c.inverse_t = 1.0 / c.mxx, 1.0 / c.myy, 1.0 / c.mtt
         return c

@@ -33,9 +33,10 @@ def make_stand(parts: SimpleNamespace) -> Any:
                     low = middle
                 else:
                     high = middle
-            y = (s.length - radius) * ti.cos(parts.HALF) + radius - high
+            left = 1.0 - parts.settled(p, s)  # of the depth: the rest has given way
+            y = (s.length - radius) * ti.cos(parts.HALF) + radius - high / left
             theta = 0.0
-            depth = high
+            depth = high / left
             error = 1e300
             best_y, best_theta, best, friction, bound = y, theta, 1e300, 0.0, 0.0
             sound = high < 0.999 * s.length
@@ -59,7 +60,7 @@ def make_stand(parts: SimpleNamespace) -> Any:
                         angle = at_theta + parts.HALF * (1.0 - 2.0 * side_of)
                         h, d = parts.arms(ti.cos(angle), ti.sin(angle), s.length, radius)
                         z = h - at_y
-                        in_z = ti.max(z, 1e-300)
+                        in_z = ti.max(left * z, 1e-300)
                         elastic, lost, stored, side, factor_s, factor_d, grip = parts.contact(
                             p, s, q, in_z, 0.0, 0.0, in_z, in_z
                         )

@@ -19,6 +19,14 @@ def inertial_side_force(s, depth, slip, sideways):
     return -sideways * abs(slip) * slip
 
 
+def carried_along(depth, normal, power, added):
+    """a b z of mass, its slope a b: the ground that moves with the tip; its momentum's change takes a b v^2 of force."""
+    slope = 0.0
+    if power == 2.0:
+        slope = added * normal
+    return slope * max(depth, 0.0), slope
+
+
 TERM = Term(
     rank=120, id="inertial-drag", summary="force of the square of the tip's speed", acts="normal and tangential force",
     parameters=(
@@ -27,10 +35,16 @@ TERM = Term(
         Parameter("power", "1", 2.0,
                   "of the speed of going in; where it is not 2, b is the force at 1 m/s over (1 m/s)^2", lowest=1.0,
                   highest=3.0, visible=(1.0, 3.0)),
+        Parameter("added", "1", 0.0,
+                  "a: share of b that is mass carried along, a b z at the depth z since the tip touched; only with a "
+                  "power of 2", lowest=0.0, highest=1.0, visible=(0.0, 1.0)),
     ),
-    source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains",
-    limits="b does not grow with depth",
-    hooks={"rate_force": inertial_rate_force, "side_force": inertial_side_force},
+    source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains. Ground that solidifies under a "
+           "foot moves with it, an added mass that grows with depth: F = d(m_a v)/dt (Aguilar and Goldman, Nature Physics "
+           "12 (2016), 278, arXiv 1512.05762)",
+    limits="b does not grow with depth; the added mass is left behind where the tip stops; friction does not see the part "
+           "of the force that goes with the acceleration",
+    hooks={"rate_force": inertial_rate_force, "side_force": inertial_side_force, "added_mass": carried_along},
 )  # fmt: skip
 
 
@@ -40,6 +54,7 @@ def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
     power = fit.prior("power", "1", 0.3, 0.2, 0.01, -1.0, 1.0, typical=2.0)
     return (
         fit.Form("normal", (normal,), ((1.0,), (20.0,))),
+        fit.Form("with the mass that it carries", (normal, fit.fixed("added", 1.0)), ((1.0,), (20.0,))),
         fit.Form("both", (normal, sideways), ((1.0, 0.3), (10.0, 2.0))),
         fit.Form("any power", (normal, sideways, power), ((1.0, 0.3 * 1.0, 0.0), (10.0, 0.3 * 10.0, 0.0))),
     )
@@ -69,7 +84,7 @@ CANDIDATE = fit.Candidate(
     tumble=fit.Tumble(
         rank=60, forms=forms,
         equation="+ normal * rate^power while a tip goes in (power 2 where it is not named), - sideways * u * abs(u) "
-                 "while it slides at u",
+                 "while it slides at u; with added = 1 the ground's mass normal * z moves with the tip while it goes in",
         bench="drop one spike onto the surface at two speeds",
     ),
     push=fit.Push(

@@ -6,6 +6,9 @@ from rigid.terms import candidate as fit
 from rigid.terms.term import Parameter, Term
 
 
+REPOSE = 0.64  # slope at which sand stands, tan(32.5 degrees)
+
+
 def crater_share(share):
     """Unloading follows the loading curve compressed into the last 1 - f of the depth."""
     return share
@@ -14,6 +17,11 @@ def crater_share(share):
 def open_crater(open):
     """Whether a tip above the bottom of its crater counts as touching, although nothing carries it [0 or 1]."""
     return open
+
+
+def crater_wall(wall):
+    """The crater stays where it is; its walls rise by this much a metre sideways, from its deepest point."""
+    return wall
 
 
 def bent_unloading(depth, top, force, share, bend):
@@ -35,12 +43,18 @@ TERM = Term(
         Parameter("open", "1", 0.0,
                   "1: a tip in its crater still touches, without a load, until it is above the undisturbed surface "
                   "(the torque acts, the damper too); 0: it touches the crater's bottom", lowest=0.0, highest=1.0),
+        Parameter("wall", "1", 0.0,
+                  "slope of the crater's walls: a tip that comes back to the place finds its crater, less deep by the "
+                  "slope times the distance; 0: the crater is forgotten above the undisturbed surface", lowest=0.0,
+                  highest=3.0, visible=(0.3, 1.0)),
     ),
     source="elastic-plastic unloading as in Walton and Braun 1986, with the unloading curve similar to the loading "
-           "(bend = 0); the bend and the open crater are ours",
-    limits="a spike forgets its crater when its tip leaves the undisturbed surface; the way back in is the way "
-           "out; no bend and no open crater on laws whose unloading has a curve of its own",
-    hooks={"crater": crater_share, "hollow": open_crater, "unload": bent_unloading},
+           "(bend = 0); loading again along the line of unloading, then along the curve of loading, as in Wong's repetitive "
+           "loading (Wong 2008, Theory of Ground Vehicles, section 2.4); the walls of a crater in sand stand at the angle "
+           "of repose, a slope of 0.6 to 0.67 for 31 to 34 degrees; the bend and the open crater are ours",
+    limits="each spike knows its own last crater, the others' never; with wall = 0 it forgets it when its tip leaves the "
+           "undisturbed surface; the way back in is the way out; no bend and no open crater on laws whose unloading has a curve of its own",
+    hooks={"crater": crater_share, "hollow": open_crater, "unload": bent_unloading, "wall": crater_wall},
 )  # fmt: skip
 
 
@@ -53,6 +67,7 @@ def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
         fit.Form("share", (share,), shares),
         fit.Form("bent way back", (share, bend), ((0.05, 0.3), (0.15, 0.3), (0.5, 0.3), (0.85, 0.3))),
         fit.Form("open crater", (share, fit.fixed("open", 1.0)), shares),
+        fit.Form("crater with walls", (share, fit.fixed("wall", REPOSE)), shares),
     )
 
 
@@ -97,7 +112,8 @@ CANDIDATE = fit.Candidate(
         rank=80, forms=forms,
         equation="on the way back the law's force at (z - share * z_m) / (1 - share), times (that over z_m)^a, "
                  "a = bend * (1 - exp(-20 * share)); z_m the deepest depth since it touched; with open = 1 a tip above "
-                 "the bottom of its crater still touches: the torque and the damper act",
+                 "the bottom of its crater still touches: the torque and the damper act; with wall > 0 a tip that left the ground finds its crater again, "
+                 "its depth less wall * the distance from where the tip left it",
         bench="press one spike in and lift it again, and see how deep the mark is",
     ),
     push=fit.Push(

@@ -306,6 +306,7 @@ def test_the_energy_of_any_effect_changes_by_the_work_done_and_the_power_lost(id
         modes = Modes(touching=[0, 7], slip=[1 if n == 0 else -1 for n in range(8)], top=[TOP] * 8)
         modes.dry = [-1 if sinking else 1, 1 if state[5] > 0 else -1]  # dry frictions slide
         z = [*state[:6], 50.0, 0.0, 0.0, *state[6:]]
+        z += [1e-3 * (1 + n) for n in range(system.size - system.first)]  # how far the ground has given way
         system.derivative(0.1, z, modes)
         modes.inner = 1 if system.inner_holds > 0 else 0
         rate, step = np.array(system.derivative(0.1, z, modes)), 1e-6

@@ -1,0 +1,59 @@
+"""The ground's force falls with the logarithm of time while a tip rests in it."""
+
+from math import exp, log
+
+from rigid.terms import candidate as fit
+from rigid.terms.term import Parameter, Term
+
+SOON = 0.05  # [s]
+
+
+def creeping(s, depth, slip, lean, share, soon):
+    """c z / tau exp(-e / (c z)): at a constant depth z the ground gives way by e = c z ln(1 + t / tau)."""
+    speed = 0.0
+    if share > 0.0:
+        size = share * max(depth, 1e-12)
+        speed = size / soon * exp(-s.given_way / size)
+    return speed
+
+
+def stood_still(s, share, soon, stood):
+    """c ln(1 + T / tau), the share of the depth after a rest of T."""
+    return share * log(1.0 + stood / soon)
+
+
+TERM = Term(
+    rank=136, id="relaxation", summary="the ground's force falls with the logarithm of time at rest",
+    acts="the ground's law, with memory",
+    parameters=(
+        Parameter("share", "1", 0.0, "c: of the force, lost for each factor of e in time", lowest=0.0, highest=0.08,
+                  visible=(0.005, 0.05)),
+        Parameter("soon", "s", SOON, "tau: time before which nothing is lost", lowest=5e-3, visible=(0.02, 0.2)),
+        Parameter("stood", "s", 60.0, "T: how long the platform has stood before t = 0", lowest=0.0, highest=600.0),
+    ),
+    source="stress of packed grains falls with the logarithm of time at a constant strain (Brujic et al. 2005; Miksic "
+           "and Alava 2013, Phys. Rev. E 88:032207); a rate process whose speed falls exponentially with what it has "
+           "released gives that law",
+    limits="one rate for all loads; what has given way comes back only by sinking further; while a tip goes in fast "
+           "nothing has time to give way, so that the force also depends on the logarithm of the speed",
+    hooks={"settle": creeping, "settled": stood_still},
+)  # fmt: skip
+
+
+def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
+    """A share of the force a factor of e in time, from a time on."""
+    numbers = (fit.free("share", "1", 0.005, 0.0, 0.08), fit.logarithm("soon", SOON, lowest=-2.0))
+    return (fit.Form("logarithmic", numbers, ((0.01, 0.0), (0.04, 0.0), (0.03, 1.5))),)
+
+
+CANDIDATE = fit.Candidate(
+    meaning="the ground's force falls with time while the tip rests in it",
+    confirm="push one spike in, hold it for a minute and read the force: it should fall by equal steps for equal factors "
+            "of time",
+    tumble=fit.Tumble(
+        forms=forms,
+        equation="the law reads z - e of the depth z; e grows at share * z / soon * exp(-e / (share * z)), which is "
+                 "e = share * z * ln(1 + t / soon) at rest",
+        bench="push one spike in, hold it for a minute and read the force",
+    ),
+)  # fmt: skip
