@@ -30,11 +30,11 @@ _FORCES = (
 """Applied force and torque; load, bound and mean arm of the spikes that stick; what holds them and what is left of it.
 Pairs of the same of the dry frictions, pulleys and bearing, are `dry_hold`, `dry_bound` and `dry_margin`."""
 _MODES = ("touch", "stick", "backwards", "fresh", "over", "lowest", "out")
-"""Bits of the spikes that touch, stick, slide towards -x, may stick from now, left a crater with walls (`out`); whether the torque is over; the lowest
-spike. `slide`: directions in which pulleys and bearing slide."""
+"""Bits of the spikes that touch, stick, slide towards -x, may stick from now, left a crater with walls (`out`); whether
+the torque is over; the lowest spike. `slide`: directions in which pulleys and bearing slide."""
 _NUMBERS = (
-    "nominal", "until", "spin_up", "braking", "mu_s", "mu_d", "radius", "crater", "kept", "wall", "mxx", "mxy", "myy", "mxt", "myt",
-    "mtt", "inverse_x", "inverse_y", "inverse_t",
+    "nominal", "until", "spin_up", "braking", "mu_s", "mu_d", "radius", "crater", "kept", "wall",
+    "mxx", "mxy", "myy", "mxt", "myt", "mtt", "inverse_x", "inverse_y", "inverse_t",
 )  # fmt: skip
 """A trial's torque and when it ends, the wheel's acceleration under 1 N m, friction, tips, mass matrix."""
 _TALLY = (
@@ -80,7 +80,7 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     TURN_COS = [math.cos(k * BETA) for k in (-1, 0, 1)]
     TURN_SIN = [math.sin(k * BETA) for k in (-1, 0, 1)]
     TWICE_COS, TWICE_SIN = math.cos(2 * BETA), math.sin(2 * BETA)
-    DIAGONAL = not model.has("mass", "up", "added_mass")  # then the mass matrix is the base model's, constant and diagonal
+    DIAGONAL = not model.has("mass", "up", "added_mass")  # then the mass matrix is constant and diagonal
     SINE = [(-1) ** k / math.factorial(2 * k + 1) for k in range(8)]
     COSINE = [(-1) ** k / math.factorial(2 * k) for k in range(9)]
     NAN = math.nan

@@ -20,7 +20,7 @@ def inertial_side_force(s, depth, slip, sideways):
 
 
 def carried_along(depth, normal, power, added):
-    """a b z of mass, its slope a b: the ground that moves with the tip; its momentum's change takes a b v^2 of force."""
+    """a b z of mass that moves with the tip, and its slope a b: taking it along needs a b v^2 of the force."""
     slope = 0.0
     if power == 2.0:
         slope = added * normal
@@ -39,11 +39,11 @@ TERM = Term(
                   "a: share of b that is mass carried along, a b z at the depth z since the tip touched; only with a "
                   "power of 2", lowest=0.0, highest=1.0, visible=(0.0, 1.0)),
     ),
-    source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains. Ground that solidifies under a "
-           "foot moves with it, an added mass that grows with depth: F = d(m_a v)/dt (Aguilar and Goldman, Nature Physics "
-           "12 (2016), 278, arXiv 1512.05762)",
-    limits="b does not grow with depth; the added mass is left behind where the tip stops; friction does not see the part "
-           "of the force that goes with the acceleration",
+    source="Katsuragi and Durian, Nature Physics 3 (2007), 420: the inertia of displaced grains. Ground that "
+           "solidifies under a foot moves with it, an added mass that grows with depth: F = d(m_a v)/dt (Aguilar and "
+           "Goldman, Nature Physics 12 (2016), 278, arXiv 1512.05762)",
+    limits="b does not grow with depth; the added mass stays behind where the tip stops; friction does not see the "
+           "part of the force that goes with the acceleration",
     hooks={"rate_force": inertial_rate_force, "side_force": inertial_side_force, "added_mass": carried_along},
 )  # fmt: skip
 
@@ -84,7 +84,7 @@ CANDIDATE = fit.Candidate(
     tumble=fit.Tumble(
         rank=60, forms=forms,
         equation="+ normal * rate^power while a tip goes in (power 2 where it is not named), - sideways * u * abs(u) "
-                 "while it slides at u; with added = 1 the ground's mass normal * z moves with the tip while it goes in",
+                 "while it slides at u; with added = 1 a mass normal * z of ground moves with the tip while it goes in",
         bench="drop one spike onto the surface at two speeds",
     ),
     push=fit.Push(

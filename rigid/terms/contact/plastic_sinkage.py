@@ -5,7 +5,6 @@ from math import exp
 from rigid.terms import candidate as fit
 from rigid.terms.term import Parameter, Term
 
-
 REPOSE = 0.64  # slope at which sand stands, tan(32.5 degrees)
 
 
@@ -49,11 +48,12 @@ TERM = Term(
                   highest=3.0, visible=(0.3, 1.0)),
     ),
     source="elastic-plastic unloading as in Walton and Braun 1986, with the unloading curve similar to the loading "
-           "(bend = 0); loading again along the line of unloading, then along the curve of loading, as in Wong's repetitive "
-           "loading (Wong 2008, Theory of Ground Vehicles, section 2.4); the walls of a crater in sand stand at the angle "
+           "(bend = 0); loading again follows the line of unloading, then the curve of loading, as in repetitive "
+           "loading (Wong 2008, Theory of Ground Vehicles, section 2.4); a crater's walls in sand stand at the angle "
            "of repose, a slope of 0.6 to 0.67 for 31 to 34 degrees; the bend and the open crater are ours",
-    limits="each spike knows its own last crater, the others' never; with wall = 0 it forgets it when its tip leaves the "
-           "undisturbed surface; the way back in is the way out; no bend and no open crater on laws whose unloading has a curve of its own",
+    limits="a spike finds its own last crater only, never another spike's; with wall = 0 it forgets it when its tip "
+           "leaves the undisturbed surface; the way back in is the way out; no bend and no open crater on laws whose "
+           "unloading has a curve of its own",
     hooks={"crater": crater_share, "hollow": open_crater, "unload": bent_unloading, "wall": crater_wall},
 )  # fmt: skip
 
@@ -112,8 +112,8 @@ CANDIDATE = fit.Candidate(
         rank=80, forms=forms,
         equation="on the way back the law's force at (z - share * z_m) / (1 - share), times (that over z_m)^a, "
                  "a = bend * (1 - exp(-20 * share)); z_m the deepest depth since it touched; with open = 1 a tip above "
-                 "the bottom of its crater still touches: the torque and the damper act; with wall > 0 a tip that left the ground finds its crater again, "
-                 "its depth less wall * the distance from where the tip left it",
+                 "the bottom of its crater still touches: the torque and the damper act; with wall > 0 a tip that left "
+                 "the ground finds its crater again, its depth less wall * the distance from where the tip left it",
         bench="press one spike in and lift it again, and see how deep the mark is",
     ),
     push=fit.Push(

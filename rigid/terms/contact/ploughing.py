@@ -25,10 +25,10 @@ TERM = Term(
         Parameter("reference", "m", 0.01, "h_0: the depth at which the power changes nothing", lowest=0.0,
                   above_lowest=True),
     ),
-    source="passive earth pressure on a narrow blade goes with the depth squared (Hegedus 1960, A simplified method for "
-           "the determination of bulldozing resistance; McKyes 1985, Soil Cutting and Tillage). A short pile carries "
-           "1.5 K_p rho g d h^2 sideways (Broms 1964, J. Soil Mech. Found. Div. 90(SM3):123): 670 N/m2 for K_p = 2.46, "
-           "1540 kg/m3, d = 12 mm, twice that for a row of two spikes",
+    source="passive earth pressure on a narrow blade goes with the depth squared (Hegedus 1960, A simplified method "
+           "for the determination of bulldozing resistance; McKyes 1985, Soil Cutting and Tillage). A short pile "
+           "carries 1.5 K_p rho g d h^2 sideways (Broms 1964, J. Soil Mech. Found. Div. 90(SM3):123): 670 N/m2 for "
+           "K_p = 2.46, 1540 kg/m3, d = 12 mm, twice that for a row of two spikes",
     limits="no heap ahead and no furrow of rows before; the force needed to start the motion is mobilised with the "
            "speed w, so that a spike that sticks has none",
     hooks={"side_force": ploughed},
@@ -36,7 +36,8 @@ TERM = Term(
 
 CANDIDATE = Candidate(
     meaning="the ground ahead of a spike resists by more than friction",
-    confirm="drag one spike sideways at two depths: the force beyond friction grows about fourfold when the depth doubles",
+    confirm="drag one spike sideways at two depths: at twice the depth the force beyond friction is about four times "
+            "as large",
     tumble=Tumble(
         forms=lambda t: (
             Form("by depth squared",

@@ -48,8 +48,8 @@ def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
 
 CANDIDATE = fit.Candidate(
     meaning="the ground's force falls with time while the tip rests in it",
-    confirm="push one spike in, hold it for a minute and read the force: it should fall by equal steps for equal factors "
-            "of time",
+    confirm="push one spike in, hold it for a minute and read the force: it should fall by equal steps for equal "
+            "factors of time",
     tumble=fit.Tumble(
         forms=forms,
         equation="the law reads z - e of the depth z; e grows at share * z / soon * exp(-e / (share * z)), which is "

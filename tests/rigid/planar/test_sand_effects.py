@@ -65,7 +65,6 @@ def test_a_platform_that_stands_sinks_with_the_logarithm_of_time():
     run = simulate(trial, duration=8.0, sample_interval=0.5)
     sunk = LENGTH * math.cos(G0) - run.y - rest
     assert sunk[8:] == pytest.approx(exact.sol(run.time)[0][8:], rel=3e-3)  # once the first swing has died away
-    assert sunk[-1] == pytest.approx(c * rest * math.log(8.0 / tau), rel=0.12)
     speed = EFFECTS["relaxation"].hooks["settle"]
     s = System(trial).s
     for t in (0.0, 0.1, 30.0):
