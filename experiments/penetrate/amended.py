@@ -24,7 +24,7 @@ from experiments.campaign.files import MODEL_COPY, keep_model
 from experiments.campaign.tables import EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
-from experiments.diagnose.push.law import PHASES, SLOTS, fall, push, slot_places, slot_table
+from experiments.diagnose.push.law import PHASES, SLOTS, fall, given_way, push, slot_places, slot_table
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantities_of
@@ -61,7 +61,7 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
     model = read_model(path)
     if not isinstance(model, PenetrationModel):
         raise ValueError(f"{path}: kind = {model.kind!r}: 'penetration' was expected")
-    forms = push_forms(retreats=True, speeds_differ=True)
+    forms = push_forms(retreats=True, speeds_differ=True, drops=True)
     numbers = [form.numbers for form in forms] + [bend.numbers for form in forms for bend in form.bends]
     known = {number.name: number.how for several in numbers for number in several}  # how each scales with the diameter
     own: list[OwnEffect] = []
@@ -197,7 +197,7 @@ class AmendedLaw:
         lane, path = np.zeros(1, np.int32), np.array([0, len(like.time)], dtype=np.int32)
         if unit.kind == "driven":
             numbers = self.numbers(speed=float(np.abs(like.velocity).max()))
-            (force,) = push(numbers, lane, path, like.depth, like.velocity, self.own)
+            (force,) = push(numbers, lane, path, like.depth, like.velocity, self.own, like.time)
             return replace(like, force=force)
         if unit.kind == "drop":
             numbers = self.numbers(speed=unit.speed)
@@ -231,7 +231,7 @@ class AmendedGround:
         """The step it is to be driven at [s]."""
         self._own = law.own
         self._numbers = law.numbers(speed=speed, creep=_CREEP)
-        self._top = self._ever = 0.0
+        self._top = self._ever = self._gone = 0.0
 
     def describe(self) -> Json:
         """What it is, in plain numbers."""
@@ -245,18 +245,21 @@ class AmendedGround:
         depth = np.array([self._ever, 0.0, self._top, middle])
         speed = np.array([0.0, 0.0, 0.0, sinking])
         lane, path = np.zeros(1, np.int32), np.array([0, 4], np.int32)
+        if middle > 0:
+            self._numbers[0, _SLOT["given_way"]] = given_way(self._numbers[0], self._gone, middle, 0.5 * dt)
         force = float(push(self._numbers, lane, path, depth, speed, self._own)[0, 3])
         self._top = max(self._top, start, end) if end > 0 else 0.0
         self._ever = max(self._ever, end, 0.0)
+        self._gone = given_way(self._numbers[0], self._gone, middle, dt) if end > 0 else 0.0
         return Reaction(np.array([0.0, 0.0, force]), np.zeros(3))
 
     def state(self) -> Json:
         """What it remembers."""
-        return {"top": np.array(self._top), "ever": np.array(self._ever)}
+        return {"top": np.array(self._top), "ever": np.array(self._ever), "given_way": np.array(self._gone)}
 
     def restore(self, state: Json) -> None:
         """Take back what `state` gave."""
-        self._top, self._ever = float(state["top"]), float(state["ever"])
+        self._top, self._ever, self._gone = (float(state[name]) for name in ("top", "ever", "given_way"))
 
 
 Runs = Mapping[str, Penetration]

@@ -51,7 +51,7 @@ class Form:
     numbers: tuple[Number, ...]
     starts: Starts  # Values of the fitted numbers to begin fits from, in their order
     equation: str = ""  # Of pushes; tumbles have one an effect
-    needs: str = ""  # Of pushes: ``retreats`` or ``speeds``, what trials must show for it to be a candidate
+    needs: str = ""  # Of pushes: ``retreats``, ``speeds`` or ``drops``, what trials must show for it to be a candidate
     form_std: float = 0.0  # How far nature's amplitude may differ from the form's, relative
     redefines: tuple[str, ...] = ()  # Base parameters that mean another thing beside this form
 
@@ -119,10 +119,13 @@ class Push:
     | `damper`  | spring                                        | factor on the damper [1]                        |
     | `force`   | z, v, x, way, share, most, ever, radius_depth | force to add [N]                                |
     | `pull`    | the same                                      | force to subtract [N]                           |
+    | `settle`  | gone, z, span                                 | `gone` [m] after `span` [s] more in the bed     |
+    | `mass`    | z, x, reference                               | mass [kg] carried along while a drop sinks      |
 
     `grown`: the force so far; `x` = z / D; `at`: depth at which the loading curve is read; `most` and `ever`: deepest
     depth since it entered, and of all; `way`: direction of the motion, -1 to 1; `share`: of a friction that takes a
-    distance to turn round, -1 to 1; `radius_depth`: at which the tip is wholly in; `reference`: D. Depths in m, speeds
+    distance to turn round, -1 to 1; `gone`: how far the bed has given way for good, which the loading curve is read
+    short of; `radius_depth`: at which the tip is wholly in; `reference`: D. Depths in m, speeds
     in m/s, downwards.
     """
 

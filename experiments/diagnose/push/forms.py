@@ -26,13 +26,13 @@ class Scales:
     force: float  # K D [N] at the stiffness of campaign.toml, or fitted where that is free
 
 
-def push_forms(*, retreats: bool, speeds_differ: bool, own: Sequence[OwnEffect] = ()) -> tuple[Form, ...]:
+def push_forms(*, retreats: bool, speeds_differ: bool, drops: bool, own: Sequence[OwnEffect] = ()) -> tuple[Form, ...]:
     """The forms that a campaign can show, with those of effects from files.
 
     `retreats`: some trial comes back out, without which nothing that acts on the way out can be seen.
-    `speeds_differ`: the speed changes by more than 5 % within or between trials.
+    `drops`: some trial is a drop. `speeds_differ`: the speed changes by more than 5 % within or between trials.
     """
-    shown = {"": True, "retreats": retreats, "speeds": speeds_differ}
+    shown = {"": True, "retreats": retreats, "speeds": speeds_differ, "drops": drops}
     library = [(found.push.rank, id, found.push) for id, found in CANDIDATES.items() if found.push is not None]
 
     def of(id: str, push: Push) -> list[Form]:
@@ -53,10 +53,10 @@ def _of_term(own: OwnEffect) -> Form:
 def physical(slot: Number, value: float, scales: Scales, *, stiffness: float, size: float) -> float:
     """What the law's slot gets: `stiffness` [N/m] is this diameter's K, `size` its diameter over the campaign's.
 
-    How it follows from the value (`Number.how`): ``plain``, ``depth`` (D e^value), ``speed`` (V e^value), ``spring``
-    (K, of this diameter), ``spring force`` (K D, of this diameter), ``area`` (force by d^2), ``drag`` (force over
-    speed^2 by d^2), ``perimeter`` (force by d), ``viscous`` (force over speed by d), ``same`` and ``change`` (of a term
-    from a file: in its own unit).
+    How it follows from the value (`Number.how`): ``plain``, ``depth`` (D e^value), ``speed`` (V e^value), ``time``
+    (e^value s), ``spring`` (K, of this diameter), ``spring force`` (K D, of this diameter), ``area`` (force by d^2),
+    ``drag`` (force over speed^2 by d^2), ``perimeter`` (force by d), ``viscous`` (force over speed by d), ``same`` and
+    ``change`` (of a term from a file: in its own unit).
     """
     if slot.how in ("plain", "same"):
         return value
@@ -64,6 +64,8 @@ def physical(slot: Number, value: float, scales: Scales, *, stiffness: float, si
         return value + slot.typical
     if slot.how == "depth":
         return scales.depth * math.exp(value)
+    if slot.how == "time":
+        return math.exp(value)
     if slot.how == "speed":
         return scales.speed * math.exp(value)
     if slot.how == "spring":
@@ -74,7 +76,7 @@ def physical(slot: Number, value: float, scales: Scales, *, stiffness: float, si
     return value * scales.force * factor[slot.how]
 
 
-_UNITS = {"depth": "m", "speed": "m/s", "spring": "N/m", "spring force": "N", "area": "N", "drag": "kg/m",
+_UNITS = {"depth": "m", "speed": "m/s", "time": "s", "spring": "N/m", "spring force": "N", "area": "N", "drag": "kg/m",
           "perimeter": "N", "viscous": "N s/m"}  # fmt: skip
 
 

@@ -33,12 +33,13 @@ from rigid.model.model import for_taichi
 from rigid.terms import CANDIDATES, FIXED_ARGUMENTS, STATE_FIELDS, Term
 from rigid.terms.candidate import Push
 
-__all__ = ["PHASES", "SLOTS", "fall", "push", "slot_places", "slot_table"]
+__all__ = ["PHASES", "SLOTS", "fall", "given_way", "push", "slot_places", "slot_table"]
 
 _HERE = ("z", "v", "x", "way", "share", "most", "ever", "reference", "radius_depth")
 _VALUES: Mapping[str, tuple[str, ...]] = {
     "loading": ("grown", "depth", "x"), "unload": ("at", "stiff", "bent", "z", "ever", "stiffness"),
-    "damper": ("factor", "spring"), "force": ("total", *_HERE), "pull": ("total", *_HERE),
+    "damper": ("factor", "spring"), "settle": ("gone", "z", "span"), "mass": ("z", "x", "reference"),
+    "force": ("total", *_HERE), "pull": ("total", *_HERE),
 }  # fmt: skip
 """What each hook of `Push.law` may ask for beside its effect's slots."""
 
@@ -56,10 +57,12 @@ _LIBRARY = tuple(
 SLOTS = (
     "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
     *(slot for effect in _LIBRARY for slot in _slots_of(effect)), "shift_depth", "shift_row", "shift_speed",
+    "given_way",
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
 direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
-depth of each row alone, all that came before it as it was)."""
+depth of each row alone, all that came before it as it was); `given_way`: what a bed has given way before the first
+row."""
 PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
@@ -98,19 +101,21 @@ def slot_table(count: int, own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]
 
 
 def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
-         depth: NDArray[np.float64], speed: NDArray[np.float64],
-         own: tuple[OwnEffect, ...] = ()) -> NDArray[np.float64]:  # fmt: skip
+         depth: NDArray[np.float64], speed: NDArray[np.float64], own: tuple[OwnEffect, ...] = (),
+         times: NDArray[np.float64] | None = None) -> NDArray[np.float64]:  # fmt: skip
     """Forces [N] of driven spikes along given paths, shape [lane_count, longest path]; 0 beyond a path's end.
 
     `numbers`: shape [lane_count, slot_count]. `lane_path`: which path a lane follows, shape [lane_count]. `starts`:
     first row of each path and the row after the last, shape [path_count + 1]. `depth`, `speed`: the paths [m, m/s], one
-    after another. `own`: effects from files, whose parameters `numbers` holds.
+    after another. `own`: effects from files, whose parameters `numbers` holds. `times`: of the paths [s]; without
+    them no time passes, so that nothing gives way.
     """
     ensure()
     longest = int(np.diff(starts).max())
     out = np.zeros((len(numbers), longest))
     kernel = _kernels(tuple((effect.term, effect.push) for effect in own))[0]
-    kernel(np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), depth, speed, out)
+    times = np.zeros(len(depth)) if times is None else times
+    kernel(np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), times, depth, speed, out)
     return out
 
 
@@ -134,6 +139,17 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
         np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), times, speeds, steps, out
     )
     return out
+
+
+def given_way(lane: NDArray[np.float64], gone: float, depth: float, span: float) -> float:
+    """How far the bed has given way [m] after `span` [s] more at `depth` [m], by the library's effects; `lane`: its
+    numbers, shape [slot_count]."""
+    for effect in _LIBRARY:
+        if "settle" in effect.law:
+            hook = effect.law["settle"]
+            asked = list(inspect.signature(hook).parameters)[len(_VALUES["settle"]) :]
+            gone = float(hook(gone, depth, span, *(float(lane[_SLOT[name]]) for name in asked)))
+    return gone
 
 
 _Own = tuple[tuple[Term, Push | None], ...]
@@ -191,6 +207,10 @@ def _changes(own: _Own) -> list[Any]:
              "return at, stiff, bent"],
         f"damper_changed(spring, {n})":
             ["factor = 1.0", *(f"factor = factor * {call}" for call in calls["damper"]), "return factor"],
+        f"settled(before, z, span, {n})":
+            ["gone = before", *(f"gone = {call}" for call in calls["settle"]), "return gone"],
+        f"mass_changed(z, x, reference, {n})":
+            ["total = 0.0", *(f"total = total + {call}" for call in calls["mass"]), "return total"],
         f"force_changed(before, {', '.join(_HERE)}, {n})":
             ["total = before", *(f"total = total + {call}" for call in calls["force"]),
              *(f"total = total - {call}" for call in calls["pull"]), "return total"],
@@ -199,12 +219,15 @@ def _changes(own: _Own) -> list[Any]:
     }, hooks, "of the library" + "".join(f"+{term.id}" for term, _ in own))  # fmt: skip
 
 
-def _functions(own: _Own) -> tuple[Any, Any]:
-    """The force on a spike, and the share of its bound that a friction has which takes a way to turn round."""
+def _functions(own: _Own) -> tuple[Any, Any, Any, Any]:
+    """The force on a spike; the share of its bound that a friction has which takes a way to turn round; how far the bed
+    has given way after a time; the mass that a spike carries along, over its own."""
     from hedgebed_taichi import ti
 
     State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
-    loading_changed, unload_changed, damper_changed, force_changed, own_spring, own_force = _changes(own)
+    loading_changed, unload_changed, damper_changed, settled, mass_changed, force_changed, own_spring, own_force = (
+        _changes(own)
+    )
     OWN = any(law is None for _, law in own)
     MASS, GRAVITY, STIFFNESS, DAMPING = (_SLOT[name] for name in ("mass", "gravity", "stiffness", "damping"))
     REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
@@ -223,14 +246,14 @@ def _functions(own: _Own) -> tuple[Any, Any]:
     @ti.func
     def force(
         z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, turn_z: ti.f64, turn_w: ti.f64,
-        n: ti.template(), k: ti.i32,
+        gone: ti.f64, n: ti.template(), k: ti.i32,
     ) -> ti.f64:  # fmt: skip
         total = 0.0
         if z > 0.0:
             most, ever = ti.max(top, z), ti.max(deepest, z)
             # Where the loading curve is read, what is taken off it, and by how much it bends.
             at, stiff, bent = unload_changed(z, ever, n[k, STIFFNESS], n, k)
-            spring = ti.max(loading(at, n, k) * bent - stiff, 0.0)
+            spring = ti.max(loading(at - gone, n, k) * bent - stiff, 0.0)
             if ti.static(OWN):
                 s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
                 spring = own_spring(s, z, spring, n, k)
@@ -246,14 +269,22 @@ def _functions(own: _Own) -> tuple[Any, Any]:
                 total += own_force(s, z, v, most, n, k)
         return total
 
-    return force, taken
+    @ti.func
+    def carried(z: ti.f64, way: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+        more = 0.0
+        if way > 0.0:
+            more = mass_changed(z, z / n[k, REFERENCE], n[k, REFERENCE], n, k) / n[k, MASS]
+        return more
+
+    return force, taken, settled, carried
 
 
 @lru_cache(maxsize=8)
 def _kernels(own: _Own) -> tuple[Any, Any]:
     from hedgebed_taichi import ti
 
-    force, taken = _functions(own)
+    force, taken, settled, carried = _functions(own)
+    GIVEN_WAY = _SLOT["given_way"]
     MASS, GRAVITY, SPEED_SCALE, SETTLED = _SLOT["mass"], _SLOT["gravity"], _SLOT["speed_scale"], _SETTLED
     SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (_SLOT[name] for name in ("shift_depth", "shift_row", "shift_speed"))
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
@@ -262,22 +293,26 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
     Cube = ti.types.ndarray(dtype=ti.f64, ndim=3)
 
     @ti.kernel
-    def push_all(numbers: Table, lane_path: Whole, starts: Whole, depth: Line, speed: Line, out: Table):
+    def push_all(
+        numbers: Table, lane_path: Whole, starts: Whole, times: Line, depth: Line, speed: Line, out: Table
+    ):  # fmt: skip
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
             top, deepest = 0.0, 0.0
-            before, share = 0.0, 0.0
+            before, share, gone = 0.0, 0.0, numbers[k, GIVEN_WAY]
             for row in range(starts[path], starts[path + 1]):
                 z, v = depth[row] + numbers[k, SHIFT_DEPTH], speed[row] + numbers[k, SHIFT_SPEED]
                 if z <= 0.0:
-                    top, before, share = 0.0, 0.0, 0.0
+                    top, before, share, gone = 0.0, 0.0, 0.0, numbers[k, GIVEN_WAY]
                 else:
+                    if row > starts[path]:
+                        gone = settled(gone, 0.5 * (z + before), times[row] - times[row - 1], numbers, k)
                     share = taken(z, 1.0 if z > before else -1.0, before, share, numbers, k)
                     before = z
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                 way = ti.tanh(v / numbers[k, SPEED_SCALE])
                 here = z + numbers[k, SHIFT_ROW]
-                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, numbers, k)
+                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, gone, numbers, k)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
@@ -286,7 +321,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
             m, g = numbers[k, MASS], numbers[k, GRAVITY]
             z, v, t, way = 0.0, speeds[path], 0.0, 1.0
             top, deepest = 0.0, 0.0
-            turn_z, turn_w = 0.0, 0.0
+            turn_z, turn_w, gone = 0.0, 0.0, 0.0
             inside, resting = 1, 0
             for row in range(starts[path], starts[path + 1]):
                 until, at = times[row], row - starts[path]
@@ -306,10 +341,15 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                             dt = high
                         # One Runge-Kutta step.
                         zs, vs, z1, v1, share = z, v, z, v, 0.0
+                        half = gone  # the bed gives way by half before the step and by half after it
+                        if inside == 1:
+                            half = settled(gone, z, 0.5 * dt, numbers, k)
                         for stage in range(4):
                             a = g
                             if inside == 1:
-                                a = g - force(ti.max(zs, 1e-300), vs, way, top, deepest, turn_z, turn_w, numbers, k) / m
+                                here = ti.max(zs, 1e-300)
+                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, half, numbers, k) / m
+                                a = a / (1.0 + carried(here, way, numbers, k))
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
                             v1 += weight * a
@@ -331,15 +371,16 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                             t += dt
                             low, high, halvings = 0.0, 0.0, 0
                             if inside == 1:
+                                gone = settled(half, ti.max(z, 1e-300), 0.5 * dt, numbers, k)
                                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                             if found and crossed:
                                 z = 0.0
                                 if inside == 1:
-                                    inside, top = 0, 0.0
+                                    inside, top, gone = 0, 0.0, 0.0
                                 else:
                                     inside, way = 1, 1.0
                                     # On what supports it at the surface it would hop for ever, ever less.
-                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, numbers, k)
+                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, 0.0, numbers, k)
                                     if v < SETTLED and bears > m * g:
                                         v, resting = 0.0, 1
                                 turn_z, turn_w = 0.0, 0.0
@@ -349,7 +390,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                                 down, up = 0.0, 0.0
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
-                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, numbers, k) / m
+                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, gone, numbers, k) / m
                                     if side == 0:
                                         down = a
                                     else:
@@ -363,12 +404,13 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                     if resting == 2:
                         out[k, at, 0] = ti.math.nan
                     else:
-                        pushed = 0.0
+                        pushed, more = 0.0, 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, numbers, k)
+                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone, numbers, k)
+                            more = carried(z, way, numbers, k)
                         out[k, at, 0] = z
                         out[k, at, 1] = v
-                        out[k, at, 2] = 0.0 if resting == 1 else g - pushed / m
+                        out[k, at, 2] = 0.0 if resting == 1 else (g - pushed / m) / (1.0 + more)
                         out[k, at, 3] = 2.0 if resting == 1 else (0.0 if inside == 0 else (1.0 if v > 0.0 else 3.0))
 
     return push_all, fall_all

@@ -96,7 +96,9 @@ class PenetrationProblem(Problem):
         self.design = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
         speeds = np.array([s for trial in prepared for s in speeds_of(trial)])
         differ = speeds.max() > 1.05 * max(speeds.min(), 1e-12)
-        self.forms = push_forms(retreats=comes_back(prepared), speeds_differ=bool(differ), own=own)
+        self.forms = push_forms(
+            retreats=comes_back(prepared), speeds_differ=bool(differ), drops=bool(self.rough), own=own
+        )  # fmt: skip
         self.shapes = shapes_of(self.forms, again=True)
         self._places = slot_places(own)
         self._whitening: dict[str, tuple[Array, Array, Array]] = {}
@@ -157,7 +159,7 @@ class PenetrationProblem(Problem):
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth, speed = (np.concatenate([getattr(t.path, name) for t in trials]) for name in ("depth", "speed"))
-            out = push(numbers, lanes, starts, depth, speed, own)
+            out = push(numbers, lanes, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
             for place, trial in enumerate(trials):
                 zeros = np.array([values.get(f"force zero[{trial.info.id}]", 0.0) for values in points])
                 if zeros.any():

@@ -60,14 +60,21 @@ def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
     )
 
 
-def push_force(z, v, x, radius_depth, drag, drag_onset, drag_reach, drag_sharpness, drag_deep, drag_tip, drag_both):
-    """b v^2 of loading, b by the depth in one of four ways; or both ways."""
+def push_force(
+    z, v, x, radius_depth, drag, drag_onset, drag_reach, drag_sharpness, drag_deep, drag_tip, drag_both, drag_carried
+):
+    """b v^2 of loading, b by the depth in one of four ways, or with its mass; or both ways."""
     sinking = max(v, 0.0)
     wide = min(z / radius_depth, 1.0)
-    share = drag + drag_deep * x + drag_tip * wide * (2.0 - wide)
+    share = drag + drag_carried + drag_deep * x + drag_tip * wide * (2.0 - wide)
     if drag_onset != 0.0:
         share = share + drag_onset * mobilised(z / drag_reach, drag_sharpness)
     return share * sinking * sinking + drag_both * v * abs(v)
+
+
+def push_mass(z, drag_carried):
+    """b z: the ground that a spike carries along, whose momentum takes b v^2."""
+    return drag_carried * max(z, 0.0)
 
 
 def _form(
@@ -88,13 +95,16 @@ CANDIDATE = fit.Candidate(
         bench="drop one spike onto the surface at two speeds",
     ),
     push=fit.Push(
-        rank=30, law={"force": push_force}, lengths={"drag_reach": 1e-3},
+        rank=30, law={"force": push_force, "mass": push_mass}, lengths={"drag_reach": 1e-3},
         forms=(
             _form("square", "drag", "+ drag * v^2, while it goes in", needs=""),
             _form("with an onset", "drag_onset", f"+ drag_onset{_ONSET} * v^2, while it goes in",
                   fit.between("drag_reach", "depth", -3.0, 1.0), starts=((0.1, -2.0), (0.1, 0.0))),
             _form("growing with depth", "drag_deep", "+ drag_deep * z / D * v^2, while it goes in"),
             _form("of the tip", "drag_tip", "+ drag_tip * u * (2 - u) * v^2, u = min(z / H, 1), while it goes in"),
+            _form("with the mass that it carries", "drag_carried",
+                  "+ drag_carried * v^2, while it goes in; a drop then has the mass drag_carried * z more",
+                  needs="drops"),
             _form("both ways", "drag_both", "+ drag_both * v * abs(v)"),
         ),
         bends=(

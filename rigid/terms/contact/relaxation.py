@@ -40,6 +40,15 @@ TERM = Term(
 )  # fmt: skip
 
 
+def push_settle(gone, z, span, relax_share, relax_soon):
+    """The same after `span` more at the depth z, exactly: c z ln(exp(e / (c z)) + span / tau)."""
+    after = gone
+    if relax_share > 0.0:
+        size = relax_share * max(z, 1e-12)
+        after = gone + size * log(1.0 + span / relax_soon * exp(-gone / size))
+    return after
+
+
 def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
     """A share of the force a factor of e in time, from a time on."""
     numbers = (fit.free("share", "1", 0.005, 0.0, 0.08), fit.logarithm("soon", SOON, lowest=-2.0))
@@ -55,5 +64,22 @@ CANDIDATE = fit.Candidate(
         equation="the law reads z - e of the depth z; e grows at share * z / soon * exp(-e / (share * z)), which is "
                  "e = share * z * ln(1 + t / soon) at rest",
         bench="push one spike in, hold it for a minute and read the force",
+    ),
+    push=fit.Push(
+        rank=45, law={"settle": push_settle}, lengths={"relax_soon": SOON},
+        forms=(
+            fit.Form("logarithmic", (fit.amplitude("relax_share", "plain", 0.03, 0.0, 0.15),
+                                     fit.between("relax_soon", "time", log(5e-3), log(5.0))),
+                     ((0.02, log(0.05)), (0.05, log(0.5))),
+                     "K * (z - e), de/dt = relax_share * z / relax_soon * exp(-e / (relax_share * z))"),
+        ),
+        apart={
+            "shaft-friction": "Hold the spike for a minute: a force that relaxes goes on falling by equal steps for "
+                              "equal factors of time, friction that is let go falls once.",
+            "plastic-sinkage": "Push in, hold for a minute and push on: what has relaxed is missing at the start of the "
+                               "second push, a crater leaves nothing behind there.",
+            "inertial-drag": "Push to one depth at a tenth of the speed and at the full one: drag falls to a hundredth, "
+                             "relaxation changes the force by equal steps for equal factors of the speed.",
+        },
     ),
 )  # fmt: skip

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from experiments.diagnose.core.effect_texts import PENETRATION, TUMBLE, equation, equations_of, with_comments
 from experiments.diagnose.fit.forms import shapes_of
@@ -19,7 +20,7 @@ from rigid.terms import EFFECTS
 
 K, C, DEEPEST, SPEED, D, H = 900.0, 4.0, 0.02, 0.05, 0.015, 0.006
 SCALES = Scales(depth=D, speed=SPEED, force=K * D)
-LIBRARY = push_forms(retreats=True, speeds_differ=True)
+LIBRARY = push_forms(retreats=True, speeds_differ=True, drops=True)
 SHAPES = shapes_of(LIBRARY, again=True)
 FORMS = {form.id: form for form in (*LIBRARY, *(form for bent in SHAPES.values() for form in bent))}
 
@@ -42,7 +43,9 @@ def computed(numbers: dict[str, float], depth: np.ndarray, speed: np.ndarray) ->
     known = {"stiffness": K, "damping": C, "reference": D, "radius_depth": H, "speed_scale": 1e-6, "mass": 1.0}
     for name, value in (known | numbers).items():
         table[0, SLOTS.index(name)] = value
-    return push(table, np.zeros(1, dtype=np.int32), np.array([0, len(depth)], dtype=np.int32), depth, speed)[0]
+    times = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(depth) / speed[1:]))])
+    ends = np.array([0, len(depth)], dtype=np.int32)
+    return push(table, np.zeros(1, dtype=np.int32), ends, depth, speed, times=times)[0]
 
 
 def told(form_id: str, numbers: dict[str, float], z: float, v: float, deepest: float) -> float:
@@ -58,6 +61,15 @@ def told(form_id: str, numbers: dict[str, float], z: float, v: float, deepest: f
         top = 1 - math.exp(-deepest / reach)
         names["w"] = 1 - math.exp(-z / reach) if v > 0 else -1 + (top + 1) * math.exp(-(deepest - z) / reach)
         clauses = [clause for clause in clauses if not clause.startswith("dw")]
+    if form_id.startswith("relaxation"):  # de/dt, solved along the path: in at SPEED, out at 0.4 SPEED
+        clauses, rate = [], clauses[0].partition(" = ")[2].replace("^", "**")
+
+        def slope(t, e):
+            here = SPEED * t if t <= DEEPEST / SPEED else DEEPEST - 0.4 * SPEED * (t - DEEPEST / SPEED)
+            return eval(rate, {}, names | {"z": max(here, 1e-12), "e": e[0]})
+
+        until = z / SPEED if v > 0 else DEEPEST / SPEED + (DEEPEST - z) / (0.4 * SPEED)
+        names["e"] = solve_ivp(slope, (0, until), [0.0], rtol=1e-8, atol=1e-14, max_step=2e-3).y[0, -1]
     for clause in clauses:
         name, _, right = clause.partition(" = ")
         if right:

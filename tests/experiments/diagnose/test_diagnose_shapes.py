@@ -158,7 +158,7 @@ def test_a_drag_that_grows_until_the_tip_is_in_has_a_corner_there():
 
 
 def test_what_is_bent_may_be_bent_once_more_each_way_once():
-    shapes = shapes_of(push_forms(retreats=True, speeds_differ=True), again=True)
+    shapes = shapes_of(push_forms(retreats=True, speeds_differ=True, drops=True), again=True)
     (twice,) = shapes["shaft-friction:by a power of depth, setting in"]
     assert twice.id == "shaft-friction:by a power of depth, setting in, rising with speed"
     names = {p.name.partition(".")[2] for p in twice.parameters}
