@@ -76,10 +76,10 @@ CANDIDATE = fit.Candidate(
         apart={
             "shaft-friction": "Hold the spike for a minute: a force that relaxes goes on falling by equal steps for "
                               "equal factors of time, friction that is let go falls once.",
-            "plastic-sinkage": "Push in, hold for a minute and push on: what has relaxed is missing at the start of the "
-                               "second push, a crater leaves nothing behind there.",
-            "inertial-drag": "Push to one depth at a tenth of the speed and at the full one: drag falls to a hundredth, "
-                             "relaxation changes the force by equal steps for equal factors of the speed.",
+            "plastic-sinkage": "Push in, hold for a minute and push on: what has relaxed is missing at the start of "
+                               "the second push, a crater leaves nothing behind there.",
+            "inertial-drag": "Push to one depth at a tenth of the speed and at the full one: drag falls to a "
+                             "hundredth, relaxation changes the force by equal steps for equal factors of the speed.",
         },
     ),
 )  # fmt: skip

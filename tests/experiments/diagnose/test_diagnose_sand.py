@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 from penetration_campaigns import (
-    ACCEL_STD, DAMPING, DEPTH_STD, FORCE_STD, GRAVITY, MASS, STIFFNESS, campaign_of, driven_trial,
+    ACCEL_STD,
+    DAMPING,
+    DEPTH_STD,
+    FORCE_STD,
+    GRAVITY,
+    MASS,
+    STIFFNESS,
+    campaign_of,
+    driven_trial,
 )  # fmt: skip
 from scipy.integrate import solve_ivp
 
