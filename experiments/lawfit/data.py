@@ -46,8 +46,6 @@ class PushRun:
     rate: Array  # dz/dt [m/s]
     acceleration: Array  # d2z/dt2 [m/s2]
     force: Array  # [N]
-    rebound: float | None = None
-    """Share of the deepest depth over which the force fell as the spike was pulled out [1]; None if unknown."""
 
 
 @dataclass(frozen=True)
@@ -137,19 +135,5 @@ def binned(run: Penetration, *, id: str, bed: str, speed: float, bins: int) -> P
         return np.asarray(np.bincount(place, weights=values, minlength=bins)[count > 0] / count[count > 0])
 
     return PushRun(
-        id, bed, run.kind, speed, mean(depth), mean(np.maximum(rate, 0.0)), mean(acceleration), mean(force),
-        rebound=_rebound(run),
+        id, bed, run.kind, speed, mean(depth), mean(np.maximum(rate, 0.0)), mean(acceleration), mean(force)
     )  # fmt: skip
-
-
-def _rebound(run: Penetration) -> float | None:
-    """Share of the deepest depth over which a straight line from the force at rest, through half of it, falls to 0."""
-    out = np.flatnonzero(run.phase == "out")
-    held = np.flatnonzero(run.phase == "rest")
-    if run.kind != "driven" or not out.size or not held.size:
-        return None
-    top, start = run.max_depth, float(run.force[held[len(held) // 2 :]].mean())
-    below = np.flatnonzero(run.force[out] < 0.5 * start)
-    if start <= 0 or not below.size:
-        return None
-    return float(2 * max(top - run.depth[out[below[0]]], 0.0) / top)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from experiments.converge.design import BASE, Member, Variant
+from experiments.converge.design import BASE, MOST_OVERLAP, ROOM, Member, Variant
 from experiments.converge.members import finished_member, make_member
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
@@ -48,7 +48,8 @@ def _base(settings: LawFitSettings) -> PenetrateSettings:
     base = PenetrateSettings.model_construct(**plain)
     if base.young is None:
         fastest = base.model_copy(update={"speeds": (*base.speeds, FASTER * max(base.speeds))})
-        base = base.model_copy(update={"young": beds.choose_softness(fastest).young})
+        room = min(MOST_OVERLAP, ROOM * base.max_overlap)  # one modulus for all beds: a run does not make it stiffer
+        base = base.model_copy(update={"young": beds.choose_softness(fastest).young, "max_overlap": room})
     return base
 
 

@@ -65,8 +65,8 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
     beyond = {name: text for name, fit in fits.items() for text in _beyond_the_law(fit)}
     for name, fit in fits.items():
         if name != ADDED_MASS and name not in beyond:
-            ground_file(fit, data, entries[name], told).write(folder.path / "laws" / f"{name}.toml")
-    ground_file(pair, data, entries[PAIR], told).write(folder.path / "ground.toml")
+            ground_file(fit, data, told).write(folder.path / "laws" / f"{name}.toml")
+    ground_file(pair, data, told).write(folder.path / "ground.toml")
     folder.write_series("bins", _columns(data, fits))
     others = [law["name"] for law in laws if law["name"] not in (PAIR, ADDED_MASS)]
     tangents = _tangents(fits, data, (PAIR, *others[:1]))
@@ -108,16 +108,14 @@ def _law_entry(settings: LawFitSettings, fitted: LawFit) -> Json:
     candidate, found = fitted.candidate, error_map(fitted)
     parameters = {name: _estimate_entry(candidate, name, fitted) for name in candidate.free}
     notes = [text for name in candidate.free for text in _bound_notes(fitted, name)]
-    rebound = _rebound(fitted) if candidate.law.has_memory else None
     entry: Json = {
         "name": candidate.name, "summary": candidate.law.summary, "parameters": parameters,
-        "fixed": dict(candidate.fixed) | ({"rebound": rebound.value} if rebound else {}),
+        "fixed": dict(candidate.fixed),
         "bed_spread": fitted.bed_spread, "sigma": fitted.sigma, "information": fitted.information,
-        "log_likelihood": fitted.log_likelihood, "held_out": held_out(fitted), "rebound": rebound,
+        "log_likelihood": fitted.log_likelihood, "held_out": held_out(fitted),
         "sinkage": [asdict(one) for one in sinkage_check(fitted)], "notes": notes,
         "map": None, "within": [], "sinkage_range": None,
     }  # fmt: skip
-    entry["rebound"] = None if rebound is None else asdict(rebound)
     if found is not None:
         entry["map"] = {
             "speeds": list(found.speeds), "depth": found.depth.tolist(), "force": found.force.tolist(),
@@ -155,37 +153,23 @@ def _beyond_the_law(fitted: LawFit) -> list[str]:
     return said
 
 
-def _rebound(fitted: LawFit) -> Estimated | None:
-    """The share of the depth that springs back, as seen when drives were pulled out; None where none was."""
-    data = fitted.data
-    of_beds = {
-        bed: [run.rebound for run in data.runs if run.bed == bed and run.rebound is not None] for bed in data.beds
-    }
-    means = np.array([np.mean(values) for values in of_beds.values() if values])
-    if len(means) < 2:
-        return None
-    whole = float(means.mean())
-    left_out = (len(means) * whole - means) / (len(means) - 1)
-    return interval(whole, left_out)
-
-
-def ground_file(fitted: LawFit, data: Data, entry: Json, told: Sequence[str]) -> GroundFile:
+def ground_file(fitted: LawFit, data: Data, told: Sequence[str]) -> GroundFile:
     """The law as a file: parameters within what a law may have, the range of the runs, and what a reader must know."""
     candidate, foundation = fitted.candidate, data.foundation
     known = {parameter.name: parameter for parameter in candidate.law.parameters}
     parameters = {}
     for name, parameter in known.items():
-        if name in candidate.free:
-            found = fitted.parameter(name)
-        elif name == "rebound" and entry["rebound"] is not None:
-            found = Estimated(**entry["rebound"])
-        else:
-            parameters[name] = Estimate(value=candidate.fixed[name], std=0.0, note=say("fixed"))
+        if name not in candidate.free:
+            note = say("unloading") if name == "rebound" else say("fixed")
+            parameters[name] = Estimate(value=candidate.fixed[name], std=0.0, note=note)
             continue
+        found = fitted.parameter(name)
         low, high = parameter.lowest, parameter.highest
         value = float(np.clip(found.value, low, high))
         ends = [float(np.clip(end, low, high)) for end in (found.low, found.high)]
         note = "" if value == found.value else say("clipped", value=found.value)
+        if name == "bulk_density":
+            note = say("scaled", own=foundation.bulk_density, scale=value / foundation.bulk_density)
         limits = (min(ends[0], value), max(ends[1], value))
         parameters[name] = Estimate(value=value, std=found.std, interval=limits, note=note)
     drops = any(run.kind == "drop" for run in data.runs)

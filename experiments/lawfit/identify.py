@@ -40,7 +40,7 @@ def identified(fitted: LawFit) -> list[str]:
     elif found.low <= 0:
         said.append(say("damping_unsure", found=found, more=more, percent=100 * VISIBLE))
     if len(several) < 2:
-        said.append(say("speeds_in_one_bed", count=len(several)))
+        said.append(say("speeds_in_one_bed"))
     stiffness = fitted.parameter("stiffness")
     if stiffness.low <= 0:
         said.append(say("stiffness_unsure", found=stiffness))

@@ -7,10 +7,10 @@ from typing import Any
 
 from coupling import Penetration
 from dem.grains.materials import material
+from experiments.grains.kept_material import MATERIAL_COPY
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.types import Json
-from hedgebed_renamed import material_of_today
 
 from .data import Data, Foundation, Placement, PushRun, binned
 from .settings import LawFitSettings, say
@@ -117,6 +117,8 @@ def _read(name: str, path: Path) -> _Source:
     if not (path / "series").is_dir():
         raise ValueError(f"runs = {str(path)!r} has no series, only numbers: {_again(path)}")
     settings = PenetrateSettings(**folder.settings)
+    if (kept := path / MATERIAL_COPY).is_file():
+        settings = settings.model_copy(update={"material": str(kept)})
     if settings.ground != "bed":
         raise ValueError(f"runs = {str(path)!r} is a run on ground = {settings.ground!r}: one in a bed was expected")
     return _Source(name, folder, settings, folder.read_result())
@@ -147,8 +149,8 @@ def _bed_of(settings: PenetrateSettings, seed: int) -> str:
 
 def _shared(settings: PenetrateSettings, name: str) -> Any:
     value = getattr(settings, name)
-    if name == "material" and not value.endswith(".toml"):
-        return material_of_today(value)
+    if name == "material":
+        return material(value)
     return 60.0 if name == "cone_angle" and settings.tip != "cone" else value
 
 
@@ -159,6 +161,8 @@ def _refuse_mixed(sources: Sequence[_Source]) -> None:
             one, other = _shared(first.settings, name), _shared(source.settings, name)
             if one != other:
                 values = {"one": one, "first": first.name, "other": other, "name": source.name}
+                if name == "material":
+                    values |= {"one": one.name, "other": other.name}
                 raise ValueError(say("mixed", what=what, key=name, **values))
 
 

@@ -1,7 +1,7 @@
 """Where a fitted law holds: its error over depth and speed, over loads, in beds that it was not fitted to."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,13 +56,7 @@ def within(found: ErrorMap, most: float) -> list[Within]:
     stretches = []
     edges = np.concatenate([[0.0], 0.5 * (found.depth[1:] + found.depth[:-1]), [found.depth[-1]]])
     for speed, errors in zip(found.speeds, found.error, strict=True):
-        best, start = (0, 0), None
-        for k, good in enumerate([*(np.abs(errors) <= most), False]):
-            if good and start is None:
-                start = k
-            elif not good and start is not None:
-                best, start = max(best, (start, k), key=lambda pair: pair[1] - pair[0]), None
-        low, high = (float(edges[place]) for place in best)
+        low, high = (float(edges[place]) for place in _longest(np.abs(errors) <= most))
         stretches.append(Within(speed, low, high, float(errors[0]), float(errors[-1])))
     return stretches
 
@@ -81,13 +75,19 @@ def sinkage_range(fitted: LawFit, found: ErrorMap, most: float) -> tuple[float, 
         bed = float(np.interp(load, rising, found.depth))
         law = fitted.candidate.depth_at(fitted.theta, float(load), found.speeds[0], deepest=10 * deepest)
         good.append(law is not None and abs(law / bed - 1) <= most)
+    start, end = _longest(good)
+    return (float(loads[start]), float(loads[end - 1])) if end > start else None
+
+
+def _longest(good: Iterable[bool]) -> tuple[int, int]:
+    """The longest stretch of true values, as a slice has it; (0, 0) of none."""
     best, start = (0, 0), None
     for k, one in enumerate([*good, False]):
         if one and start is None:
             start = k
         elif not one and start is not None:
-            best, start = max(best, (start, k - 1), key=lambda pair: pair[1] - pair[0]), None
-    return (float(loads[best[0]]), float(loads[best[1]])) if any(good) else None
+            best, start = max(best, (start, k), key=lambda pair: pair[1] - pair[0]), None
+    return best
 
 
 def held_out(fitted: LawFit) -> dict[str, float | None]:

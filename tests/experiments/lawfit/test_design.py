@@ -4,6 +4,7 @@ import pytest
 from fake_bed import FakeBed
 
 from experiments import lawfit
+from experiments.lawfit.design import _base
 from experiments.penetrate import beds
 
 K, C, STEP = 100.0, 0.5, 5e-5
@@ -60,6 +61,17 @@ def test_the_budget_bounds_what_is_computed_and_too_small_a_one_is_refused(made,
     with pytest.raises(ValueError, match="budget") as error:
         lawfit.check(lawfit.Settings(**(QUICK | {"budget": 0.9 * costs[0]})))
     assert f"{costs[0]:.3g}" in str(error.value)
+
+
+def test_all_beds_have_one_modulus_with_room_for_the_faster_drive(monkeypatch):
+    chosen = []
+    real = beds.choose_softness
+    monkeypatch.setattr(beds, "choose_softness", lambda s: chosen.append(max(s.speeds)) or real(s))
+    settings = lawfit.Settings(**(QUICK | {"young": None, "max_overlap": 0.04}))
+    base = _base(settings)
+    assert chosen == [1.6]
+    assert base.young == real(settings.model_copy(update={"speeds": (0.2, 1.6)})).young
+    assert base.max_overlap == 0.08
 
 
 @pytest.mark.long

@@ -1,12 +1,15 @@
 """`hedgebed calibrate`: K, C and rival laws from runs whose law is known, what is refused, what is said."""
 
+import re
 import shutil
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import dem
 from experiments import lawfit
 from experiments.cli.main import main
 from experiments.lawfit.data import Data, PushRun
@@ -14,7 +17,9 @@ from experiments.lawfit.fit import fit_law
 from experiments.lawfit.identify import identified
 from experiments.lawfit.laws import ADDED_MASS, CANDIDATES, candidates_for
 from experiments.lawfit.reading import read_data
+from experiments.lawfit.settings import LAWS
 from experiments.lawfit.synthetic import DESIGNS, FOUNDATION, TRUTHS, coverage, synthetic_data
+from experiments.lawfit.trust import ErrorMap, within
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import make_run, plan_units
 from experiments.runs.folder import RunFolder
@@ -184,6 +189,33 @@ def test_two_folders_are_fitted_together_and_a_folder_of_folders_is_opened(of_th
     inside = read_data(lawfit.Settings(runs=(str(tmp_path / "all"),)))
     assert len(both.beds) == len(inside.beds) == 5
     assert sorted(inside.sources) == ["more", "three"]
+
+
+def test_a_material_of_one_s_own_is_taken_from_the_run_s_copy(of_three_beds, tmp_path):
+    named = (Path(of_three_beds) / "run.toml").read_text(encoding="utf-8")
+    for name, repose in (("a", ""), ("b", ""), ("c", "friction = 0.4")):
+        copy = shutil.copytree(of_three_beds, tmp_path / name)
+        (copy / "run.toml").write_text(named.replace('material = "sand"', 'material = "gone.toml"'), encoding="utf-8")
+        text = (Path(dem.__file__).parent / "presets" / "sand.toml").read_text(encoding="utf-8")
+        changed = re.sub(r"(?m)^friction = [0-9.]+", repose, text) if repose else text
+        (copy / "material.toml").write_text(changed.replace('name = "sand"', 'name = "mine"'), encoding="utf-8")
+    assert read_data(lawfit.Settings(runs=(str(tmp_path / "a"),))).foundation.material == "mine"
+    with pytest.raises(ValueError, match="same run"):  # so alike in everything before
+        read_data(lawfit.Settings(runs=(str(tmp_path / "a"), str(tmp_path / "b"))))
+    with pytest.raises(ValueError, match="material"):
+        read_data(lawfit.Settings(runs=(str(tmp_path / "a"), str(tmp_path / "c"))))
+
+
+def test_the_settings_name_every_law_that_there_is():
+    assert tuple(CANDIDATES) == LAWS
+
+
+def test_the_stretch_of_depth_within_an_error_is_the_longest_one():
+    depth = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    found = ErrorMap((0.1, 0.2), depth, np.ones((2, 5)), np.array([[0.1, 0.3, 0.1, -0.1, 0.1], [0.9] * 5]))
+    first, second = within(found, 0.2)
+    assert (first.low, first.high, first.at_end) == (2.5, 5.0, 0.1)
+    assert second.low == second.high
 
 
 def test_runs_that_cannot_be_fitted_together_are_refused_by_name(of_three_beds, tmp_path):
