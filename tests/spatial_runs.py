@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["CUBE", "small_bed"]
+__all__ = ["BALL", "CUBE", "EXAMPLES", "LEG", "ball", "grain_bed", "model_of", "moving", "small_bed"]
 
 CUBE = Path(__file__).parents[1] / "experiments/examples/platform-cube/cube.toml"
 """A cube on eight spikes, 30 mm across, with wheels about x and y, that ships."""

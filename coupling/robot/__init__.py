@@ -10,11 +10,13 @@ Imports `coupling`, `dem`, `rigid`.
 from .bed_feet import BedFeet
 from .body import MujocoRobot
 from .feet import Foot, Part, find_feet
+from .foot_forces import FootForces
 from .law_feet import LawFeet
 from .models import load_model
 from .run import RobotRun
 from .stability import check_exchange
 
 __all__ = [
-    "BedFeet", "Foot", "LawFeet", "MujocoRobot", "Part", "RobotRun", "check_exchange", "find_feet", "load_model",
+    "BedFeet", "Foot", "FootForces", "LawFeet", "MujocoRobot", "Part", "RobotRun", "check_exchange", "find_feet",
+    "load_model",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 
 from .feet import Foot
 
-__all__ = ["LawFeet"]
+__all__ = ["LawFeet", "refuse_pointless"]
 
 
 class LawFeet:
@@ -47,14 +47,10 @@ class LawFeet:
     ) -> None:
         self.feet, scales = list(feet), scales or {}
         self.grounds: list[list[SurfaceGround]] = []
+        refuse_pointless(feet)
         for foot in feet:
             own = []
             for part in foot.parts:
-                if not len(part.centres):
-                    raise ValueError(
-                        f"feet: {part.name!r} is a {part.kind}, which has no points for a surface law: grains would "
-                        f"do, or a sphere, capsule, cylinder, box or ellipsoid"
-                    )
                 count = part.share * scales.get(part.name, 1.0)
                 own += [
                     SurfaceGround(
@@ -163,3 +159,12 @@ class LawFeet:
         for k, own in enumerate(self.grounds):
             for j, ground in enumerate(own):
                 ground.restore(part_of(state, f"{k}-{j}"))
+
+
+def refuse_pointless(feet: Sequence[Foot]) -> None:
+    """Raise ValueError, naming the part, for one that has no points for a surface law."""
+    for part in (part for foot in feet for part in foot.parts if not len(part.centres)):
+        raise ValueError(
+            f"feet: {part.name!r} is a {part.kind}, which has no points for a surface law: grains would do, or a "
+            f"sphere, capsule, cylinder, box or ellipsoid"
+        )

@@ -1,0 +1,68 @@
+"""``hedgebed bench feet``: how many feet a second a surface law is computed for in MuJoCo's own loop.
+
+`coupling.robot.FootForces` is called as MuJoCo calls it, with every foot in contact: robots of one foot and of six,
+each foot a ball. Several rounds by processor time; the median counts. For quick trials, in the environment:
+HEDGEBED_BENCH_CALLS, HEDGEBED_BENCH_ROUNDS.
+"""
+
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from benchmarks.race.machine import begin_timing, column_table, environment_numbers, wide_console
+from coupling.robot import FootForces, find_feet
+from experiments.runs.types import Json
+
+__all__ = ["run"]
+
+LAWS = ("spring-damper", "hunt-crossley", "rft")
+COUNTS = (1, 6)  # Feet of the robots
+WANTED = 100_000  # Evaluations of one foot a second that control asks for
+_BODY = '<body pos="{x} 0 0.0099"><freejoint/><geom name="foot_{k}" size="0.01" mass="0.1"/></body>'
+
+
+def _robot(count: int) -> tuple[Any, Any]:
+    """Model and data of `count` balls that lie 0.1 mm deep."""
+    bodies = "".join(_BODY.format(x=0.1 * k, k=k) for k in range(count))
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def run(out: Path, *, progress: Any) -> Json:
+    """Time the callback; show the table; return what goes into bench.json. Nothing is written to `out`."""
+    (calls,), (rounds,) = environment_numbers("CALLS", (20_000,)), environment_numbers("ROUNDS", (5,))
+    bench, remarks = begin_timing("feet")
+    for remark in remarks:
+        progress.message(remark)
+    bench |= {
+        "unit": "feet a second of processor time",
+        "calls": calls,
+        "wanted": WANTED,
+        "cases": [],
+    }
+    progress.plan({"feet": 1.0})
+    progress.stage("feet", total=float(len(LAWS) * len(COUNTS)))
+    for law in LAWS:
+        for count in COUNTS:
+            model, data = _robot(count)
+            forces = FootForces(find_feet(model, data, ["foot_*"]), law=law)
+            speeds = []
+            for _ in range(rounds):
+                before, begin = forces.points, time.process_time()
+                for _ in range(calls // count):
+                    forces(model, data)
+                speeds.append((forces.points - before) / (time.process_time() - begin))
+            bench["cases"].append({"law": law, "feet": count, "per_s": statistics.median(speeds), "rounds": speeds})
+            progress.update(float(len(bench["cases"])))
+    progress.close()
+    table = column_table(("law", "feet", "feet/s", "slowest - fastest"), title="feet: a surface law in MuJoCo's loop")
+    for case in bench["cases"]:
+        spread = f"{min(case['rounds']):,.0f} - {max(case['rounds']):,.0f}"
+        table.add_row(case["law"], str(case["feet"]), f"{case['per_s']:,.0f}", spread)
+    wide_console().print(table)
+    return bench

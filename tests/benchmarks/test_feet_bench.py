@@ -1,0 +1,16 @@
+"""`hedgebed bench feet`: small, what it times and what it leaves."""
+
+import pytest
+
+pytest.importorskip("mujoco")
+
+from benchmarks import feet
+from experiments.runs.progress import Progress
+
+
+def test_every_law_is_timed_with_all_feet_in_contact(monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("HEDGEBED_BENCH_CALLS", "60")
+    monkeypatch.setenv("HEDGEBED_BENCH_ROUNDS", "1")
+    bench = feet.run(tmp_path, progress=Progress())
+    assert [(case["law"], case["feet"]) for case in bench["cases"]] == [(law, n) for law in feet.LAWS for n in (1, 6)]
+    assert all(case["per_s"] > 0 for case in bench["cases"]) and "feet/s" in capsys.readouterr().out
