@@ -91,12 +91,13 @@ class Foot:
 
 
 def refuse_missing() -> Any:
-    """The package mujoco. Raises ValueError, with how to install it, where it is not there."""
+    """The package mujoco. Raises ValueError, with how to install it, where it or trimesh is not there."""
     try:
         import mujoco
+        import trimesh  # noqa: F401
     except ImportError as error:
         raise ValueError(
-            f"robots of MuJoCo need the Python package 'mujoco', which cannot be imported ({error}): "
+            f"robots of MuJoCo need the Python packages 'mujoco' and 'trimesh', which cannot be imported ({error}): "
             f"pip install 'hedgebed[mujoco]', or pip install mujoco trimesh"
         ) from None
     return mujoco

@@ -82,10 +82,11 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         self.duration, self.surface, self.counterweight = settings.duration, settings.surface, 0.0
         self.gravity = plan.numbers["gravity"].value
         robot = self._robot = plan.robot()
-        self.widths, self.areas = {}, {}
+        self.widths, self.areas, self.narrowest = {}, {}, math.inf  # Of the feet [m], [m2]; of any part [m]
         for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
             matrix = to_matrix(turn)
-            self.widths[foot.name] = max(width_of(part, matrix) for part in foot.parts)
+            widths = [width_of(part, matrix) for part in foot.parts]
+            self.widths[foot.name], self.narrowest = max(widths), min(self.narrowest, *widths)
             self.areas[foot.name] = sum(plan_area(part.vertices @ matrix.T) for part in foot.parts)
         self.spike_diameter = min(self.widths.values())
         self.reach = 2 * max(foot.reach for foot in robot.feet)
@@ -176,5 +177,5 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
     def conclude(self, run: RobotRun, folder: Path) -> Result:
         return conclude(
             self.settings, self.plan, run, folder, beside=self.forecast.run, softening=self.softening(),
-            across=self.spike_diameter / self.settings.grain,
+            across=self.narrowest / self.settings.grain,
         )  # fmt: skip

@@ -1,6 +1,7 @@
 """A robot of MuJoCo on surface laws: closed forms, `rigid.spatial` again, energy, stability, restarts."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -189,6 +190,30 @@ def test_floors_of_mujocos_own_world_touch_nothing():
     assert robot.floors == ("floor",)
     run = on_law(robot, 4e-4, 0.2)
     assert run.columns["z"].min() < 0.045  # it has gone through z = 0, where MuJoCo's floor was
+
+
+URDF = """<robot name="leg"><link name="base"/><link name="shank"><inertial><mass value="1"/>
+<inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision name="foot"><origin xyz="0 0 -0.1"/><geometry><sphere radius="0.03"/></geometry></collision></link>
+<joint name="rail" type="prismatic"><parent link="base"/><child link="shank"/><origin xyz="0 0 0.2"/>
+<axis xyz="0 0 1"/><limit effort="10" velocity="1" lower="-1" upper="1"/></joint></robot>"""
+
+
+def test_a_urdf_stands_where_the_spring_carries_it(tmp_path):
+    (tmp_path / "leg.urdf").write_text(URDF)
+    robot = MujocoRobot(tmp_path / "leg.urdf", ["foot"], height=0.0)
+    run = on_law(robot, 1e-3, 0.6, parameters={"stiffness": 2000.0, "damping": 100.0})
+    assert run.columns["sinkage"][-1] == pytest.approx(9.81 / 2000.0, rel=0.01)
+
+
+@pytest.mark.long
+def test_the_scripts_of_the_page_run_as_they_stand(monkeypatch):
+    root = EXAMPLES.parents[1]
+    monkeypatch.chdir(root)
+    blocks = re.findall(r"```python\n(.*?)```", (root / "docs" / "mujoco.md").read_text(), flags=re.S)
+    assert len(blocks) == 2
+    for block in blocks:
+        exec(compile(block, "docs/mujoco.md", "exec"), {})
 
 
 def test_the_controller_is_called_at_the_models_own_step_whatever_the_exchanges():
