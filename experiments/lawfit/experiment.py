@@ -22,9 +22,9 @@ from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
 
 from .data import Data
 from .design import check_design, compute_runs
-from .fit import Estimated, LawFit, fit_law, interval
+from .fit import Estimated, LawFit, fit_law, fit_usable, interval
 from .identify import identified, influences
-from .laws import ADDED_MASS, Candidate, candidates_for
+from .laws import ADDED_MASS, RATES, Candidate, candidates_for
 from .reading import read_data
 from .settings import LawFitSettings, say
 from .trust import error_map, held_out, sinkage_check, sinkage_range, within
@@ -54,14 +54,18 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
     progress.stage("laws", total=float(len(candidates)))
     fits: dict[str, LawFit] = {}
     laws: list[Json] = []
+    told: list[str] = []
+    contributed: list[Json] = []
     for done, candidate in enumerate(candidates, 1):
-        fits[candidate.name] = fit_law(candidate, data)
+        free = fit_law(candidate, data)
+        fits[candidate.name] = fit_usable(free)
+        told += identified(free) if candidate.name == PAIR else []
+        contributed += influences(free) if candidate.name == PAIR else []
         laws.append(_law_entry(settings, fits[candidate.name]))
         progress.update(done)
     laws = ranked(laws)
     best = laws[0]["name"]
     pair, entries = fits[PAIR], {law["name"]: law for law in laws}
-    told = identified(pair)
     beyond = {name: text for name, fit in fits.items() for text in _beyond_the_law(fit)}
     for name, fit in fits.items():
         if name != ADDED_MASS and name not in beyond:
@@ -70,7 +74,6 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
     folder.write_series("bins", _columns(data, fits))
     others = [law["name"] for law in laws if law["name"] not in (PAIR, ADDED_MASS)]
     tangents = _tangents(fits, data, (PAIR, *others[:1]))
-    contributed = influences(pair)
     warnings = [
         *(designed.notes if designed else []),
         *told,
@@ -106,14 +109,15 @@ def _with_material(settings: LawFitSettings, folder: RunFolder) -> LawFitSetting
 def _law_entry(settings: LawFitSettings, fitted: LawFit) -> Json:
     """What result.json says of one law."""
     candidate, found = fitted.candidate, error_map(fitted)
-    parameters = {name: _estimate_entry(candidate, name, fitted) for name in candidate.free}
-    notes = [text for name in candidate.free for text in _bound_notes(fitted, name)]
+    parameters = {
+        name: asdict(found) | {"unit": _unit(candidate, name)} for name, found in _fitted_parameters(fitted).items()
+    }
     entry: Json = {
         "name": candidate.name, "summary": candidate.law.summary, "parameters": parameters,
-        "fixed": dict(candidate.fixed),
+        "fixed": {name: value for name, value in candidate.fixed.items() if name not in parameters},
         "bed_spread": fitted.bed_spread, "sigma": fitted.sigma, "information": fitted.information,
         "log_likelihood": fitted.log_likelihood, "held_out": held_out(fitted),
-        "sinkage": [asdict(one) for one in sinkage_check(fitted)], "notes": notes,
+        "sinkage": [asdict(one) for one in sinkage_check(fitted)], "notes": _notes(fitted),
         "map": None, "within": [], "sinkage_range": None,
     }  # fmt: skip
     if found is not None:
@@ -130,15 +134,25 @@ def _unit(candidate: Candidate, name: str) -> str:
     return next(parameter.unit for parameter in candidate.law.parameters if parameter.name == name)
 
 
-def _estimate_entry(candidate: Candidate, name: str, fitted: LawFit) -> Json:
-    return asdict(fitted.parameter(name)) | {"unit": _unit(candidate, name), "at_bound": fitted.at_bound(name)}
+def _fitted_parameters(fitted: LawFit) -> dict[str, Estimated]:
+    """All fitted parameters within what the law allows: a rate below 0 is 0, with the rest of its interval."""
+    found = {name: fitted.parameter(name) for name in fitted.candidate.free}
+    if (free := fitted.free_rate) is not None:
+        rate = next(name for name in RATES if name in fitted.candidate.fixed)
+        found[rate] = Estimated(0.0, free.std, 0.0, max(free.high, 0.0))
+    return found
 
 
-def _bound_notes(fitted: LawFit, name: str) -> list[str]:
-    found = fitted.parameter(name)
-    if name == fitted.candidate.rate_parameter and found.value < 0:
-        return [say("negative_rate", key=name, found=found, unit=_unit(fitted.candidate, name))]
-    return [say("at_bound", key=name, found=found, unit=_unit(fitted.candidate, name))] if fitted.at_bound(name) else []
+def _notes(fitted: LawFit) -> list[str]:
+    """Which parameters came out at a bound."""
+    candidate, said = fitted.candidate, []
+    for name, found in _fitted_parameters(fitted).items():
+        unit = f" {_unit(candidate, name)}".removesuffix(" 1")
+        if name not in candidate.free:
+            said.append(say("negative_rate", key=name, found=fitted.free_rate, unit=unit))
+        elif fitted.at_bound(name):
+            said.append(say("at_bound", key=name, found=found, unit=unit))
+    return said
 
 
 def _beyond_the_law(fitted: LawFit) -> list[str]:
@@ -157,17 +171,17 @@ def ground_file(fitted: LawFit, data: Data, told: Sequence[str]) -> GroundFile:
     """The law as a file: parameters within what a law may have, the range of the runs, and what a reader must know."""
     candidate, foundation = fitted.candidate, data.foundation
     known = {parameter.name: parameter for parameter in candidate.law.parameters}
-    parameters = {}
+    parameters, estimates = {}, _fitted_parameters(fitted)
     for name, parameter in known.items():
-        if name not in candidate.free:
+        if name not in estimates:
             note = say("unloading") if name == "rebound" else say("fixed")
             parameters[name] = Estimate(value=candidate.fixed[name], std=0.0, note=note)
             continue
-        found = fitted.parameter(name)
+        found = estimates[name]
         low, high = parameter.lowest, parameter.highest
         value = float(np.clip(found.value, low, high))
         ends = [float(np.clip(end, low, high)) for end in (found.low, found.high)]
-        note = "" if value == found.value else say("clipped", value=found.value)
+        note = "" if name in candidate.free else say("clipped", value=fitted.free_rate.value)  # type: ignore[union-attr]
         if name == "bulk_density":
             note = say("scaled", own=foundation.bulk_density, scale=value / foundation.bulk_density)
         limits = (min(ends[0], value), max(ends[1], value))
@@ -241,11 +255,9 @@ def _tangent(fitted: LawFit, theta: Any, load: float, speed: float) -> tuple[flo
 def _quantities(settings: LawFitSettings, pair: LawFit, own: Json, best: Json) -> dict[str, Json]:
     """The numbers that a person would quote."""
     found: dict[str, Json] = {}
-    for name in ("stiffness", "damping"):
-        one = pair.parameter(name)
-        value = max(one.value, 0.0)
-        note = say("of_pair", found=one, bound=say("is_bound") if one.value < 0 else "")
-        found[name] = {"value": value, "std": one.std, "unit": _unit(pair.candidate, name), "note": note}
+    for name, one in _fitted_parameters(pair).items():
+        note = say("of_pair", found=one, bound="" if name in pair.candidate.free else say("is_bound"))
+        found[name] = {"value": one.value, "std": one.std, "unit": _unit(pair.candidate, name), "note": note}
     load = list(own["sinkage"])
     found["bed_spread"] = {"value": own["bed_spread"], "std": None, "unit": "1", "note": say("of_bed_spread")}
     for key, entry in (("held_out_error", own), ("held_out_error_best", best)):

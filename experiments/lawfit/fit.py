@@ -13,7 +13,7 @@ likelihood but from leaving out one bed at a time, with the largest of the usual
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
@@ -22,7 +22,7 @@ from scipy.stats import t as student_t
 from .data import Array, Data
 from .laws import Candidate
 
-__all__ = ["CONFIDENCE", "Estimated", "LawFit", "fit_law", "interval", "solve_law"]
+__all__ = ["CONFIDENCE", "Estimated", "LawFit", "fit_law", "fit_usable", "interval", "solve_law"]
 
 CONFIDENCE = 0.9
 """Of all intervals."""
@@ -51,6 +51,8 @@ class LawFit:
     share: float  # lambda [1/N2]
     sigma: float  # [N]
     log_likelihood: float
+    free_rate: Estimated | None = None
+    """The parameter of the rate by a fit in which it came out below 0, where it is kept at 0 here."""
 
     @property
     def bed_spread(self) -> float:
@@ -87,6 +89,14 @@ def interval(value: float, left_out: Array) -> Estimated:
     std = math.sqrt((count - 1) / count * float(np.sum((left_out - value) ** 2)))
     half = float(student_t.ppf(0.5 + 0.5 * CONFIDENCE, count - 1)) * std
     return Estimated(value, std, value - half, value + half)
+
+
+def fit_usable(fitted: LawFit) -> LawFit:
+    """`fitted`, or where its parameter of the rate is below 0, which no law allows, a fit with it at 0."""
+    rate = fitted.candidate.rate_parameter
+    if rate is None or fitted.parameter(rate).value >= 0:
+        return fitted
+    return replace(fit_law(fitted.candidate.without_rate(), fitted.data), free_rate=fitted.parameter(rate))
 
 
 def fit_law(candidate: Candidate, data: Data, *, jackknife: bool = True) -> LawFit:

@@ -12,7 +12,7 @@ and Durian's own. In drives at constant speed both laws are the same.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,12 +20,12 @@ from rigid.ground.laws import SurfaceLaw, find_law
 
 from .data import Array, Data, Foundation
 
-__all__ = ["ADDED_MASS", "CANDIDATES", "Candidate", "candidates_for"]
+__all__ = ["ADDED_MASS", "CANDIDATES", "RATES", "Candidate", "candidates_for"]
 
 ADDED_MASS = "katsuragi-durian-added-mass"
 _ENDS = {"exponent": (0.3, 3.9), "dissipation": (-9.0, 9.0)}
 """Bounds of free parameters that may not be any number [1, s/m]."""
-_RATES = ("damping", "dissipation", "drag", "inertia")
+RATES = ("damping", "dissipation", "drag", "inertia")
 """Parameters of the rate. A fit may make them negative, so that their intervals are honest about 0."""
 
 
@@ -42,7 +42,13 @@ class Candidate:
     @property
     def rate_parameter(self) -> str | None:
         """The free parameter that the rate enters by; None if there is none."""
-        return next((name for name in self.free if name in _RATES), None)
+        return next((name for name in self.free if name in RATES), None)
+
+    def without_rate(self) -> "Candidate":
+        """The same with the parameter of the rate kept at 0."""
+        rate = self.rate_parameter
+        assert rate is not None
+        return replace(self, free=tuple(name for name in self.free if name != rate), fixed={**self.fixed, rate: 0.0})
 
     def values(self, theta: Array) -> dict[str, float]:
         """All parameters by name, the free ones being `theta`."""
@@ -59,7 +65,7 @@ class Candidate:
         pairs = zip(depth.tolist(), rate.tolist(), strict=True)
         force = np.array([law.loading(z, p) + law.rate_force(z, v, p) for z, v in pairs], dtype=float)
         if self.added_mass and acceleration is not None:
-            force += float(theta[self.free.index("drag")]) * depth * acceleration
+            force += self.values(theta)["drag"] * depth * acceleration
         return force
 
     def depth_at(self, theta: Array, load: float, rate: float = 0.0, *, deepest: float = 1.0) -> float | None:
@@ -82,7 +88,7 @@ class Candidate:
 
     def bounds(self) -> tuple[Array, Array]:
         """Smallest and largest value of each free parameter, shape [parameter_count]."""
-        pairs = [_ENDS.get(name, (-np.inf, np.inf) if name in _RATES else (0.0, np.inf)) for name in self.free]
+        pairs = [_ENDS.get(name, (-np.inf, np.inf) if name in RATES else (0.0, np.inf)) for name in self.free]
         return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
     def start(self, data: Data) -> Array:
@@ -96,7 +102,7 @@ class Candidate:
         if "exponent" in guess:
             guess["exponent"] = exponent - (1.0 if self.name == "bekker" and self.fixed["tip_height"] > 0 else 0.0)
             guess["exponent"] = max(guess["exponent"], 0.35)
-        strength = next(name for name in self.free if name not in (*_RATES, "exponent"))
+        strength = next(name for name in self.free if name not in (*RATES, "exponent"))
         guess[strength] = 1.0
         rate = self.rate_parameter
         if rate is not None:

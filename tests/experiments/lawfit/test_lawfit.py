@@ -162,6 +162,9 @@ def test_a_rate_that_lowers_the_force_is_labelled_and_becomes_0_in_the_file(tmp_
     fitted = read_ground(tmp_path / "run" / "ground.toml")
     assert fitted.values["damping"] == 0.0
     assert fitted.parameters["damping"].interval[0] == 0.0
+    # Both speeds weigh the same, so that K alone is that of their mean, 0.95 K.
+    assert fitted.values["stiffness"] == pytest.approx(0.95 * K, rel=0.01)
+    assert result["quantities"]["stiffness"]["value"] == fitted.values["stiffness"]
     assert any("damping" in text and "bound" in text for text in result["warnings"])
 
 
