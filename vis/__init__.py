@@ -20,10 +20,12 @@ import hedgebed_renamed  # noqa: F401  (old names of modules)
 if TYPE_CHECKING:
     from vis.pictures.frames import FrameWriter, read_frames
     from vis.report import write_report
+    from vis.view.notebook import View
 
-__all__ = ["FrameWriter", "read_frames", "write_report"]
+__all__ = ["FrameWriter", "View", "read_frames", "write_report"]
 
 _HOMES = {"FrameWriter": "vis.pictures.frames", "read_frames": "vis.pictures.frames", "write_report": "vis.report"}
+_HOMES["View"] = "vis.view.notebook"
 
 
 def __getattr__(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""`report.html` of a run folder: one file that opens from disk, without a network, scripts or fonts of its own."""
+"""`report.html` of a run folder: one file that opens from disk, without a network or fonts of its own."""
 
 from __future__ import annotations
 

@@ -347,8 +347,10 @@ def build_app() -> App:
     app.command(_resume, name="resume", group=GROUPS["keep"])
     if "tumble" in registry.EXPERIMENTS:
         from experiments.cli.render import render
+        from experiments.cli.view import view
 
         app.command(render, name="render", group=GROUPS["keep"])
+        app.command(view, name="view", group=GROUPS["keep"])
         from experiments.suite.commands import add_suite_commands
 
         about = "List and run the cases that ship: the platform on beds of grains."

@@ -1,4 +1,4 @@
 """Reports of beds, of tests of their strength, of a calibration and of the verification suite.
 
-Imports `rigid`, `vis.page`, `vis.pictures`.
+Imports `rigid`, `vis.page`, `vis.pictures`, `vis.view`.
 """

@@ -12,6 +12,7 @@ from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import grains_box, read_frames
 from vis.pictures.pictures import carry_out
 from vis.pictures.render import PictureJob, View, run_job
+from vis.view.page import report_scene
 
 __all__ = ["write_bed_report"]
 
@@ -36,7 +37,7 @@ def write_bed_report(report: Report) -> Path:
     criteria = [f"{stage['stage']}: {stage['criterion']}." for stage in result["stages"]]
     command = result["experiment"]
     sections = [
-        Section("", [*tables(result), *picture, *drawn]),
+        Section("", [*tables(result), *picture, *report_scene(report.folder), *drawn]),
         Section("How each stage came to rest", [listing(criteria)]),
         report.numbers(),
         report.again(f"hedgebed {command} run.toml\nhedgebed bed show bed.npz", "bits"),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vis.page.folder import read_columns
 from vis.page.plots import Array
 from vis.page.report import Result
-from vis.pictures.canvas import colour_values, moved_since, nice_above
+from vis.pictures.canvas import colour_top, moved_since
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
 from vis.pictures.meshes import in_place, spike_mesh
 
@@ -96,12 +96,8 @@ class _Filmed:
         """Upper end of a scale for all pictures, in the unit of its label, by those grains that take part."""
         if self.frames is None or not self.on_grains:
             return self.least
-        most = 0.0
-        for index in {len(self) // 3, 2 * len(self) // 3, len(self) - 1}:
-            values = colour_values(self.grains(self.frames[index]), by)
-            taking = values[values > 0.05 * values.max()] if len(values) else values
-            most = max(most, float(np.percentile(taking, 97)) if len(taking) else 0.0)
-        return nice_above(most)
+        chosen = {len(self) // 3, 2 * len(self) // 3, len(self) - 1}
+        return colour_top((self.grains(self.frames[index]) for index in chosen), by)
 
 
 class SpaceReel(_Filmed):

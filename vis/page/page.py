@@ -18,8 +18,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from PIL import Image
 
 __all__ = [
-    "Block", "Columns", "Page", "Section", "Tile", "code", "columns", "figure", "listing", "table", "table_of",
-    "text", "write_page", "write_template",
+    "Block", "Columns", "Page", "Section", "Tile", "code", "columns", "figure", "listing", "scene_block", "table",
+    "table_of", "text", "write_page", "write_template",
 ]  # fmt: skip
 
 _KINDS = {".png": "png", ".gif": "gif", ".jpg": "jpeg"}
@@ -27,19 +27,20 @@ _KINDS = {".png": "png", ".gif": "gif", ".jpg": "jpeg"}
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """One piece of a section. Made by `text`, `code`, `listing`, `figure` and `table`."""
+    """One piece of a section. Made by `text`, `code`, `listing`, `figure`, `scene_block` and `table`."""
 
     kind: str
     text: str = ""
     title: str = ""
     caption: str = ""
-    data: str = ""
+    data: str | tuple[str, ...] = ""
+    head: str | tuple[str, ...] = ()
     file: str = ""
     small: bool = False
     half: bool = False
     words: bool = False
+    whole: bool = False
     entries: tuple[str, ...] = ()
-    head: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
 
 
@@ -106,6 +107,14 @@ def figure(
         kind, content = "jpeg", buffer.getvalue()
     data = f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
     return Block(kind="figure", title=title, caption=caption, data=data, half=half, file=path.name if show_file else "")
+
+
+def scene_block(head: str, data: Sequence[str], *, whole: bool = False) -> Block:
+    """Runs that can be turned and moved through time, as `vis.view` makes them.
+
+    ``head``: JSON in which no tag can begin. ``data``: Base64 for each run. ``whole``: Whether it is all of its page.
+    """
+    return Block(kind="scene", head=head, data=tuple(data), whole=whole)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", words: bool = False) -> Block:

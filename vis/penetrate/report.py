@@ -24,6 +24,7 @@ from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
 from vis.pictures.pictures import Picture, Pictures, make_pictures
+from vis.view.page import report_scene
 
 __all__ = ["AMENDED", "PLOTS", "make_plots", "words_of_effects", "write_penetration_report"]
 
@@ -63,6 +64,7 @@ def write_penetration_report(folder: str | Path, *, pictures: bool = True, progr
     context = summarise(run)
     context["missing"] = [*context["missing"], *(text for text in undrawn if _asked_for(run, text))]
     context["plots"] = {plot.name: figure(path, title=plot.title, caption=plot.caption) for plot, path in plots}
+    context["scenes"] = report_scene(run.path) if pictures else []
     context["pictures"] = [_picture(picture) for picture in drawn.stills if picture.file.exists()]
     context["animation"] = _picture(drawn.animation) if drawn.animation and drawn.animation.file.exists() else None
     context |= {"method": drawn.method, "picture_notes": drawn.notes, "limits": limits_words(run.result)}

@@ -7,7 +7,7 @@ the page from its lower left corner.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from vis.page.numbers import quote
 from vis.page.plots import INK, styled
 
 __all__ = [
-    "COLOURS", "FORCE", "HALO", "Page", "blank_page", "colour_values", "colourmap", "draw_force",
+    "COLOURS", "FORCE", "HALO", "Page", "blank_page", "colour_top", "colour_values", "colourmap", "draw_force",
     "draw_measure", "moved_since", "nice_above", "pixels",
 ]  # fmt: skip
 
@@ -78,6 +78,16 @@ def moved_since(grains: dict[str, NDArray[Any]], first: dict[str, NDArray[Any]])
         places = np.argsort(first["id"])
         before = before[places[np.searchsorted(first["id"], grains["id"], sorter=places)]]
     return grains | {"displacement": np.asarray(grains["displacement"], dtype=np.float64) - before}
+
+
+def colour_top(sample: Iterable[dict[str, NDArray[Any]]], by: str) -> float:
+    """Upper end of a scale for all pictures, in the unit of its label, by those grains of a `sample` that take part."""
+    most = 0.0
+    for grains in sample:
+        values = colour_values(grains, by)
+        taking = values[values > 0.05 * values.max()] if len(values) else values
+        most = max(most, float(np.percentile(taking, 97)) if len(taking) else 0.0)
+    return nice_above(most)
 
 
 def nice_above(value: float) -> float:

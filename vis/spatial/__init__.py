@@ -1,4 +1,4 @@
 """The report of a platform in space.
 
-Imports `vis.film`, `vis.page`, `vis.pictures`.
+Imports `vis.film`, `vis.page`, `vis.pictures`, `vis.view`.
 """

@@ -19,6 +19,7 @@ from vis.page.report import Report, Result, given, report_of
 from vis.page.states import States, draw_bands, draw_states, passages
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
+from vis.view.page import report_scene
 
 __all__ = ["AXES", "draw_energy", "pair", "say_grains", "write_spatial_report"]
 
@@ -51,7 +52,12 @@ def write_spatial_report(
     seen = []
     if pictures and NAME in frame_names(home):
         made = draw_runs([SpaceReel(home)], home, "space", by=colour, film=film, progress=report.rest())
-        seen = [Section("Seen", [*shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)])]
+        seen = [
+            Section(
+                "Seen",
+                [*report_scene(home), *shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)],
+            )
+        ]
     changes = result.get("transitions")  # an older folder has none
     sections = [
         Section("", [listing(result["departures"]["sentences"]), *drawn, *say_grains(result)]),

@@ -1,4 +1,4 @@
 """The report of a tumble in the plane: path, states, energy, tracks, film.
 
-Imports `vis.film`, `vis.page`, `vis.pictures`.
+Imports `vis.film`, `vis.page`, `vis.pictures`, `vis.view`.
 """

@@ -27,6 +27,7 @@ from vis.pictures.canvas import COLOURS, nice_above
 from vis.pictures.pictures import Picture
 from vis.tumble.beside import HEAD
 from vis.tumble.grains import grains_section
+from vis.view.page import report_scene
 
 __all__ = ["draw_tracks", "write_tumble_report"]
 
@@ -90,7 +91,7 @@ def _seen(report: Report, colour: str, film: bool) -> Section:
     if reel.frames is not None and "surface" in reel.frame(len(reel) - 1).maps:
         drawn.stills.append(draw_tracks(reel, report.figures / "tracks.png"))
     notes = [text(say("camera"), small=True), *(text(note) for note in drawn.notes)]
-    return Section("Seen from near", [*shown(drawn), *notes])
+    return Section("Seen from near", [*report_scene(report.folder), *shown(drawn), *notes])
 
 
 def _tiles(result: Result) -> list[Tile]:

@@ -1,0 +1,201 @@
+"""A run as a page: it holds the run's numbers, needs no network, keeps to its limit and says what it leaves out."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from benchmarks.view import bed_of
+from experiments.cli.main import BAD_INPUT, DONE, main
+from vis.page.page import Page, Section, write_page
+from vis.pictures.canvas import colour_values
+from vis.pictures.frames import FrameWriter, read_frames
+from vis.view.packing import Codes, pack, unpack
+from vis.view.page import IN_REPORT, report_scene, write_view
+from vis.view.scene import Limits, make_scene
+from vis.view.sources import sources_of
+
+HEAD = re.compile(r'class="head">(.*?)</script>', re.DOTALL)
+DATA = re.compile(r'class="data" data-run="(\d+)">(.*?)</script>', re.DOTALL)
+
+
+def decoded(page):
+    """The scenes of a page and their arrays, by number of the run."""
+    from base64 import b64decode
+
+    text = page.read_text()
+    scenes = json.loads(HEAD.search(text)[1])["scenes"]
+    return scenes, {int(run): unpack(b64decode(data), scenes[int(run)]["arrays"]) for run, data in DATA.findall(text)}
+
+
+def places(scene, arrays):
+    """Positions of the grains [m], shape (frames, n, 3)."""
+    return np.array(scene["grains"]["low"]) + scene["grains"]["step"] * arrays["position"]
+
+
+@pytest.fixture(scope="module")
+def page(make_run, tmp_path_factory):
+    """The page of a made-up run of 4,800 grains."""
+    return write_view(make_run(tmp_path_factory.mktemp("run"), frames=3))
+
+
+def test_arrays_come_back_as_they_were_packed():
+    rng = np.random.default_rng(3)
+    arrays = [
+        Codes(name, rng.integers(0, np.iinfo(kind).max, shape, dtype=kind, endpoint=True))
+        for name, kind, shape in (("a", np.uint16, (5, 7, 3)), ("b", np.uint8, (5, 7, 1)), ("c", np.uint32, (1, 4, 3)))
+    ]
+    found = unpack(pack(arrays), [array.entry() for array in arrays])
+    for array in arrays:
+        np.testing.assert_array_equal(found[array.name], array.values)
+    with pytest.raises(ValueError, match="bytes"):
+        unpack(pack(arrays[:2]), [array.entry() for array in arrays])
+
+
+def test_the_positions_on_the_page_are_those_of_the_frames_to_half_a_step(page):
+    scenes, arrays = decoded(page)
+    shown = [k for k, scene in enumerate(scenes) if scene["frames"]]
+    assert len(shown) == 3
+    for number in shown:
+        scene, frames = scenes[number], read_frames(page.parent, scenes[number]["id"])
+        assert scene["times"] == pytest.approx(frames.times, rel=1e-6)
+        found = places(scene, arrays[number])
+        for index, frame in enumerate(frames):
+            apart = np.abs(found[index] - frame.grains["position"])
+            assert apart.max() <= 0.51 * scene["grains"]["step"] < 2e-6
+            radius = arrays[number]["radius"][0, :, 0] / 255 * scene["grains"]["radius"]
+            np.testing.assert_allclose(radius, frame.grains["radius"], atol=scene["grains"]["radius"] / 500)
+
+
+def test_colours_and_bodies_on_the_page_are_those_of_the_frames(page):
+    scenes, arrays = decoded(page)
+    frame, own = read_frames(page.parent, scenes[0]["id"])[1], arrays[0]
+    for colour in scenes[0]["colours"]:
+        share = colour_values(frame.grains, colour["name"]) / colour["top"]
+        codes = own[f"colour {colour['name']}"][1, :, 0]
+        np.testing.assert_allclose(codes / 255, np.clip(share, 0.0, 1.0), atol=0.51 / 255)
+    loose = scenes[0]["frames"][1]
+    corners = np.array(loose["centre"]) - loose["size"] + 2 * loose["size"] / 65535 * own["body spike"][1]
+    points, triangles = frame.bodies["spike"]
+    np.testing.assert_allclose(corners, points, atol=2 * loose["size"] / 65535)
+    np.testing.assert_array_equal(own["triangles spike"][0], triangles)
+    (arrow,) = loose["arrows"]
+    assert arrow[2] == pytest.approx(points[:, 2].min(), abs=1e-6)
+    assert arrow[5] == pytest.approx(frame.values["force"], rel=1e-3)
+
+
+def test_a_page_asks_nothing_of_a_network_and_names_run_and_surface(page):
+    text = page.read_text()
+    assert not re.findall(r"(?:src|href)\s*=|@import|url\(|fetch\(|import\(", text)
+    links = set(re.findall(r"https?://[^\"' )]*", text))
+    assert links == {"http://www.w3.org/2000/svg"}  # the name of a format, which is not loaded
+    assert re.search(r"<h1>A 12 mm ball-tipped spike in fine sand</h1>", text)
+
+
+def test_runs_without_frames_have_curves_and_say_how_to_get_frames(make_run, tmp_path):
+    page = write_view(make_run(tmp_path, frames=0))
+    scenes, arrays = decoded(page)
+    assert not arrays and len(scenes) > 5
+    for scene in scenes:
+        assert scene["panels"] and not scene["frames"] and "--frame-count" in scene["notes"][0]
+    assert report_scene(tmp_path) == []
+
+
+def test_peaks_of_a_curve_survive_its_thinning(page):
+    scenes, _ = decoded(page)
+    force = next(panel for panel in scenes[0]["panels"] if "force" in panel["label"])
+    bed, law = force["lines"]
+    assert (bed["name"], law["name"], law["dashed"]) == ("bed", "spring-damper", True)
+    table = np.genfromtxt(page.parent / "series" / f"{scenes[0]['id']}.csv", delimiter=",", skip_header=1)
+    assert max(bed["y"]) == pytest.approx(table[:, 3].max(), rel=1e-3)
+
+
+def test_a_small_scene_keeps_the_grains_at_every_face_and_says_so(make_run, tmp_path):
+    (source, *_) = sources_of(make_run(tmp_path, frames=3))
+    full = make_scene(source, Limits(1e8, 99)).head
+    small = make_scene(source, IN_REPORT)
+    assert small.head["grains"]["count"] < 0.6 * full["grains"]["count"]
+    assert small.head["grains"]["shell"] and len(small.head["notes"]) > len(full["notes"])
+    from base64 import b64decode
+
+    shown = places(small.head, unpack(b64decode(small.data), small.head["arrays"]))[0]
+    every = source.frame(0).grains["position"]
+    behind = every[every[:, 1] >= source.cut]
+    assert shown[:, 1].min() >= source.cut - 1e-5
+    for axis in range(3):
+        for edge in (behind[:, axis].min(), behind[:, axis].max()):
+            at_face = np.abs(behind[:, axis] - edge) < 0.0036
+            assert np.abs(shown[:, axis] - edge)[np.abs(shown[:, axis] - edge) < 0.0036].size == at_face.sum()
+
+
+def test_a_scene_stays_within_its_limit_and_one_that_cannot_is_refused(make_run, tmp_path):
+    (source, *_) = sources_of(make_run(tmp_path, frames=16))
+    whole = make_scene(source, Limits(1e8, 99))
+    assert len(whole.head["times"]) == 16
+    for share in (0.8, 0.3, 0.1):
+        limited = make_scene(source, Limits(share * len(whole.data), 99))
+        assert len(limited.data) <= share * len(whole.data)
+        assert limited.head["times"][0] == whole.head["times"][0]
+    assert limited.head["grains"]["shell"]
+    with pytest.raises(ValueError, match="--limit"):
+        make_scene(source, Limits(1000, 99))
+
+
+def test_a_title_is_text_and_never_runs(tmp_path):
+    title = "</script><script>document.title = 'taken'</script><img src=x onerror=alert(1)>"
+    text = write_view(bed_of(tmp_path, 50, frames=1, title=title)).read_text()
+    assert "<img" not in text and text.count("<script") == text.count("</script") == 3
+    assert json.loads(HEAD.search(text)[1])["title"] == title
+
+
+def test_frames_with_other_grains_are_refused_by_number(tmp_path):
+    bed_of(tmp_path, 20, frames=1)
+    writer = FrameWriter(tmp_path, name="bed", resume=True)
+    more = {name: np.zeros((19, 3)) for name in ("position", "velocity", "force", "displacement")}
+    writer.write(1.0, more | {"radius": np.ones(19), "id": np.arange(19)})
+    with pytest.raises(ValueError, match="frame 1 of bed"):
+        write_view(tmp_path)
+
+
+def test_a_report_holds_the_small_scene_with_its_script_once(make_run, tmp_path):
+    blocks = report_scene(make_run(tmp_path, frames=2))
+    page = write_page(tmp_path / "report.html", Page("t", [], [Section("", blocks), Section("", blocks)]))
+    text = page.read_text()
+    assert text.count("class Viewer") == 1 and len(HEAD.findall(text)) == 2
+    assert page.stat().st_size < 15e6
+    empty = write_page(tmp_path / "other.html", Page("t", [], [Section("", [])]))
+    assert "class Viewer" not in empty.read_text()
+
+
+def test_the_command_writes_the_page_and_refuses_what_it_cannot_show(make_run, tmp_path, capsys):
+    run = make_run(tmp_path / "run", frames=2)
+    assert main(["view", str(run), "--no-open", "--quiet", "--frames", "1"]) == DONE
+    assert capsys.readouterr().out.split() == ["page:", str(run / "view.html")]
+    scenes, _ = decoded(run / "view.html")
+    assert [len(scene["times"]) for scene in scenes if scene["frames"]] == [1, 1, 1]
+    for more in (["--limit", "0"], ["--frames", "0"], ["--interval", "-1"], ["--out", "page.pdf"]):
+        assert main(["view", str(run), "--no-open", "--quiet", *more]) == BAD_INPUT
+        assert more[0].strip("-") in capsys.readouterr().err
+    assert main(["view", str(tmp_path), "--no-open"]) == BAD_INPUT
+    (empty := tmp_path / "empty").mkdir()
+    (empty / "run.toml").write_text((run / "run.toml").read_text())
+    assert main(["view", str(empty), "--no-open", "--quiet"]) == BAD_INPUT
+    assert str(empty) in capsys.readouterr().err
+
+
+def test_a_notebook_shows_a_run_or_a_bed_in_a_frame_of_its_own(make_run, tmp_path):
+    from html import unescape
+    from types import SimpleNamespace
+
+    from vis import View
+
+    shown = View(make_run(tmp_path / "run", frames=1))._repr_html_()
+    source = re.fullmatch(r'<iframe srcdoc="([^"]*)" .*sandbox="allow-scripts".*></iframe>', shown)[1]
+    assert len(DATA.findall(unescape(source))) == 3
+    arrays = {"position": np.random.default_rng(1).random((30, 3)), "radius": np.full(30, 0.01), "id": np.arange(30)}
+    bed = SimpleNamespace(time=0.5, grains=lambda: SimpleNamespace(as_dict=lambda: arrays))
+    scenes, _ = decoded(View(bed).save(tmp_path / "bed.html"))
+    assert scenes[0]["grains"]["count"] == 30
+    with pytest.raises(ValueError, match="list"):
+        View([1, 2])

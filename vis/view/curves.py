@@ -1,0 +1,136 @@
+"""Curves beside a scene: which columns of a run's series are drawn over time, thinned to what a page can show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vis.page.folder import Run, read_columns
+from vis.page.plots import BED, INK, MODEL, STATES, Array, mean_over
+from vis.page.states import States, state_runs
+from vis.pictures.frames import Frames
+
+__all__ = ["Line", "Panel", "bands", "line", "of_frames", "of_penetration", "of_space", "of_tumble", "panel"]
+
+Line = dict[str, Any]
+"""`name`, `colour`, `dashed`, times `t` [s] and values `y`."""
+Panel = dict[str, Any]
+"""`label` with the unit, and `lines`."""
+_BINS = 300
+"""A line keeps the least and the largest value of each of so many parts of its time."""
+_SMOOTH = 5e-3
+"""Forces on a platform are means over this [s], as in its report."""
+
+
+def line(name: str, time: Array, values: Array, *, colour: str = BED, dashed: bool = False) -> Line:
+    """A line of at most `2 * _BINS` points; what is not finite is left out. Peaks are kept."""
+    known = np.isfinite(time) & np.isfinite(values)
+    time, values = np.asarray(time, dtype=float)[known], np.asarray(values, dtype=float)[known]
+    if len(time) > 2 * _BINS:
+        edges = np.linspace(0, len(time), _BINS + 1).astype(int)
+        rows = {low + int(place(values[low:high])) for low, high in pairwise(edges) for place in (np.argmin, np.argmax)}
+        kept = sorted({0, len(time) - 1, *rows})
+        time, values = time[kept], values[kept]
+    return {
+        "name": name, "colour": colour, "dashed": dashed,
+        "t": [float(f"{t:.6g}") for t in time], "y": [float(f"{y:.4g}") for y in values],
+    }  # fmt: skip
+
+
+def panel(label: str, *lines: Line) -> list[Panel]:
+    """The lines that have two points at least, in one panel; none where there are none."""
+    shown = [one for one in lines if len(one["t"]) > 1]
+    return [{"label": label, "lines": shown}] if shown else []
+
+
+def bands(time: Array, states: States) -> list[dict[str, Any]]:
+    """States over time: `from` and `to` [s], `state` and its colour."""
+    last = len(time) - 1
+    return [
+        {"from": float(time[low]), "to": float(time[min(high, last)]), "state": name, "colour": STATES.get(name, INK)}
+        for low, high, name in state_runs(states)
+    ]
+
+
+def of_penetration(run: Run) -> list[Panel]:
+    """Depth and force of a spike in the bed and on the spring-damper."""
+    there = [
+        (name, series, colour)
+        for name, series, colour in (("bed", run.bed, BED), ("spring-damper", run.model, MODEL))
+        if series is not None
+    ]
+
+    def each(column: str, scale: float = 1.0) -> list[Line]:
+        return [
+            line(name, series.time, scale * getattr(series, column), colour=colour, dashed=colour == MODEL)
+            for name, series, colour in there
+        ]
+
+    return [
+        *panel("depth of the tip [mm]", *each("depth", 1e3)),
+        *panel("force on the spike [N]", *each("force")),
+        *panel("velocity, downwards [mm/s]", *each("velocity", 1e3)),
+    ]
+
+
+def of_tumble(folder: Path, series: Mapping[str, Array], name: str) -> list[Panel]:
+    """Angle, height and speed of a platform in the plane, called `name`, and of the spring-damper beside it if kept."""
+    runs = [(name, series, BED, False)]
+    beside = folder / "series" / "spring-damper.csv"
+    if beside.exists():
+        runs.append(("spring-damper", read_columns(beside)[0], MODEL, True))
+
+    def each(values: Any) -> list[Line]:
+        return [line(own, s["t_s"], values(s), colour=colour, dashed=dashed) for own, s, colour, dashed in runs]
+
+    return [
+        *panel("θ [degrees]", *each(lambda s: np.degrees(s["theta_rad"]))),
+        *panel("height of the centre [mm]", *each(lambda s: 1e3 * s["y_m"])),
+        *panel("speed of the centre [mm/s]", *each(lambda s: 1e3 * np.hypot(s["vx_m_s"], s["vy_m_s"]))),
+        *_load(folder),
+    ]
+
+
+def of_space(folder: Path, series: Mapping[str, Array]) -> list[Panel]:
+    """Turn, height, speed and force of a platform in space."""
+    time = series["t_s"]
+    speed = np.sqrt(sum(series[f"v{axis}_m_s"] ** 2 for axis in "xyz"))
+    turn = panel("turn from the start [degrees]", line("", time, np.degrees(series["turn_rad"])))
+    motion = folder / "series" / "motion.csv"
+    force: list[Panel] = []
+    if motion.exists():
+        columns, _ = read_columns(motion)
+        (mean,) = mean_over(_SMOOTH, columns["t_s"], [columns["fz_N"]])
+        force = panel("vertical force of the ground [N]", line("", columns["t_s"], mean))
+    return [
+        *turn,
+        *panel("height of the centre of mass [mm]", line("", time, 1e3 * series["z_m"])),
+        *panel("speed of the centre of mass [mm/s]", line("", time, 1e3 * speed)),
+        *force,
+    ]
+
+
+def of_frames(frames: Frames) -> list[Panel]:
+    """The values that the frames themselves hold, such as depth [m] and force [N]."""
+    rows = [frame.values for frame in frames]
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    return [
+        one
+        for name in names
+        for one in panel(name, line("", frames.times, np.array([row.get(name, np.nan) for row in rows])))
+    ]
+
+
+def _load(folder: Path) -> list[Panel]:
+    """The normal force on all rows of spikes of a platform on grains."""
+    path = folder / "series" / "feet.csv"
+    if not path.exists():
+        return []
+    feet, _ = read_columns(path)
+    total = np.sum([values for name, values in feet.items() if name.startswith("normal_")], axis=0)
+    (mean,) = mean_over(_SMOOTH, feet["t_s"], [total])
+    return panel("force of the ground, normal [N]", line("bed of grains", feet["t_s"], mean))
