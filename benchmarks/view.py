@@ -77,7 +77,7 @@ class Browser:
         ours_in, theirs_out = os.pipe()
         theirs_in, ours_out = os.pipe()
         options = [
-            "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--use-angle=swiftshader",
+            "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--disable-gpu",
             "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run",
             "--host-resolver-rules=MAP * ~NOTFOUND",
             f"--window-size={size[0]},{size[1]}", f"--user-data-dir={self._home}", "about:blank",

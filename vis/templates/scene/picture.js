@@ -60,7 +60,7 @@ class Picture {
   /** Draws on a canvas. Throws an Error where the browser has no WebGL 2. */
   constructor(canvas) {
     this.canvas = canvas;
-    this.gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true });
+    this.gl = canvas.getContext("webgl2", { antialias: false });
     if (!this.gl) throw new Error("no WebGL 2");
     const gl = this.gl;
     this.grains = this.program(GRAIN_VERTEX, GRAIN_FRAGMENT, ["scale"]);

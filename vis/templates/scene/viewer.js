@@ -36,7 +36,7 @@ class Viewer {
     this.over = element("canvas", { className: "over" });
     this.message = element("p", { className: "message", hidden: true });
     this.stage = element("div", { className: "stage" }, this.canvas, this.over, this.message);
-    this.beside = element("div", { className: "curves" });
+    this.beside = element("div", { className: "curves", tabIndex: 0, ariaLabel: "curves" });
     this.labels = {};
     const labelled = (name, text, control) => (this.labels[name] = element("label", {}, text + " ", control));
     const row = element("div", { className: "row" }, c.play, c.time, c.clock);
