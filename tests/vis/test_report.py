@@ -41,7 +41,7 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        if not self.open or self.open[-1] != "style":
+        if not self.open or self.open[-1] not in ("style", "script"):
             self.words.append(data)
 
     @property
@@ -65,11 +65,10 @@ def report(tmp_path_factory, make_run):
 
 
 def test_it_needs_no_network(report):
-    text = report.read_text()
-    assert not re.search(r"https?:|//[a-z]|@import|url\(", re.sub(r"base64,[A-Za-z0-9+/=]+", "", text))
+    text = re.sub(r'data-run="\d+">[^<]*', ">", report.read_text())
+    assert not re.search(r"https?:|//[a-z]|@import|url\(|fetch\(", re.sub(r"base64,[A-Za-z0-9+/=]+", "", text))
     page = Page(text)
     assert page.open == []
-    assert "script" not in page.tags
     assert "link" not in page.tags
     assert page.sources
     assert all(source.startswith("data:image/") for source in page.sources)

