@@ -1,6 +1,7 @@
 """`hedgebed mujoco`: a robot of MuJoCo on a surface law or on a bed of grains."""
 
 from coupling.robot import RobotRun
+from experiments.platform.ground_file import with_kept_ground
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -26,6 +27,7 @@ def _carry_out(settings: RobotSettings, folder: RunFolder, progress: Progress) -
     """In `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
         keep_files(settings, folder.path)
+        settings = with_kept_ground(settings, folder.path)
         plan = plan_robot(settings, folder=folder.path)
         if settings.ground == "bed":
             return RobotOnBed(settings, plan).carry_out(folder, progress)

@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling.members import Member
+from coupling.poses import Vector as Array
 from coupling.robot import BedFeet, MujocoRobot, RobotRun
 from coupling.robot.stability import plan_area
 from dem import Bed
@@ -30,6 +32,7 @@ from .settings import RobotSettings
 
 __all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed"]
 
+SEEN = 200  # Moments of the forecast at which the extent of the feet is taken
 FEWEST_ACROSS = 5.0  # Grains across the widest part of a foot, below which it is refused [1]
 
 
@@ -101,15 +104,26 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         near = depth > 0
         if not near.any():  # it never comes down
             near = np.ones_like(near)
-        reach = np.array([foot.reach for foot in self._robot.feet])
-        low, high = (
-            [float(found(places[..., axis] + sign * reach, where=near, initial=start)) for axis in range(2)]
-            for found, sign, start in ((np.min, -1, math.inf), (np.max, 1, -math.inf))
-        )
+        low, high = self._footprint(feet, near)
         return RobotForecast(
-            run=run, low=(low[0], low[1]), high=(high[0], high[1]), deepest=float(depth.max()),
+            run=run, low=(float(low[0]), float(low[1])), high=(float(high[0]), float(high[1])),
+            deepest=float(depth.max()),
             fastest=float(speeds.max(where=near[1:], initial=0.05)), rise=float(rows["z"].max() - rows["z"][0]),
         )  # fmt: skip
+
+    def _footprint(self, feet: Array, near: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Corners of what the feet cover from above where they are `near` the ground, x and y from the origin [m].
+
+        Of `SEEN` moments evenly over the run; ``feet``: `RobotRun.feet`; ``near``: shape (row, foot).
+        """
+        low, high = np.full(2, math.inf), np.full(2, -math.inf)
+        for k, foot in enumerate(self._robot.feet):
+            rows = np.flatnonzero(near[:, k])
+            vertices = np.concatenate([part.vertices for part in foot.parts])
+            for row in rows[np.linspace(0, len(rows) - 1, min(SEEN, len(rows))).astype(int)]:
+                points = feet[row, k, :2] + vertices @ to_matrix(feet[row, k, 3:7])[:2].T
+                low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+        return low, high
 
     def check(self) -> None:
         """Raise ValueError, naming key, value and what would do, for a bed that does not suit this robot."""

@@ -13,8 +13,10 @@ import numpy as np
 from coupling.robot import LawFeet, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
 from coupling.robot.stability import plan_area
+from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import Surface, find_surface
+from rigid.ground_file import GroundFile
 from rigid.platform.rig import STANDARD_GRAVITY
 from rigid.spatial.quaternions import to_matrix
 
@@ -41,6 +43,7 @@ class RobotPlan:
     surface: Surface
     numbers: Mapping[str, Number]
     scales: Mapping[str, float]  # Of the law under each part of a foot [1]
+    fitted: GroundFile | None  # The file that the law comes from
     warnings: tuple[str, ...]
 
     def robot(self) -> MujocoRobot:
@@ -51,8 +54,10 @@ class RobotPlan:
     def law_feet(self, robot: MujocoRobot, *, as_spring: bool = False) -> LawFeet:
         """The surface law under the robot's feet; `as_spring`: the spring-damper, whatever the settings say."""
         s, value = self.settings, {name: number.value for name, number in self.numbers.items()}
-        law = "spring-damper" if as_spring or s.ground == "bed" else s.ground
-        if law == "spring-damper":
+        law = "spring-damper" if as_spring else self.law
+        if self.fitted is not None and not as_spring:
+            parameters, scales = self.fitted.values, self.scales
+        elif law == "spring-damper":
             parameters, scales = {key: value[key] for key in ("stiffness", "damping")}, self.scales
         else:
             parameters, scales = dict(_assignment(text) for text in s.ground_parameters), {}
@@ -60,6 +65,13 @@ class RobotPlan:
             robot.feet, law=law, parameters=parameters, mu_s=value["mu_s"], mu_d=value["mu_d"], time_step=LAW_STEP,
             scales=scales,
         )  # fmt: skip
+
+    @property
+    def law(self) -> str:
+        """Name of the surface law; on grains that of the forecast."""
+        if self.fitted is not None:
+            return self.fitted.law
+        return "spring-damper" if self.settings.ground == "bed" else self.settings.ground
 
     def announcement(self) -> list[str]:
         """What was not given, then the warnings."""
@@ -108,15 +120,19 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     of_model = f"model {robot.name}"
     numbers["mass"] = Number(robot.mass, "kg", of_model)
     numbers["gravity"] = Number(robot.gravity, "m/s2", "given" if settings.gravity is not None else of_model)
-    surface = find_surface(settings.surface)
+    surface, fitted = find_surface(settings.surface), fitted_ground(settings.ground)
     warnings = [part.note for foot in robot.feet for part in foot.parts if part.note]
     if robot.floors:
         warnings.append(say("floors_off", floors=", ".join(robot.floors)))
     scales = {}
     for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
         for part in foot.parts:
-            scales[part.name] = _scale(part, to_matrix(turn), surface, settings)
+            tip = None if settings.stiffness is not None or not surface.granular else surface.spike
+            tip = fitted.foot.diameter if fitted is not None else tip
+            scales[part.name] = _scale(part, to_matrix(turn), tip)
     largest = max(scales.values())
+    if fitted is not None and largest != 1.0:
+        warnings.append(say("fitted", file=fitted, most=largest))
     for key in ("stiffness", "damping"):
         given = getattr(settings, key)
         unit = "N/m" if key == "stiffness" else "N s/m"
@@ -134,7 +150,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     numbers["weight"] = Number(max(robot.mass * robot.gravity, 1e-9), "N", "mass times gravity")
     return RobotPlan(
         settings=settings, model=model, controller=_controller(settings, folder), surface=surface, numbers=numbers,
-        scales=scales, warnings=tuple(warnings),
+        scales=scales, fitted=fitted, warnings=tuple(warnings),
     )  # fmt: skip
 
 
@@ -152,11 +168,14 @@ def _settle_friction(settings: RobotSettings, surface: Surface, numbers: dict[st
         raise ValueError(say("sliding_above", mu_d=numbers["mu_d"].value, mu_s=mu_s))
 
 
-def _scale(part: Part, matrix: Any, surface: Surface, settings: RobotSettings) -> float:
-    """How many times the numbers of one spike a part has: on sand by its area from above, as K goes with the area."""
-    if settings.stiffness is not None or not surface.granular or surface.spike is None or part.kind == "site":
+def _scale(part: Part, matrix: Any, tip: float | None) -> float:
+    """How many times the law of a tip of this diameter [m] a part has: by its area from above; None, and a point: once.
+
+    So goes K on sand.
+    """
+    if tip is None or part.kind == "site":
         return 1.0
-    return max(plan_area(part.vertices @ matrix.T) / (0.25 * math.pi * surface.spike**2), 1e-3)
+    return max(plan_area(part.vertices @ matrix.T) / (0.25 * math.pi * tip**2), 1e-3)
 
 
 def width_of(part: Part, matrix: Any) -> float:

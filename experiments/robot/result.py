@@ -137,18 +137,21 @@ def conclude(
     """The result, its series written. On grains `beside` is the robot on the spring-damper."""
     write_series_of(run, folder)
     robot = run.robot
-    what = f"a bed of {plan.surface.name}" if settings.ground == "bed" else f"{plan.surface.name} ({settings.ground})"
+    what = f"a bed of {plan.surface.name}" if settings.ground == "bed" else f"{plan.surface.name} ({plan.law})"
     title = say("title", name=robot.name, what=what, gravity=robot.gravity)
     warnings: list[str | None] = [
         *plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master),
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
     ]  # fmt: skip
+    if plan.fitted is not None:
+        warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]
     result: Json = {
         "title": title, "status": "done", "quantities": quantities_of(run),
         "departures": {"sentences": _sentences(run)},
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
-        "surface": plan.surface.name, "ground": settings.ground, "duration": settings.duration,
+        "surface": plan.surface.name, "ground": "bed" if settings.ground == "bed" else plan.law,
+        "duration": settings.duration,
         "feet": [foot.name for foot in robot.feet], "warnings": warnings, "macro_step": run.macro_step,
         "robot_step": robot.step, "steps": run.master.count,
     }  # fmt: skip
@@ -171,6 +174,19 @@ def conclude(
         ]
     result["warnings"] = [warning for warning in warnings if warning]
     return Result.make("mujoco", **result)
+
+
+def _beyond(plan: RobotPlan, run: RobotRun) -> list[str]:
+    """A sentence for each number that is outside the range of the law of a file: load of a tip, depth, gravity."""
+    assert plan.fitted is not None
+    feet, fitted = run.feet, plan.fitted
+    shares = [sum(plan.scales[part.name] for part in foot.parts) for foot in run.robot.feet]
+    load = float((feet[:, :, 9].max(axis=0) / shares).max())
+    found = {"load": load, "depth": float(feet[:, :, -1].max())}
+    most = {name: max(value, fitted.range[name][0]) for name, value in found.items()}
+    low, high = fitted.range["gravity"]
+    near = min(max(run.robot.gravity, low), high)  # MuJoCo's own 9.81 m/s2 are as good as 9.80665
+    return fitted.beyond(**most, gravity=near if abs(near - run.robot.gravity) < 0.01 * near else run.robot.gravity)
 
 
 def quantities_of(run: RobotRun) -> dict[str, Json]:

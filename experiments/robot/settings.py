@@ -8,6 +8,7 @@ from experiments.grains.settings import GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
 from rigid.checks import nearest
 from rigid.ground.laws import GROUNDS
+from rigid.ground_file import is_ground_file
 from vis.page.sentences import Sentences
 
 __all__ = ["RobotSettings"]
@@ -41,7 +42,7 @@ class RobotSettings(GrainsSettings):
     """Material: steel, brick, sand, sand-weak or jsc1a."""
     ground: str = "spring-damper"
     """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, katsuragi-durian, bekker,
-    rft), or bed: grains."""
+    rft), the file of one (ground.toml, as hedgebed calibrate writes it), or bed: grains."""
     ground_parameters: tuple[str, ...] = ()
     """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot."""
     stiffness: Positive | None = None
@@ -65,6 +66,9 @@ class RobotSettings(GrainsSettings):
         return self
 
     def _of_ground(self) -> str | None:
+        if is_ground_file(self.ground):
+            own = self.ground_parameters or self.stiffness is not None or self.damping is not None
+            return say("of_a_file", s=self) if own else None
         known = [*GROUNDS, "bed"]
         if self.ground not in known:
             return say("no_ground", s=self, known=nearest(self.ground, known))

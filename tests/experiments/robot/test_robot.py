@@ -112,6 +112,18 @@ def test_on_a_small_bed_a_stopped_run_goes_on_to_the_same_bits_and_is_drawn(tmp_
     assert json.loads((tmp_path / "whole" / "result.json").read_text())["grains"]["grain_count"] == 768
 
 
+def test_a_law_in_a_file_is_that_of_its_tip_times_the_area_of_the_foot():
+    file = EXAMPLES.parents[1] / "docs" / "results" / "calibrate-sand-1mm" / "ground.toml"
+    plan = plan_robot(RobotSettings(**HOPPER, ground=str(file)))
+    fitted = plan.fitted
+    assert plan.scales["foot"] == pytest.approx((0.06 / fitted.foot.diameter) ** 2, rel=0.01)
+    ground = plan.law_feet(plan.robot())
+    own = sum(float(law.force(1e-3, 0.0)) for law in ground.grounds[0][:8])
+    assert own == pytest.approx(plan.scales["foot"] * float(fitted.ground().force(1e-3, 0.0)), rel=1e-9)
+    with pytest.raises(ValueError, match="has its own parameters"):
+        RobotSettings(**HOPPER, ground=str(file), stiffness=1.0)
+
+
 def test_the_command_takes_the_model_as_its_first_word(tmp_path, capsys):
     file = str(EXAMPLES / "mujoco-hopper" / "hopper.xml")
     out = str(tmp_path / "run")
