@@ -127,5 +127,5 @@ def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
     if not groups:
         say(f"no case of several tumbles has a result in {results}: `hedgebed experiments run grains3` makes them")
         return 1
-    print("* set down by the hand, or still going down at the end: left out of the fit")
+    print("* during the placement, or still going down at the end: not used in the fit")
     return 0

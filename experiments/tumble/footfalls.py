@@ -103,7 +103,7 @@ def footfall_table(falls: Sequence[Footfall]) -> Json:
     rows = [
         [
             str(number), str(fall.row), f"{fall.time:.3f}", f"{1e3 * fall.deepest:.2f}", f"{fall.load:.2f}",
-            "set down by the hand" if fall.set_down else "still going down at the end" if fall.open else "",
+            "during the placement" if fall.set_down else "still going down at the end" if fall.open else "",
         ]
         for number, fall in enumerate(falls)
     ]  # fmt: skip

@@ -266,5 +266,5 @@ def test_a_run_of_another_kind_is_refused_by_what_it_is(tmp_path, capsys, more):
 def test_only_a_finished_run_of_penetrate_becomes_a_campaign(grains, tmp_path):
     with pytest.raises(ValueError, match="has no run"):
         campaign_of_run(tmp_path)
-    with pytest.raises(ValueError, match="a higher rate would do"):
+    with pytest.raises(ValueError, match="use a higher rate"):
         campaign_of_run(grains, sensors=SpikeSensors(rate=5))

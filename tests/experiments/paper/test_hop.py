@@ -194,7 +194,7 @@ def test_a_motor_slows_the_wheel_where_there_is_no_brake_and_unequal_sides_have_
     assert status == DONE
     golden("hop/slowed_by_its_motor", [" ".join(error.split()), *result["departures"]["sentences"]])
     assert result["quantities"]["model_distance"]["value"] is None
-    assert any("MASCOT has not" in warning for warning in result["warnings"])
+    assert any("MASCOT does not have" in warning for warning in result["warnings"])
     assert (tmp_path / "run" / "report.html").exists()
 
 
@@ -289,7 +289,7 @@ def test_a_distance_too_far_says_what_each_ground_allows(tmp_path, capsys):
     _, error = hop(tmp_path, capsys, "--distance", "5000")
     golden("hop/too_far", " ".join(error.split()))
     _, error = hop(tmp_path, capsys, "--distance", "40")
-    speed = re.search(r"goes that far with a wheel at (\S+) rad/s: --wheel-speed-0", error)[1]
+    speed = re.search(r"reaches it with a wheel at (\S+) rad/s: --wheel-speed-0", error)[1]
     _, result = hop(tmp_path, capsys, "--wheel-speed-0", speed)
     assert result["quantities"]["model_distance"]["value"] == pytest.approx(40, rel=1e-2)
 
@@ -311,9 +311,9 @@ def test_a_motor_is_asked_for_its_torque(result_of):
             ("--torque", "1", "--actuator", "motor"),
             "torque = 1 N m is beyond the motor of platform = 'hedgehog': at most",
         ),
-        (("--torque", "0.2", "--actuator", "motor", "--distance", "2"), "leave one of the two out"),
-        (("--wheel-speed-0", "100", "--distance", "2"), "leave one of the two out"),
-        (("--wheel-speed-0", "100", "--actuator", "motor"), "torque in place of distance would do"),
+        (("--torque", "0.2", "--actuator", "motor", "--distance", "2"), "leave one out"),
+        (("--wheel-speed-0", "100", "--distance", "2"), "leave one out"),
+        (("--wheel-speed-0", "100", "--actuator", "motor"), "use torque instead of distance"),
         (("--wheel-speed-0", "1100"), "beyond max_wheel_speed = 1050 rad/s (platform hedgehog)"),
         (("--wheel-speed-0", "0.001"), "does not make the platform leave rigid ground"),
         (("--inertia", "0.5"), "inertia = 0.5 kg m2 must not exceed mass spike_length^2"),

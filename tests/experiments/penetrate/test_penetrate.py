@@ -431,7 +431,7 @@ def test_coarse_tips_can_be_asked_for():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"grain": 2e-5, "tip_diameter": 0.012}, r"grain = 2e-05 m makes about .* GB are free: grains of"),
+        ({"grain": 2e-5, "tip_diameter": 0.012}, r"grain = 2e-05 m makes about .* GB are free: use grains of"),
         (
             {"speeds": (3000.0,)},
             r"speeds = 3000 m/s makes the grains overlap by more than max_overlap = 0.05 .* m/s, or",
@@ -442,7 +442,7 @@ def test_coarse_tips_can_be_asked_for():
         ({"substeps": 1000}, "substeps = 1000 moves a spike .* use at most 150"),
         ({"young": 1e12}, r"young = 1e.12 Pa is more than sand itself has: at most 7e.10 Pa would do"),
         ({"young": 1e4}, "young = 10000 Pa is so soft"),
-        ({"threads": 1024}, r"threads = 1024 is more than the cores there are: at most \d+ would do"),
+        ({"threads": 1024}, r"threads = 1024 is more than the number of cores: use at most \d+"),
         ({"load": 4.0}, "load = 4 N would put .* a load of at most 0.73 N,"),
         ({"drop_speeds": (2.0,)}, r"drop_speeds = 2 m/s with mass = 0.1 kg would reach about .* at most .* m/s"),
         ({"speeds": (1e-9,)}, r"speeds = 1e-09 m/s needs .* the limit is 1e.09"),

@@ -55,11 +55,14 @@ def test_a_bed_that_is_softer_throughout_is_not_taken_for_sinking_on():
     golden("tumble/not_sinking", found.verdict)
 
 
-@pytest.mark.parametrize(("step", "words"), [(1e-3, "It goes on sinking: +1.0"), (-1e-3, "It goes less and less deep")])
+@pytest.mark.parametrize(
+    ("step", "words"),
+    [(1e-3, "increases from tumble to tumble: +1.0"), (-1e-3, "sinkage decreases")],
+)
 def test_rows_that_go_deeper_or_less_deep_each_time_are_said_to(step: float, words: str):
     noise = 1e-4 * np.random.default_rng(1).standard_normal((3, 8))
     found = sinking_over([_falls(list(0.03 + step * np.arange(8) + own)) for own in noise])
-    assert found is not None and found.verdict.startswith(words)
+    assert found is not None and words in found.verdict
     assert found.low < step < found.high
 
 

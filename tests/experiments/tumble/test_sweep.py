@@ -101,8 +101,11 @@ def test_the_middle_of_a_sweep_is_a_tumble_of_its_own():
         (["--sweep", "camera-scale.scale=1:2:1"], ["alters a sensor"]),
         (["--sweep", "mu_s=0.3:0.6:1e-5"], ["at most 2500"]),
         (["--sweep", "mu_s=0.3:0.6:0.1", "mu_s=0.1:0.2:0.1"], ["mu_s twice"]),
-        (["--sweep", "mu_s=0.3:0.6:0.1", "--mu-s", "0.4"], ["mu_s = 0.4 is given and swept"]),
-        (["--sweep", "pendulum.length=2:3:1", "--effects", "pendulum.length=2"], ["pendulum.length = 2 is given and"]),
+        (["--sweep", "mu_s=0.3:0.6:0.1", "--mu-s", "0.4"], ["mu_s = 0.4 is both given and swept"]),
+        (
+            ["--sweep", "pendulum.length=2:3:1", "--effects", "pendulum.length=2"],
+            ["length = 2 is both given"],
+        ),
         (["--sweep", "mu_s=0.3:0.6:0.1", "--mu-d", "0.4"], ["at mu_s = 0.3: mu_d = 0.4 is above mu_s = 0.3"]),
         (["--sweep", "torque=0.1:0.3:0.1"], ["at torque = 0.3", "at most 0.22 N m"]),
         (["--sweep", "mu_s=0.3:0.6:0.1", "--method", "paper"], ["method = 'paper'", "'located' would do"]),

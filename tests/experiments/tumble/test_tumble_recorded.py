@@ -75,7 +75,7 @@ def test_k_and_c_of_a_row_are_twice_those_fitted_to_a_spike_in_the_same_grains(r
     [
         (
             ("--also", "brick"),
-            "has stiffness = 15000.* and .* 140.0: .* runs that differ in gravity, torque or seed alone would do",
+            "has stiffness = 15000.* and .* 140.0: .* runs that differ only in gravity, torque or seed",
         ),
         (("--depth-std", "1e-4"), "--depth-std is given, and .* is a run of a tumble"),
     ],
