@@ -8,6 +8,7 @@ result.to_dataframe()
 Its JSON schema is experiments/runs/result.schema.json: ``python -m experiments.runs.result`` prints it.
 """
 
+import hashlib
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -21,8 +22,8 @@ from .series import RESULT_FORMAT, ResultFormat, pandas, replacing
 from .version import __version__
 
 __all__ = [
-    "Departures", "Quantity", "Result", "Table", "plain", "quantities_of", "quantity", "read_json", "schema",
-    "toml_value", "write_json", "write_text",
+    "Departures", "Quantity", "Result", "Table", "check_digests", "digest_of", "plain", "quantities_of", "quantity",
+    "read_json", "read_result", "schema", "toml_value", "write_json", "write_text",
 ]  # fmt: skip
 
 Json = dict[str, Any]
@@ -110,14 +111,16 @@ class Result(_Entries):
 
     @classmethod
     def load(cls, folder: str | Path) -> Self:
-        """The result in a run folder, or the file itself. Raises ValueError, naming file and key, for none."""
+        """The result in a run folder, or the file itself.
+
+        Raises ValueError, naming file and key, for none, and for one that is damaged.
+        """
         path = Path(folder) / "result.json" if Path(folder).is_dir() else Path(folder)
         try:
-            return cls._checked(json.loads(path.read_text(encoding="utf-8")), str(path))
+            entries = read_result(path)
         except OSError as error:
             raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
-        except json.JSONDecodeError as error:
-            raise ValueError(f"{path}: is no JSON: {error}") from None
+        return cls._checked(entries, str(path))
 
     @classmethod
     def _checked(cls, entries: Any, where: str) -> Self:
@@ -191,8 +194,41 @@ def write_json(path: Path, data: Any) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """The contents of the JSON file `path`."""
-    return json.loads(Path(path).read_text(encoding="utf-8"))
+    """The contents of the JSON file `path`. Raises ValueError, naming it, for one that is damaged; OSError for none."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: is no JSON: {error}") from None
+
+
+def digest_of(path: Path) -> str:
+    """The digest of a file, as the status.json of a finished run keeps it."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def check_digests(folder: Path, *names: str) -> None:
+    """Raise ValueError, naming the file, for one of a finished run that is not as the run wrote it; all if no `names`.
+
+    status.json has the digests; an older one has none, and a file that is not there is not looked at.
+    """
+    try:
+        kept = read_json(folder / "status.json").get("digests", {})
+    except (OSError, ValueError, AttributeError):
+        return
+    for name, digest in kept.items() if isinstance(kept, dict) else ():
+        if (not names or name in names) and (folder / name).is_file() and digest_of(folder / name) != digest:
+            raise ValueError(
+                f"{folder / name}: is not as the run wrote it: its digest differs from that in status.json"
+            )
+
+
+def read_result(path: Path) -> Json:
+    """The contents of a result.json. Raises ValueError, naming it, for one that is damaged; OSError for none."""
+    entries = read_json(path)
+    if not isinstance(entries, dict):
+        raise ValueError(f"{path}: holds {type(entries).__name__}, a table was expected")
+    check_digests(path.parent, path.name)
+    return entries
 
 
 def toml_value(value: Any) -> str:

@@ -92,10 +92,19 @@ def write_series(path: str | Path, columns: Mapping[str, Any], *, line_end: str 
 def read_series(path: str | Path, *, text: Container[str] = ()) -> dict[str, NDArray[Any]]:
     """The columns of the CSV file `path`: name -> array of shape [n], float where all of it is numbers, else text.
 
-    Columns named in `text` stay text, whatever they hold.
+    Columns named in `text` stay text, whatever they hold. Raises ValueError, naming the file, for one that is damaged:
+    empty, no text, a row that ends too early.
     """
-    with Path(path).open(newline="", encoding="utf-8") as file:
-        names, *rows = [row for row in csv.reader(file) if row]
+    try:
+        with Path(path).open(newline="", encoding="utf-8") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: is no CSV file: {error}") from None
+    if not rows:
+        raise ValueError(f"{path}: is empty; a row with the names of the columns was expected")
+    names = rows.pop(0)
+    if short := next((number for number, row in enumerate(rows, 2) if len(row) < len(names)), None):
+        raise ValueError(f"{path}: row {short} has {len(rows[short - 2])} cells, {len(names)} were expected")
     cells = {name: [row[place] for row in rows] for place, name in enumerate(names)}
     return {name: np.array(own, dtype=str) if name in text else _array(own) for name, own in cells.items()}
 

@@ -35,6 +35,7 @@ from experiments.runs.streams import (
 )
 from experiments.runs.version import __version__
 from hedgebed_taichi import chosen
+from rigid.result import check_digests
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "GROUPS", "STOPPED", "build_app", "main"]
 
@@ -151,6 +152,15 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     return _with_parameters(command, parameters)
 
 
+def _damage(run: RunFolder) -> str:
+    """What is wrong with the files of a finished run; empty where nothing is."""
+    try:
+        run.read_result()
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
 _Json = Annotated[bool, Parameter(help="Print the result as JSON on stdout and nothing else.", negative="")]
 _Quiet = Annotated[bool, Parameter(help="Show no progress.", negative="")]
 _Verbose = Annotated[bool, Parameter(help="Print every number and finding of the report.", negative="")]
@@ -171,9 +181,16 @@ def _resume(
         kept = run.status is None and (folder / "result.json").exists()  # as docs/results has them: not to be written
         if not kept:
             settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
+            check_digests(run.path, "run.toml")
             with run.lock():
                 pass
-    if kept or (run.status == "done" and (folder / "result.json").exists()):
+        done = kept or (run.status == "done" and (folder / "result.json").exists())
+        if done and (fault := _damage(run)):
+            if kept:
+                raise ValueError(fault)
+            say(f"{fault}; it is made again")
+            done = False
+    if done:
         say(f"the run in {folder} is done")
         redraw_old_report(run, quiet=quiet)
         return show_folder(run, as_json=json, verbose=verbose)

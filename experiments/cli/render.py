@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from experiments.runs.folder import RunFolder
+from experiments.runs.folder import RunFolder, read_series
 from experiments.runs.kept_results import drawn_from, require_files, require_whole
 from experiments.runs.progress import make_progress
 from experiments.runs.streams import refusing, say, stdout_to_stderr
@@ -33,8 +33,11 @@ def render(
             raise ValueError(
                 f"run = {str(run)!r} has no result yet: `hedgebed resume {run}` finishes it where it can be"
             )
+        folder.read_result()
         if folder.command in ("tumble", "tumble spatial"):
             require_files(folder, drawn_from(folder), key="run")
+            for name in drawn_from(folder):
+                read_series(run / name)
         else:
             require_whole(folder, key="run")
         with folder.lock():

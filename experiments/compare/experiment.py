@@ -52,6 +52,8 @@ def check(settings: CompareSettings) -> None:
         raise ValueError(say("plane_and_space", runs=settings.runs, first=first, second=second))
     if first.command != second.command:
         raise ValueError(say("two_kinds", runs=settings.runs, first=first, second=second))
+    for one in (first, second):
+        one.read_result()
     if first.command == IN_SPACE:  # an older folder lacks series: said before anything is written
         for one in (first, second):
             compare_spatial.read_moved(one.path, one.read_result())

@@ -4,14 +4,13 @@ K, C and what follows from them are fitted anew on both sides, to the runs whose
 at other speeds do not pass for a change of grain. Each condition weighs on both sides what it weighs in the reference.
 """
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from experiments.runs.folder import RunFolder
+from experiments.runs.folder import RunFolder, read_json
 from experiments.runs.types import Json
 from rigid.series import RESULT_FORMAT
 from vis.page.numbers import foldable, quote
@@ -31,7 +30,7 @@ COMPARED = ("stiffness", "damping", "sinkage_dem", "sinkage_spring_damper", "dra
 def read_reference(reference: str | Path) -> Json:
     """The result.json to compare with. Raises ValueError where it is not the result of a penetrate run."""
     try:
-        other = json.loads(Path(reference).read_text(encoding="utf-8"))
+        other = read_json(Path(reference))
         if isinstance(other, dict) and (Path(reference).parent / "run.toml").is_file():
             other = RunFolder.open(Path(reference).parent).of_today(other)  # what its materials are called
     except (OSError, ValueError) as error:

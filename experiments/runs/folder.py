@@ -9,14 +9,17 @@ status.json               {"status": "running|stopped|failed|done", "reason", "u
 lock                      the process that is writing the folder; the system frees it when that process dies
 result.json               the numbers a person would quote
 series/<id>.csv           time series, the unit of each column in its name
-checkpoint/<name>.npz     arrays to carry on from; checkpoint/<name>.done.json says that a piece of the work is finished
+checkpoint/<name>.npz     arrays to carry on from; <name>.npz.before: those of the checkpoint before
+checkpoint/<name>.done.json    says that a piece of the work is finished
 ```
 """
 
-import json
 import os
 import re
+import sys
 import tomllib
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
@@ -28,7 +31,7 @@ from filelock import FileLock, Timeout
 from pydantic import BaseModel
 
 from hedgebed_renamed import BEFORE_RUN_2
-from rigid.result import plain, read_json, toml_value, write_json, write_text
+from rigid.result import check_digests, digest_of, plain, read_json, read_result, toml_value, write_json, write_text
 from rigid.series import read_series, replacing, write_series
 from rigid.version import __version__
 
@@ -52,6 +55,10 @@ Status = Literal["running", "stopped", "failed", "done"]
 RUN_FORMAT = "hedgebed-run/2"
 RUN_FORMATS = ("hedgebed-run/1", RUN_FORMAT)  # what can be read; the first has materials and surfaces by other names
 _NAMED = ("material", "surface", "surfaces")
+_NAMES = "names-of-all"  # in a checkpoint: a zip file whose list is cut off is read as a shorter one
+_BEFORE = ".before"  # ends the name of the checkpoint before the last
+_DAMAGED = (OSError, EOFError, KeyError, ValueError, NotImplementedError, zipfile.BadZipFile, zlib.error)
+"""What numpy raises for a file of arrays that is cut off or has a wrong byte; its members have checksums."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 
 
@@ -248,7 +255,7 @@ class RunFolder:
         """What status.json holds; nothing where there is none."""
         try:
             kept = read_json(self.path / "status.json")
-        except (OSError, json.JSONDecodeError):
+        except (OSError, ValueError):
             return {}
         return kept if isinstance(kept, dict) else {}
 
@@ -261,21 +268,32 @@ class RunFolder:
         return round(self._spent_before + _processor_time() - self._began, 2)
 
     def set_status(self, status: Status, reason: str = "") -> None:
-        """Write status.json. `reason` says why a run stopped or failed."""
+        """Write status.json, of a run that is done with digests of its files. `reason`: why it stopped or failed."""
         if status not in get_args(Status):
             raise ValueError(f"status = {status!r} is none of {', '.join(get_args(Status))}")
         now = {"status": status, "reason": reason, "updated": _now(), "processor_time": self.processor_time}
+        digests = self._kept_digests()
+        if status == "done":
+            files = (path for name in ("result.json", "*.csv", "series/*.csv") for path in sorted(self.path.glob(name)))
+            digests |= {path.relative_to(self.path).as_posix(): digest_of(path) for path in files}
+        now["digests"] = digests
         write_json(self.path / "status.json", now)
 
     # What it holds
 
     def write_result(self, result: Mapping[str, Any]) -> None:
         """Write result.json (see `write_json`): what the settings determine, so no times of day or of computing."""
+        self._forget_digests()
         write_json(self.path / "result.json", result)
 
     def read_result(self) -> dict[str, Any]:
-        """The contents of result.json, material and surface by today's names."""
-        return self.of_today(read_json(self.path / "result.json"))
+        """The contents of result.json, material and surface by today's names.
+
+        Raises ValueError, naming the file, where it or another of a finished run is damaged; OSError where there is
+        none.
+        """
+        check_digests(self.path)
+        return self.of_today(read_result(self.path / "result.json"))
 
     def of_today(self, result: dict[str, Any]) -> dict[str, Any]:
         """A result of this run; where it is of before 2026-11-26, material and surface by the names since."""
@@ -287,6 +305,7 @@ class RunFolder:
     def write_series(self, name: str, columns: Mapping[str, Any]) -> str:
         """Write series/<name>.csv (see `write_series`); return its path relative to the folder."""
         relative = f"series/{_checked(name)}.csv"
+        self._forget_digests()
         write_series(self.path / relative, columns)
         return relative
 
@@ -294,8 +313,19 @@ class RunFolder:
         """The columns of series/<name>.csv."""
         return read_series(self.path / "series" / f"{_checked(name)}.csv")
 
+    def _kept_digests(self) -> dict[str, str]:
+        """That of run.toml as it was when the run began."""
+        kept, name = self._kept_status().get("digests"), "run.toml"
+        return {name: kept[name] if isinstance(kept, dict) and name in kept else digest_of(self.path / name)}
+
+    def _forget_digests(self) -> None:
+        """All but that of run.toml, of a run that was done and is written again."""
+        kept = self._kept_status()
+        if len(kept.get("digests", ())) > 1:
+            write_json(self.path / "status.json", kept | {"digests": self._kept_digests()})
+
     def save_checkpoint(self, name: str, arrays: Mapping[str, Any]) -> None:
-        """Write `arrays` (name -> array, number or text) to checkpoint/<name>.npz, in place of what was there.
+        """Write `arrays` (name -> array, number or text) to checkpoint/<name>.npz; the one before is kept beside it.
 
         Raises TypeError for anything else: a checkpoint never holds pickled objects.
         """
@@ -303,22 +333,42 @@ class RunFolder:
         for key, array in stored.items():
             if array.dtype.hasobject:
                 raise TypeError(f"{key!r} in checkpoint {name!r} is neither numbers nor text: {arrays[key]!r}")
-        with replacing(self.path / "checkpoint" / f"{_checked(name)}.npz") as temporary, temporary.open("wb") as file:
-            np.savez(file, **stored)  # type: ignore[arg-type]
+        path = self._checkpoint(name)
+        with replacing(path) as temporary:
+            with temporary.open("wb") as file:
+                np.savez(file, **stored, **{_NAMES: np.array(sorted(stored))})  # type: ignore[arg-type]
+            if path.exists():
+                path.replace(self._checkpoint(name, _BEFORE))
         if self.status == "running":  # a run that is killed has its processor time until here
             self.set_status("running")
 
     def load_checkpoint(self, name: str) -> dict[str, np.ndarray] | None:
-        """The arrays of checkpoint/<name>.npz; None where there is none."""
-        path = self.path / "checkpoint" / f"{_checked(name)}.npz"
-        if not path.exists():
-            return None
-        with np.load(path, allow_pickle=False) as archive:
-            return {key: archive[key] for key in archive.files}
+        """The arrays of checkpoint/<name>.npz; None where there is none.
+
+        One that is damaged is told on stderr, and the one before it is taken; None where that one is too.
+        """
+        for path in (self._checkpoint(name), self._checkpoint(name, _BEFORE)):
+            if not path.exists():
+                continue
+            try:
+                with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+                    found = {key: archive[key] for key in archive.files}
+                names = found.pop(_NAMES, None)
+                if names is not None and sorted(found) != names.tolist():
+                    raise ValueError(f"it holds {len(found)} arrays, {len(names)} were written")
+                return found
+            except _DAMAGED as error:
+                said = f"{path} is damaged ({error}): the work goes on from the checkpoint before it, or from its start"
+                print(f"hedgebed: {said}", file=sys.stderr, flush=True)
+        return None
 
     def drop_checkpoint(self, name: str) -> None:
-        """Remove checkpoint/<name>.npz if it is there."""
-        (self.path / "checkpoint" / f"{_checked(name)}.npz").unlink(missing_ok=True)
+        """Remove the checkpoints of that name, if there are any."""
+        for before in ("", _BEFORE):
+            self._checkpoint(name, before).unlink(missing_ok=True)
+
+    def _checkpoint(self, name: str, before: str = "") -> Path:
+        return self.path / "checkpoint" / f"{_checked(name)}.npz{before}"
 
     def mark_done(self, name: str, data: Any = None) -> None:
         """Say that the piece of work `name` is finished, with what a resumed run wants to know of it (JSON)."""

@@ -1,6 +1,5 @@
 """Whether a run folder still holds what its pictures and curves are made of: a kept result does not."""
 
-import json
 from collections.abc import Iterable
 
 from .folder import RunFolder
@@ -14,7 +13,7 @@ def drawn_from(folder: RunFolder) -> list[str]:
     """The files that the report of a finished run of a platform is drawn from, relative to its folder."""
     try:
         result = folder.read_result()
-    except (OSError, json.JSONDecodeError):
+    except (OSError, ValueError):
         return list(PATH_AND_MOTION)
     grains, sweep = result.get("grains") or {}, result.get("sweep") or {}
     return [*dict.fromkeys([*PATH_AND_MOTION, *grains.get("series", {}).values(), *filter(None, [sweep.get("file")])])]

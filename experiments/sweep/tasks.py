@@ -20,7 +20,6 @@ from pydantic import BaseModel, ValidationError
 from experiments.runs.folder import RunFolder, write_json, write_text
 from experiments.runs.progress import Progress
 from experiments.runs.registry import Experiment, find_experiment
-from experiments.runs.result import Result
 from experiments.runs.whole_runs import keeping_status, without_reports
 
 __all__ = ["Outcome", "Task", "Tell", "carry_out", "code_of", "done_before", "received", "task_of"]
@@ -97,7 +96,7 @@ def done_before(task: Task) -> Outcome | None:
         folder = RunFolder.open(task.path)
         if folder.status != "done":
             return None
-        Result.load(task.path)
+        folder.read_result()
         text = (task.path / "result.json").read_text(encoding="utf-8")
     except (OSError, ValueError):
         return None

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from functools import cached_property
@@ -15,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid.result import read_result
 from vis.page.folder import read_columns
 from vis.page.plots import Array
 from vis.page.report import Result
@@ -54,7 +54,7 @@ class _Filmed:
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
-        self.result: Result = json.loads((self.folder / "result.json").read_text(encoding="utf-8"))
+        self.result: Result = read_result(self.folder / "result.json")
         self.series, self.states = read_columns(self.folder / "trajectory.csv")
         self.frames = read_frames(self.folder, NAME) if NAME in frame_names(self.folder) else None
         self.times: Array = np.zeros(0) if self.frames is None else np.asarray(self.frames.times)

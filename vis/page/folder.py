@@ -153,10 +153,7 @@ def read_series(path: str | Path) -> Series:
     Raises FileNotFoundError: there is no such file. ValueError: a column is missing, a number cannot be read, or it has
     no rows.
     """
-    try:
-        columns = series.read_series(path, text=("phase",))
-    except IndexError as error:
-        raise ValueError(f"{path} has a row that ends too early") from error
+    columns = series.read_series(path, text=("phase",))
     if absent := [name for name in _COLUMNS if name not in columns]:
         raise ValueError(f"{path} has no column {', '.join(absent)}")
     if not len(columns["t_s"]):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
+from rigid.result import read_result
 from vis.page.folder import read_columns
 from vis.page.limits import limits_words
 from vis.page.page import Block, Page, Section, Tile, code, figure, table, text, write_page
@@ -40,7 +40,7 @@ class Report:
     ) -> None:
         self.folder, self.dpi, self.captions = Path(folder), dpi, Sentences(package, "figures.toml")
         self.done, self.progress = 0.0, progress
-        self.result: Result = json.loads((self.folder / "result.json").read_text(encoding="utf-8"))
+        self.result: Result = read_result(self.folder / "result.json")
         self.figures = self.folder / "figures"
         self.figures.mkdir(exist_ok=True)
 

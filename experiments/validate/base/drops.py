@@ -9,6 +9,7 @@ to the body's lowest point; the ball starts where it first touches a grain.
 import hashlib
 import json
 import math
+import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -155,7 +156,7 @@ def part(
         try:
             with np.load(path) as kept:
                 return {key: kept[key] for key in kept.files}
-        except (OSError, ValueError):  # ended while it was written by other means; computed anew
+        except (OSError, ValueError, zipfile.BadZipFile):  # ended while it was written by other means; computed anew
             pass
     found = {key: np.asarray(value) for key, value in compute().items()}
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,131 @@
+"""Files that are cut off or have a wrong byte: a sentence that names the file, never a traceback, never another number.
+
+`make torture` damages as many files as HEDGEBED_DAMAGES says; the suite does a few.
+"""
+
+import os
+import random
+import shutil
+
+import numpy as np
+import pytest
+
+from experiments.campaign.files import new_campaign
+from experiments.cli.main import main
+from experiments.runs.folder import RunFolder
+
+DAMAGES = int(os.environ.get("HEDGEBED_DAMAGES", "4"))
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """No report is drawn: what is read for the numbers is what is damaged."""
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A finished tumble on a law and one that differs from it, which no test writes to."""
+    home = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
+        for name, torque in (("run", "0.2"), ("other", "0.15")):
+            tokens = ["--duration", "0.2", "--torque", torque, "--out", str(home / name), "--quiet"]
+            assert main(["tumble", *tokens]) == 0
+    new_campaign(home / "campaign", kind="tumble")
+    return home
+
+
+def damaged(path, chance):
+    """Cut the file off somewhere, or change one bit of it."""
+    content = bytearray(path.read_bytes())
+    place = chance.randrange(len(content))
+    if chance.random() < 0.5:
+        content = content[:place]
+    else:
+        content[place] ^= 1 << chance.randrange(8)
+    path.write_bytes(content)
+
+
+def said_of(tokens, capsys):
+    """Exit status of the command, and what it said on stderr."""
+    capsys.readouterr()
+    status = main([*tokens])
+    return status, capsys.readouterr().err
+
+
+@pytest.mark.parametrize("seed", range(DAMAGES))
+def test_a_damaged_result_is_made_again_to_the_same_bits(seed, whole, tmp_path, capsys):
+    """The digest in status.json tells a changed digit, which is JSON as good as another."""
+    run = tmp_path / "run"
+    shutil.copytree(whole / "run", run)
+    damaged(run / "result.json", random.Random(seed))
+    status, said = said_of(["resume", str(run), "--quiet"], capsys)
+    assert status == 0 and f"{run / 'result.json'}: " in said and "Traceback" not in said
+    assert (run / "result.json").read_bytes() == (whole / "run" / "result.json").read_bytes()
+
+
+@pytest.mark.parametrize("seed", range(DAMAGES))
+def test_a_run_whose_settings_are_damaged_is_not_gone_on_with(seed, whole, tmp_path, capsys):
+    run = tmp_path / "run"
+    shutil.copytree(whole / "run", run)
+    (run / "result.json").unlink()
+    damaged(run / "run.toml", random.Random(seed))
+    status, said = said_of(["resume", str(run), "--quiet"], capsys)
+    assert status == 2 and "run.toml" in said and "Traceback" not in said
+    assert not (run / "result.json").exists()
+
+
+@pytest.mark.parametrize("seed", range(DAMAGES))
+def test_a_damaged_file_of_a_run_is_named_by_who_reads_it(seed, whole, tmp_path, capsys):
+    """Settings, status, result and trajectory of one of two runs that are compared, and of a run made a campaign."""
+    chance = random.Random(seed)
+    run = tmp_path / "run"
+    shutil.copytree(whole / "run", run)
+    name = chance.choice(["run.toml", "status.json", "result.json", "trajectory.csv", "series/motion.csv"])
+    damaged(run / name, chance)
+    for tokens in (
+        ["compare", str(run), str(whole / "other"), "--out", str(tmp_path / "compared"), "--quiet"],
+        ["campaign", "from-run", str(run), str(tmp_path / "campaign")],
+    ):
+        status, said = said_of(tokens, capsys)
+        assert "Traceback" not in said and status in (0, 1, 2), said
+        if name == "result.json":
+            assert status == 2 and str(run / name) in said
+        elif status:
+            assert str(run) in said or "compare" in said, said
+
+
+@pytest.mark.parametrize("seed", range(DAMAGES))
+def test_a_damaged_campaign_is_told_in_words(seed, whole, tmp_path, capsys):
+    chance = random.Random(seed)
+    folder = tmp_path / "campaign"
+    shutil.copytree(whole / "campaign", folder)
+    damaged(chance.choice(sorted(path for path in folder.rglob("*") if path.is_file())), chance)
+    status, said = said_of(["campaign", "check", str(folder), "--out", str(tmp_path / "checked"), "--quiet"], capsys)
+    assert status in (0, 2) and "Traceback" not in said, said
+
+
+@pytest.mark.parametrize("seed", range(DAMAGES))
+def test_a_damaged_checkpoint_gives_way_to_the_one_before_it(seed, tmp_path, capsys):
+    """Or is whole: zip keeps a checksum of every array, and what it does not guard is not read."""
+    folder, chance = RunFolder(tmp_path, "any", "1", {}), random.Random(seed)
+    arrays = np.random.default_rng(seed).normal(size=(2, 50))
+    for array in arrays:
+        folder.save_checkpoint("work", {"numbers": array, "name": "a"})
+    damaged(tmp_path / "checkpoint" / "work.npz", chance)
+    found, said = folder.load_checkpoint("work"), capsys.readouterr().err
+    before = "work.npz" in said
+    assert np.array_equal(found["numbers"], arrays[0 if before else 1]) and found["name"] == "a"
+    damaged(tmp_path / "checkpoint" / "work.npz.before", chance)
+    found = folder.load_checkpoint("work")
+    assert found is None or any(np.array_equal(found["numbers"], array) for array in arrays)
+    folder.drop_checkpoint("work")
+    assert folder.load_checkpoint("work") is None
+
+
+def test_a_checkpoint_that_was_being_replaced_when_the_run_was_killed_is_the_one_before(tmp_path):
+    folder = RunFolder(tmp_path, "any", "1", {})
+    folder.save_checkpoint("work", {"row": 1})
+    (tmp_path / "checkpoint" / "work.npz").rename(tmp_path / "checkpoint" / "work.npz.before")
+    assert folder.load_checkpoint("work")["row"] == 1
