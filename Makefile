@@ -9,7 +9,7 @@ WORKERS ?= 2
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test fast long slow tiers cover validate experiments bench gpu doctor format clean distclean
+.PHONY: help run test fast long slow fuzz torture tiers cover validate experiments bench gpu doctor format clean distclean
 
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
@@ -34,6 +34,13 @@ long: $(VENV)/.installed-test  ## the tests of some 10 s and more, which CI runs
 
 slow: $(VENV)/.installed-test  ## the tests that take minutes: physics against closed forms, kill and resume
 	$(PYTEST) -m slow $(ARGS)
+
+fuzz: $(VENV)/.installed-test  ## settings and campaigns drawn at random, 10,000 and 500: exit 0, or 2 with a sentence
+	HEDGEBED_FUZZ=10000 $(PYTEST) tests/faults/test_fuzz.py $(ARGS)
+
+torture: $(VENV)/.installed-test  ## files damaged, 1,000 in all, and experiments killed, 25 times each, resumed to the same bits
+	HEDGEBED_DAMAGES=200 $(PYTEST) tests/faults/test_damage.py $(ARGS)
+	HEDGEBED_KILLS=25 $(PYTEST) -m slow tests/faults/test_killed.py $(ARGS)
 
 tiers: $(VENV)/.installed-test  ## measure again which files of tests `make fast` may take (tests/durations.toml)
 	$(PYTEST) --write-durations $(ARGS)

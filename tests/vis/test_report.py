@@ -180,7 +180,7 @@ def test_summary_is_plain_data(made_once):
 def test_a_series_that_is_cut_short_is_refused(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("t_s,depth_m,velocity_m_s,force_N,phase\n0,0,0,0,in\n1,2\n")
-    with pytest.raises(ValueError, match="ends too early"):
+    with pytest.raises(ValueError, match="row 3 has 2 cells"):
         read_series(path)
     path.write_text("t_s,depth_m,velocity_m_s,force_N,phase\n")
     with pytest.raises(ValueError, match="no rows"):

@@ -1,4 +1,4 @@
 """Films and stills of a run in the plane or in space: reels of frames, cameras, one sheet.
 
-Imports `vis.page`, `vis.pictures`.
+Imports `rigid`, `vis.page`, `vis.pictures`.
 """

@@ -14,7 +14,7 @@ from golden import golden
 from experiments.cli.main import main
 from experiments.compare import experiment as compare
 from experiments.compare.tumbles import read_moved
-from experiments.runs.folder import read_series
+from experiments.runs.folder import RunFolder, read_series
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +72,8 @@ def test_numbers_that_go_with_how_long_a_run_lasts_are_compared_over_the_time_th
 def test_a_warning_of_both_runs_stands_once_and_one_of_either_is_told_with_its_label(runs, tmp_path):
     for name, own in (("sand", ["the wind blew", "sand's own"]), ("brick", ["the wind blew"])):
         shutil.copytree(runs / name, tmp_path / name)
-        file = tmp_path / name / "result.json"
-        file.write_text(json.dumps({**json.loads(file.read_text()), "warnings": own}))
+        folder = RunFolder.open(tmp_path / name)
+        folder.write_result(folder.read_result() | {"warnings": own})
     given = [str(tmp_path / name) for name in ("sand", "brick")]
     assert main(["compare", *given, "--no-pictures", "--out", str(tmp_path / "both"), "--quiet"]) == 0
     warnings = json.loads((tmp_path / "both" / "result.json").read_text())["warnings"]
@@ -95,7 +95,7 @@ def test_a_spring_damper_s_sinkage_is_its_compression_below_the_undisturbed_surf
     shutil.copytree(runs / "brick", old)
     for name in ("sinkage_start", "sinkage_largest"):
         del result["quantities"][name]
-    (old / "result.json").write_text(json.dumps(result))
+    RunFolder.open(old).write_result(result)
     out = tmp_path / "both"
     assert main(["compare", str(old), str(runs / "sand"), "--no-pictures", "--out", str(out), "--quiet"]) == 0
     found = json.loads((out / "result.json").read_text())

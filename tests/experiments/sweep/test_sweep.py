@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.cli.main import main
-from experiments.runs.folder import RunFolder, write_json
+from experiments.runs.folder import RunFolder
 from experiments.sweep import Settings, design, result, tasks
 from rigid.series import read_series
 from vis.report import write_report
@@ -161,7 +161,7 @@ def test_the_page_shows_what_is_asked_for_over_every_setting(tmp_path):
     found = json.loads((swept / "result.json").read_text())
     entry = {"quantity": "max_speed", "first": 0.4, "first_conf": 0.1, "total": None, "total_conf": None}
     found["sensitivities"] = [entry | {"key": "torque"}, entry | {"key": "mu_s", "total": 0.5, "total_conf": 0.2}]
-    write_json(swept / "result.json", found)
+    RunFolder.open(swept).write_result(found)
     assert write_report(swept).read_text().count("<img") == 3
     assert sorted(path.name for path in (swept / "figures").iterdir()) == [
         "over-max_speed.png", "over-sinkage_largest.png", "sensitivities.png",

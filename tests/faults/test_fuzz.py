@@ -1,0 +1,141 @@
+"""Settings and campaigns drawn at random: exit 0, or exit 2 with a sentence that names what is wrong, before any work.
+
+`make fuzz` draws as many as HEDGEBED_FUZZ says; the suite a few. The work itself is replaced: what is tried is all that
+comes before it.
+"""
+
+import os
+import random
+import shutil
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from experiments.campaign.files import new_campaign
+from experiments.cli.main import main
+from experiments.runs import registry
+from experiments.runs.registry import EXPERIMENTS
+from rigid.result import toml_value
+
+CASES = int(os.environ.get("HEDGEBED_FUZZ", "60"))
+SLOW_TO_CHECK = {"hop", "paper", "validate", "converge", "sweep"}
+"""Their checks compute for seconds where a setting is at its limit: `make fuzz` draws them too."""
+DRAWN = [one for one in EXPERIMENTS.values() if CASES > 60 or one.name not in SLOW_TO_CHECK]
+some = settings(max_examples=CASES, deadline=None, suppress_health_check=list(HealthCheck), derandomize=CASES <= 60)
+
+numbers = st.one_of(
+    st.sampled_from([0, 1, -1, 2, 3, 0.5, 1e-3, 1e-6, 1e6, 1e300, -1e-300, 2**31, float("nan"), float("inf")]),
+    st.floats(1e-4, 1e2),
+    st.integers(1, 20),
+)
+texts = st.one_of(
+    st.sampled_from(
+        ["", "none", "bed", "sand", "brick", "16mm", "1e-3g", "3 kg", "a=b", "nowhere.toml", "../x", "x:y:z"]
+    ),
+    st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_size=6),
+)
+values = st.recursive(st.one_of(numbers, texts, st.booleans()), lambda inner: st.lists(inner, max_size=3), max_leaves=4)
+
+
+@st.composite
+def cases(draw):
+    """An experiment, and some of its settings: as they are by default, near that, or anything."""
+    experiment = draw(st.sampled_from(DRAWN))
+    fields = experiment.settings_class().model_fields
+    given = {}
+    for name in draw(st.lists(st.sampled_from(sorted(fields)), max_size=5, unique=True)):
+        default, choices = fields[name].get_default(call_default_factory=True), get_args(fields[name].annotation)
+        near = [st.sampled_from(choices)] if choices and all(isinstance(one, str) for one in choices) else []
+        if isinstance(default, float) and default:
+            near.append(st.floats(0.3, 3.0).map(lambda factor, default=default: factor * default))
+        given[name] = draw(st.one_of(*near, values))
+    if draw(st.integers(0, 9)) == 0:
+        given[draw(st.text(st.characters(codec="ascii", categories=["Ll"]), min_size=1, max_size=8))] = draw(values)
+    return experiment.name, given
+
+
+def outcome(*tokens):
+    """Exit status and the lines on stderr."""
+    said = StringIO()
+    with redirect_stderr(said), redirect_stdout(StringIO()):
+        status = main(list(map(str, tokens)))
+    return status, said.getvalue()
+
+
+def in_words(said):
+    """Whether each line is one of ours, and short enough to be read."""
+    return "Traceback" not in said and all(len(line) < 900 for line in said.splitlines())
+
+
+@pytest.fixture
+def no_work(monkeypatch, tmp_path):
+    """Every experiment is over as soon as its settings are accepted."""
+
+    def over(self, given, folder, *, progress):
+        result = {"title": self.name, "quantities": {}}
+        registry.import_module("experiments.runs.folder").RunFolder.open(folder).write_result(result)
+        return result
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry.Experiment, "run", over)
+    monkeypatch.setattr(registry.Experiment, "headline_of", lambda self, result: None)
+
+
+@some
+@given(case=cases())
+def fuzz_settings(case):
+    name, given = case
+    lines = [f"{key} = {toml_value(value)}\n" for key, value in given.items()]
+    Path("case.toml").write_text("".join(lines), encoding="utf-8")
+    shutil.rmtree("out", ignore_errors=True)
+    status, said = outcome(*name.split(" "), "case.toml", "--out", "out", "--quiet")
+    assert status in (0, 2) and in_words(said), (name, given, status, said)
+    assert status == 0 or said.strip(), (name, given)
+
+
+def test_settings_of_any_kind_are_run_or_refused_in_words(no_work):
+    fuzz_settings()
+
+
+def mangled(text, chance):
+    """A file of a campaign with one thing another: a word, a line, a character."""
+    lines = text.splitlines(keepends=True)
+    place = chance.randrange(len(lines))
+    words = lines[place].replace(",", " , ").split(" ")
+    odd = ["", "nan", "-1", "1e308", "0", "x", "<script>alert(1)</script>", '"', "[", "é", "1,2", "true", "-0.0", "\t"]
+    kind = chance.randrange(4)
+    if kind == 0:
+        lines[place] = " ".join([*words[: len(words) // 2], chance.choice(odd), *words[len(words) // 2 + 1 :]])
+    elif kind == 1:
+        del lines[place]
+    elif kind == 2:
+        lines.insert(place, lines[chance.randrange(len(lines))])
+    else:
+        at = chance.randrange(len(lines[place]) + 1)
+        lines[place] = lines[place][:at] + chance.choice(odd) + lines[place][at + 1 :]
+    return "".join(lines)
+
+
+@pytest.mark.parametrize("kind", ["tumble", "penetration"])
+def test_campaigns_with_something_wrong_are_checked_or_refused_in_words(kind, tmp_path, monkeypatch):
+    """No markup of a campaign gets into the page as such."""
+    monkeypatch.chdir(tmp_path)
+    new_campaign(tmp_path / "new", kind=kind)
+    reports = CASES > 60
+    if not reports:
+        monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
+    for seed in range(max(8, CASES // 20)):
+        chance = random.Random(seed)
+        shutil.rmtree("one", ignore_errors=True), shutil.rmtree("out", ignore_errors=True)
+        shutil.copytree("new", "one")
+        path = chance.choice(sorted(path for path in (tmp_path / "one").rglob("*") if path.is_file()))
+        path.write_text(mangled(path.read_text(encoding="utf-8"), chance), encoding="utf-8")
+        status, said = outcome("campaign", "check", "one", "--out", "out", "--quiet")
+        assert status in (0, 2) and in_words(said), (seed, path, said)
+        if reports and status == 0:
+            assert "<script>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8"), seed
