@@ -28,44 +28,42 @@ EXPERIMENTS = {
 }  # fmt: skip
 
 
-def begun(tokens, cache):
-    """The command in a process of its own that leads its group."""
+def begun(tokens, cache, log):
+    """The command in a process of its own; what it says goes to the file `log`."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "HEDGEBED_CACHE": str(cache)}
-    return subprocess.Popen(
-        [sys.executable, "-m", "hedgebed", *map(str, tokens), "--quiet"], env=environment, start_new_session=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+    command = [sys.executable, "-m", "hedgebed", *map(str, tokens), "--quiet"]
+    with log.open("w") as file:
+        return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=file)
 
 
 def files(folder):
     """What a run says: its numbers, series and tables."""
     paths = [path for path in folder.rglob("*") if path.suffix in (".csv", ".nc") or path.name == "result.json"]
-    return {str(path.relative_to(folder)): path.read_bytes() for path in paths if "checkpoint" not in path.parts}
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_an_experiment_killed_at_random_moments_ends_in_the_same_bits(name, tmp_path):
-    chance, tokens = random.Random(name), EXPERIMENTS[name]
-    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    """A run that comes to its end between two kills is compared, and the next begins."""
+    chance, tokens, log = random.Random(name), EXPERIMENTS[name], tmp_path / "log"
     started = time.monotonic()
-    process = begun([*tokens, "--out", whole], tmp_path / "cache-of-whole")
-    assert process.wait() == 0, process.stderr.read()
-    lasts = time.monotonic() - started
-    killed = 0
-    while killed < KILLS:
-        there = (broken / "run.toml").exists()
-        process = begun(["resume", broken] if there else [*tokens, "--out", broken], tmp_path / "cache")
+    assert begun([*tokens, "--out", tmp_path / "whole"], tmp_path / "cache", log).wait() == 0, log.read_text()
+    lasts, whole, killed, turn = time.monotonic() - started, files(tmp_path / "whole"), 0, 0
+    assert "result.json" in whole
+    ended = True
+    while killed < KILLS or not ended:
+        if ended:
+            turn += 1
+            out, cache = tmp_path / f"broken{turn}", tmp_path / f"cache{turn}"
+        process = begun(["resume", out] if (out / "run.toml").exists() else [*tokens, "--out", out], cache, log)
         try:
-            status = process.wait(timeout=chance.uniform(0.0, lasts))
+            status = process.wait(timeout=chance.uniform(0.0, lasts) if killed < KILLS else None)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-            killed += 1
+            killed, ended = killed + 1, False
         else:
-            assert status == 0, process.stderr.read()
-            break
-    process = begun(["resume", broken] if (broken / "run.toml").exists() else [*tokens, "--out", broken],
-                    tmp_path / "cache")  # fmt: skip
-    assert process.wait() == 0, process.stderr.read()
-    assert files(broken) == files(whole) and "result.json" in files(whole)
+            ended = True
+            assert status == 0, log.read_text()
+            assert files(out) == whole
