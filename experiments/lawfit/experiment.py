@@ -10,6 +10,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.platform.surfaces import surface_of_grains
@@ -202,9 +203,9 @@ def ground_file(fitted: LawFit, data: Data, told: Sequence[str]) -> GroundFile:
     )  # fmt: skip
 
 
-def _columns(data: Data, fits: dict[str, LawFit]) -> dict[str, Any]:
+def _columns(data: Data, fits: dict[str, LawFit]) -> dict[str, NDArray[Any]]:
     """The rows that were fitted, and each law's force there."""
-    columns: dict[str, Any] = {
+    columns: dict[str, NDArray[Any]] = {
         "run": data.run_of_row, "bed": data.bed_of_row, "depth_m": data.depth, "rate_m_s": data.rate,
         "acceleration_m_s2": data.acceleration, "force_N": data.force,
     }  # fmt: skip

@@ -12,11 +12,11 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from experiments.runs.folder import write_json
+from experiments.runs.types import Json
 
 from .data import Data, Foundation, PushRun
 from .fit import fit_law
@@ -83,7 +83,9 @@ def synthetic_data(
     return Data(FOUNDATION, tuple(runs))
 
 
-def coverage(law: str, design: Design, *, count: int, first_seed: int = 0, **noise: float) -> dict[str, Any]:
+def coverage(
+    law: str, design: Design, *, count: int, first_seed: int = 0, **noise: float
+) -> dict[str, dict[str, float]]:
     """How often the 90 % intervals of `count` fits to made-up runs hold the truth, by parameter [1], and the bias."""
     truth, candidate = TRUTHS[law], CANDIDATES[law](FOUNDATION)
     assert candidate is not None
@@ -106,7 +108,7 @@ def coverage(law: str, design: Design, *, count: int, first_seed: int = 0, **noi
 
 def _measure(path: Path, count: int = 400) -> None:
     """Coverage of every law and design, into a JSON file, written anew after each so that it can be stopped."""
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    found: Json = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     for design, beds in DESIGNS.items():
         for law in TRUTHS:
             key, began = f"{law}: {design}", time.process_time()
