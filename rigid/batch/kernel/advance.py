@@ -18,34 +18,8 @@ def make_advance(parts: SimpleNamespace) -> Any:
     start_inner, advance_inner = make_inner(parts)
     push_spikes, hold = make_contacts(parts), make_hold(parts)
     find_events, switch = make_events(parts)
+    begin_memory, remember = make_memory(parts)
     record, follow, enter, summarise = make_records(parts)
-
-    @ti.func
-    def remember(
-        m: ti.template(), spikes: ti.template(), dt, top: ti.template(), held: ti.template(), gone: ti.template(),
-        settling: ti.template(), c: ti.template(),
-    ):  # fmt: skip
-        """What the ground keeps of a step: deepest depths, and how far it has given way."""
-        if ti.static(parts.MEMORY or parts.SETTLES):
-            for j in ti.static(range(3)):
-                n = (m.lowest + j - 1 + parts.count) % parts.count
-                whole = spikes.depth[j]
-                if ti.static(parts.SETTLES):
-                    whole += gone[n] + dt * settling[n]
-                    gone[n] += 0.5 * dt * (settling[n] + spikes.settling[j])
-                if (m.touch & (1 << n)) != 0:
-                    if ti.static(parts.MEMORY):
-                        top[n] = ti.max(top[n], spikes.depth[j])
-                    if ti.static(parts.HOLDS):
-                        held[n] = ti.max(held[n], spikes.depth[j])
-                elif whole < 0.0:  # forgotten above the surface, unless the crater has walls
-                    if c.wall > 0.0:
-                        m.out |= 1 << n
-                    else:
-                        if ti.static(parts.MEMORY):
-                            top[n] = 0.0
-                        if ti.static(parts.SETTLES):
-                            gone[n] = 0.0
 
     @ti.kernel
     def advance(
@@ -86,16 +60,7 @@ def make_advance(parts: SimpleNamespace) -> Any:
             )
             if c.nominal == 0.0 or c.until <= 0.0:
                 m.over = 1
-            share_gone = parts.settled(p, s)
-            for n in ti.static((0, parts.count - 1)):
-                angle = now.theta + parts.HALF + n * parts.BETA
-                depth = ti.max((s.length - c.radius) * ti.cos(angle) + c.radius - now.y, 0.0)
-                if ti.static(parts.SETTLES):
-                    gone[n] = share_gone * depth
-                if ti.static(parts.MEMORY):
-                    top[n] = (1.0 - share_gone) * depth
-                    if ti.static(parts.HOLDS):
-                        held[n] = top[n]
+            begin_memory(s, p, c, now, top, held, gone)
             time = 0.0
             pull = 0.0  # the torque at the step's start
             status = 0
@@ -172,10 +137,7 @@ def make_advance(parts: SimpleNamespace) -> Any:
                         record(series, i, sample, share, dt, now, then, parts.state_of(m.touch, m.stick))
                         sample += 1
                     follow(t, now, then, y_start, launch)
-                    remember(m, spikes, dt, top, held, gone, settling, c)
-                if ti.static(parts.SETTLES):
-                    for j in ti.static(range(3)):
-                        settling[(m.lowest + j - 1 + parts.count) % parts.count] = spikes.settling[j]
+                remember(m, spikes, dt, top, held, gone, settling, c)
                 # -- accept --
                 now = then
                 last = f
@@ -222,6 +184,66 @@ def make_advance(parts: SimpleNamespace) -> Any:
             summarise(summary, i, t, now)
 
     return advance
+
+
+def make_memory(parts: SimpleNamespace) -> Any:
+    """Two Taichi functions for what the ground remembers of each spike.
+
+    `begin_memory` sets it for a platform at rest; `remember` keeps what a step of `dt` [s] leaves: deepest depths, how
+    far the ground has given way (`gone`) and how fast it does (`settling`).
+    """
+    from hedgebed_taichi import ti
+
+    @ti.func
+    def begin_memory(
+        s: ti.template(), p: ti.template(), c: ti.template(), now: ti.template(), top: ti.template(),
+        held: ti.template(), gone: ti.template(),
+    ):  # fmt: skip
+        share = parts.settled(p, s)
+        for n in ti.static((0, parts.count - 1)):
+            angle = now.theta + parts.HALF + n * parts.BETA
+            depth = ti.max((s.length - c.radius) * ti.cos(angle) + c.radius - now.y, 0.0)
+            if ti.static(parts.SETTLES):
+                gone[n] = share * depth
+            if ti.static(parts.MEMORY):
+                top[n] = (1.0 - share) * depth
+            if ti.static(parts.HOLDS):
+                held[n] = (1.0 - share) * depth
+
+    @ti.func
+    def remember(
+        m: ti.template(), spikes: ti.template(), dt, top: ti.template(), held: ti.template(), gone: ti.template(),
+        settling: ti.template(), c: ti.template(),
+    ):  # fmt: skip
+        if ti.static(parts.MEMORY or parts.SETTLES):
+            for j in ti.static(range(3)):
+                n = (m.lowest + j - 1 + parts.count) % parts.count
+                if dt > 0.0:
+                    whole = spikes.depth[j]
+                    if ti.static(parts.SETTLES):
+                        whole += gone[n] + dt * settling[n]
+                        gone[n] += 0.5 * dt * (settling[n] + spikes.settling[j])
+                    if (m.touch & (1 << n)) != 0:
+                        if ti.static(parts.MEMORY):
+                            top[n] = ti.max(top[n], spikes.depth[j])
+                        if ti.static(parts.HOLDS):
+                            held[n] = ti.max(held[n], spikes.depth[j])
+                    elif whole < 0.0:  # forgotten above the surface, unless the crater has walls
+                        if c.wall > 0.0:
+                            m.out |= 1 << n
+                        else:
+                            forget(n, top, gone)
+                if ti.static(parts.SETTLES):
+                    settling[n] = spikes.settling[j]
+
+    @ti.func
+    def forget(n, top: ti.template(), gone: ti.template()):
+        if ti.static(parts.MEMORY):
+            top[n] = 0.0
+        if ti.static(parts.SETTLES):
+            gone[n] = 0.0
+
+    return begin_memory, remember
 
 
 def make_inner(parts: SimpleNamespace) -> Any:
