@@ -34,8 +34,8 @@ TERM = Term(
     source="stress of packed grains falls with the logarithm of time at a constant strain (Brujic et al. 2005; Miksic "
            "and Alava 2013, Phys. Rev. E 88:032207); a rate process whose speed falls exponentially with what it has "
            "released gives that law",
-    limits="one rate for all loads; what has given way never comes back, so that after a hold the force stays below that "
-           "of a push without one; a slow push has time to relax: the force depends on the logarithm of the speed too",
+    limits="one rate for all loads; what has given way never comes back, so that after a hold the force stays below "
+           "that of a push without one; a slow push has time to relax: the force depends on the logarithm of the speed too",
     hooks={"settle": creeping, "settled": stood_still},
 )  # fmt: skip
 
