@@ -22,7 +22,6 @@ def on_sand(*effects, seed):
     [
         ("ploughing", {"strength": 2e4, "speed": 0.01}),
         ("slip-sinkage", {"share": 0.6, "way": 0.012}),
-        ("relaxation", {"share": 0.03, "soon": 0.05}),
         ("inertial-drag", {"normal": 60.0, "added": 1.0}),
         ("plastic-sinkage", {"share": 0.5, "wall": 0.6}),
     ],
