@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.runs.types import Json
 from vis.pictures.frames import FrameWriter
 from vis.view.page import write_view
 
@@ -109,10 +110,10 @@ class Browser:
         os.close(self._out)
         shutil.rmtree(self._home, ignore_errors=True)
 
-    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
+    def call(self, method: str, **parameters: Any) -> Any:
         """The result of a command of the protocol. Raises RuntimeError where it fails."""
         self._count += 1
-        message: dict[str, Any] = {"id": self._count, "method": method, "params": parameters}
+        message: Json = {"id": self._count, "method": method, "params": parameters}
         if self._session is not None:
             message["sessionId"] = self._session
         os.write(self._out, json.dumps(message).encode() + b"\0")
@@ -132,7 +133,7 @@ class Browser:
             if answer.get("id") == self._count:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']}")
-                return dict(answer["result"])
+                return answer["result"]
 
     def open(self, page: Path, part: str = "") -> None:
         """Load a page, with what follows # in its address, and wait until its scene is there."""
@@ -193,7 +194,7 @@ def bed_of(folder: Path, grains: int, *, frames: int = 2, title: str = "A made-u
     return folder
 
 
-def run(out: Path, *, progress: Any, grains: int = 100_000, turns: int = 40) -> dict[str, Any]:
+def run(out: Path, *, progress: Any, grains: int = 100_000, turns: int = 40) -> Json:
     """Measure, and return grains, frames per second and processor time per frame at full and at half resolution.
 
     Raises RuntimeError where there is no Chromium, ValueError for fewer than 1 grain or turn.

@@ -199,3 +199,17 @@ def test_a_notebook_shows_a_run_or_a_bed_in_a_frame_of_its_own(make_run, tmp_pat
     assert scenes[0]["grains"]["count"] == 30
     with pytest.raises(ValueError, match="list"):
         View([1, 2])
+
+
+def test_a_run_that_goes_on_is_shown_again_until_it_ends(make_run, tmp_path, monkeypatch):
+    run, slept = make_run(tmp_path / "run", frames=1), []
+    (run / "status.json").write_text('{"status": "running"}')
+
+    def sleep(seconds):
+        slept.append((seconds, json.loads(HEAD.search((run / "view.html").read_text())[1])["live"]))
+        (run / "status.json").write_text('{"status": "done"}')
+
+    monkeypatch.setattr("experiments.cli.view.time.sleep", sleep)
+    assert main(["view", str(run), "--no-open", "--quiet", "--live", "--interval", "3"]) == DONE
+    assert slept == [(3.0, 3.0)]
+    assert json.loads(HEAD.search((run / "view.html").read_text())[1])["live"] == 0

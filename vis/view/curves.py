@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -14,12 +14,28 @@ from vis.page.plots import BED, INK, MODEL, STATES, Array, mean_over
 from vis.page.states import States, state_runs
 from vis.pictures.frames import Frames
 
-__all__ = ["Line", "Panel", "bands", "line", "of_frames", "of_penetration", "of_space", "of_tumble", "panel"]
+__all__ = ["Band", "Line", "Panel", "bands", "line", "of_frames", "of_penetration", "of_space", "of_tumble", "panel"]
 
-Line = dict[str, Any]
-"""`name`, `colour`, `dashed`, times `t` [s] and values `y`."""
-Panel = dict[str, Any]
-"""`label` with the unit, and `lines`."""
+
+class Line(TypedDict):
+    """Times [s] and values of one line."""
+
+    name: str
+    colour: str
+    dashed: bool
+    t: list[float]
+    y: list[float]
+
+
+class Panel(TypedDict):
+    """Lines over time; the label has their unit."""
+
+    label: str
+    lines: list[Line]
+
+
+Band = TypedDict("Band", {"from": float, "to": float, "state": str, "colour": str})
+"""A state from one time to another [s]."""
 _BINS = 300
 """A line keeps the least and the largest value of each of so many parts of its time."""
 _SMOOTH = 5e-3
@@ -47,7 +63,7 @@ def panel(label: str, *lines: Line) -> list[Panel]:
     return [{"label": label, "lines": shown}] if shown else []
 
 
-def bands(time: Array, states: States) -> list[dict[str, Any]]:
+def bands(time: Array, states: States) -> list[Band]:
     """States over time: `from` and `to` [s], `state` and its colour."""
     last = len(time) - 1
     return [

@@ -9,16 +9,26 @@ import base64
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["LEVELS", "Codes", "pack", "packed_size", "scale_of", "to_codes", "to_text", "unpack"]
+__all__ = ["LEVELS", "Codes", "Entry", "pack", "packed_size", "scale_of", "to_codes", "to_text", "unpack"]
 
 LEVELS = 65535
 """Largest code of a position."""
 _DTYPES: dict[int, np.dtype[Any]] = {1: np.dtype("<u1"), 2: np.dtype("<u2"), 4: np.dtype("<u4")}
+
+
+class Entry(TypedDict):
+    """What a page must know to decode an array: its shape, and the bytes of a number."""
+
+    name: str
+    frames: int
+    count: int
+    parts: int
+    bytes: int
 
 
 @dataclass(frozen=True)
@@ -31,7 +41,7 @@ class Codes:
     name: str
     values: NDArray[Any]
 
-    def entry(self) -> dict[str, Any]:
+    def entry(self) -> Entry:
         """What a page must know to decode them."""
         frames, count, parts = self.values.shape
         return {"name": self.name, "frames": frames, "count": count, "parts": parts, "bytes": self.values.itemsize}
@@ -66,7 +76,7 @@ def to_text(blob: bytes) -> str:
     return base64.b64encode(blob).decode("ascii")
 
 
-def unpack(blob: bytes, entries: Sequence[dict[str, Any]]) -> dict[str, NDArray[Any]]:
+def unpack(blob: bytes, entries: Sequence[Entry]) -> dict[str, NDArray[Any]]:
     """What `pack` has packed, by name, as a page decodes it. Raises ValueError for a blob of another length."""
     raw = np.frombuffer(zlib.decompress(blob), dtype=np.uint8)
     wanted = sum(e["frames"] * e["count"] * e["parts"] * e["bytes"] for e in entries)
@@ -74,7 +84,7 @@ def unpack(blob: bytes, entries: Sequence[dict[str, Any]]) -> dict[str, NDArray[
         raise ValueError(f"the data of a scene has {len(raw)} bytes; its entries describe {wanted}")
     found, start = {}, 0
     for entry in entries:
-        frames, count, parts, size = (entry[key] for key in ("frames", "count", "parts", "bytes"))
+        frames, count, parts, size = entry["frames"], entry["count"], entry["parts"], entry["bytes"]
         stop = start + frames * count * parts * size
         planes = raw[start:stop].reshape(frames, parts, size, count)
         steps = np.ascontiguousarray(planes.transpose(0, 3, 1, 2)).view(_DTYPES[size])[..., 0]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -110,7 +109,7 @@ def _title(home: Path) -> tuple[str, list[str]]:
 def _head(scenes: Sequence[Packed], title: str, live: float = 0.0) -> str:
     """What the page's script reads, as JSON that cannot end the script's tag."""
     palette = np.round(255 * colourmap()(np.arange(256))[:, :3]).astype(int).tolist()
-    head: dict[str, Any] = {
+    head = {
         "title": title, "live": live, "palette": palette, "ground": GROUND, "floor": FLOOR,
         "scenes": [scene.head for scene in scenes],
     }  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from vis.page.sentences import Sentences
 from vis.pictures.canvas import COLOURS, colour_top, colour_values
 from vis.pictures.frames import Frame
 from vis.pictures.scene import METAL, PARTS
-from vis.view.packing import Codes, pack, packed_size, scale_of, to_codes, to_text
+from vis.view.curves import Band, Panel
+from vis.view.packing import Codes, Entry, pack, packed_size, scale_of, to_codes, to_text
 from vis.view.sources import Source
 
 __all__ = ["Limits", "Packed", "make_scene"]
@@ -48,11 +49,64 @@ class Limits:
     half: bool = False
 
 
+class Loose(TypedDict):
+    """What a frame has besides grains and corners of bodies.
+
+    ``centre``: Of the bodies [m]. ``size``: Half the edge of the cube that their corners are rounded in [m].
+    ``arrows``: Point [m] and force [N] of each. ``span``: Lowest and highest corner of the bodies [m].
+    """
+
+    centre: list[float]
+    size: float
+    arrows: list[list[float]]
+    span: NotRequired[list[list[float]] | None]
+
+
+class Body(TypedDict):
+    """A body and its colour, red, green and blue from 0 to 1."""
+
+    name: str
+    colour: list[float]
+
+
+class Extent(TypedDict):
+    """What the first view contains, as `_extent` has it."""
+
+    far: list[list[float]]
+    near: list[list[float]]
+    walks: bool
+
+
+class Head(TypedDict, total=False):
+    """What a page knows of a scene beside its arrays; the names are those of `Source`, or of the functions here."""
+
+    id: str
+    title: str
+    times: list[float]
+    frames: list[Loose]
+    cut: float
+    surface: float | None
+    low: list[float]
+    high: list[float]
+    block: bool
+    colours: list[Any]
+    force: Any
+    panels: list[Panel]
+    states: list[Band]
+    notes: list[str]
+    arrays: list[Entry]
+    grains: Any
+    bodies: list[Body]
+    far: list[list[float]]
+    near: list[list[float]]
+    walks: bool
+
+
 @dataclass(frozen=True)
 class Packed:
     """A scene as a page holds it: `head` becomes JSON; `data` is base64."""
 
-    head: dict[str, Any]
+    head: Head
     data: str
 
 
@@ -101,7 +155,7 @@ def make_scene(source: Source, limits: Limits, progress: Progress | None = None)
     grain_count = len(first.grains["position"])
     while len(chosen) > _FEWEST and len(chosen) * grain_count * 10 > _RAW:
         chosen = _evenly(count, len(chosen) // 2)
-    frames: list[dict[str, Any]] = []
+    frames: list[Loose] = []
     tops = _tops(source, first)
     grains, bodies = _read(source, chosen, tops, frames, progress)
     kept, shell = np.ones(grain_count, dtype=bool), False
@@ -133,9 +187,7 @@ def make_scene(source: Source, limits: Limits, progress: Progress | None = None)
     return Packed(head, to_text(blob))
 
 
-def _head(
-    source: Source, chosen: NDArray[np.int64], frames: list[dict[str, Any]], tops: dict[str, float]
-) -> dict[str, Any]:
+def _head(source: Source, chosen: NDArray[np.int64], frames: list[Loose], tops: dict[str, float]) -> Head:
     """What is known of a scene without its arrays."""
     colours = [{"name": name, "label": COLOURS[name][0], "top": float(top)} for name, top in tops.items()]
     times = source.times[chosen] if len(chosen) else _along(source)
@@ -158,7 +210,7 @@ def _read(
     source: Source,
     chosen: NDArray[np.int64],
     tops: dict[str, float],
-    frames: list[dict[str, Any]],
+    frames: list[Loose],
     progress: Progress | None,
 ) -> tuple[_Grains, list[Codes]]:
     """The grains and bodies of the chosen frames; what else a frame has is appended to `frames`."""
@@ -251,7 +303,7 @@ def _body_size(frame: Frame) -> float:
     return 1.05 * max(far, default=1e-6)
 
 
-def _loose(frame: Frame, centre: Array, size: float) -> dict[str, Any]:
+def _loose(frame: Frame, centre: Array, size: float) -> Loose:
     """What a frame has besides grains and the corners of its bodies: where the bodies are, and forces."""
     points, fields = frame.clouds.get("row_forces", (np.zeros((0, 3)), {}))
     force = np.asarray(fields.get("force", np.zeros((0, 3))), dtype=float).reshape(-1, 3)
@@ -264,7 +316,7 @@ def _loose(frame: Frame, centre: Array, size: float) -> dict[str, Any]:
     return {"centre": [float(f"{c:.8g}") for c in centre], "size": size, "arrows": arrows, "span": span}
 
 
-def _extent(source: Source, frames: list[dict[str, Any]]) -> dict[str, Any]:
+def _extent(source: Source, frames: list[Loose]) -> Extent:
     """Corners of what is seen: `far` of everything in all frames, `near` of the bodies in the first; `walks`.
 
     `walks` says that a body moves further than twice its size, so that the camera follows it.
@@ -286,7 +338,7 @@ def _triangles(first: Frame) -> list[Codes]:
     ]
 
 
-def _bodies_head(first: Frame) -> list[dict[str, Any]]:
+def _bodies_head(first: Frame) -> list[Body]:
     return [{"name": name, "colour": list(PARTS.get(name, METAL))} for name in first.bodies]
 
 

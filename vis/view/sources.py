@@ -13,6 +13,7 @@ import numpy as np
 from vis.film.reel import NAME, Reel, SpaceReel
 from vis.page.folder import Run, read_folder
 from vis.page.plots import Array
+from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.pictures.frames import Frame, frame_names, grains_box, read_frames
 from vis.view import curves
@@ -49,7 +50,7 @@ class Source:
     block: bool = False
     force: tuple[str, float] | None = None
     panels: list[curves.Panel] = field(default_factory=list)
-    states: list[dict[str, Any]] = field(default_factory=list)
+    states: list[curves.Band] = field(default_factory=list)
     note: str = ""
 
 
@@ -102,7 +103,7 @@ def _in_space(home: Path) -> Source:
     )  # fmt: skip
 
 
-def _of_frames(home: Path, name: str, result: dict[str, Any], runs: list[Run]) -> Source:
+def _of_frames(home: Path, name: str, result: Result, runs: list[Run]) -> Source:
     """A series of frames: of a spike in a bed, of a bed, of a test of its strength."""
     frames = read_frames(home, name)
     run = next((one for one in runs if _matches(one, name)), None)
@@ -158,7 +159,7 @@ def _called(run: Run | None, name: str) -> str:
     return words if run.seed is None else f"{words}, bed {run.seed}"
 
 
-def _stated(result: dict[str, Any], name: str) -> float | None:
+def _stated(result: Result, name: str) -> float | None:
     """A number of the bed in the result, or None."""
     given = result.get("bed")
     stated = given.get(name) if isinstance(given, dict) else None
