@@ -14,7 +14,7 @@ from experiments.campaign.files import new_campaign
 from experiments.cli.main import main
 from experiments.runs.folder import RunFolder
 
-DAMAGES = int(os.environ.get("HEDGEBED_DAMAGES", "4"))
+DAMAGES = int(os.environ.get("HEDGEBED_DAMAGES", "2"))
 
 
 @pytest.fixture(autouse=True)

@@ -22,7 +22,7 @@ from experiments.runs import registry
 from experiments.runs.registry import EXPERIMENTS
 from rigid.result import toml_value
 
-CASES = int(os.environ.get("HEDGEBED_FUZZ", "60"))
+CASES = int(os.environ.get("HEDGEBED_FUZZ", "24"))
 SLOW_TO_CHECK = {"hop", "paper", "validate", "converge", "sweep"}
 """Their checks compute for seconds where a setting is at its limit: `make fuzz` draws them too."""
 DRAWN = [one for one in EXPERIMENTS.values() if CASES > 60 or one.name not in SLOW_TO_CHECK]
@@ -129,7 +129,7 @@ def test_campaigns_with_something_wrong_are_checked_or_refused_in_words(kind, tm
     reports = CASES > 60
     if not reports:
         monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
-    for seed in range(max(8, CASES // 20)):
+    for seed in range(max(4, CASES // 20)):
         chance = random.Random(seed)
         shutil.rmtree("one", ignore_errors=True), shutil.rmtree("out", ignore_errors=True)
         shutil.copytree("new", "one")
