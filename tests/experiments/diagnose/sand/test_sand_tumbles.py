@@ -22,6 +22,7 @@ def on_sand(*effects, seed, **ground):
     [
         ("ploughing", {"strength": 2e4, "speed": 0.01}),
         ("slip-sinkage", {"share": 0.6, "way": 0.012}),
+        ("plastic-sinkage", {"share": 0.5, "wall": 0.6}),
     ],
 )
 def test_an_effect_of_sand_is_named(id, parameters):
