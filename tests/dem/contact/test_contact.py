@@ -257,7 +257,7 @@ def test_every_number_of_a_preset_has_a_source():
 
 def test_a_preset_whose_bulk_figures_are_off_says_so():
     """By the names that there are, and never of what a user calibrated."""
-    assert set(CAVEATS) == set(MATERIALS) - {"sand", "jsc-1a-loose-cut", "jsc-1a-dense-cut"}
+    assert set(CAVEATS) == set(MATERIALS) - {"sand", "jsc-1a-loose-cut"}
     assert CAVEATS["sand-weak"] in caveat(SAND_WEAK) and "docs/materials.md" in caveat(SAND_WEAK)
     assert caveat(SAND) is caveat(replace(SAND_WEAK, name="mine")) is None
     for said in CAVEATS.values():
