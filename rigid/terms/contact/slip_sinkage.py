@@ -27,7 +27,8 @@ TERM = Term(
            "J. Terramechanics 47:21, from memory; Ding et al. 2010, J. Cent. South Univ. Technol. 17:129, for lunar "
            "rovers); an exponential of the shear displacement, j = 18 mm of a lunar soil (Janosi and Hanamoto 1961)",
     limits="no heap and no furrow; what has given way never comes back; forgotten where the tip leaves the undisturbed "
-           "surface, unless craters have walls",
+           "surface, unless craters have walls; together with relaxation each counts what the other has given way as "
+           "its own, so both act too little",
     hooks={"settle": slipping},
 )  # fmt: skip
 
