@@ -1,12 +1,14 @@
 """``hedgebed bench feet``: how many feet a second a surface law is computed for in MuJoCo's own loop.
 
-`coupling.robot.FootForces` is called as MuJoCo calls it, with every foot in contact: robots of one foot and of six,
-each foot a ball. Several rounds by processor time; the median counts. For quick trials, in the environment:
-HEDGEBED_BENCH_CALLS, HEDGEBED_BENCH_ROUNDS.
+`coupling.robot.FootForces` is called as MuJoCo calls it, with every foot in contact: robots of one foot and of six. A
+foot is a ball (one point), a box that lies flat (4 of 8 points in contact) or a cylinder on its end (8 of 16). Several
+rounds by processor time; the median counts. For quick trials, in the environment: HEDGEBED_BENCH_CALLS,
+HEDGEBED_BENCH_ROUNDS.
 """
 
 import statistics
 import time
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +23,17 @@ __all__ = ["run"]
 LAWS = ("spring-damper", "hunt-crossley", "rft")
 COUNTS = (1, 6)  # Feet of the robots
 WANTED = 100_000  # Evaluations of one foot a second that control asks for
-_BODY = '<body pos="{x} 0 0.0099"><freejoint/><geom name="foot_{k}" size="0.01" mass="0.1"/></body>'
+SHAPES = {
+    "ball": 'type="sphere" size="0.01"',
+    "box": 'type="box" size="0.01 0.01 0.01"',
+    "cylinder": 'type="cylinder" size="0.01 0.01"',
+}
+_BODY = '<body pos="{x} 0 0.0099"><freejoint/><geom name="foot_{k}" {shape} mass="0.1"/></body>'
 
 
-def _robot(count: int) -> tuple[Any, Any]:
-    """Model and data of `count` balls that lie 0.1 mm deep."""
-    bodies = "".join(_BODY.format(x=0.1 * k, k=k) for k in range(count))
+def _robot(shape: str, count: int) -> tuple[Any, Any]:
+    """Model and data of `count` feet of a shape that are 0.1 mm deep."""
+    bodies = "".join(_BODY.format(x=0.1 * k, k=k, shape=SHAPES[shape]) for k in range(count))
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -46,23 +53,25 @@ def run(out: Path, *, progress: Any) -> Json:
         "cases": [],
     }
     progress.plan({"feet": 1.0})
-    progress.stage("feet", total=float(len(LAWS) * len(COUNTS)))
-    for law in LAWS:
-        for count in COUNTS:
-            model, data = _robot(count)
-            forces = FootForces(find_feet(model, data, ["foot_*"]), law=law)
-            speeds = []
-            for _ in range(rounds):
-                before, begin = forces.points, time.process_time()
-                for _ in range(calls // count):
-                    forces(model, data)
-                speeds.append((forces.points - before) / (time.process_time() - begin))
-            bench["cases"].append({"law": law, "feet": count, "per_s": statistics.median(speeds), "rounds": speeds})
-            progress.update(float(len(bench["cases"])))
+    progress.stage("feet", total=float(len(SHAPES) * len(LAWS) * len(COUNTS)))
+    for shape, law, count in product(SHAPES, LAWS, COUNTS):
+        model, data = _robot(shape, count)
+        forces = FootForces(model, data, find_feet(model, data, ["foot_*"]), law=law)
+        made, speeds = max(1, calls // count), []
+        for _ in range(rounds):
+            begin = time.process_time()
+            for _ in range(made):
+                forces(model, data)
+            speeds.append(made * count / (time.process_time() - begin))
+        case = {"shape": shape, "law": law, "feet": count, "per_s": statistics.median(speeds), "rounds": speeds}
+        bench["cases"].append(case)
+        progress.update(float(len(bench["cases"])))
     progress.close()
-    table = column_table(("law", "feet", "feet/s", "slowest - fastest"), title="feet: a surface law in MuJoCo's loop")
+    table = column_table(
+        ("shape", "law", "feet", "feet/s", "slowest - fastest"), title="feet: a surface law in MuJoCo's loop"
+    )
     for case in bench["cases"]:
         spread = f"{min(case['rounds']):,.0f} - {max(case['rounds']):,.0f}"
-        table.add_row(case["law"], str(case["feet"]), f"{case['per_s']:,.0f}", spread)
+        table.add_row(case["shape"], case["law"], str(case["feet"]), f"{case['per_s']:,.0f}", spread)
     wide_console().print(table)
     return bench

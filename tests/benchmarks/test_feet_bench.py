@@ -1,5 +1,7 @@
 """`hedgebed bench feet`: small, what it times and what it leaves."""
 
+from itertools import product
+
 import pytest
 
 pytest.importorskip("mujoco")
@@ -12,5 +14,6 @@ def test_every_law_is_timed_with_all_feet_in_contact(monkeypatch, tmp_path, caps
     monkeypatch.setenv("HEDGEBED_BENCH_CALLS", "60")
     monkeypatch.setenv("HEDGEBED_BENCH_ROUNDS", "1")
     bench = feet.run(tmp_path, progress=Progress())
-    assert [(case["law"], case["feet"]) for case in bench["cases"]] == [(law, n) for law in feet.LAWS for n in (1, 6)]
+    found = [(case["shape"], case["law"], case["feet"]) for case in bench["cases"]]
+    assert found == list(product(("ball", "box", "cylinder"), feet.LAWS, (1, 6)))
     assert all(case["per_s"] > 0 for case in bench["cases"]) and "feet/s" in capsys.readouterr().out

@@ -20,7 +20,7 @@ def stepped(model, names, duration, *, step=2e-4, before=None, **options):
     if before is not None:
         before(data)
     mujoco.mj_forward(model, data)
-    with FootForces(find_feet(model, data, names), **options) as forces:
+    with FootForces(model, data, find_feet(model, data, names), **options) as forces:
         for _ in range(round(duration / step)):
             mujoco.mj_step(model, data)
     assert mujoco.get_mjcb_passive() is None
@@ -58,7 +58,8 @@ def test_its_force_on_feet_of_many_points_is_that_of_the_ground_of_a_run(name, f
     still = np.zeros(3)
     expected = ground.step(robot.pose.position, still, 1e-6, robot.pose.turn, still)
     robot.data.qfrc_passive[:] = 0.0
-    FootForces(robot.feet, parameters={"stiffness": 1e3, "damping": 0.0})(robot.model, robot.data)
+    forces = FootForces(robot.model, robot.data, robot.feet, parameters={"stiffness": 1e3, "damping": 0.0})
+    forces(robot.model, robot.data)
     linear, angular = robot.jacobian(robot.feet[0].body)
     pushed = linear.T @ expected.force + angular.T @ expected.torque
     assert expected.force[2] > 1.0
@@ -68,6 +69,93 @@ def test_its_force_on_feet_of_many_points_is_that_of_the_ground_of_a_run(name, f
 def test_what_cannot_be_is_refused():
     robot = moving(MujocoRobot(ball(), "foot"), 0, 0, 0, 0, 0, 0)
     with pytest.raises(ValueError, match="no surface law 'mud'"):
-        FootForces(robot.feet, law="mud")
+        FootForces(robot.model, robot.data, robot.feet, law="mud")
     with pytest.raises(ValueError, match="slip_speed"):
-        FootForces(robot.feet, slip_speed=0.0)
+        FootForces(robot.model, robot.data, robot.feet, slip_speed=0.0)
+
+
+def pushed(forces, model, data, depth):
+    """Upward force of the law on a ball of 50 mm radius at `depth` [m], at rest, at the time of `data`."""
+    data.qpos[:3], data.qvel[:] = (0.0, 0.0, 0.05 - depth), 0.0
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_comVel(model, data)
+    data.qfrc_passive[:] = 0.0
+    forces(model, data)
+    return data.qfrc_passive[2]
+
+
+def sand_and(model):
+    """New data of a model, and the callback for a law that remembers."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return data, FootForces(model, data, find_feet(model, data, ["foot"]), law="katsuragi-durian")
+
+
+def test_sand_pushes_less_below_the_deepest_depth_and_a_reset_makes_it_new():
+    model = ball()
+    data, forces = sand_and(model)
+    fresh = pushed(forces, model, data, 1e-3)
+    assert fresh > 1e-3
+    for depth in (0.01, 1e-3):
+        data.time += model.opt.timestep
+        again = pushed(forces, model, data, depth)
+    assert again == 0.0
+    mujoco.mj_resetData(model, data)
+    assert pushed(forces, model, data, 1e-3) == fresh
+    data.time = 5.0  # a state from elsewhere
+    assert pushed(forces, model, data, 0.01) > fresh
+    data.time = 9.0
+    assert pushed(forces, model, data, 1e-3) == fresh
+
+
+def test_a_second_look_at_the_same_time_leaves_no_trace():
+    model = ball()
+    data, forces = sand_and(model)
+    fresh = pushed(forces, model, data, 1e-3)
+    pushed(forces, model, data, 0.01)
+    assert pushed(forces, model, data, 1e-3) == fresh
+
+
+def test_each_data_has_its_own_depths_and_other_models_get_no_force():
+    model = ball()
+    data, forces = sand_and(model)
+    fresh = pushed(forces, model, data, 1e-3)
+    data.time += model.opt.timestep
+    pushed(forces, model, data, 0.01)
+    data.time += model.opt.timestep
+    other = mujoco.MjData(model)
+    other.time = data.time
+    assert pushed(forces, model, other, 1e-3) == fresh
+    assert pushed(forces, model, data, 1e-3) == 0.0
+    stranger = ball()
+    assert pushed(forces, stranger, mujoco.MjData(stranger), 1e-3) == 0.0
+
+
+def test_two_models_may_have_their_laws_at_once():
+    first, second = ball(), ball()
+    (one, on_first), (two, on_second) = sand_and(first), sand_and(second)
+    with on_first:
+        with on_second:
+            for model, data in ((first, one), (second, two)):
+                data.qpos[2] = 0.04
+                mujoco.mj_forward(model, data)
+        assert one.qfrc_passive[2] == two.qfrc_passive[2] > 0.0
+        mujoco.mj_forward(second, two)
+        mujoco.mj_forward(first, one)
+        assert one.qfrc_passive[2] > 0.0 == two.qfrc_passive[2]
+    assert mujoco.get_mjcb_passive() is None
+
+
+def test_a_step_that_is_too_long_for_the_law_is_refused_on_entry():
+    model = ball()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    mass, step = float(model.body_mass.sum()), 1e-3
+    model.opt.timestep = step
+    feet, limit = find_feet(model, data, ["foot"]), 4 * mass / step**2  # K h^2 / 4 m = 1
+    with FootForces(model, data, feet, parameters={"stiffness": 0.9 * limit, "damping": 0.0}):
+        pass
+    with pytest.raises(ValueError, match=r"model.opt.timestep = 0.001 s .*'foot'"):
+        FootForces(model, data, feet, parameters={"stiffness": 1.1 * limit, "damping": 0.0}).__enter__()
+    assert mujoco.get_mjcb_passive() is None
