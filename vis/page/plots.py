@@ -19,9 +19,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 __all__ = [
-    "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES", "WIDTH", "Array", "as_it_lies", "handle",
-    "legend_above", "line_handles", "line_styles", "mean_over", "new_figure", "new_panels", "nice_below", "shades",
-    "sheet", "smooth_ratio", "styled",
+    "AXES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES", "WIDTH", "Array", "as_it_lies",
+    "handle", "legend_above", "line_handles", "line_styles", "mean_over", "new_figure", "new_panels", "nice_below",
+    "shades", "sheet", "smooth_ratio", "styled",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -33,6 +33,7 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222", "#E69F00", "#
 _DASHES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (1, 1.4)))
 BED = "#0072B2"  # what the grains do
 MODEL = "#D55E00"  # what the spring-damper does; always dashed as well, for print in grey
+AXES: dict[str, str] = {"x": BED, "y": "#009E73", "z": MODEL}
 INK = "#222222"
 GREY = "#8a8a8a"
 STATES = {"stand": "#a4a4a4", "pivot": BED, "slip": MODEL, "hop": "#882255"}

@@ -1,4 +1,4 @@
 """The report of a robot of MuJoCo.
 
-Imports `vis.film`, `vis.page`, `vis.pictures`, `vis.spatial`.
+Imports `vis.film`, `vis.page`, `vis.pictures`, `vis.spatial`, `vis.view`.
 """

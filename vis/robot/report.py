@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -14,16 +13,17 @@ from vis.film.film import ARROWS, draw_runs, shown
 from vis.film.reel import NAME, SpaceReel
 from vis.page.numbers import quantity
 from vis.page.page import Section, Tile, listing, text
-from vis.page.plots import BED, DASHED, INK, MODEL, Array, legend_above, mean_over
+from vis.page.plots import AXES, BED, DASHED, INK, MODEL, Array, legend_above, mean_over
 from vis.page.report import Report, given, report_of
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
-from vis.spatial.report import AXES, draw_energy, pair, say_grains
+from vis.spatial.report import draw_energy, pair, say_grains
+from vis.view.curves import MOST_LINES, joint_columns
+from vis.view.page import report_scene
 
 __all__ = ["write_robot_report"]
 
 Columns = Mapping[str, Array]
-MOST_LINES = 10  # In one panel
 
 
 @report_of(dpi=130)
@@ -48,7 +48,8 @@ def write_robot_report(
     seen = []
     if pictures and NAME in frame_names(home):
         made = draw_runs([SpaceReel(home)], home, "robot", by=colour, film=film, progress=report.rest())
-        seen = [Section("Seen", [*shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)])]
+        notes = [text(ARROWS, small=True), *(text(note) for note in made.notes)]
+        seen = [Section("Seen", [*report_scene(home), *shown(made), *notes])]
     quantities = result["quantities"]
     sections = [
         Section("", [listing(result["departures"]["sentences"])]),
@@ -104,15 +105,11 @@ def _draw_beside(motion: Columns, other: Columns) -> Figure:
 
 def _draw_joints(joints: Columns) -> Figure:
     drawing, place, force = pair("position [rad, m]", "force [N, N m]")
-    time, ends = joints["t_s"], ("_rad", "_m")
-    moved = [
-        name for name in joints
-        if name.endswith(ends) and not name.endswith(("_x_m", "_y_m", "_z_m")) and np.ptp(joints[name]) > 0
-    ]  # fmt: skip
-    for k, name in enumerate(moved[:MOST_LINES]):
+    time = joints["t_s"]
+    moved, driven = joint_columns(joints)
+    for k, name in enumerate(moved):
         place.plot(time, joints[name], color=colormaps["tab10"](k), label=name.rpartition("_")[0])
-    driven = [name for name in joints if name.endswith("_force")]
-    for k, name in enumerate(driven[:MOST_LINES]):
+    for k, name in enumerate(driven):
         force.plot(time, joints[name], color=colormaps["tab10"](k), label=name.removesuffix("_force"))
     for axis in (place, force):
         if axis.lines:

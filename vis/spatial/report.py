@@ -14,17 +14,16 @@ from vis.film.reel import NAME, SpaceReel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity
 from vis.page.page import Block, Section, Tile, listing, text
-from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, Array, legend_above, mean_over, sheet
+from vis.page.plots import AXES, BED, DASHED, DOTTED, GREY, INK, MODEL, Array, legend_above, mean_over, sheet
 from vis.page.report import Report, Result, given, report_of
 from vis.page.states import States, draw_bands, draw_states, passages
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
 from vis.view.page import report_scene
 
-__all__ = ["AXES", "draw_energy", "pair", "say_grains", "write_spatial_report"]
+__all__ = ["draw_energy", "pair", "say_grains", "write_spatial_report"]
 
 Columns = Mapping[str, Array]
-AXES = {"x": BED, "y": "#009E73", "z": MODEL}
 _TURN = "turn from the start [degrees]"
 
 

@@ -8,13 +8,18 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
 from vis.page.folder import Run, read_columns
-from vis.page.plots import BED, INK, MODEL, STATES, Array, mean_over
+from vis.page.plots import AXES, BED, INK, MODEL, STATES, Array, mean_over
 from vis.page.states import States, state_runs
 from vis.pictures.frames import Frames
 
-__all__ = ["Band", "Line", "Panel", "bands", "line", "of_frames", "of_penetration", "of_space", "of_tumble", "panel"]
+__all__ = [
+    "MOST_LINES", "Band", "Line", "Panel", "bands", "joint_columns", "line", "of_frames", "of_penetration", "of_robot",
+    "of_space", "of_tumble", "panel",
+]  # fmt: skip
 
 
 class Line(TypedDict):
@@ -36,6 +41,8 @@ class Panel(TypedDict):
 
 Band = TypedDict("Band", {"from": float, "to": float, "state": str, "colour": str})
 """A state from one time to another [s]."""
+MOST_LINES = 10
+"""Feet or joints in one panel."""
 _BINS = 300
 """A line keeps the least and the largest value of each of so many parts of its time."""
 _SMOOTH = 5e-3
@@ -128,6 +135,59 @@ def of_space(folder: Path, series: Mapping[str, Array]) -> list[Panel]:
         *panel("speed of the centre of mass [mm/s]", line("", time, 1e3 * speed)),
         *force,
     ]
+
+
+def of_robot(folder: Path) -> list[Panel]:
+    """Way, force, depths of feet, joints and motors of a robot; dashed is the spring-damper beside a bed, if kept."""
+    motion, feet, joints = (read_columns(folder / "series" / f"{name}.csv")[0] for name in ("motion", "feet", "joints"))
+    time = motion["t_s"]
+    ways = [
+        line(axis, time, 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0]), colour=colour)
+        for axis, colour in AXES.items()
+    ]
+    forces = [
+        line(axis, time, mean, colour=colour)
+        for (axis, colour), mean in zip(
+            AXES.items(), mean_over(_SMOOTH, time, [motion[f"f{axis}_N"] for axis in AXES]), strict=True
+        )
+    ]
+    beside = folder / "series" / "spring-damper.csv"
+    if beside.exists():
+        law = read_columns(beside)[0]
+        ways.append(line("z, spring-damper", law["t_s"], 1e3 * (law["z_m"] - law["z_m"][0]), colour=INK, dashed=True))
+        (mean,) = mean_over(_SMOOTH, law["t_s"], [law["fz_N"]])
+        forces.append(line("z, spring-damper", law["t_s"], mean, colour=INK, dashed=True))
+    depths = [name for name in feet if name.endswith("_depth_m")][:MOST_LINES]
+    moved, driven = joint_columns(joints)
+    return [
+        *panel("way of the centre of mass [mm]", *ways),
+        *panel("force of the ground [N]", *forces),
+        *_many("depth of the feet [mm]", feet, depths, "_depth_m", 1e3),
+        *panel("feet that touch", line("", time, motion["touching"], colour=INK)),
+        *_many("joints [rad, m]", joints, moved),
+        *_many("force of the motors [N, N m]", joints, driven, "_force"),
+    ]
+
+
+def joint_columns(joints: Mapping[str, Array]) -> tuple[list[str], list[str]]:
+    """Of series/joints.csv: positions of hinges and slides that move, forces of actuators; `MOST_LINES` of each."""
+    moved = [
+        name for name in joints
+        if name.endswith(("_rad", "_m")) and not name.endswith(("_x_m", "_y_m", "_z_m")) and np.ptp(joints[name]) > 0
+    ]  # fmt: skip
+    return moved[:MOST_LINES], [name for name in joints if name.endswith("_force")][:MOST_LINES]
+
+
+def _many(
+    label: str, columns: Mapping[str, Array], names: list[str], ending: str = "", scale: float = 1.0
+) -> list[Panel]:
+    """A panel of columns over t_s, called by their names less `ending`, or less the unit; one alone is in the label."""
+    called = [name.removesuffix(ending) if ending else name.rpartition("_")[0] for name in names]
+    lines = [
+        line(own, columns["t_s"], scale * columns[name], colour=to_hex(colormaps["tab10"](k)))
+        for k, (own, name) in enumerate(zip(called, names, strict=True))
+    ]
+    return panel(f"{label}: {called[0]}" if len(lines) == 1 else label, *lines)
 
 
 def of_frames(frames: Frames) -> list[Panel]:

@@ -160,7 +160,7 @@ def make_scene(source: Source, limits: Limits, progress: Progress | None = None)
     grains, bodies = _read(source, chosen, tops, frames, progress)
     kept, shell = np.ones(grain_count, dtype=bool), False
     every = np.arange(len(chosen))
-    if limits.half:
+    if limits.half and grain_count:
         kept, shell = _near_faces(grains, source), True
     while True:
         here = grains.of(every, kept)
@@ -168,7 +168,7 @@ def make_scene(source: Source, limits: Limits, progress: Progress | None = None)
         blob = pack(arrays)
         if packed_size(blob) <= limits.size:
             break
-        if not shell and len(every) <= _FEWEST:
+        if grain_count and not shell and len(every) <= _FEWEST:
             kept, shell = _near_faces(grains, source), True
         elif len(every) > 1:
             every = _evenly(len(every), max(1, len(every) // 2)) if len(every) > 2 else every[:1]

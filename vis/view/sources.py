@@ -65,6 +65,8 @@ def sources_of(folder: str | Path) -> list[Source]:
     kind = str(run.result.get("experiment", ""))
     if kind.startswith("tumble") and (home / "trajectory.csv").exists():
         return [_in_space(home) if kind == "tumble spatial" else _in_plane(home)]
+    if kind == "mujoco" and (home / "series" / "motion.csv").exists():
+        return [_of_robot(home)]
     names = frame_names(home)
     shown = [_of_frames(home, name, run.result, run.runs) for name in names]
     rest = [one for one in run.runs if not any(_matches(one, name) for name in names)]
@@ -88,18 +90,41 @@ def _in_plane(home: Path) -> Source:
 
 def _in_space(home: Path) -> Source:
     series = _read(lambda: SpaceReel(home), home)
-    panels = curves.of_space(home, series.series)
     states = curves.bands(series.series["t_s"], series.states) if len(series.states) else []
+    weight = ("weight", series.number("weight")) if len(series) else None
+    return _on_reel(series, "Platform in space", weight, curves.of_space(home, series.series), states)
+
+
+def _of_robot(home: Path) -> Source:
+    """A robot of MuJoCo; without gravity its arrows are measured by the largest force."""
+    series = _read(lambda: SpaceReel(home), home)
+    ground = "bed of grains" if series.result.get("ground") == "bed" else series.result.get("ground", "law")
+    largest = float(series.result["quantities"]["largest_force"]["value"])
+    force = ("weight", series.number("weight"))
+    if not force[1]:
+        force = ("largest force", largest)
+    panels = _read(lambda: curves.of_robot(home), home)
+    return _on_reel(series, f"Robot on the {ground}", force if largest else None, panels, [])
+
+
+def _on_reel(
+    series: SpaceReel,
+    title: str,
+    force: tuple[str, float] | None,
+    panels: list[curves.Panel],
+    states: list[curves.Band],
+) -> Source:
+    """A run in space that has frames, or its curves alone."""
     if not len(series):
         return Source(
-            id=NAME, title="Platform in space", times=np.zeros(0), frame=_no_frame, panels=panels, states=states,
+            id=NAME, title=title, times=np.zeros(0), frame=_no_frame, panels=panels, states=states,
             note=say("no_frames"),
         )  # fmt: skip
     low, high = series.box
     return Source(
-        id=NAME, title="Platform in space", times=series.times, frame=series.frame, low=low, high=high,
+        id=NAME, title=title, times=series.times, frame=series.frame, low=low, high=high,
         cut=float(low[1]) - (0.01 * float(high[1] - low[1])), surface=float(high[2]) if not series.on_grains else None,
-        block=not series.on_grains, force=("weight", series.number("weight")), panels=panels, states=states,
+        block=not series.on_grains, force=force, panels=panels, states=states,
     )  # fmt: skip
 
 

@@ -14,6 +14,8 @@ from experiments.robot.plan import plan_robot
 from experiments.robot.settings import RobotSettings
 from experiments.runs.folder import RunFolder, read_series
 from vis.page.folder import read_columns
+from vis.view.page import report_scene
+from vis.view.sources import sources_of
 
 pytest.importorskip("mujoco")
 
@@ -109,7 +111,43 @@ def test_on_a_small_bed_a_stopped_run_goes_on_to_the_same_bits_and_is_drawn(tmp_
     assert all((rows[0][name] == rows[1][name]).all() for name in rows[0])
     assert whole.quantities["largest_force"].value > 1.0 and whole.quantities["energy_residual"].value < 0.02
     assert (tmp_path / "whole" / "figures" / "robot-end.png").exists()
+    assert (tmp_path / "whole" / "report.html").read_text().count('class="head"') == 1  # the scene that can be turned
+    (seen,) = sources_of(tmp_path / "whole")
+    assert not seen.block and len(seen.times) >= 2 and len(seen.frame(0).grains["position"]) == 768
+    assert [line["dashed"] for line in seen.panels[0]["lines"]] == [False, False, False, True]  # and the spring-damper
     assert json.loads((tmp_path / "whole" / "result.json").read_text())["grains"]["grain_count"] == 768
+
+
+def test_a_robot_on_a_law_is_shown_on_a_block_with_its_curves_and_arrows_in_weights(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    result = robot.run(RobotSettings(**HOPPER, duration=0.06, frame_count=4), tmp_path)
+    (seen,) = sources_of(tmp_path)
+    assert seen.block and seen.surface == 0.0 and (seen.low[:2] < seen.high[:2]).all()
+    assert seen.force == ("weight", pytest.approx(1.72 * 9.81))
+    assert seen.times[-1] == pytest.approx(0.06) and set(seen.frame(0).bodies) == {"spikes", "hull"}
+    panels = {panel["label"]: {line["name"]: line for line in panel["lines"]} for panel in seen.panels}
+    assert [list(lines) for lines in panels.values()] == [
+        [*"xyz"],
+        [*"xyz"],
+        ["foot"],
+        [""],
+        ["rail", "knee"],
+        ["push"],
+    ]
+    (depth,) = panels["depth of the feet [mm]: foot"].values()
+    assert max(depth["y"]) == pytest.approx(1e3 * result.quantities["sinkage_largest"].value, rel=1e-3)
+    last = read_series(tmp_path / "series" / "motion.csv")
+    _, arrows = seen.frame(len(seen.times) - 1).clouds["row_forces"]
+    assert arrows["force"][0, 2] == pytest.approx(last["fz_N"][-1], rel=1e-5)
+    assert len(report_scene(tmp_path)) == 1
+
+
+def test_a_robot_without_frames_has_its_curves_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    robot.run(RobotSettings(**HOPPER, duration=0.04, frame_count=0), tmp_path)
+    (seen,) = sources_of(tmp_path)
+    assert not len(seen.times) and len(seen.panels) >= 5 and "--frame-count" in seen.note
+    assert report_scene(tmp_path) == []
 
 
 def test_a_law_in_a_file_is_that_of_its_tip_times_the_area_of_the_foot():

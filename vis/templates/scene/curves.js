@@ -55,13 +55,16 @@ class Curves {
   drawLegend(lines) {
     const names = new Map(lines.map((line) => [line.name, line]));
     if (!names.size) return;
-    const sheet = svg("svg", { viewBox: `0 0 ${WIDE} 20` });
-    let x = EDGE.left;
+    const sheet = svg("svg", {});
+    let x = EDGE.left, y = 10;
     for (const { name, colour, dashed } of names.values()) {
-      sheet.append(svg("line", { x1: x, x2: x + 22, y1: 10, y2: 10, class: "curve", stroke: colour, "stroke-dasharray": dashed ? "5 3" : "" }));
-      sheet.append(svg("text", { x: x + 27, y: 14 }, name));
-      x += 44 + 6.2 * name.length;
+      const wide = 44 + 6.2 * name.length;
+      if (x > EDGE.left && x + wide - 17 > WIDE) [x, y] = [EDGE.left, y + 16];
+      sheet.append(svg("line", { x1: x, x2: x + 22, y1: y, y2: y, class: "curve", stroke: colour, "stroke-dasharray": dashed ? "5 3" : "" }));
+      sheet.append(svg("text", { x: x + 27, y: y + 4 }, name));
+      x += wide;
     }
+    sheet.setAttribute("viewBox", `0 0 ${WIDE} ${y + 10}`);
     this.home.append(sheet);
   }
 
