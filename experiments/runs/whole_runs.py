@@ -181,11 +181,12 @@ def whole_run(
             for name, value in kept.settings.items()
             if not as_given or name not in fields or value != fields[name].default
         }
-        # Where another value is taken for what is not given, as how long a tumble on grains lasts, it was given.
-        made, whole = settings_class(**given), settings_class(**kept.settings)
-        given |= {name: kept.settings[name] for name in kept.settings if getattr(made, name) != getattr(whole, name)}
+        asked = dict(kept.settings)
         if material_copy and (kept.path / material_copy).is_file():
-            given["material"] = str(kept.path / material_copy)
+            given["material"] = asked["material"] = str(kept.path / material_copy)
+        # Where another value is taken for what is not given, as how long a tumble on grains lasts, it was given.
+        made, whole = settings_class(**given), settings_class(**asked)
+        given |= {name: asked[name] for name in asked if getattr(made, name) != getattr(whole, name)}
         return carry_out(settings_class(**given), kept, progress or Progress())
 
     return run, resume

@@ -354,8 +354,8 @@ def test_a_list_that_holds_what_cannot_be_is_refused_with_what_would_do_and_its_
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"bed_size": (0.04, 0.06, 0.04)}, "bed_size.*too narrow.*would do.*times"),
-        ({"grain": 0.003}, "4 grains across.*would do.*times"),
+        ({"bed_size": (0.04, 0.06, 0.04)}, "bed_size.*too narrow.*0.048 m.*times"),
+        ({"grain": 0.003}, "4 grains across.*0.0024 m.*times"),
         ({"ratios": (5.0, 5.0)}, "ratios.*twice"),
         ({"reference": "shipped"}, "reference"),
         ({"time_step": 1e-6}, "time_step"),

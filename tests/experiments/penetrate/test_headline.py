@@ -50,11 +50,11 @@ def test_warnings_are_never_left_out_and_a_reference_is_one_sentence():
 
 def test_a_report_older_than_its_result_is_made_anew(tmp_path, capsys, monkeypatch):
     from experiments.penetrate.settings import PenetrateSettings
-    from experiments.runs import whole_runs
+    from experiments.cli import runs
     from experiments.runs.folder import RunFolder
 
     drawn = []
-    monkeypatch.setattr(whole_runs, "draw_report", lambda folder, progress: drawn.append(folder.path))
+    monkeypatch.setattr(runs, "draw_report", lambda folder, progress: drawn.append(folder.path))
     folder = RunFolder.create(tmp_path / "run", "penetrate", PenetrateSettings())
     shutil.copy(SHIPPED, folder.path)
     (folder.path / "report.html").write_text("")

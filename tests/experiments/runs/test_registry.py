@@ -43,8 +43,11 @@ def test_the_defaults_are_valid(experiment):
 def test_a_subject_must_be_named(experiment):
     with pytest.raises(ValueError, match=experiment.subject):
         settings_from(experiment.settings_class(), [])
-    named = "somewhere" if experiment.name != "compare" else ("somewhere", "else")
-    settings_from(experiment.settings_class(), [Layer(None, {experiment.subject: named})])
+    several = {"compare": ("somewhere", "else"), "calibrate": ("somewhere",)}
+    named = {experiment.subject: several.get(experiment.name, "somewhere")}
+    if experiment.name == "mujoco":
+        named["feet"] = ("foot",)
+    settings_from(experiment.settings_class(), [Layer(None, named)])
 
 
 @pytest.mark.parametrize("experiment", [one for one in EXPERIMENTS.values() if one.example], ids=lambda one: one.name)
