@@ -4,7 +4,7 @@ from pathlib import Path
 
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.settings import PenetrateSettings
-from experiments.runs.folder import RunFolder
+from experiments.runs.folder import RunFolder, holding
 from experiments.runs.progress import Progress
 from experiments.runs.whole_runs import keeping_status
 
@@ -12,15 +12,21 @@ __all__ = ["finished_member", "make_member"]
 
 
 def make_member(settings: PenetrateSettings, path: Path, progress: Progress) -> str | None:
-    """Carry out the run in the folder `path`, or go on with it; what went wrong, None where nothing did."""
-    own = RunFolder.open(path) if (path / "run.toml").is_file() else RunFolder.create(
-        path, "penetrate", settings, code=penetrate.fingerprint()
-    )  # fmt: skip
-    try:
-        with keeping_status(own):
-            penetrate.compute(settings, own, _Within(progress))
-    except RuntimeError as error:
-        return str(error)
+    """Carry out the run in the folder `path`, or go on with it; what went wrong, None where nothing did.
+
+    Waits while another process has the folder, and takes over what that one has done.
+    """
+    with holding(path, waiting=progress.message):
+        if finished_member(path) is not None:
+            return None
+        own = RunFolder.open(path) if (path / "run.toml").is_file() else RunFolder.create(
+            path, "penetrate", settings, code=penetrate.fingerprint()
+        )  # fmt: skip
+        try:
+            with keeping_status(own):
+                penetrate.compute(settings, own, _Within(progress))
+        except RuntimeError as error:
+            return str(error)
     return None
 
 

@@ -20,7 +20,7 @@ import sys
 import tomllib
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
@@ -36,9 +36,11 @@ from rigid.series import read_series, replacing, write_series
 from rigid.version import __version__
 
 __all__ = [
+    "BusyError",
     "RunFolder",
     "Status",
     "fresh_path",
+    "holding",
     "plain",
     "read_json",
     "read_series",
@@ -59,6 +61,7 @@ _NAMES = "names-of-all"  # in a checkpoint: a zip file whose list is cut off is 
 _BEFORE = ".before"  # ends the name of the checkpoint before the last
 _DAMAGED = (OSError, EOFError, KeyError, ValueError, NotImplementedError, zipfile.BadZipFile, zlib.error)
 """What numpy raises for a file of arrays that is cut off or has a wrong byte; its members have checksums."""
+_POLL = 0.2  # Between two looks whether a folder is free [s]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 
 
@@ -135,6 +138,44 @@ def _checked(name: str) -> str:
     return name
 
 
+def _in_use(path: Path) -> list[str]:
+    """What a folder holds of a run; not what one leaves that was killed before its run.toml was there."""
+    left = re.compile(r"lock|traceback\.txt|\..*\.tmp")
+    return sorted(item.name for item in path.iterdir() if not left.fullmatch(item.name)) if path.exists() else []
+
+
+class BusyError(ValueError):
+    """Another process is writing the folder."""
+
+
+@contextmanager
+def holding(path: Path, *, waiting: Callable[[str], None] | None = None) -> Iterator[None]:
+    """Hold the folder `path` of a run, made where it is not there, for this process, which can take it again within.
+
+    While another process has it: BusyError (a ValueError) is raised that names that process; or, with `waiting`, that
+    is called with the sentence, and the folder is waited for. A process that died, however it died, has left it free.
+    """
+    path.mkdir(parents=True, exist_ok=True)
+    file = path.resolve() / "lock"
+    lock = FileLock(file, timeout=0, is_singleton=True, thread_local=False)
+    try:
+        lock.acquire()
+    except Timeout:
+        owner = file.read_text(encoding="utf-8", errors="replace").strip() or "another"
+        said = f"{str(path)!r} is being written by process {owner}: "
+        if waiting is None:
+            raise BusyError(f"{said}wait for it or stop it first") from None
+        waiting(f"{said}this one waits for it")
+        lock.acquire(timeout=-1, poll_interval=_POLL)
+    file.write_text(f"{os.getpid()}\n", encoding="utf-8")
+    try:
+        yield
+    finally:
+        if lock.lock_counter == 1:
+            file.write_text("", encoding="utf-8")
+        lock.release()
+
+
 class RunFolder:
     """The folder of one run: `create` makes one, `open` takes an old one, `ensure` does either."""
 
@@ -171,19 +212,27 @@ class RunFolder:
             )
         if path.exists() and not path.is_dir():
             raise ValueError(f"{where} is a file: name a folder that is empty or does not exist yet")
-        if path.exists() and (held := sorted(item.name for item in path.iterdir())):
+        cls._check_free(path)
+        try:
+            with holding(path):
+                cls._check_free(path)  # another process may have made its run meanwhile
+                write_text(path / "run.toml", text)
+                folder = cls.open(path)
+                folder.set_status("running")
+        except OSError as error:
+            raise ValueError(f"{where} cannot be written ({error.strerror}): name a folder that can be") from error
+        return folder
+
+    @staticmethod
+    def _check_free(path: Path) -> None:
+        """Raise ValueError where the folder holds something of a run."""
+        if held := _in_use(path):
             what = ", ".join(held[:3]) + (", ..." if len(held) > 3 else "")
             remedy = _what_else(path) if "run.toml" in held else ""
             raise ValueError(
-                f"{where} is in use (it holds {what}): name a folder that is empty or does not exist yet{remedy}"
+                f"out = {str(path)!r} is in use (it holds {what}): name a folder that is empty or does not exist yet"
+                f"{remedy}"
             )
-        try:
-            write_text(path / "run.toml", text)
-        except OSError as error:
-            raise ValueError(f"{where} cannot be written ({error.strerror}): name a folder that can be") from error
-        folder = cls.open(path)
-        folder.set_status("running")
-        return folder
 
     @classmethod
     def open(cls, path: Path) -> "RunFolder":
@@ -221,27 +270,9 @@ class RunFolder:
 
     @contextmanager
     def lock(self) -> Iterator[None]:
-        """Hold the folder for this process. Within one process it can be taken again.
-
-        Raises ValueError, naming the other process, if that one is alive and has it. A process that died, however it
-        died, has left it free.
-        """
-        path = self.path.resolve() / "lock"
-        lock = FileLock(path, timeout=0, is_singleton=True, thread_local=False)
-        try:
-            lock.acquire()
-        except Timeout:
-            owner = path.read_text(encoding="utf-8", errors="replace").strip() or "another"
-            raise ValueError(
-                f"{str(self.path)!r} is being written by process {owner}: wait for it or stop it first"
-            ) from None
-        path.write_text(f"{os.getpid()}\n", encoding="utf-8")
-        try:
+        """Hold the folder for this process, as `holding` does. Raises BusyError where another has it."""
+        with holding(self.path):
             yield
-        finally:
-            if lock.lock_counter == 1:
-                path.write_text("", encoding="utf-8")
-            lock.release()
 
     # How far
 

@@ -7,17 +7,19 @@ on with from its checkpoint.
 
 import hashlib
 import json
-import time
+import re
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from experiments.runs.folder import RunFolder, write_json, write_text
+from dem.prepare.bedfile import bed_shelf
+from experiments.runs.folder import BusyError, RunFolder, holding, write_json, write_text
 from experiments.runs.progress import Progress
 from experiments.runs.registry import Experiment, find_experiment
 from experiments.runs.whole_runs import keeping_status, without_reports
@@ -28,10 +30,13 @@ Settings = TypeVar("Settings", bound=BaseModel)
 Tell = Callable[[float], None]
 """Called with the share of a run that is done, 0 to 1."""
 _ROOT = Path(__file__).parents[2]
-_HOW = ("threads", "checkpoint_interval", "cache")
-"""Settings that say how a run is computed; its bits do not depend on them."""
-_WAIT = 0.5  # Between two looks whether a folder is free [s]
-_SIGNS = ("/", ".toml", ".csv", ".npz", ".stl", ".json")  # a text that may name a file
+_HOW = ("threads", "workers", "checkpoint_interval", "cache", "members")
+"""Settings that say how a run is computed and where its parts are kept; its bits do not depend on them."""
+_CODE = ("coupling", "dem", "experiments", "rigid")
+_CODE_FILES = (".py", ".toml", ".csv", ".xml", ".json", ".gz")
+_FOLDERS = ("bed", "campaign", "reference", "runs")  # settings that may name a file or folder of any name
+_NAMING = (".toml", ".xml", ".urdf")  # files that may name others, in quotes
+_QUOTED = re.compile(r"""\"([^"\n]{1,255})"|'([^'\n]{1,255})'""")
 
 
 @dataclass(frozen=True)
@@ -63,30 +68,24 @@ class Outcome:
 
 def task_of(experiment: Experiment, settings: BaseModel, home: Path, *, threads: int, reports: bool) -> Task:
     """The task of these settings; `threads` where they do not say how many. Files that they name are made absolute."""
-    files = {name: str(path.resolve()) for name, path in _files(settings).items()}
-    settings = _with_threads(settings.model_copy(update=files), threads)
-    kept = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _HOW}
-    contents = {name: _digest(path) for name, path in _files(settings).items()}
+    settings = _with_threads(_absolute(settings), threads)
+    values = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _HOW}
     code = code_of(experiment)
-    text = json.dumps([experiment.name, {**kept, **contents}, code], sort_keys=True)
+    contents = {name: _replaced(value, partial(_content, setting=name)) for name, value in values.items()}
+    text = json.dumps([experiment.name, contents, code], sort_keys=True)
     name = f"{experiment.name.replace(' ', '-')}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     return Task(name, experiment.name, settings, str(home.resolve()), code, reports)
 
 
 @cache
 def code_of(experiment: Experiment) -> str:
-    """A digest of the code that computes the experiment: its own where it has one, else of the packages it is made of.
-
-    These are `coupling`, `dem` and `rigid` with all their files, and the experiment's own.
+    """A digest of all code and data that compute: `coupling`, `dem`, `experiments`, `rigid`; and of the experiment's
+    own digest, where it has one. `vis` only draws and is not part of it.
     """
-    if own := experiment.code():
-        return own
-    package = _ROOT.joinpath(*experiment.module.split(".")).parent
-    digest = hashlib.sha256()
-    for folder in (*(_ROOT / name for name in ("coupling", "dem", "rigid")), package):
-        for path in sorted(folder.rglob("*")):
-            if path.suffix in (".py", ".toml"):
-                digest.update(path.read_bytes())
+    digest = hashlib.sha256(experiment.code().encode())
+    files = [path for name in _CODE for path in (_ROOT / name).rglob("*") if path.suffix in _CODE_FILES]
+    for path in sorted([*files, *_ROOT.glob("hedgebed*.py")]):
+        _add(digest, path.relative_to(_ROOT).as_posix(), path.read_bytes())
     return digest.hexdigest()[:16]
 
 
@@ -111,31 +110,24 @@ def carry_out(task: Task, tell: Tell) -> Outcome:
     try:
         if code_of(find_experiment(task.experiment)) != task.code:
             raise ValueError("the code here is not that of the sweep: install the same version of hedgebed everywhere")
-        while (folder := _free_folder(task)) is None:
-            time.sleep(_WAIT)
-        with folder.lock():
-            if (done := done_before(task)) is not None:
-                return done
-            return _compute(task, folder, tell)
+        with holding(task.path, waiting=_unsaid):
+            return done_before(task) or _compute(task, _folder_of(task), tell)
     except Exception as error:
         if task.path.is_dir():
             write_text(task.path / "traceback.txt", traceback.format_exc())
         return Outcome(task.name, fault=" ".join(f"{type(error).__name__}: {error}".split()))
 
 
-def _free_folder(task: Task) -> RunFolder | None:
-    """The folder of the task, made where it is not there; None while another process has it."""
-    begun = (task.path / "run.toml").is_file()
-    folder = (
-        RunFolder.open(task.path)
-        if begun
-        else RunFolder.create(task.path, task.experiment, task.settings, code=task.code)
-    )
-    try:
-        with folder.lock():
-            return folder
-    except ValueError:
-        return None
+def _folder_of(task: Task) -> RunFolder:
+    """The folder of the task, made where it is not there; this process holds it."""
+    if (task.path / "run.toml").is_file():
+        return RunFolder.open(task.path)
+    code = find_experiment(task.experiment).code() or task.code
+    return RunFolder.create(task.path, task.experiment, task.settings, code=code)
+
+
+def _unsaid(_: str) -> None:
+    """The sweep tells of all runs together: a worker that waits says nothing."""
 
 
 def _compute(task: Task, folder: RunFolder, tell: Tell) -> Outcome:
@@ -153,9 +145,14 @@ def _compute(task: Task, folder: RunFolder, tell: Tell) -> Outcome:
 
 
 def received(task: Task, outcome: Outcome) -> None:
-    """Keep a result that came from a worker whose storage is another: settings, result and status, and no series."""
-    if not outcome.fault and not (task.path / "result.json").is_file():
-        folder = RunFolder.ensure(task.path, task.experiment, task.settings, code=task.code)
+    """Keep a result that came from a worker whose storage is another: settings, result and status, and no series.
+
+    Where another process has the folder, that one writes it.
+    """
+    if outcome.fault or (task.path / "result.json").is_file():
+        return
+    with suppress(BusyError), holding(task.path):
+        folder = _folder_of(task)
         write_text(task.path / "result.json", outcome.result)
         write_json(
             task.path / "status.json",
@@ -175,20 +172,85 @@ def _with_threads(settings: Settings, threads: int) -> Settings:
         return settings
 
 
-def _files(settings: BaseModel) -> dict[str, Path]:
-    """Settings that name a file or folder that is there -> its path."""
-    texts = {name: value for name, value in settings if isinstance(value, str) and value}
-    signed = {name: Path(value) for name, value in texts.items() if any(sign in value for sign in _SIGNS)}
-    return {name: path for name, path in signed.items() if path.exists()}
+def _replaced(value: Any, of: Callable[[str], str]) -> Any:
+    """`value` with each text in it, also in lists and tables, as `of` has it."""
+    if isinstance(value, str):
+        return of(value)
+    if isinstance(value, Mapping):
+        return {key: _replaced(item, of) for key, item in value.items()}
+    if isinstance(value, BaseModel):
+        return _absolute(value)
+    if isinstance(value, list | tuple):
+        return type(value)(_replaced(item, of) for item in value)
+    return value
+
+
+def _absolute(settings: Settings) -> Settings:
+    """The same settings, each file or folder that they name by its whole path."""
+    changed = {name: _replaced(value, partial(_whole, setting=name)) for name, value in settings}
+    return settings.model_copy(update={name: new for name, new in changed.items() if new != getattr(settings, name)})
+
+
+def _whole(text: str, setting: str) -> str:
+    path, rest = _path_in(text, setting)
+    return text if path is None else f"{path.resolve()}{rest}"
+
+
+def _path_in(text: str, setting: str) -> tuple[Path | None, str]:
+    """The path that a text names, None where it names none that is there; and what follows it (robot.py:control)."""
+    if setting == "bed" and not any(_there(Path(text, name), Path.is_file) for name in ("", "bed.npz")):
+        return None, ""  # it is one on the shelf
+    head, colon, tail = text.rpartition(":")
+    for name, rest in ((text, ""), (head, colon + tail)):
+        if name and (setting in _FOLDERS or "/" in name or Path(name).suffix) and _there(Path(name)):
+            return Path(name), rest
+    return None, ""
+
+
+def _content(text: str, setting: str) -> str:
+    """A digest of what a text names: a file, a folder, or a bed on the shelf; the text itself where it names none."""
+    path, rest = _path_in(text, setting)
+    if path is None and setting == "bed" and _there(shelved := bed_shelf() / f"{text}.npz"):
+        path = shelved
+    return text if path is None else _digest(path) + rest
+
+
+def _there(path: Path, kind: Callable[[Path], bool] = Path.exists) -> bool:
+    """Whether the path is there; a text may be too long for a path."""
+    try:
+        return kind(path)
+    except (OSError, ValueError):
+        return False
 
 
 def _digest(path: Path) -> str:
-    """Of a file, or of all files of a folder with their names."""
-    digest = hashlib.sha256()
-    for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
-        if file.is_file():
-            digest.update(f"{file.relative_to(path)}".encode() + file.read_bytes())
+    """Of a file, or of all files of a folder with their names; and of the files that its TOML and XML files name."""
+    digest, todo, seen = hashlib.sha256(), [path.resolve()], set()
+    while todo:
+        at = todo.pop()
+        for file in sorted(at.rglob("*")) if at.is_dir() else [at]:
+            if not file.is_file() or file in seen:
+                continue
+            seen.add(file)
+            content = file.read_bytes()
+            _add(digest, file.relative_to(at).as_posix(), content)
+            if file.suffix in _NAMING:
+                todo += _named_in(file, content.decode(errors="replace"))
     return digest.hexdigest()
+
+
+def _named_in(file: Path, text: str) -> Iterator[Path]:
+    """The files that a text in `file` names in quotes: from its folder, from a folder that it names, or from here."""
+    quoted = sorted({first or second for first, second in _QUOTED.findall(text)})
+    below = [file.parent / name for name in quoted if _there(file.parent / name, Path.is_dir)]
+    folders = [file.parent, *below, Path.cwd()]
+    for name in quoted:
+        if found := next((folder / name for folder in folders if _there(folder / name, Path.is_file)), None):
+            yield found.resolve()
+
+
+def _add(digest: "hashlib._Hash", name: str, content: bytes) -> None:
+    digest.update(f"{name}\0{len(content)}\0".encode() + content)
 
 
 class _Told(Progress):

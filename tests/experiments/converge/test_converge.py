@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -16,12 +18,14 @@ from experiments.converge import experiment as converge
 from experiments.converge.analysis import numbers_of, two_finest
 from experiments.converge.design import affordable, inertial_number, members_of, variants_of
 from experiments.converge.headline import converge_headline
+from experiments.converge.members import finished_member, make_member
 from experiments.converge.result import doubts, plan_told
 from experiments.converge.settings import ConvergeSettings
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.result import SHIPPED_RESULT
 from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
 from vis.report import write_report
 
@@ -286,6 +290,30 @@ def test_sweeps_that_share_a_folder_of_members_share_their_runs(swift, tmp_path)
 
 
 # What is said -----------------------------------------------------------------------------------------------------
+
+
+HOLD = """
+import sys, time
+from filelock import FileLock
+with FileLock(sys.argv[1]):
+    open(sys.argv[1], "w").write("4711")
+    print("held", flush=True)
+    time.sleep(0.3)
+"""
+
+
+def test_a_member_that_another_process_has_is_waited_for_and_not_made_twice(swift, tmp_path):
+    member, told = members_of(settings_of(), variants_of(settings_of()))[0], []
+    progress, path = Progress(), tmp_path / "member"
+    progress.message = told.append
+    path.mkdir()
+    with subprocess.Popen([sys.executable, "-c", HOLD, path / "lock"], stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"held\n"
+        assert make_member(member.settings, path, progress) is None
+        assert other.wait() == 0
+    assert len(told) == 1 and "process 4711" in told[0] and len(swift) == 1
+    assert finished_member(path) is not None
+    assert make_member(member.settings, path, progress) is None and len(swift) == 1
 
 
 def finding(fine, coarse):

@@ -98,6 +98,14 @@ def test_an_empty_folder_will_do(tmp_path):
     assert RunFolder.create(tmp_path, "dig", DigSettings()).status == "running"
 
 
+def test_what_a_killed_process_left_before_run_toml_is_no_run(tmp_path):
+    for name in (".run.toml.4711.tmp", "lock", "traceback.txt"):
+        (tmp_path / name).touch()
+    assert RunFolder.create(tmp_path, "dig", DigSettings()).status == "running"
+    with pytest.raises(ValueError, match=r"holds run\.toml, status\.json"):
+        RunFolder.create(tmp_path, "dig", DigSettings())
+
+
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(ValueError, match="cannot be written"):

@@ -1,7 +1,10 @@
 """A sweep in one process: its table, sensitivities and page; what is done is not done twice; a run that fails."""
 
+import ast
 import json
 import math
+import pickle
+import subprocess
 import sys
 
 import numpy as np
@@ -122,6 +125,109 @@ def test_a_folder_is_named_by_what_the_result_hangs_on(tmp_path):
     assert name(platform=str(mine)) != first
     bed = {"ground": "bed"}
     assert name(**bed, threads=3) == name(**bed) != name(**bed, seed=2)
+
+
+def test_code_is_all_that_computes_and_not_what_draws(tmp_path, monkeypatch):
+    """K, C and mu of the surfaces too, also of an experiment that has a digest of its own."""
+    surfaces, drawing = tmp_path / "experiments/platform/surfaces.toml", tmp_path / "vis/report.py"
+    for path in (surfaces, drawing):
+        path.parent.mkdir(parents=True)
+        path.write_bytes((tasks._ROOT / path.relative_to(tmp_path)).read_bytes() if path == surfaces else b"")
+    monkeypatch.setattr(tasks, "_ROOT", tmp_path)
+
+    def codes():
+        return [tasks.code_of.__wrapped__(design.find_experiment(name)) for name in ("tumble", "penetrate")]
+
+    first = codes()
+    drawing.write_text("colour = 1\n")
+    assert codes() == first and first[0] != first[1]
+    surfaces.write_text(surfaces.read_text().replace("1.5e4", "1.6e4"))
+    assert all(new != old for new, old in zip(codes(), first, strict=True))
+
+
+def test_files_in_lists_and_files_that_files_name_are_part_of_a_runs_name(tmp_path, monkeypatch):
+    """A list of effects, the effect of a model, the meshes of a robot, a campaign by its bare name, a shelved bed.
+
+    A folder that is called as a material is, such as the sweep's own, is no part of it.
+    """
+    monkeypatch.setenv("HEDGEBED_BEDS", str(tmp_path / "shelf"))
+    files = (
+        "mud.py", "far/mud.py", "model.toml", "meshes/foot.stl", "robot.xml", "mine/campaign.toml", "control.py",
+        "shelf/loose.npz", "loose/run.toml", "sand/run.toml",
+    )  # fmt: skip
+    for name in files:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("first\n")
+    (tmp_path / "model.toml").write_text("[[effects]]\nfile = 'far/mud.py'\n")
+    (tmp_path / "robot.xml").write_text('<compiler meshdir="meshes"/><mesh file="foot.stl"/>')
+
+    def task(experiment, **given):
+        experiment = design.find_experiment(experiment)
+        return tasks.task_of(experiment, experiment.settings_class()(**given), tmp_path, threads=1, reports=False)
+
+    def names():
+        diagnosed = task("diagnose", campaign="mine", effect_file=("mud.py",))
+        moved = task("mujoco", model="robot.xml", feet=("foot",), controller="control.py:act")
+        assert diagnosed.settings.effect_file == (str(tmp_path / "mud.py"),)
+        assert moved.settings.controller == f"{tmp_path}/control.py:act"
+        pushed = task("penetrate", bed="loose")
+        assert diagnosed.settings.campaign == str(tmp_path / "mine") and pushed.settings.bed == "loose"
+        return [one.name for one in (diagnosed, moved, task("tumble", model="model.toml", surface="sand"), pushed)]
+
+    first = names()
+    hangs_on = (
+        ("mud.py", "mine/campaign.toml"), ("meshes/foot.stl", "control.py"), ("far/mud.py",), ("shelf/loose.npz",),
+        ("sand/run.toml", "loose/run.toml"),
+    )  # fmt: skip
+    for place, name in ((place, name) for place, changed in enumerate(hangs_on) for name in changed):
+        (tmp_path / name).write_text("second\n")
+        assert [new != old for new, old in zip(names(), first, strict=True)] == [place == run for run in range(4)]
+        (tmp_path / name).write_text("first\n")
+    assert names() == first
+
+
+OTHER = """
+import pickle, sys
+from experiments.sweep import tasks
+todo, done, compute = pickle.load(sys.stdin.buffer), [], tasks._compute
+tasks._compute = lambda task, *rest: done.append(task.name) or compute(task, *rest)
+print("ready", flush=True)
+sys.stdin.buffer.readline()
+print([[outcome.name, outcome.fault] for outcome in (tasks.carry_out(task, print) for task in todo)], file=sys.stderr)
+print(len(done), file=sys.stderr)
+"""
+
+
+def tumbles(home, torques):
+    experiment = design.find_experiment("tumble")
+    every = [experiment.settings_class()(duration=0.1, torque=torque) for torque in torques]
+    return [tasks.task_of(experiment, settings, home, threads=1, reports=False) for settings in every]
+
+
+def test_two_processes_with_the_same_runs_do_each_once(tmp_path, monkeypatch):
+    todo, done, compute = tumbles(tmp_path / "members", np.linspace(0.15, 0.2, 12)), [], tasks._compute
+    monkeypatch.setattr(tasks, "_compute", lambda task, *rest: done.append(task.name) or compute(task, *rest))
+    command = [sys.executable, "-c", OTHER]
+    with subprocess.Popen(command, stdin=-1, stdout=-1, stderr=-1, cwd=tasks._ROOT) as other:
+        other.stdin.write(pickle.dumps(todo))
+        other.stdin.flush()
+        assert other.stdout.readline() == b"ready\n"
+        other.stdin.write(b"\n")
+        other.stdin.flush()
+        here = [tasks.carry_out(task, float) for task in todo]
+        said = other.communicate()[1].decode().splitlines()
+    assert not [outcome.fault for outcome in here if outcome.fault]
+    assert ast.literal_eval(said[-2]) == [[task.name, ""] for task in todo]
+    assert len(done) + int(said[-1]) == len(todo)
+
+
+def test_a_run_killed_while_its_folder_was_made_is_made_again(tmp_path):
+    (task,) = tumbles(tmp_path, [0.15])
+    task.path.mkdir()
+    for name in (".run.toml.4711.tmp", "lock", "traceback.txt"):
+        (task.path / name).touch()
+    assert not tasks.carry_out(task, float).fault
+    assert tasks.done_before(task) is not None
 
 
 def test_sensitivities_are_those_of_the_closed_form():
