@@ -2,8 +2,8 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed sweep`; calling one imports what computes.
 
-Imports `experiments.converge`, `experiments.penetrate`, `experiments.runs`, `experiments.suite`, `experiments.tumble`,
-`rigid`.
+Imports `dem.prepare`, `experiments.converge`, `experiments.penetrate`, `experiments.runs`, `experiments.suite`,
+`experiments.tumble`, `rigid`.
 """
 
 from experiments.runs.registry import face

@@ -34,7 +34,7 @@ _HOW = ("threads", "workers", "checkpoint_interval", "cache", "members")
 """Settings that say how a run is computed and where its parts are kept; its bits do not depend on them."""
 _CODE = ("coupling", "dem", "experiments", "rigid")
 _CODE_FILES = (".py", ".toml", ".csv", ".xml", ".json", ".gz")
-_FOLDERS = ("bed", "campaign", "reference", "runs")  # settings that may name a file or folder of any name
+_FOLDERS = ("bed", "campaign", "runs")  # settings that may name a file or folder of any name
 _NAMING = (".toml", ".xml", ".urdf")  # files that may name others, in quotes
 _QUOTED = re.compile(r"""\"([^"\n]{1,255})"|'([^'\n]{1,255})'""")
 

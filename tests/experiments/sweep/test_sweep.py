@@ -170,9 +170,9 @@ def test_files_in_lists_and_files_that_files_name_are_part_of_a_runs_name(tmp_pa
         moved = task("mujoco", model="robot.xml", feet=("foot",), controller="control.py:act")
         assert diagnosed.settings.effect_file == (str(tmp_path / "mud.py"),)
         assert moved.settings.controller == f"{tmp_path}/control.py:act"
-        pushed = task("penetrate", bed="loose")
-        assert diagnosed.settings.campaign == str(tmp_path / "mine") and pushed.settings.bed == "loose"
-        return [one.name for one in (diagnosed, moved, task("tumble", model="model.toml", surface="sand"), pushed)]
+        refined = task("bed refine", bed="loose")
+        assert diagnosed.settings.campaign == str(tmp_path / "mine") and refined.settings.bed == "loose"
+        return [one.name for one in (diagnosed, moved, task("tumble", model="model.toml", surface="sand"), refined)]
 
     first = names()
     hangs_on = (
