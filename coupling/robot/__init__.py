@@ -12,11 +12,11 @@ from .body import MujocoRobot
 from .feet import Foot, Part, find_feet
 from .foot_forces import FootForces
 from .law_feet import LawFeet
-from .models import load_model
+from .models import LostRobotError, load_model
 from .run import RobotRun
 from .stability import check_exchange
 
 __all__ = [
-    "BedFeet", "Foot", "FootForces", "LawFeet", "MujocoRobot", "Part", "RobotRun", "check_exchange", "find_feet",
-    "load_model",
+    "BedFeet", "Foot", "FootForces", "LawFeet", "LostRobotError", "MujocoRobot", "Part", "RobotRun", "check_exchange",
+    "find_feet", "load_model",
 ]  # fmt: skip

@@ -31,7 +31,7 @@ from rigid.spatial.quaternions import multiply, to_matrix
 
 from .feet import Foot, find_feet, mesh_of, refuse_missing
 from .friction import FeetFriction
-from .models import check_model, keyframe_of, load_model, switch_off_floors
+from .models import check_model, keyframe_of, load_model, refuse_lost, rises, switch_off_floors
 
 __all__ = ["Controller", "MujocoRobot"]
 
@@ -70,6 +70,7 @@ class MujocoRobot:
         self.controller = controller
         self.control_step = float(self.model.opt.timestep)  # Between two calls of the controller [s]
         check_model(self.model)
+        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # which hides a state that is lost
         self.data = mujoco.MjData(self.model)
         if keyframe is not None:
             mujoco.mj_resetDataKeyframe(self.model, self.data, keyframe_of(self.model, keyframe))
@@ -134,6 +135,11 @@ class MujocoRobot:
         return not (held or medium or model.neq or walls)
 
     @property
+    def hangs(self) -> bool:
+        """Whether the world holds it: it has neither a free joint nor an upright rail at a root."""
+        return not rises(self.model, self.data)
+
+    @property
     def _static_geoms(self) -> Vector:
         return np.asarray(self.model.body_weldid[self.model.geom_bodyid] == 0)
 
@@ -181,22 +187,13 @@ class MujocoRobot:
 
         Raises ValueError where there are none at its root.
         """
-        model, kinds = self.model, self._mujoco.mjtJoint
-        raised = False
-        for joint in range(model.njnt):
-            place = int(model.jnt_qposadr[joint])
-            rooted = model.body_weldid[model.body_parentid[model.jnt_bodyid[joint]]] == 0
-            up = float(self.data.xaxis[joint, 2])
-            if model.jnt_type[joint] == int(kinds.mjJNT_FREE):
-                self.data.qpos[place + 2] += height
-                raised = True
-            elif rooted and model.jnt_type[joint] == int(kinds.mjJNT_SLIDE) and abs(up) > 1 - 1e-9:
-                self.data.qpos[place] += height / up
-                raised = True
-        if not raised:
+        ways = rises(self.model, self.data)
+        if not ways:
             raise ValueError(
                 "height is given, but the robot has no free joint or upright rail to be raised by: leave it out"
             )
+        for place, up in ways:
+            self.data.qpos[place] += height / up
         self.start()
 
     def start(self) -> None:
@@ -251,11 +248,8 @@ class MujocoRobot:
                 self._calls += 1
             mujoco.mj_step2(model, data)
             self._count_work(before)
+            refuse_lost(data)
         mujoco.mj_fwdPosition(model, data)
-        if not np.isfinite(data.qpos).all():
-            raise RuntimeError(
-                f"the robot's state is no number at {data.time:g} s: its own step or gains are too large"
-            )
         start = self._pose
         self._end = self._pose_now()
         turns = [

@@ -25,7 +25,7 @@ __all__ = ["Foot", "Part", "find_feet", "mesh_of", "refuse_missing"]
 
 ROUND = 32  # Segments around of the picture of a round geom
 RIM = 8  # Points on the rim of a cylinder that stands on its end
-UPRIGHT = math.sqrt(0.5)  # Cosine between axis and vertical from which on a cylinder stands on its end
+UPRIGHT = math.sqrt(0.5)  # Cosine between axis and vertical from which on a cylinder or capsule stands on its end
 FINE = 3  # Subdivisions of the ball that stands for an ellipsoid among grains: 1280 triangles, 0.3 % too small
 
 Faces = NDArray[np.int64]
@@ -106,9 +106,9 @@ def refuse_missing() -> Any:
 def find_feet(model: Any, data: Any, names: Sequence[str]) -> list[Foot]:
     """The feet that `names` mean: geoms or sites of the model, by name or pattern (``spike_*``).
 
-    ``data`` has the robot where it starts: a cylinder whose axis is within 45 degrees of the vertical there stands on
-    its end, and rolls otherwise. Raises ValueError, naming the geom, for none of that name, one that does not move,
-    and one of a kind that no foot can be.
+    ``data`` has the robot where it starts: a cylinder or capsule whose axis is within 45 degrees of the vertical there
+    stands on its end, and lies otherwise. Raises ValueError, naming the geom, for none of that name, one that does not
+    move, and one of a kind that no foot can be.
     """
     mujoco = refuse_missing()
     kinds = {"geom": mujoco.mjtObj.mjOBJ_GEOM, "site": mujoco.mjtObj.mjOBJ_SITE}
@@ -175,6 +175,7 @@ def _geom(model: Any, data: Any, k: int, name: str) -> Part:
     vertices, faces = mesh_of(model, k)
     vertices = at + vertices @ matrix.T
     points, spreads, share, note = np.zeros((0, 3)), np.zeros((0, 3, 3)), 1.0, ""
+    upright = abs(float(data.geom_xmat[k].reshape(3, 3)[2, 2])) > UPRIGHT
     if kind == "sphere":
         shape: Any = Ball(center=tuple(at.tolist()), radius=size[0])
         points, spreads = at.reshape(1, 3), size[0] * np.eye(3).reshape(1, 3, 3)
@@ -182,11 +183,12 @@ def _geom(model: Any, data: Any, k: int, name: str) -> Part:
         points = at + np.outer([-size[1], size[1]], matrix[:, 2])
         shape = Capsule(start=tuple(points[0].tolist()), end=tuple(points[1].tolist()), radius=size[0])
         spreads = np.tile(size[0] * np.eye(3), (2, 1, 1))
+        share = 1.0 if upright else 0.5
     elif kind == "cylinder":
         shape = Placed(Cylinder(bottom=-size[1], top=size[1], radius=size[0]), **place)
         axis = matrix[:, 2]
         ends = at + np.outer([-size[1], size[1]], axis)
-        if abs(float(data.geom_xmat[k].reshape(3, 3)[2, 2])) > UPRIGHT:
+        if upright:
             angles = 2 * math.pi / RIM * np.arange(RIM)
             ring = size[0] * (np.outer(np.cos(angles), matrix[:, 0]) + np.outer(np.sin(angles), matrix[:, 1]))
             points, share = np.concatenate([end + ring for end in ends]), 1 / RIM

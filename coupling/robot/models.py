@@ -7,7 +7,21 @@ import numpy as np
 
 from .feet import refuse_missing
 
-__all__ = ["actuators_of", "check_model", "joints_of", "keyframe_of", "load_model", "switch_off_floors"]
+__all__ = [
+    "LostRobotError", "actuators_of", "check_model", "joints_of", "keyframe_of", "load_model", "refuse_lost", "rises",
+    "switch_off_floors",
+]  # fmt: skip
+
+
+SOFTER = "use a smaller time step of the model, or softer gains"
+
+
+class LostRobotError(RuntimeError):
+    """A robot cannot go on: its state or control is no number, or its controller fails. `remedy`: what would do."""
+
+    def __init__(self, message: str, *, remedy: str) -> None:
+        super().__init__(message)
+        self.remedy = remedy
 
 
 def load_model(path: str | Path) -> Any:
@@ -52,6 +66,40 @@ def switch_off_floors(model: Any) -> tuple[str, ...]:
             model.geom_contype[k] = model.geom_conaffinity[k] = 0
             found.append(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k) or f"geom {k}")
     return tuple(found)
+
+
+def rises(model: Any, data: Any) -> list[tuple[int, float]]:
+    """The free joints and upright rails at the roots: the place of their height in qpos, and its sense, 1 or -1."""
+    kinds, found = refuse_missing().mjtJoint, []
+    for joint in range(model.njnt):
+        place, up = int(model.jnt_qposadr[joint]), float(data.xaxis[joint, 2])
+        rooted = model.body_weldid[model.body_parentid[model.jnt_bodyid[joint]]] == 0
+        if model.jnt_type[joint] == int(kinds.mjJNT_FREE):
+            found.append((place + 2, 1.0))
+        elif rooted and model.jnt_type[joint] == int(kinds.mjJNT_SLIDE) and abs(up) > 1 - 1e-9:
+            found.append((place, up))
+    return found
+
+
+def refuse_lost(data: Any) -> None:
+    """Raise LostRobotError where MuJoCo has found a state or a control that is no number, or too large for it."""
+    kinds = refuse_missing().mjtWarning
+    for kind, what in (
+        (kinds.mjWARN_BADCTRL, "control (data.ctrl)"),
+        (kinds.mjWARN_BADQPOS, "position (data.qpos)"),
+        (kinds.mjWARN_BADQVEL, "velocity (data.qvel)"),
+        (kinds.mjWARN_BADQACC, "acceleration (data.qacc)"),
+    ):
+        warning = data.warning[int(kind)]
+        if warning.number:
+            by_control = kind == kinds.mjWARN_BADCTRL
+            raise LostRobotError(
+                f"the robot is lost at {data.time:g} s: MuJoCo found a {what} that is no number or too large, "
+                f"number {warning.lastinfo}",
+                remedy="mend the controller" if by_control else SOFTER,
+            )
+    if not np.isfinite(data.qpos).all():
+        raise LostRobotError(f"the robot is lost at {data.time:g} s: its position is no number", remedy=SOFTER)
 
 
 def joints_of(model: Any) -> list[tuple[str, str, int, int]]:

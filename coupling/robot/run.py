@@ -15,7 +15,7 @@ from rigid.ground.reaction import Reaction, State
 from .bed_feet import BedFeet
 from .body import MujocoRobot
 from .law_feet import LawFeet
-from .stability import check_exchange
+from .stability import ITERATED, ExchangeLoad, check_exchange
 
 __all__ = ["RobotRun"]
 
@@ -26,6 +26,7 @@ COLUMNS = (
 """Of a row: centre of mass [m], energies [J] (potential: gravity and springs), work of what else is in the robot and of
 its actuators alone [J], work on the ground by robot and ground [J], force of the ground on all feet [N], how many feet
 touch, the deepest depth [m]."""
+BELOW = 1e-3  # What is no foot may start as deep as that [m]
 FOOT = 14
 """Numbers of a foot in a row: position, quaternion, force [N], torque [N m], depth of its lowest point [m]."""
 
@@ -41,7 +42,8 @@ class RobotRun(EnergyBalance, Stepper):
     checked : whether a start in the ground, and an exchange that would be unstable (`check_exchange`), are refused.
     options : those of `Master`: substeps, iterations, extrapolation, tolerance.
 
-    Raises ValueError, naming the foot, for a start in the ground and for an unstable exchange.
+    Raises ValueError for a robot that another run has, and, naming the foot or geom, for a start in the ground and for
+    an unstable exchange. On the way `load` may go above `most_load`: that is for the caller to say.
     """
 
     COLUMNS = COLUMNS
@@ -59,18 +61,25 @@ class RobotRun(EnergyBalance, Stepper):
     ) -> None:
         super().__init__()
         check_above_zero("in s", duration=duration, energy_interval=energy_interval)
+        if robot.step:
+            raise ValueError(
+                f"robot: another run has it, and has come to {robot.time:g} s: make a new MujocoRobot for this one"
+            )
         self.body, self.ground, self.duration = robot, ground, float(duration)
         robot.start()
         if checked:
             ground.place(robot.pose)
+            _refuse_below(robot)
         self.master = Master(robot, ground, **options)
         self.macro_step = self.master.macro_step
         self._pull = np.array([0.0, 0.0, -robot.mass * robot.gravity])
         self._free, self._turns = ((0, 1, 2), (0, 1, 2)) if robot.floats else ((), ())
-        substeps = int(options.get("substeps", 10))
-        self.load = 0.0  # Of the lightest foot, over what the explicit exchange bears [1]
+        iterations = self.master.iterations
+        self.load = 0.0  # Largest when sampled, over what the explicit exchange bears [1]
+        self.most_load = 1.0 if iterations == 1 else ITERATED  # Up to which the exchange is stable, or settles [1]
         if checked:
-            self.load = check_exchange(robot, ground, substeps=substeps, iterations=int(options.get("iterations", 1)))
+            check_exchange(robot, ground, substeps=int(options.get("substeps", 10)), iterations=iterations)
+        self._load = ExchangeLoad(robot, ground)
         self._every = max(1, round(energy_interval / self.macro_step))
         self.energy_interval = self._every * self.macro_step
         self.lowest_other = (np.inf, "")  # Lowest height of what is no foot, when sampled [m], and its geom
@@ -149,6 +158,7 @@ class RobotRun(EnergyBalance, Stepper):
     def _sample(self) -> None:
         super()._sample()
         self.lowest_other = min(self.lowest_other, self.robot.lowest_other())
+        self.load = max(self.load, self._load.now().at(self.macro_step))
 
     @property
     def feet_now(self) -> Vector:
@@ -185,6 +195,7 @@ class RobotRun(EnergyBalance, Stepper):
         own: State = {
             "frames": np.array(self._frames), "rows": self._row_table, "feet": np.array(self._feet),
             "joints": np.array(self._joints), "lowest": np.array([str(part) for part in self.lowest_other]),
+            "load": np.array(self.load),
         }  # fmt: skip
         return prefixed("run", own) | prefixed("balance", self._balance_state()) | self.master.state()
 
@@ -196,5 +207,16 @@ class RobotRun(EnergyBalance, Stepper):
         self._feet, self._joints = (list(np.array(own[name], dtype=float)) for name in ("feet", "joints"))
         lowest, name = (str(part) for part in np.asarray(own["lowest"]))
         self.lowest_other = (float(lowest), name)
+        self.load = float(own.get("load", self.load))  # an earlier version has it of the start alone
         self._restore_balance(part_of(state, "balance"))
         self.master.restore(state)
+
+
+def _refuse_below(robot: MujocoRobot) -> None:
+    """Raise ValueError, naming the geom, where what is no foot starts below the surface."""
+    height, name = robot.lowest_other()
+    if height < -BELOW:
+        raise ValueError(
+            f"{name!r}, which is no foot, starts {-height:.3g} m below the surface, where no ground would hold it: "
+            f"name it under feet, or raise the robot (height)"
+        )

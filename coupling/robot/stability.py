@@ -1,9 +1,9 @@
 """Whether the exchange of forces between a robot and its ground is stable: `check_exchange`.
 
-In an explicit exchange every H a foot of the effective mass m = 1 / (J M^-1 J^T), along z, on contacts of the stiffness
-K and the damping C is stable while K H^2 / 4 m + C H / m < 1 (docs/coupling.md; the damping acts one step late). Of a
-part that stands on several points 1 / m is their mean, which bounds the fastest of its vibrations. The iterated
-exchange settles up to some ten times that (`ITERATED`).
+The points on which all feet stand at once have the vertical Jacobian J, the stiffnesses K and the dampings C. An
+explicit exchange every H is stable while L(K) H^2 / 4 + L(C) H < 1 (docs/coupling.md; the damping acts one step late).
+L(D) is the largest eigenvalue of D J M^-1 J^T. It is K / m and C / m for one foot with the effective mass m along z.
+The iterated exchange settles up to some ten times that (`ITERATED`).
 """
 
 import math
@@ -12,25 +12,28 @@ from typing import Any
 
 import numpy as np
 
+from coupling.poses import Vector
+
 from .bed_feet import BedFeet
 from .law_feet import LawFeet
 
-__all__ = ["ITERATED", "Load", "check_exchange", "exchange_loads", "plan_area"]
+__all__ = ["ITERATED", "ExchangeLoad", "Load", "check_exchange", "plan_area"]
 
 ITERATED = 10.0
 """Load up to which the iterated exchange settles: K H^2 / m = 40 is the largest that did (docs/coupling.md)."""
 SPEED = 0.5  # At which the damping of a law is taken [m/s]
 COVER = 0.8  # Share of a plate's area under which one layer of grains lies [1]
+TOGETHER = 0.5  # A part stands if it is that near to the lowest point of its foot, over the foot's reach [1]
+SAMPLED = 16  # Vertices of a part that stand for its surface among grains
 
 
 @dataclass(frozen=True)
 class Load:
-    """How much the explicit exchange asks of one foot: it is stable up to 1."""
+    """How much the explicit exchange asks of the feet: it is stable up to 1."""
 
-    foot: str
-    part: str
-    mass: float  # Effective, along z [kg]
-    stiffness: float  # Of the contacts under it [N/m]
+    foot: str  # The one that moves most in the fastest vibration
+    mass: float  # Effective, along z, of that vibration [kg]
+    stiffness: float  # Of the contacts under that foot [N/m]
     damping: float  # [N s/m]
 
     def at(self, macro_step: float) -> float:
@@ -43,28 +46,79 @@ class Load:
         return 2 * self.mass / (b + math.sqrt(b * b + 4 * a * self.mass))
 
 
-def exchange_loads(robot: Any, ground: LawFeet | BedFeet) -> list[Load]:
-    """Of every part of every foot, where the robot is now."""
-    loads = []
-    weight = robot.mass * max(robot.gravity, 1e-3)
-    for k, foot in enumerate(robot.feet):
-        linear, angular = robot.jacobian(foot.body)
-        matrix = robot.data.xmat[foot.body].reshape(3, 3)
-        first = 0
+class ExchangeLoad:
+    """The `Load` of `robot` on `ground`, wherever the robot is."""
+
+    def __init__(self, robot: Any, ground: LawFeet | BedFeet) -> None:
+        self.robot, self.ground = robot, ground
+        self._laws: list[list[tuple[float, float]]] = []
+        self._grain = 0.0, 0.0  # Radius [m], stiffness of its contact [N/m]
+        if isinstance(ground, BedFeet):
+            self._grain = _of_grain(ground.bed)
+            return
+        weight = robot.mass * max(robot.gravity, 1e-3)
+        for foot, laws in zip(robot.feet, ground.grounds, strict=True):
+            firsts = np.cumsum([0, *(len(part.centres) for part in foot.parts[:-1])])
+            self._laws.append([_of_law(laws[j], weight * p.share) for j, p in zip(firsts, foot.parts, strict=True)])
+
+    def now(self) -> Load:
+        """Of all points on which the feet can stand at once, in the robot's present posture."""
+        robot = self.robot
+        arms, stiffness, damping, owners = self._points()
+        rows = np.zeros((len(owners), robot.model.nv))
+        for k, foot in enumerate(robot.feet):
+            linear, angular = robot.jacobian(foot.body)
+            rows[owners == k] = linear[2] + np.cross(arms[owners == k], [0.0, 0.0, 1.0]) @ angular
+        softness = rows @ robot.solve(rows).T
+        by_stiffness, shares = _largest(softness, stiffness)
+        by_damping, others = _largest(softness, damping)
+        size = shares if by_stiffness > 0 else others
+        worst = int(np.argmax(np.bincount(owners, weights=size, minlength=len(robot.feet))))
+        own = owners == worst
+        if by_stiffness > 0:
+            mass = float(stiffness[own].sum()) / by_stiffness
+        else:
+            mass = float(damping[own].sum()) / by_damping if by_damping > 0 else 1.0  # 1: whatever it is
+        return Load(robot.feet[worst].name, mass, by_stiffness * mass, by_damping * mass)
+
+    def _points(self) -> tuple[Vector, Vector, Vector, Vector]:
+        """Arms about the origins of the feet [m], stiffness [N/m], damping [N s/m] and foot of each point."""
+        found: list[tuple[Vector, float, float, int]] = []
+        for k, foot in enumerate(self.robot.feet):
+            matrix = self.robot.data.xmat[foot.body].reshape(3, 3)
+            parts = self._on_law(k, foot, matrix) if self._laws else self._on_grains(foot, matrix)
+            bottom = min(float(arms[:, 2].min()) for arms, *_ in parts)
+            for arms, stiffness, damping in parts:
+                if float(arms[:, 2].min()) <= bottom + TOGETHER * foot.reach:
+                    found += [(arm, stiffness, damping, k) for arm in arms]
+        columns = [np.array(column) for column in zip(*found, strict=True)]
+        arms, strength, damping, owners = columns
+        return arms, np.maximum(strength, 0.0), np.maximum(damping, 0.0), owners
+
+    def _on_law(self, k: int, foot: Any, matrix: Vector) -> list[tuple[Vector, float, float]]:
+        """Of each part: the arms of the points on which it stands, stiffness and damping of one point."""
+        every = np.split(foot.lowest(matrix), np.cumsum([len(part.centres) for part in foot.parts])[:-1])
+        return [
+            (arms[np.argsort(arms[:, 2], kind="stable")[: round(1 / part.share)]], *law)
+            for part, arms, law in zip(foot.parts, every, self._laws[k], strict=True)
+        ]
+
+    def _on_grains(self, foot: Any, matrix: Vector) -> list[tuple[Vector, float, float]]:
+        """Likewise, of some vertices of each part."""
+        (radius, each), parts = self._grain, []
         for part in foot.parts:
-            points = part.centres if isinstance(ground, LawFeet) else part.vertices[:: max(1, len(part.vertices) // 16)]
-            arms = points @ matrix.T
-            rows = linear[2] + np.cross(arms, [0.0, 0.0, 1.0]) @ angular
-            softest = float((rows * robot.solve(rows)).sum(axis=1).mean())
-            if isinstance(ground, LawFeet):
-                law = ground.grounds[k][first]
-                first += len(part.centres)
-                stiffness, damping = _of_law(law, weight * part.share)
-                stiffness, damping = stiffness / part.share, damping / part.share
-            else:
-                stiffness, damping = _of_bed(ground.bed, plan_area(part.vertices @ matrix.T)), 0.0
-            loads.append(Load(foot.name, part.name, 1 / max(softest, 1e-300), stiffness, damping))
-    return loads
+            turned = part.vertices @ matrix.T
+            arms = turned[:: max(1, len(turned) // SAMPLED)]
+            grains = max(1.0, COVER * plan_area(turned) / (math.pi * radius**2))
+            parts.append((arms, grains * each / len(arms), 0.0))
+        return parts
+
+
+def _largest(softness: Vector, strengths: Vector) -> tuple[float, Vector]:
+    """Largest eigenvalue of diag(strengths) times softness, and the share of each point in its vibration [1]."""
+    roots = np.sqrt(strengths)
+    values, vectors = np.linalg.eigh(roots[:, None] * (0.5 * (softness + softness.T)) * roots)
+    return max(0.0, float(values[-1])), np.asarray(vectors[:, -1] ** 2)
 
 
 def _of_law(law: Any, load: float) -> tuple[float, float]:
@@ -77,17 +131,17 @@ def _of_law(law: Any, load: float) -> tuple[float, float]:
     return stiffness, float(law.force(depth, SPEED + rate) - law.force(depth, SPEED)) / rate
 
 
-def _of_bed(bed: Any, area: float) -> float:
-    """Stiffness of the grains under a plate of this area [N/m], each at half the overlap that the bed is made for.
+def _of_grain(bed: Any) -> tuple[float, float]:
+    """Mean radius of a grain [m], and stiffness of its contact with a foot [N/m].
 
-    Of a contact with the effective radius of a grain R on a plane it is 2 E* a, a = sqrt(R d) (Hertz).
+    The contact is at half the overlap d that the bed is made for. With the effective radius R of a grain on a plane its
+    stiffness is 2 E* a, a = sqrt(R d) (Hertz).
     """
     radius = float(np.mean(bed.grains(contacts=False).radius))
     overlap = 0.5 * float(bed.overlap_limit) * 2 * radius
     material = bed.material
     pair = material.young / (1 - material.poisson**2)  # a rigid foot
-    each = 2 * pair * math.sqrt(radius * overlap)
-    return max(1.0, COVER * area / (math.pi * radius**2)) * each
+    return radius, 2 * pair * math.sqrt(radius * overlap)
 
 
 def plan_area(vertices: Any) -> float:
@@ -103,12 +157,12 @@ def plan_area(vertices: Any) -> float:
 
 
 def check_exchange(robot: Any, ground: LawFeet | BedFeet, *, substeps: int, iterations: int = 1) -> float:
-    """The largest load of any foot over what is stable [1], with `substeps` of the ground in a macro step.
+    """The load of the robot where it is now over what is stable [1], with `substeps` of the ground in a macro step.
 
     Raises ValueError, naming the foot, where it is above 1, or with `iterations` above 1 above `ITERATED`.
     """
     step = substeps * ground.time_step
-    worst = max(exchange_loads(robot, ground), key=lambda load: load.at(step))
+    worst = ExchangeLoad(robot, ground).now()
     found, most = worst.at(step), 1.0 if iterations == 1 else ITERATED
     if found > most:
         fits = int(worst.longest() / ground.time_step)
@@ -117,7 +171,7 @@ def check_exchange(robot: Any, ground: LawFeet | BedFeet, *, substeps: int, iter
             remedies.append("iterations = 20")
         remedies.append("a heavier foot (or joint armature)")
         raise ValueError(
-            f"feet: {worst.part!r} is too light for this ground: its effective mass of {worst.mass:.3g} kg on contacts "
+            f"feet: {worst.foot!r} is too light for this ground: its effective mass of {worst.mass:.3g} kg on contacts "
             f"of {worst.stiffness:.3g} N/m and {worst.damping:.3g} N s/m is unstable with substeps = {substeps}, an "
             f"exchange every {1e6 * step:.4g} us ({found:.3g} times what is stable"
             f"{'' if iterations == 1 else ' explicitly'}); "

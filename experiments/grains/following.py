@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from coupling import BedGround, CoupledTumble, LeftTheBedError, SpatialRun
-from coupling.robot import RobotRun
+from coupling.robot import LostRobotError, RobotRun
 from coupling.stepper import Reporting
 from dem import BedFailure
 from experiments.runs.folder import RunFolder
@@ -113,6 +113,8 @@ class Followed(ABC, Generic[Run]):
 def _remedy(error: RuntimeError) -> str:
     if isinstance(error, LeftTheBedError):
         return say("longer_bed", by=2 * error.lacking) if error.lacking else say("deeper_bed")
+    if isinstance(error, LostRobotError):
+        return error.remedy
     if "come to rest" in str(error):
         return say("slower_placement")
     return say("coupling_or_bed" if isinstance(error, BedFailure) else "other_bed")

@@ -8,7 +8,7 @@ from experiments.runs.result import Result
 from experiments.runs.whole_runs import whole_run
 
 from .on_grains import RobotFollowed, RobotOnBed
-from .plan import keep_files, plan_robot
+from .plan import keep_files, plan_robot, try_controller
 from .settings import RobotSettings
 
 __all__ = ["check", "resume", "run"]
@@ -17,6 +17,7 @@ __all__ = ["check", "resume", "run"]
 def check(settings: RobotSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
     plan = plan_robot(settings)
+    try_controller(plan.robot())
     if settings.ground == "bed":
         RobotOnBed(settings, plan).check()
     else:

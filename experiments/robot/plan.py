@@ -1,8 +1,10 @@
 """A robot as it is settled: its model, where its numbers come from, and the surface law under its feet."""
 
+import copy
 import importlib.util
 import math
 import shutil
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from coupling.robot import LawFeet, MujocoRobot, load_model
+from coupling.robot import LawFeet, LostRobotError, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
 from coupling.robot.stability import plan_area
 from experiments.platform.ground_file import fitted_ground
@@ -23,7 +25,7 @@ from rigid.spatial.quaternions import to_matrix
 from . import say
 from .settings import RobotSettings
 
-__all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "width_of"]
+__all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "try_controller", "width_of"]
 
 LAW_STEP = 4e-5  # Of a surface law [s], ten of which make an exchange by default
 SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
@@ -122,6 +124,8 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     numbers["gravity"] = Number(robot.gravity, "m/s2", "given" if settings.gravity is not None else of_model)
     surface, fitted = find_surface(settings.surface), fitted_ground(settings.ground)
     warnings = [part.note for foot in robot.feet for part in foot.parts if part.note]
+    if robot.hangs:
+        warnings.append(say("hangs"))
     if robot.floors:
         warnings.append(say("floors_off", floors=", ".join(robot.floors)))
     scales = {}
@@ -202,6 +206,7 @@ def _controller(settings: RobotSettings, folder: Path | None) -> Controller | No
     spec = importlib.util.spec_from_file_location("hedgebed_controller", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    module.__file__ = str(Path(file).absolute())  # of the original: what lies beside it is not copied
     try:
         spec.loader.exec_module(module)
     except Exception as error:
@@ -210,4 +215,30 @@ def _controller(settings: RobotSettings, folder: Path | None) -> Controller | No
     if not callable(found):
         known = ", ".join(key for key, value in vars(module).items() if callable(value) and not key.startswith("_"))
         raise ValueError(say("no_function", s=settings, name=name, known=known or "none"))
-    return found  # type: ignore[no-any-return]
+
+    def control(model: Any, data: Any) -> None:
+        try:
+            found(model, data)
+        except Exception as error:
+            lines = [at.lineno for at in traceback.extract_tb(error.__traceback__) if Path(at.filename) == path]
+            said = f"{type(error).__name__}: {error}"
+            where = say("controller_fails", file=file, name=name, line=lines[-1] if lines else "?", said=said)
+            raise LostRobotError(where, remedy=say("mend")) from error
+
+    return control
+
+
+def try_controller(robot: MujocoRobot) -> None:
+    """Call the robot's controller once on copies of its model and data.
+
+    Raises ValueError where it fails, or leaves a control that is no number.
+    """
+    if robot.controller is None:
+        return
+    data = copy.copy(robot.data)
+    try:
+        robot.controller(copy.copy(robot.model), data)
+    except LostRobotError as error:
+        raise ValueError(str(error)) from error
+    if not np.isfinite(data.ctrl).all():
+        raise ValueError(say("no_control", values=data.ctrl.tolist()))

@@ -141,6 +141,7 @@ def conclude(
     title = say("title", name=robot.name, what=what, gravity=robot.gravity)
     warnings: list[str | None] = [
         *plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master),
+        say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
     ]  # fmt: skip

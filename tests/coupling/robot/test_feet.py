@@ -102,8 +102,14 @@ def test_the_lowest_point_of_a_ball_an_ellipsoid_and_a_wheel_is_that_of_their_cl
 
 
 def test_a_foot_that_stands_has_the_law_once_whatever_its_number_of_points():
-    for kind, size, count in (("sphere", "0.05", 1), ("box", "0.05 0.05 0.05", 4), ("cylinder", "0.05 0.05", 8)):
-        robot = MujocoRobot(ball(kind, size), "foot")
+    for kind, size, count in (
+        ("sphere", "0.05", 1), ("box", "0.05 0.05 0.05", 4), ("cylinder", "0.05 0.05", 8), ("capsule", "0.02 0.03", 1),
+        ("lying", "0.05 0.05", 2),
+    ):  # fmt: skip
+        model = ball("capsule" if kind == "lying" else kind, size)
+        if kind == "lying":
+            model.qpos0[3:7] = from_turn([0.5 * np.pi, 0.0, 0.0])
+        robot = MujocoRobot(model, "foot")
         ground = LawFeet(robot.feet, parameters={"stiffness": 1000.0, "damping": 0.0})
         pose = robot.pose
         sunk = pose.position - [0.0, 0.0, 0.052]

@@ -8,7 +8,8 @@ import pytest
 from spatial_runs import EXAMPLES, LEG, ball, model_of, moving
 
 from coupling import LawGround, SpatialRun
-from coupling.robot import LawFeet, MujocoRobot, RobotRun, load_model
+from coupling.poses import Wrench
+from coupling.robot import LawFeet, LostRobotError, MujocoRobot, RobotRun, load_model
 from rigid.platform.actuation import TorqueHistory
 from rigid.platform.files import find_platform
 from rigid.spatial.quaternions import from_turn, to_matrix
@@ -72,7 +73,7 @@ def test_a_box_on_its_four_corners_stays_where_it_is_put_and_a_push_beyond_frict
 
 
 def test_a_wheel_on_rails_is_not_pushed_where_it_cannot_move_and_rolls_without_slip():
-    """Driven at 2 rad/s with twelve grousers, on an axle that has no way to go sideways."""
+    """Driven at 2 rad/s, its grousers no feet, on an axle that has no way to go sideways."""
     robot = MujocoRobot(load_model(EXAMPLES / "mujoco-wheel" / "wheel.xml"), ["wheel"], keyframe="drive")
     run = on_law(robot, 4e-4, 0.3, parameters={"stiffness": 6000.0, "damping": 130.0})
     assert np.abs(run.columns["fy"]).max() == 0.0 and run.columns["fz"].max() < 500.0
@@ -171,6 +172,83 @@ def test_a_foot_too_light_for_the_explicit_exchange_is_refused_or_iterated():
     assert calm.load == pytest.approx(2e5 * step**2 / 4 / 0.01, rel=0.1) and calm.master.exchange.unsettled <= 3
     assert calm.energy_residual < 0.1 * wild.energy_residual
     assert float(calm.columns["fz"].mean()) == pytest.approx(float(fine.columns["fz"].mean()), rel=0.05)
+
+
+RING = """<mujoco><worldbody><body pos="0 0 .01"><freejoint/>
+<inertial pos="0 0 0" mass=".012" diaginertia="{inertia} {inertia} {inertia}"/>{balls}</body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("inertia", [1e-4, 1e-6])
+def test_parts_of_one_foot_load_the_exchange_together_and_what_is_just_above_stable_is_refused(inertia):
+    """Twelve balls on a ring of radius r: L = max(12 K / m, 6 K r^2 / I), of its fall and of its rocking."""
+    angles, radius, step = 2 * math.pi / 12 * np.arange(12), 0.05, 4e-4
+    balls = "".join(
+        f'<geom name="foot_{k}" size=".01" pos="{radius * math.cos(a)} {radius * math.sin(a)} 0"/>'
+        for k, a in enumerate(angles)
+    )
+    most = max(12 / 0.012, 6 * radius**2 / inertia)
+    for load in (0.98, 1.02):
+        robot = MujocoRobot(model_of(RING.format(inertia=inertia, balls=balls)), "foot_*")
+        spring = {"stiffness": 0.5 * load * 4 / step**2 / most, "damping": 0.5 * load / step / most}
+        ground = LawFeet(robot.feet, parameters=spring, time_step=0.1 * step)
+        if load < 1:
+            assert RobotRun(robot, ground, duration=0.1).load == pytest.approx(load, rel=1e-6)
+        else:
+            with pytest.raises(ValueError, match=r"too light for this ground.*1.02 times"):
+                RobotRun(robot, ground, duration=0.1)
+
+
+def test_on_a_spring_without_damping_a_swing_grows_by_the_closed_form_in_each_exchange():
+    """Eigenvalue of the step of docs/coupling.md on a spring: 1 + k^2 / 8 for a small k = K H^2 / m; 0.2 here."""
+    k, step = 0.2, 1e-3
+    change = np.array([[1, 1, 0.5], [-k, 1 - 0.5 * k, -0.25 * k], [-k, -0.5 * k, -0.25 * k]])  # of z, H v, F H^2 / m
+    growth = float(np.abs(np.linalg.eigvals(change)).max())
+    assert growth == pytest.approx(1 + k**2 / 8, rel=1e-3)
+    deep = 9.81 * step**2 / k
+    robot = MujocoRobot(ball(height=0.05 - 1.01 * deep), "foot")
+    rest = Wrench(np.array([0.0, 0.0, 9.81]), np.zeros(3))
+    spring = {"stiffness": k / step**2, "damping": 0.0}
+    run = on_law(robot, step, 0.15, parameters=spring, checked=False, first_guess=rest)
+    swing = run.columns["z"] - (0.05 - deep)
+    assert np.ptp(swing[-30:]) / np.ptp(swing[:30]) == pytest.approx(growth ** (len(swing) - 30), rel=0.05)
+
+
+def test_a_posture_on_the_way_that_loads_the_exchange_more_than_the_start_is_kept():
+    """A ball on a long arm falls over: along the arm it has the whole mass, across it that of the ball alone."""
+    arm = model_of(
+        "<mujoco><option gravity='0 0 0'/><worldbody><body pos='0 0 .5'><joint type='slide' axis='0 0 1' armature='9'/>"
+        "<geom size='.01' mass='1'/><body><joint type='hinge' axis='0 1 0'/>"
+        "<geom name='foot' size='.01' pos='0 0 -.2' mass='.1'/></body></body></worldbody></mujoco>"
+    )
+    loads = []
+    for duration in (4e-4, 0.2):
+        run = on_law(moving(MujocoRobot(arm, "foot"), 0.0, 0.5 * math.pi / 0.2), 4e-4, duration)
+        loads.append(run.load)
+    assert loads[0] == pytest.approx(2000 * 4e-4**2 / 4 / 10.1, rel=0.01)
+    assert loads[1] == pytest.approx(2000 * 4e-4**2 / 4 / 0.1, rel=0.05)
+
+
+def test_a_robot_whose_state_or_control_is_no_number_ends_the_run_instead_of_starting_anew():
+    text = LEG.format(foot_mass=0.1).replace("<motor ", '<position kp="5e6" ')
+    with pytest.raises(LostRobotError, match=r"lost at .* s: .* too large") as lost:
+        on_law(MujocoRobot(model_of(text), "foot"), 4e-4, 0.3)
+    assert "gains" in lost.value.remedy
+    broken = MujocoRobot(
+        model_of(LEG.format(foot_mass=0.1)), "foot", controller=lambda _, data: data.ctrl.fill(math.nan)
+    )
+    with pytest.raises(LostRobotError, match=r"control .data.ctrl. that is no number") as lost:
+        on_law(broken, 4e-4, 0.1)
+    assert "controller" in lost.value.remedy
+
+
+def test_a_robot_that_has_been_run_and_a_part_below_the_surface_are_refused():
+    robot = MujocoRobot(ball(), "foot")
+    on_law(robot, 1e-3, 0.01)
+    with pytest.raises(ValueError, match=r"another run has it.* 0.01 s.* new MujocoRobot"):
+        on_law(robot, 1e-3, 0.02)
+    deep = LEG.format(foot_mass=0.1).replace('size=".03 .03 .03"', 'size=".03 .03 .14"')
+    with pytest.raises(ValueError, match=r"'block', which is no foot, starts 0.015 m below"):
+        on_law(MujocoRobot(model_of(deep), "foot"), 1e-3, 0.01)
 
 
 def test_a_foot_that_starts_in_the_ground_is_refused_by_name_and_a_height_lifts_it():

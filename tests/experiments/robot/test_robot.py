@@ -9,8 +9,9 @@ from tumble_runs import stop_at
 
 from experiments.cli.main import main
 from experiments.robot import experiment as robot
-from experiments.robot.on_grains import RobotOnBed
-from experiments.robot.plan import plan_robot
+from experiments.robot.on_grains import RobotFollowed, RobotOnBed
+from experiments.robot.plan import keep_files, plan_robot
+from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
 from experiments.runs.folder import RunFolder, read_series
 from vis.page.folder import read_columns
@@ -73,6 +74,55 @@ def test_what_there_is_not_and_what_would_be_unstable_is_refused_before_any_work
 def test_a_bed_that_does_not_suit_the_robot_is_refused_before_any_work(given, said):
     with pytest.raises(ValueError, match=said):
         robot.check(RobotSettings(**ON_BED | given))
+
+
+def test_a_controller_that_fails_is_refused_with_its_file_and_line_and_finds_what_lies_beside_it(tmp_path):
+    (tmp_path / "gait.txt").write_text("1")
+    file = tmp_path / "own.py"
+    file.write_text(
+        "from pathlib import Path\nHERE = Path(__file__).with_name('gait.txt')\n\n\n"
+        "def late(model, data):\n    data.ctrl[0] = 1 / (data.time < 0.1)\n\n\n"
+        "def bad(model, data):\n    data.ctrl[1] = 0.0\n\n\n"
+        "def wild(model, data):\n    data.ctrl[0] = float('nan')\n\n\n"
+        "def reads(model, data):\n    data.ctrl[0] = float(HERE.read_text())\n"
+    )
+
+    def given(name):
+        return RobotSettings(**HOPPER, controller=f"{file}:{name}", duration=0.15, frame_count=0)
+
+    with pytest.raises(ValueError, match=r"own.py, line 10: bad fails: IndexError"):
+        robot.check(given("bad"))
+    with pytest.raises(ValueError, match=r"sets data.ctrl to \[nan\]"):
+        robot.check(given("wild"))
+    robot.check(given("late"))
+    with pytest.raises(RuntimeError, match=r"own.py, line 6: late fails: ZeroDivisionError.*; mend the controller"):
+        robot.run(given("late"), tmp_path / "late")
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    keep_files(given("reads"), kept)
+    made = plan_robot(given("reads"), folder=kept).robot()
+    made.controller(made.model, made.data)
+    assert made.data.ctrl[0] == 1.0
+
+
+def test_a_robot_that_the_world_holds_and_a_load_above_the_limit_are_told(tmp_path):
+    held = tmp_path / "held.xml"
+    held.write_text(
+        "<mujoco><worldbody><body pos='0 0 .3'><joint type='hinge' axis='0 1 0'/>"
+        "<geom name='foot' size='.02' pos='0 0 -.25' mass='1'/></body></worldbody></mujoco>"
+    )
+    told = [any("fixed to the world" in said for said in plan_robot(RobotSettings(**given)).warnings)
+            for given in (HOPPER | {"model": str(held)}, HOPPER)]  # fmt: skip
+    assert told == [True, False]
+    settings = RobotSettings(**HOPPER, duration=0.01)
+    plan = plan_robot(settings)
+    made = RobotFollowed(settings, plan).run_on_law()
+    made.run()
+    warned = []
+    for load in (0.5, 1.5):
+        made.load = load
+        warned.append(any("stability" in said for said in conclude(settings, plan, made, tmp_path).warnings))
+    assert warned == [False, True]
 
 
 @pytest.mark.long
