@@ -91,9 +91,8 @@ class ExchangeLoad:
             for arms, stiffness, damping in parts:
                 if float(arms[:, 2].min()) <= bottom + TOGETHER * foot.reach:
                     found += [(arm, stiffness, damping, k) for arm in arms]
-        columns = [np.array(column) for column in zip(*found, strict=True)]
-        arms, strength, damping, owners = columns
-        return arms, np.maximum(strength, 0.0), np.maximum(damping, 0.0), owners
+        arms, strengths, dampings, owners = (np.array(column) for column in zip(*found, strict=True))
+        return arms, np.maximum(strengths, 0.0), np.maximum(dampings, 0.0), owners
 
     def _on_law(self, k: int, foot: Any, matrix: Vector) -> list[tuple[Vector, float, float]]:
         """Of each part: the arms of the points on which it stands, stiffness and damping of one point."""
