@@ -12,7 +12,6 @@ __all__ = [
     "switch_off_floors",
 ]  # fmt: skip
 
-
 SOFTER = "use a smaller time step of the model, or softer gains"
 
 
