@@ -1,7 +1,8 @@
 """What a fit of surface laws is made from: runs of a spike in beds, averaged over depth, and placements at rest.
 
-A run is the first loading of a drive or of a drop. Its rows are averaged over equal intervals of depth, so that a slow
-run has no more weight than a fast one. A placement is a spike set down that has come to rest under its load.
+A run is the first loading of a drive or of a drop. Its rows are averaged over intervals of depth that are the same for
+all runs, so that a slow run has no more weight than a fast one, and bin k is one depth in every run. A placement is a
+spike set down that has come to rest under its load.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from coupling import Penetration
 from experiments.penetrate.fit import fit_rows
 
-__all__ = ["Array", "Data", "Foundation", "Placement", "PushRun", "binned"]
+__all__ = ["Array", "Data", "Foundation", "Placement", "PushRun", "binned", "reached"]
 
 Array = NDArray[np.float64]
 
@@ -120,15 +121,23 @@ class Data:
         return np.concatenate([np.full(len(run.depth), number) for number, run in enumerate(self.runs)])
 
 
-def binned(run: Penetration, *, id: str, bed: str, speed: float, bins: int) -> PushRun | None:
-    """The first loading of `run` in `bins` equal intervals of depth; None where it has no row to fit."""
+def reached(run: Penetration) -> float:
+    """Largest depth of the first loading of `run` [m]; 0 where it has no row to fit."""
+    return float(np.max(run.depth[fit_rows(run)], initial=0.0))
+
+
+def binned(run: Penetration, *, id: str, bed: str, speed: float, bins: int, deepest: float) -> PushRun | None:
+    """The first loading of `run` in the intervals of depth from 0 to `deepest` [m], `bins` of equal size.
+
+    Intervals that the run does not reach are left out. None where it has fewer than two rows to fit.
+    """
     rows = fit_rows(run)
-    if rows.sum() < bins:
+    if rows.sum() < 2:
         return None
     depth, rate, force = run.depth[rows], run.velocity[rows], run.force[rows]
     # A drive's last macro step is shorter than the others and so slower: that is no acceleration.
     acceleration = np.gradient(rate, run.time[rows]) if run.kind == "drop" else np.zeros_like(rate)
-    place = np.minimum((bins * depth / depth.max()).astype(int), bins - 1)
+    place = np.minimum((bins * depth / deepest).astype(int), bins - 1)
     count = np.bincount(place, minlength=bins)
 
     def mean(values: Array) -> Array:

@@ -1,5 +1,8 @@
 """Which runs tell K and C: two beds first, then a run where the answer is least sure, until it is sure or time is up.
 
+It does not stop before `LEAST_BEDS` beds: of two or three that happen to be alike, the interval is too narrow, and a
+rule that stops at the first narrow one would choose those. `experiments.lawfit.synthetic` measures what is left of it.
+
 Every bed gets the same drives, drops and a placement under the load. After each step the spring-damper is fitted. How
 sure it is, is half of the 90 % interval of its force at the middle of the depth and the fastest speed, over the force.
 If C is not told from 0, and is most of it, each bed gets one more drive at twice the fastest speed. Else another bed is
@@ -9,6 +12,8 @@ added. Costs are estimates made beforehand, so that the same settings lead to th
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from experiments.converge.design import BASE, MOST_OVERLAP, ROOM, Member, Variant
 from experiments.converge.members import finished_member, make_member
@@ -20,15 +25,17 @@ from experiments.runs.progress import Progress
 from experiments.runs.types import Json
 
 from .data import Data
-from .fit import LawFit, fit_law
+from .fit import Estimated, LawFit, fit_law, interval
 from .laws import CANDIDATES
 from .reading import read_folders
 from .settings import LawFitSettings, say
 
-__all__ = ["Designed", "check_design", "compute_runs"]
+__all__ = ["Designed", "check_design", "compute_runs", "how_sure", "middle_force", "sure_enough"]
 
 FASTER = 2.0
 """Speed of a drive that is added, over the fastest of the settings [1]; the modulus of the grains allows for it."""
+LEAST_BEDS = 4
+"""Beds below which no interval is narrow enough to stop at [1]."""
 
 
 @dataclass
@@ -99,6 +106,7 @@ def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress
         if designed is not None and spent + sum(costs) > budget:
             now = designed.steps[-1]["sure"]
             said = {"now": now, "tolerance": settings.tolerance, "spent": spent, "budget": budget, "beds": beds_made}
+            said["least"] = LEAST_BEDS
             designed.notes.append(say("spent", **said, more=spent + sum(costs) - budget))
             return designed
         progress.message(why)
@@ -109,11 +117,11 @@ def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress
         beds_made = len({member.seed for member in todo} | set(seeds[:beds_made]))
         data = read_folders([(path.name, path) for path in paths], settings)
         fitted = fit_law(CANDIDATES["spring-damper"](data.foundation), data)  # type: ignore[arg-type]
-        sure, of_rate = _sure(fitted)
+        sure, of_rate = how_sure(fitted)
         step: Json = {"why": why, "runs": [path.name for path in paths[-len(todo) :]], "cost": sum(costs), "sure": sure}
         designed = Designed(data, [*(designed.steps if designed else []), step])
-        numbers = {"now": sure, "tolerance": settings.tolerance}
-        if sure <= settings.tolerance:
+        numbers = {"now": sure, "tolerance": settings.tolerance, "least": LEAST_BEDS}
+        if sure_enough(sure, beds_made, settings.tolerance):
             designed.notes.append(say("told", **numbers))
             return designed
         if not fast and of_rate > 0.5 and fitted.parameter("damping").low <= 0:
@@ -123,7 +131,7 @@ def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress
         if beds_made == len(seeds):
             designed.notes.append(say("enough_beds", beds=beds_made, **numbers))
             return designed
-        why, seed = say("more_beds", **numbers), seeds[beds_made]
+        why, seed = say("more_beds" if sure > settings.tolerance else "least_beds", **numbers), seeds[beds_made]
         todo = [_member(base, seed), *([_member(base, seed, faster=True)] if fast else [])]
 
 
@@ -135,11 +143,25 @@ def _make(member: Member, path: Path, progress: Progress) -> None:
         raise RuntimeError(say("member_failed", name=path.name, reason=failed))
 
 
-def _sure(fitted: LawFit) -> tuple[float, float]:
-    """Half of the 90 % interval of the force over the force, and the share of its square that C has [1]."""
+def sure_enough(sure: float, beds: int, tolerance: float) -> bool:
+    """Whether no more runs are needed."""
+    return beds >= LEAST_BEDS and sure <= tolerance
+
+
+def middle_force(fitted: LawFit) -> Estimated:
+    """The force at half the depth and the fastest speed [N].
+
+    Its interval is from the forces of the fits that leave out one bed each: K and C are not independent.
+    """
     depth, speed = 0.5 * float(fitted.data.depth.max()), max(fitted.data.speeds)
-    stiffness, damping = (fitted.parameter(name) for name in ("stiffness", "damping"))
-    halves = [0.5 * (one.high - one.low) * arm for one, arm in ((stiffness, depth), (damping, speed))]
-    force = max(stiffness.value, 0.0) * depth + max(damping.value, 0.0) * speed
-    whole = halves[0] ** 2 + halves[1] ** 2
-    return (whole**0.5 / force if force > 0 else float("inf")), (halves[1] ** 2 / whole if whole > 0 else 0.0)
+    z, v = np.array([depth]), np.array([speed])
+    forces = [float(fitted.candidate.force(theta, z, v)[0]) for theta in (fitted.theta, *fitted.left_out)]
+    return interval(forces[0], np.array(forces[1:]))
+
+
+def how_sure(fitted: LawFit) -> tuple[float, float]:
+    """Half of the 90 % interval of `middle_force` over it, and the share that C has in its variance [1]."""
+    depth, speed, found = 0.5 * float(fitted.data.depth.max()), max(fitted.data.speeds), middle_force(fitted)
+    parts = [(fitted.parameter(name).std * arm) ** 2 for name, arm in (("stiffness", depth), ("damping", speed))]
+    sure = 0.5 * (found.high - found.low) / found.value if found.value > 0 else float("inf")
+    return sure, parts[1] / sum(parts) if sum(parts) > 0 else 0.0

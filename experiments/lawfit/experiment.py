@@ -82,6 +82,8 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
         *(say(why, name=name, f=data.foundation) for name, why in left.items()),
     ]
     warnings += [say("few_beds", beds=len(data.beds))] if len(data.beds) < 3 else []
+    if (shown := entries[PAIR]["map"]) is not None and shown["left"]:
+        warnings.append(say("not_in_map", mm=1e3 * shown["depth"][-1], runs=", ".join(shown["left"])))
     warnings += [f"{law['name']}: {text}" for law in laws for text in law["notes"]] + list(beyond.values())
     return Result.make(
         "calibrate",
@@ -124,7 +126,7 @@ def _law_entry(settings: LawFitSettings, fitted: LawFit) -> Json:
     if found is not None:
         entry["map"] = {
             "speeds": list(found.speeds), "depth": found.depth.tolist(), "force": found.force.tolist(),
-            "error": found.error.tolist(),
+            "error": found.error.tolist(), "left": list(found.left),
         }  # fmt: skip
         entry["within"] = [asdict(one) for one in within(found, settings.force_error)]
         entry["sinkage_range"] = sinkage_range(fitted, found, settings.sinkage_error)
@@ -263,10 +265,13 @@ def _quantities(settings: LawFitSettings, pair: LawFit, own: Json, best: Json) -
     found["bed_spread"] = {"value": own["bed_spread"], "std": None, "unit": "1", "note": say("of_bed_spread")}
     for key, entry in (("held_out_error", own), ("held_out_error_best", best)):
         note = say("of_held_out", law=entry["name"])
-        found[key] = {"value": entry["held_out"]["beds"], "std": None, "unit": "1", "note": note}
+        out = entry["held_out"]
+        found[key] = {"value": out["beds"], "std": out["beds_std"], "unit": "1", "note": note}
     if load:
         note = say("of_sinkage_error", one=load[0])
-        found["held_out_sinkage_error"] = {"value": load[0]["error"], "std": None, "unit": "1", "note": note}
+        error = {"value": load[0]["error"], "std": load[0]["error_std"], "unit": "1", "note": note}
+        rms = {"value": load[0]["rms"], "std": None, "unit": "1", "note": say("of_sinkage_rms")}
+        found |= {"held_out_sinkage_error": error, "held_out_sinkage_rms": rms}
     if own["sinkage_range"] is not None:
         for key, value in zip(("load_least", "load_largest"), own["sinkage_range"], strict=True):
             note = say("of_load", percent=100 * settings.sinkage_error)

@@ -22,7 +22,7 @@ from scipy.stats import t as student_t
 from .data import Array, Data
 from .laws import Candidate
 
-__all__ = ["CONFIDENCE", "Estimated", "LawFit", "fit_law", "fit_usable", "interval", "solve_law"]
+__all__ = ["CONFIDENCE", "Estimated", "LawFit", "fit_law", "fit_usable", "interval", "mean_of", "solve_law"]
 
 CONFIDENCE = 0.9
 """Of all intervals."""
@@ -66,7 +66,11 @@ class LawFit:
 
     @property
     def information(self) -> float:
-        """Akaike's information criterion, corrected for few rows: smaller is better [1]."""
+        """Akaike's information criterion, corrected for few rows: smaller is better [1].
+
+        It takes bins as independent, which they are not, so that a difference grows with the number of bins. No law is
+        called better for it.
+        """
         count, size = len(self.theta) + 2, len(self.data.force)
         return -2 * self.log_likelihood + 2 * count + 2 * count * (count + 1) / max(1, size - count - 1)
 
@@ -87,6 +91,16 @@ def interval(value: float, left_out: Array) -> Estimated:
     """The uncertainty of `value` from those that leave out one bed each (see the module), shape [bed_count >= 2]."""
     count = len(left_out)
     std = math.sqrt((count - 1) / count * float(np.sum((left_out - value) ** 2)))
+    return _within(value, std, count)
+
+
+def mean_of(values: Array) -> Estimated:
+    """The mean of independent `values`, one of each bed, shape [bed_count >= 2]."""
+    count = len(values)
+    return _within(float(values.mean()), float(values.std(ddof=1)) / math.sqrt(count), count)
+
+
+def _within(value: float, std: float, count: int) -> Estimated:
     half = float(student_t.ppf(0.5 + 0.5 * CONFIDENCE, count - 1)) * std
     return Estimated(value, std, value - half, value + half)
 

@@ -12,7 +12,7 @@ from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.types import Json
 
-from .data import Data, Foundation, Placement, PushRun, binned
+from .data import Data, Foundation, Placement, binned, reached
 from .settings import LawFitSettings, say
 
 __all__ = ["read_data", "read_folders"]
@@ -21,7 +21,7 @@ _OF_BED = (
     "bed", "seed", "bed_size", "grain", "spread", "coarse", "fine_radius", "fine_depth", "packing", "bed_stages",
     "gravity", "young", "max_overlap", "time_step",
 )  # fmt: skip
-"""Settings that decide which bed a run begins in."""
+"""Settings that decide which bed a run begins in: the same run twice is one that has them all in common."""
 _SHARED = {
     "material": "grains", "tip": "tip", "tip_diameter": "diameter of the tip [m]", "cone_angle": "cone_angle [degrees]",
     "gravity": "gravity [m/s2]", "grain": "grain [m]", "spike_friction": "friction of spike and grains [1]",
@@ -60,15 +60,18 @@ def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) 
     """The runs in `folders` (name, path) as the data of one fit; raises as `read_data`."""
     sources = [_read(name, path) for name, path in folders]
     _refuse_mixed(sources)
-    runs: list[PushRun] = []
+    loaded: list[tuple[Penetration, Json]] = []
     placements: list[Placement] = []
+    grains: dict[str, set[str]] = {}
     seen: dict[tuple[Any, ...], str] = {}
     for source in sources:
         for entry in source.result["runs"]:
             run = _series(source, entry)
-            bed, speed = _bed_of(source.settings, int(entry["seed"])), float(entry["speed"])
+            begun, bed = _bed_of(source.settings, int(entry["seed"]))
+            speed = float(entry["speed"])
+            grains.setdefault(bed, set()).add(begun)
             free = () if run.kind == "driven" else (source.settings.weight, source.settings.mass)
-            key = (bed, run.kind, speed, *free)
+            key = (begun, run.kind, speed, *free)
             if key in seen and run.kind == "set_down":
                 continue  # every run of penetrate has one: the same again
             if key in seen:
@@ -78,12 +81,17 @@ def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) 
                 if run.resting_depth is not None and run.resting_depth > 0:
                     placements.append(Placement(bed, source.settings.weight, run.resting_depth))
                 continue
-            found = binned(run, id=f"{source.name}/{entry['id']}", bed=bed, speed=speed, bins=settings.bins)
-            if found is not None:
-                runs.append(found)
+            loaded.append((run, {"id": f"{source.name}/{entry['id']}", "bed": bed, "speed": speed}))
+    deepest = max((reached(run) for run, _ in loaded), default=0.0)
+    made = [(about["id"], binned(run, **about, bins=settings.bins, deepest=deepest)) for run, about in loaded]
+    notes = list(_notes(sources))
+    if left := [name for name, run in made if run is None]:
+        notes.append(say("not_fitted", runs=", ".join(left)))
+    if shared := [bed for bed, of_bed in grains.items() if len(of_bed) > 1]:
+        notes.append(say("one_seed", beds=", ".join(shared)))
     data = Data(
-        _foundation(sources), tuple(runs), tuple(placements), tuple(source.name for source in sources),
-        tuple(_notes(sources)),
+        _foundation(sources), tuple(run for _, run in made if run is not None), tuple(placements),
+        tuple(source.name for source in sources), tuple(notes),
     )  # fmt: skip
     _refuse_few(data)
     return data
@@ -141,10 +149,15 @@ def _series(source: _Source, entry: Json) -> Penetration:
     return run
 
 
-def _bed_of(settings: PenetrateSettings, seed: int) -> str:
-    """The same text for runs that begin in the same bed."""
+def _bed_of(settings: PenetrateSettings, seed: int) -> tuple[str, str]:
+    """The same text for runs that begin in the same bed, and the bed that a fit takes them for.
+
+    A fit takes all beds of one seed for one bed, whatever their size or the stiffness of their grains: they begin with
+    the same random numbers, so that their factors need not be independent.
+    """
     values = [seed if name == "seed" else getattr(settings, name) for name in _OF_BED]
-    return f"seed {seed} " + " ".join(str(value) for value in values)
+    bed = f"seed {seed}" + ("" if settings.bed is None else f" of {settings.bed}")
+    return " ".join(str(value) for value in values), bed
 
 
 def _shared(settings: PenetrateSettings, name: str) -> Any:

@@ -4,7 +4,8 @@ Each bed multiplies the force by a factor 1 + u with u normal of standard deviat
 fluctuates besides by `noise` times its mean, normal and correlated over a length of a grain in depth, as forces in
 grains are. The bins of a run are therefore not independent, which the likelihood of a fit takes them to be.
 
-`python -m experiments.lawfit.synthetic OUT.json` measures the coverage of docs/results/calibrate-coverage.
+`python -m experiments.lawfit.synthetic OUT.json` measures the coverage of docs/results/calibrate-coverage: of fits to
+so many beds, and of the whole procedure of `design`, which adds beds until the force is sure.
 """
 
 import json
@@ -19,10 +20,11 @@ from experiments.runs.folder import write_json
 from experiments.runs.types import Json
 
 from .data import Data, Foundation, PushRun
+from .design import LEAST_BEDS, how_sure, middle_force, sure_enough
 from .fit import fit_law
 from .laws import CANDIDATES
 
-__all__ = ["DESIGNS", "FOUNDATION", "coverage", "synthetic_data"]
+__all__ = ["DESIGNS", "FOUNDATION", "coverage", "stopping_coverage", "synthetic_data"]
 
 FOUNDATION = Foundation(
     material="sand", tip="sphere", diameter=0.012, tip_height=0.006, cone_angle=60.0, gravity=9.80665, grain=0.001,
@@ -41,6 +43,8 @@ DESIGNS: dict[str, Design] = {
     },
 }
 """What is driven in which bed, by name."""
+SPREADS = (0.02, 0.05, 0.08, 0.12, 0.2)
+"""Spreads of the beds with which the whole procedure is measured [1]."""
 TRUTHS: dict[str, dict[str, float]] = {
     "spring-damper": {"stiffness": 62.0, "damping": 0.3},
     "katsuragi-durian": {"stiffness": 62.0, "drag": 0.6},
@@ -57,8 +61,12 @@ def synthetic_data(
     seed: int,
     bed_spread: float = 0.08,
     noise: float = 0.1,
+    bins: int = BINS,
 ) -> Data:
-    """Made-up runs of `law` with the free parameters `truth`, by `design`; the same `seed` gives the same runs."""
+    """Made-up runs of `law` with the free parameters `truth`, by `design`; the same `seed` gives the same runs.
+
+    `bins`: intervals over which the rows of a run are averaged, a divisor of 240; the rows are the same for all.
+    """
     candidate = CANDIDATES[law](FOUNDATION)
     assert candidate is not None
     random, theta = np.random.default_rng(seed), np.array([truth[name] for name in candidate.free])
@@ -75,8 +83,8 @@ def synthetic_data(
             for k, kick in enumerate(random.standard_normal(rows - 1)):
                 waves[k + 1] = kept * waves[k] + np.sqrt(1 - kept**2) * kick
             seen = factor * force + noise * force.mean() * waves
-            means = [values.reshape(BINS, -1).mean(axis=1) for values in (depth, seen)]
-            still = np.zeros(BINS)
+            means = [values.reshape(bins, -1).mean(axis=1) for values in (depth, seen)]
+            still = np.zeros(bins)
             runs.append(
                 PushRun(f"{bed}-{speed:g}", str(bed), "driven", speed, means[0], still + speed, still, means[1])
             )
@@ -84,7 +92,7 @@ def synthetic_data(
 
 
 def coverage(
-    law: str, design: Design, *, count: int, first_seed: int = 0, **noise: float
+    law: str, design: Design, *, count: int, first_seed: int = 0, bed_spread: float = 0.08, noise: float = 0.1
 ) -> dict[str, dict[str, float]]:
     """How often the 90 % intervals of `count` fits to made-up runs hold the truth, by parameter [1], and the bias."""
     truth, candidate = TRUTHS[law], CANDIDATES[law](FOUNDATION)
@@ -92,7 +100,7 @@ def coverage(
     inside = dict.fromkeys(truth, 0)
     values: dict[str, list[float]] = {name: [] for name in truth}
     for seed in range(first_seed, first_seed + count):
-        fitted = fit_law(candidate, synthetic_data(law, truth, design, seed=seed, **noise))
+        fitted = fit_law(candidate, synthetic_data(law, truth, design, seed=seed, bed_spread=bed_spread, noise=noise))
         for name, value in truth.items():
             found = fitted.parameter(name)
             inside[name] += found.low <= value <= found.high
@@ -104,6 +112,35 @@ def coverage(
         }
         for name, value in truth.items()
     }  # fmt: skip
+
+
+def stopping_coverage(
+    *, count: int, bed_spread: float, tolerance: float = 0.1, most: int = 12, first_seed: int = 0
+) -> dict[str, float]:
+    """How often the last 90 % intervals of `count` runs of the whole procedure hold the truth [1].
+
+    Beds of a spring-damper, driven at two speeds each, are added as in `design`, up to `most`. "force": of the force
+    that is to be sure; "beds": how many there were in the mean; "sure": in how many runs the force became sure.
+    """
+    truth = TRUTHS["spring-damper"]
+    candidate = CANDIDATES["spring-damper"](FOUNDATION)
+    assert candidate is not None
+    found = dict.fromkeys((*truth, "force", "beds", "sure"), 0.0)
+    for seed in range(first_seed, first_seed + count):
+        design = dict.fromkeys(range(most), (0.1, 0.4))
+        whole = synthetic_data("spring-damper", truth, design, seed=seed, bed_spread=bed_spread)
+        for beds in range(min(LEAST_BEDS, most), most + 1):
+            fitted = fit_law(candidate, whole.only(lambda run, beds=beds: int(run.bed) < beds))  # type: ignore[misc]
+            if sure_enough(how_sure(fitted)[0], beds, tolerance):
+                found["sure"] += 1
+                break
+        force = middle_force(fitted)
+        real = truth["stiffness"] * 0.5 * float(fitted.data.depth.max()) + truth["damping"] * 0.4
+        found["force"] += force.low <= real <= force.high
+        found["beds"] += beds
+        for name, value in truth.items():
+            found[name] += fitted.parameter(name).low <= value <= fitted.parameter(name).high
+    return {name: total / count for name, total in found.items()}
 
 
 def _measure(path: Path, count: int = 400) -> None:
@@ -118,6 +155,12 @@ def _measure(path: Path, count: int = 400) -> None:
             write_json(path, found)
             print(key, {name: one["covered"] for name, one in found[key]["parameters"].items()}, flush=True)
             print(f"{time.process_time() - began:.0f} s", file=sys.stderr)
+    for spread in SPREADS:
+        key = f"beds added until sure, spread {spread:g}"
+        if key not in found:
+            found[key] = {"fits": count, "covered": stopping_coverage(count=count, bed_spread=spread)}
+            write_json(path, found)
+            print(key, found[key]["covered"], flush=True)
 
 
 if __name__ == "__main__":

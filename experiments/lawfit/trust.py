@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .data import Array, Data, PushRun
-from .fit import LawFit, fit_law
+from experiments.runs.types import Json
 
-__all__ = ["ErrorMap", "SinkageCheck", "Within", "error_map", "held_out", "sinkage_check", "sinkage_range", "within"]
+from .data import Array, Data, PushRun
+from .fit import Estimated, LawFit, fit_law, mean_of
+
+__all__ = [
+    "ErrorMap", "SinkageCheck", "Within", "error_map", "held_out", "paired", "sinkage_check", "sinkage_range", "within",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -20,16 +24,26 @@ class ErrorMap:
     depth: Array  # Mean of each interval [m], shape [bin_count]
     force: Array  # Mean over beds [N]
     error: Array  # (law - mean) / mean [1]
+    left: tuple[str, ...] = ()  # Drives that are not in it, as they do not fill the same intervals of depth
 
 
 def error_map(fitted: LawFit) -> ErrorMap | None:
-    """The map of a fit; None where no drive reaches the usual depth."""
+    """The map of a fit, in the runs that it was fitted to; None where there is no drive.
+
+    It has the drives that fill all intervals of depth that the deepest of them fills.
+    """
     data, predicted = fitted.data, fitted.predicted
     driven = [number for number, run in enumerate(data.runs) if run.kind == "driven"]
     if not driven:
         return None
-    bins = max(len(data.runs[number].depth) for number in driven)
-    driven = [number for number in driven if len(data.runs[number].depth) == bins]
+    deepest = max((data.runs[number].depth for number in driven), key=lambda depth: (len(depth), depth[-1]))
+    apart = 0.5 * float(np.median(np.diff(deepest))) if len(deepest) > 1 else np.inf
+
+    def fills(depth: Array) -> bool:
+        return len(depth) == len(deepest) and bool(np.all(np.abs(depth - deepest) < apart))
+
+    left = tuple(data.runs[number].id for number in driven if not fills(data.runs[number].depth))
+    driven = [number for number in driven if fills(data.runs[number].depth)]
     speeds = tuple(sorted({data.runs[number].speed for number in driven}))
 
     def means(values: Array) -> Array:
@@ -37,7 +51,7 @@ def error_map(fitted: LawFit) -> ErrorMap | None:
         return np.array([np.mean([rows[n] for n in driven if data.runs[n].speed == speed], axis=0) for speed in speeds])
 
     force = means(data.force)
-    return ErrorMap(speeds, means(data.depth).mean(axis=0), force, means(predicted) / force - 1)
+    return ErrorMap(speeds, means(data.depth).mean(axis=0), force, means(predicted) / force - 1, left)
 
 
 @dataclass(frozen=True)
@@ -90,10 +104,11 @@ def _longest(good: Iterable[bool]) -> tuple[int, int]:
     return best
 
 
-def held_out(fitted: LawFit) -> dict[str, float | None]:
+def held_out(fitted: LawFit) -> Json:
     """Rms error of the force over the rms force, of runs that the law was not fitted to [1].
 
-    "beds": each bed by the fit to all others. "speeds": each speed by the fit to all others; None below three speeds.
+    "beds": each bed by the fit to all others. "of_beds": the same of each bed alone, in the order of `Data.beds`.
+    "beds_std": the scatter of those. "speeds": each speed by the fit to all others; None below three speeds.
     """
     data = fitted.data
     beds = [
@@ -109,7 +124,19 @@ def held_out(fitted: LawFit) -> dict[str, float | None]:
 
             theta = fit_law(fitted.candidate, data.only(other), jackknife=False).theta
             speeds.append((data.only(lambda run, speed=speed: run.speed == speed), theta))  # type: ignore[misc]
-    return {"beds": _rms(fitted, beds), "speeds": _rms(fitted, speeds) if speeds else None}
+    of_beds = [_rms(fitted, [bed]) for bed in beds]
+    return {
+        "beds": _rms(fitted, beds), "of_beds": of_beds, "beds_std": float(np.std(of_beds, ddof=1)),
+        "speeds": _rms(fitted, speeds) if speeds else None,
+    }  # fmt: skip
+
+
+def paired(one: Sequence[float], other: Sequence[float]) -> Estimated:
+    """How much `one` is above `other` in the mean, both of the same beds, shapes [bed_count >= 2].
+
+    What a bed does to both drops out. The interval is that of Student's t for the mean of the differences.
+    """
+    return mean_of(np.asarray(one, dtype=float) - np.asarray(other, dtype=float))
 
 
 def _rms(fitted: LawFit, parts: Sequence[tuple[Data, Array]]) -> float:
@@ -126,25 +153,35 @@ class SinkageCheck:
     """Depth at rest under a load, of the beds and of the law fitted to the other beds; nothing of it was fitted."""
 
     load: float  # [N]
-    count: int
+    count: int  # Beds
     beds: float  # Mean over beds [m]
     beds_std: float | None  # Scatter of the beds [m]; None of one
     law: float  # Mean of the predictions [m]
     error: float  # law / beds - 1 [1]
+    error_std: float | None  # Scatter over beds of the same of each bed [1]; None of one
+    rms: float  # Rms over beds of the same of each bed [1]
 
 
 def sinkage_check(fitted: LawFit) -> list[SinkageCheck]:
-    """The check at every load of which there are placements; a bed is predicted by the fit to the other beds."""
+    """The check at every load of which there are placements; a bed is predicted by the fit to the other beds.
+
+    Several placements in one bed count as their mean.
+    """
     data, found = fitted.data, []
     deepest = 10 * float(data.depth.max())
     without = dict(zip(data.beds, fitted.left_out, strict=True))
     for load in sorted({place.load for place in data.placements}):
-        own = [place for place in data.placements if place.load == load]
-        laws = [fitted.candidate.depth_at(without.get(place.bed, fitted.theta), load, deepest=deepest) for place in own]
-        known = [depth for depth in laws if depth is not None]
+        own: dict[str, list[float]] = {}
+        for place in data.placements:
+            if place.load == load:
+                own.setdefault(place.bed, []).append(place.depth)
+        laws = [fitted.candidate.depth_at(without.get(bed, fitted.theta), load, deepest=deepest) for bed in own]
+        known = np.array([depth for depth in laws if depth is not None])
         if len(known) < len(own):
             continue
-        beds, law = np.array([place.depth for place in own]), float(np.mean(known))
-        std = float(beds.std(ddof=1)) if len(own) > 1 else None
-        found.append(SinkageCheck(load, len(own), float(beds.mean()), std, law, law / float(beds.mean()) - 1))
+        beds = np.array([np.mean(depths) for depths in own.values()])
+        each, mean, law = known / beds - 1, float(beds.mean()), float(known.mean())
+        stds = [float(values.std(ddof=1)) if len(own) > 1 else None for values in (beds, each)]
+        rms = math.sqrt(float(np.mean(each**2)))
+        found.append(SinkageCheck(load, len(own), mean, stds[0], law, law / mean - 1, stds[1], rms))
     return found

@@ -1,47 +1,46 @@
 """Tables and sentences of a comparison of laws."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 
 from experiments.runs.types import Json
 
 from .data import Data
 from .settings import LawFitSettings, say
+from .trust import paired
 
 __all__ = ["closing", "law_rows", "ranked"]
 
-ALIKE = 1.1
-"""Held-out errors that differ by less than this factor are called alike [1]."""
-CLEAR = 10.0
-"""Difference of the information criterion from which on a law is clearly the better one (Burnham and Anderson,
-Sociological Methods and Research 33 (2004), 261)."""
+SAME = 1.01
+"""Held-out errors within this factor of the least are the same; of such laws that with fewer parameters goes first."""
 
 
 def ranked(laws: Sequence[Json]) -> list[Json]:
-    """The laws, best first: by held-out error, and those that are alike there (`ALIKE`) by information criterion.
-
-    A held-out error holds the scatter of the beds as well, in which laws that differ clearly may look alike.
-    """
+    """The laws, that with the least held-out error first; each gets how much it is above the first in the same beds."""
     least = min(law["held_out"]["beds"] for law in laws)
 
-    def place(law: Json) -> tuple[bool, float]:
-        alike = law["held_out"]["beds"] < ALIKE * least
-        return not alike, law["information"] if alike else law["held_out"]["beds"]
+    def place(law: Json) -> tuple[int, float]:
+        error = law["held_out"]["beds"]
+        return len(law["parameters"]) if error <= SAME * least else 1000, error
 
-    return sorted(laws, key=place)
+    best, *others = sorted(laws, key=place)
+    for law in (best, *others):
+        law["above_best"] = asdict(paired(law["held_out"]["of_beds"], best["held_out"]["of_beds"]))
+    return [best, *others]
 
 
 def law_rows(laws: Sequence[Json]) -> Json:
     """Head and rows of the table of laws, in the order of their held-out error."""
-    least = min(law["information"] for law in laws)
     rows = []
     for law in laws:
-        other = law["held_out"]["speeds"]
-        sunk = ", ".join(f"{100 * one['error']:+.3g} %" for one in law["sinkage"]) or "-"
+        own, other, above = law["held_out"], law["held_out"]["speeds"], law["above_best"]
+        sunk = ", ".join(f"{100 * one['error']:+.3g} % ({100 * one['rms']:.2g} %)" for one in law["sinkage"]) or "-"
         rows.append([
-            law["name"], f"{100 * law['held_out']['beds']:.3g} %", "-" if other is None else f"{100 * other:.3g} %",
-            f"{law['information'] - least:.1f}", sunk,
+            law["name"], f"{100 * own['beds']:.3g} ± {100 * own['beds_std']:.2g} %",
+            "-" if law is laws[0] else f"{100 * above['value']:+.2g} ± {50 * (above['high'] - above['low']):.2g} %",
+            "-" if other is None else f"{100 * other:.3g} %", sunk,
         ])  # fmt: skip
-    head = ["law", "force, other beds", "force, other speeds", "AICc less the least", "sinkage"]
+    head = [say(key) for key in ("head_law", "head_beds", "head_above", "head_speeds", "head_sinkage")]
     return {"head": head, "rows": rows}
 
 
@@ -53,16 +52,14 @@ def closing(settings: LawFitSettings, data: Data, laws: Mapping[str, Json], best
         low, high = pair["sinkage_range"]
         said.append(say("sinkage_holds", percent=100 * settings.sinkage_error, low=low, high=high))
     said += [_of_sinkage(one) for one in pair["sinkage"]]
-    own, theirs = (law["held_out"]["beds"] for law in (pair, winner))
-    numbers = {"best": best, "own": 100 * own, "theirs": 100 * theirs}
-    less = pair["information"] - winner["information"]
-    if winner is pair:
-        said.append(say("pair_best", own=100 * own))
-    elif own < ALIKE * theirs:
-        said.append(say("alike" if less < CLEAR else "alike_but", less=less, **numbers))
-    else:
-        said.append(say("better", **numbers))
-    return said
+    own, theirs = (law["held_out"] for law in (pair, winner))
+    gap = pair["above_best"]
+    numbers = {
+        "best": best, "own": 100 * own["beds"], "theirs": 100 * theirs["beds"], "std": 100 * own["beds_std"],
+        "gap": 100 * gap["value"], "half": 50 * (gap["high"] - gap["low"]),
+    }  # fmt: skip
+    key = "pair_best" if winner is pair else "better" if gap["low"] > 0 else "alike"
+    return [*said, say(key, **numbers)]
 
 
 def _where(settings: LawFitSettings, pair: Json) -> list[str]:
@@ -88,4 +85,5 @@ def _off(error: float) -> str:
 
 def _of_sinkage(one: Json) -> str:
     std = "" if one["beds_std"] is None else f" (std between beds {1e3 * one['beds_std']:.2g} mm)"
-    return say("sinkage", one=one, beds=1e3 * one["beds"], law=1e3 * one["law"], std=std, error=100 * one["error"])
+    about = {"beds": 1e3 * one["beds"], "law": 1e3 * one["law"], "error": 100 * one["error"], "rms": 100 * one["rms"]}
+    return say("sinkage", one=one, std=std, **about)

@@ -41,8 +41,8 @@ def write_lawfit_report(report: Report) -> Path:
         Tile(name, quote(numbers[key]["value"], numbers[key]["std"], numbers[key]["unit"]), "one standard deviation")
         for name, key in (("K", "stiffness"), ("C", "damping"))
     ]
-    own = numbers["held_out_error"]["value"]
-    tiles.append(Tile("Force in other beds", f"{100 * own:.2g} %", "rms error of the spring-damper"))
+    own, std = (100 * numbers["held_out_error"][key] for key in ("value", "std"))
+    tiles.append(Tile("Force in other beds", f"{own:.2g} ± {std:.1g} %", "rms of the spring-damper, std over beds"))
     counted = f"{len(result['contributions'])} runs in {len({one['bed'] for one in result['contributions']})} beds"
     return report.write(sections, lead=["calibrate", counted], tiles=tiles)
 
@@ -103,7 +103,7 @@ def _trust(report: Report, laws: list[Result]) -> Block | None:
         axis.set(title=law["name"], xlabel="depth of the tip [mm]")
         axis.grid(visible=False)
     grid[0][0].set_ylabel("speed [m/s]")
-    drawing.colorbar(image, ax=grid[0].tolist(), label="law less grains [%]", extend="both", shrink=0.9)
+    drawing.colorbar(image, ax=grid[0].tolist(), label="law less grains, fitted runs [%]", extend="both", shrink=0.9)
     return report.draw("trust", drawing)
 
 

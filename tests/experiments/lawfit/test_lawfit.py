@@ -12,14 +12,15 @@ import pytest
 import dem
 from experiments import lawfit
 from experiments.cli.main import main
-from experiments.lawfit.data import Data, PushRun
+from experiments.lawfit.data import Data, Placement, PushRun
 from experiments.lawfit.fit import fit_law
 from experiments.lawfit.identify import identified
 from experiments.lawfit.laws import ADDED_MASS, CANDIDATES, candidates_for
 from experiments.lawfit.reading import read_data
 from experiments.lawfit.settings import LAWS
 from experiments.lawfit.synthetic import DESIGNS, FOUNDATION, TRUTHS, coverage, synthetic_data
-from experiments.lawfit.trust import ErrorMap, within
+from experiments.lawfit.trust import ErrorMap, error_map, held_out, paired, sinkage_check, within
+from experiments.lawfit.words import ranked
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import make_run, plan_units
 from experiments.runs.folder import RunFolder
@@ -105,8 +106,9 @@ def test_runs_of_another_law_rank_that_law_first_and_say_how_wrong_the_pair_is(t
 @pytest.mark.parametrize(
     "law", [law if law == "spring-damper" else pytest.param(law, marks=pytest.mark.long) for law in TRUTHS]
 )
-def test_the_90_percent_intervals_of_made_up_runs_hold_the_truth_in_85_to_95_percent(law):
-    # A binomial count of 150 at 90 % scatters by 2.4 %; docs/results/calibrate-coverage has 1000 of each design.
+def test_the_90_percent_intervals_of_made_up_runs_hold_the_truth_in_84_to_97_percent(law):
+    # docs/results/calibrate-coverage has 400 fits of each design, all within 85 to 95 %.
+    # A count of 150 scatters by 2.4 % more (of 60 by 3.9 %), so that the band here is wider.
     count = 150 if law != "power-irreversible" else 60
     for name, found in coverage(law, DESIGNS["three beds, two speeds"], count=count, first_seed=5000).items():
         assert 0.84 <= found["covered"] <= 0.97, name
@@ -202,6 +204,7 @@ def test_a_material_of_one_s_own_is_taken_from_the_run_s_copy(of_three_beds, tmp
         text = (Path(dem.__file__).parent / "presets" / "sand.toml").read_text(encoding="utf-8")
         changed = re.sub(r"(?m)^friction = [0-9.]+", repose, text) if repose else text
         (copy / "material.toml").write_text(changed.replace('name = "sand"', 'name = "mine"'), encoding="utf-8")
+        (copy / "status.json").write_text('{"status": "done"}', encoding="utf-8")  # no digests of other files
     assert read_data(lawfit.Settings(runs=(str(tmp_path / "a"),))).foundation.material == "mine"
     with pytest.raises(ValueError, match="same run"):  # so alike in everything before
         read_data(lawfit.Settings(runs=(str(tmp_path / "a"), str(tmp_path / "b"))))
@@ -211,6 +214,74 @@ def test_a_material_of_one_s_own_is_taken_from_the_run_s_copy(of_three_beds, tmp
 
 def test_the_settings_name_every_law_that_there_is():
     assert tuple(CANDIDATES) == LAWS
+
+
+def test_bin_k_is_one_depth_in_runs_of_different_depth_and_the_map_names_those_that_are_not_in_it(
+    of_three_beds, tmp_path
+):
+    shallow = made_up_run(tmp_path / "shallow", seeds=(4, 5, 6), depth=0.006)
+    data = read_data(lawfit.Settings(runs=(of_three_beds, shallow)))
+    deep, low = (next(run for run in data.runs if run.bed == bed) for bed in ("seed 1", "seed 4"))
+    np.testing.assert_allclose(low.depth, deep.depth[: len(low.depth)], atol=1e-4)
+    assert len(low.depth) < len(deep.depth)
+    found = error_map(fit_law(CANDIDATES["spring-damper"](FOUNDATION), data))
+    assert {name.split("/")[0] for name in found.left} == {"shallow"} and len(found.left) == 6
+    assert found.depth[-1] == pytest.approx(0.0115, rel=0.02)
+    np.testing.assert_allclose(found.force[0], K * found.depth + 0.1 * C, rtol=0.03)
+
+
+def test_one_seed_is_one_bed_whatever_the_size_and_the_modulus(of_three_beds, tmp_path):
+    soft = made_up_run(tmp_path / "soft", seeds=(1, 2, 3), young=2e7)
+    wide = made_up_run(tmp_path / "wide", seeds=(1, 2, 4), bed_size=(0.1, 0.1, 0.0508))
+    data = read_data(lawfit.Settings(runs=(of_three_beds, soft, wide)))
+    assert data.beds == ["seed 1", "seed 2", "seed 3", "seed 4"]
+    assert len(data.runs) == 18
+    assert any("seed 1, seed 2, seed 3" in note for note in data.notes)
+
+
+def entries(data, names):
+    """What `ranked` takes, of each law."""
+    fits = [fit_law(CANDIDATES[name](FOUNDATION), data) for name in names]
+    return [
+        {"name": fit.candidate.name, "held_out": held_out(fit), "information": fit.information, "sinkage": [],
+         "parameters": fit.candidate.free}
+        for fit in fits
+    ]  # fmt: skip
+
+
+def test_whether_a_law_is_clearly_better_does_not_depend_on_the_number_of_bins():
+    names, gaps, informed = ("spring-damper", "katsuragi-durian"), [], []
+    for bins in (12, 120):
+        truth = TRUTHS["katsuragi-durian"] | {"drag": 1.2}
+        data = synthetic_data("katsuragi-durian", truth, DESIGNS["three beds, two speeds"], seed=4, bins=bins)
+        laws = ranked(entries(data, names))
+        gaps.append([laws[1]["above_best"][key] for key in ("low", "value", "high")])
+        informed.append(abs(laws[1]["information"] - laws[0]["information"]))
+    # Bins finer than a grain add nothing: the difference in the same beds stays, that of AICc goes with their number.
+    assert gaps[1] == pytest.approx(gaps[0], abs=0.1 * (gaps[0][2] - gaps[0][0]))
+    assert informed[1] > 4 * informed[0]
+
+
+def test_held_out_errors_and_sinkage_have_a_scatter_over_beds():
+    data = synthetic_data("spring-damper", SPRING, DESIGNS["five beds, two speeds"], seed=6)
+    own = (0.9, 1.0, 1.1, 1.2, 0.8)
+    placed = [Placement(str(bed), 0.2, factor * 0.2 / K) for bed, factor in enumerate(own)]
+    data = replace(data, placements=(*placed, placed[0]))
+    fitted = fit_law(CANDIDATES["spring-damper"](FOUNDATION), data)
+    out = held_out(fitted)
+    assert len(out["of_beds"]) == 5 and min(out["of_beds"]) <= out["beds"] <= max(out["of_beds"])
+    assert out["beds_std"] == pytest.approx(np.std(out["of_beds"], ddof=1))
+    (sunk,) = sinkage_check(fitted)
+    each = np.array([0.2 / theta[0] for theta in fitted.left_out]) / (np.array(own) * 0.2 / K) - 1
+    assert sunk.count == 5  # the bed with two placements once
+    assert (sunk.rms, sunk.error_std) == pytest.approx((np.sqrt(np.mean(each**2)), np.std(each, ddof=1)), rel=1e-6)
+    assert abs(sunk.error) < 0.1 < sunk.rms
+
+
+def test_the_difference_of_two_laws_leaves_out_what_a_bed_does_to_both():
+    found = paired([0.31, 0.12, 0.22], [0.30, 0.10, 0.19])
+    # 0.01, 0.02, 0.03: mean 0.02, standard deviation 0.01, t of 2 degrees of freedom at 95 % is 2.920.
+    assert (found.value, found.high - found.low) == pytest.approx((0.02, 2 * 2.920 * 0.01 / np.sqrt(3)), rel=1e-3)
 
 
 def test_the_stretch_of_depth_within_an_error_is_the_longest_one():
