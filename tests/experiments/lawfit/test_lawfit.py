@@ -17,7 +17,7 @@ from experiments.lawfit.fit import fit_law
 from experiments.lawfit.identify import identified
 from experiments.lawfit.laws import ADDED_MASS, CANDIDATES, candidates_for
 from experiments.lawfit.reading import read_data
-from experiments.lawfit.settings import LAWS
+from experiments.lawfit.settings import LAWS, say
 from experiments.lawfit.synthetic import DESIGNS, FOUNDATION, TRUTHS, coverage, synthetic_data
 from experiments.lawfit.trust import ErrorMap, error_map, held_out, paired, sinkage_check, within
 from experiments.lawfit.words import ranked
@@ -236,7 +236,7 @@ def test_one_seed_is_one_bed_whatever_the_size_and_the_modulus(of_three_beds, tm
     data = read_data(lawfit.Settings(runs=(of_three_beds, soft, wide)))
     assert data.beds == ["seed 1", "seed 2", "seed 3", "seed 4"]
     assert len(data.runs) == 18
-    assert any("seed 1, seed 2, seed 3" in note for note in data.notes)
+    assert say("one_seed", beds=", ".join(data.beds[:3])) in data.notes
 
 
 def entries(data, names):
