@@ -158,9 +158,9 @@ def _measure(path: Path, count: int = 400) -> None:
     for spread in SPREADS:
         key = f"beds added until sure, spread {spread:g}"
         if key not in found:
-            found[key] = {"fits": count, "covered": stopping_coverage(count=count, bed_spread=spread)}
+            found[key] = {"runs": count, "procedure": stopping_coverage(count=count, bed_spread=spread)}
             write_json(path, found)
-            print(key, found[key]["covered"], flush=True)
+            print(key, found[key]["procedure"], flush=True)
 
 
 if __name__ == "__main__":
