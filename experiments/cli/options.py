@@ -89,6 +89,8 @@ def option_of(name: str, field: FieldInfo) -> inspect.Parameter:
     hint = _bare(field.annotation, with_unit=find_unit(field.description) is not None)
     if may_be_empty(field):
         hint = tuple[get_args(hint)[0] | None, ...]  # type: ignore[misc]
+    elif field.is_required() and get_origin(field.annotation) is tuple:
+        default = ()  # cyclopts checks a list's default, and None is none; what is missing is refused with the settings
     more = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     annotation = Annotated[
         hint,  # type: ignore[valid-type]

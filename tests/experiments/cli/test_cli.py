@@ -414,3 +414,8 @@ def test_help_does_not_wait_for_taichi():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_robot_without_feet_is_answered_with_the_option_that_is_missing(capsys):
+    assert main(["mujoco", "hopper"]) == 2
+    assert "--feet must be given" in capsys.readouterr().err

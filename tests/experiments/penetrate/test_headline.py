@@ -49,8 +49,8 @@ def test_warnings_are_never_left_out_and_a_reference_is_one_sentence():
 
 
 def test_a_report_older_than_its_result_is_made_anew(tmp_path, capsys, monkeypatch):
-    from experiments.penetrate.settings import PenetrateSettings
     from experiments.cli import runs
+    from experiments.penetrate.settings import PenetrateSettings
     from experiments.runs.folder import RunFolder
 
     drawn = []
