@@ -159,3 +159,38 @@ def test_a_step_that_is_too_long_for_the_law_is_refused_on_entry():
     with pytest.raises(ValueError, match=r"model.opt.timestep = 0.001 s .*'foot'"):
         FootForces(model, data, feet, parameters={"stiffness": 1.1 * limit, "damping": 0.0}).__enter__()
     assert mujoco.get_mjcb_passive() is None
+
+
+def test_a_slope_by_tilted_gravity_and_any_integrator_may_be_entered():
+    model = ball()
+    model.opt.gravity[:] = 1.0, 0.0, -9.7
+    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_RK4)
+    data, forces = sand_and(model)
+    with forces:
+        mujoco.mj_step(model, data)
+    assert model.opt.gravity[0] == 1.0 and model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4)
+
+
+def test_the_bound_on_entry_is_where_a_ball_on_an_undamped_spring_gains_energy():
+    """Steps v' = v - h K z / m, z' = z + h v' grow for K h^2 / 4 m above 1 only."""
+    swings = []
+    for share in (0.95, 1.05):
+        model = ball()
+        switch_off_floors(model)
+        mass, step = float(model.body_mass.sum()), 1e-3
+        model.opt.timestep, stiffness = step, share * 4 * mass / step**2
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        forces = FootForces(
+            model, data, find_feet(model, data, ["foot"]), parameters={"stiffness": stiffness, "damping": 0.0}
+        )
+        mujoco.set_mjcb_passive(forces)
+        rest = 0.05 - 9.81 * mass / stiffness
+        data.qpos[2] = rest + 1e-8
+        found = []
+        for _ in range(20):
+            mujoco.mj_step(model, data)
+            found.append(abs(data.qpos[2] - rest))
+        mujoco.set_mjcb_passive(None)
+        swings.append(max(found) / 1e-8)
+    assert swings[0] < 20 < 100 < swings[1]
