@@ -228,7 +228,8 @@ def test_a_posture_on_the_way_that_loads_the_exchange_more_than_the_start_is_kep
     assert loads[1] == pytest.approx(2000 * 4e-4**2 / 4 / 0.1, rel=0.05)
 
 
-def test_a_robot_whose_state_or_control_is_no_number_ends_the_run_instead_of_starting_anew():
+def test_a_robot_whose_state_or_control_is_no_number_ends_the_run_instead_of_starting_anew(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file there
     text = LEG.format(foot_mass=0.1).replace("<motor ", '<position kp="5e6" ')
     with pytest.raises(LostRobotError, match=r"lost at .* s: .* too large") as lost:
         on_law(MujocoRobot(model_of(text), "foot"), 4e-4, 0.3)
