@@ -56,7 +56,12 @@ class LawFitSettings(PenetrateSettings):
     laws: tuple[str, ...] = Field(LAWS, min_length=1)
     """Laws to compare beside the spring-damper: spring-damper, hunt-crossley, power-irreversible, katsuragi-durian,
     katsuragi-durian-added-mass, bekker, rft."""
-    bins: int = Field(12, ge=4, le=200, description="Intervals of depth over which each run is averaged [1].")
+    bins: int = Field(
+        12,
+        ge=4,
+        le=200,
+        description="Intervals from 0 to the largest depth of all runs, over which each run is averaged [1].",
+    )
     force_error: float = Field(0.2, gt=0, lt=1, description="Error of the force up to which a law is said to hold [1].")
     sinkage_error: float = Field(
         0.15, gt=0, lt=1, description="Error of the sinkage up to which a law is said to hold [1]."
