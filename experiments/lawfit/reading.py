@@ -62,6 +62,7 @@ def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) 
     _refuse_mixed(sources)
     loaded: list[tuple[Penetration, Json]] = []
     placements: list[Placement] = []
+    above: list[str] = []  # Beds whose grains carry the spike at the surface or above it
     grains: dict[str, set[str]] = {}
     seen: dict[tuple[Any, ...], str] = {}
     for source in sources:
@@ -80,6 +81,8 @@ def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) 
             if run.kind == "set_down":
                 if run.resting_depth is not None and run.resting_depth > 0:
                     placements.append(Placement(bed, source.settings.weight, run.resting_depth))
+                elif run.resting_depth is not None:
+                    above.append(bed)
                 continue
             loaded.append((run, {"id": f"{source.name}/{entry['id']}", "bed": bed, "speed": speed}))
     deepest = max((reached(run) for run, _ in loaded), default=0.0)
@@ -87,6 +90,8 @@ def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) 
     notes = list(_notes(sources))
     if left := [name for name, run in made if run is None]:
         notes.append(say("not_fitted", runs=", ".join(left)))
+    if above:
+        notes.append(say("above", beds=", ".join(above), count=len(above), of=len(above) + len(placements)))
     if shared := [bed for bed, of_bed in grains.items() if len(of_bed) > 1]:
         notes.append(say("one_seed", beds=", ".join(shared)))
     data = Data(
@@ -119,8 +124,8 @@ def _read(name: str, path: Path) -> _Source:
         raise ValueError(f"runs = {str(path)!r} is a run of {folder.command!r}: one of 'penetrate' was expected")
     if not (path / "result.json").exists() or folder.status not in ("done", None):
         raise ValueError(
-            f"runs = {str(path)!r} is not finished ({folder.status or 'no result.json'}): "
-            f"`hedgebed resume {path}` finishes it"
+            f"runs = {str(path)!r} is not finished ({folder.status or 'no result.json'}): wait for it if it is being "
+            f"computed; `hedgebed resume {path}` finishes it if not"
         )
     if not (path / "series").is_dir():
         raise ValueError(f"runs = {str(path)!r} has no series, only numbers: {_again(path)}")
