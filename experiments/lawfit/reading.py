@@ -79,9 +79,9 @@ def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) 
                 raise ValueError(say("twice", name=source.name, other=seen[key], kind=key[1], speed=speed))
             seen[key] = source.name
             if run.kind == "set_down":
-                if run.resting_depth is not None and run.resting_depth > 0:
-                    placements.append(Placement(bed, source.settings.weight, run.resting_depth))
-                elif run.resting_depth is not None:
+                if (depth := run.resting_depth) is not None and depth > 0:
+                    placements.append(Placement(bed, source.settings.weight, depth))
+                elif depth is not None:
                     above.append(bed)
                 continue
             loaded.append((run, {"id": f"{source.name}/{entry['id']}", "bed": bed, "speed": speed}))

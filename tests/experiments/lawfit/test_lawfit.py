@@ -329,3 +329,10 @@ def test_the_command_takes_several_folders_and_a_run_toml_does_the_same_again(of
     first, second = ((tmp_path / name / "result.json").read_bytes() for name in "ab")
     assert first == second
     assert main(["calibrate", str(tmp_path / "nowhere"), "--out", str(tmp_path / "c")]) == 2
+
+
+def test_a_bed_whose_grains_carry_the_spike_above_the_surface_is_named(of_three_beds, monkeypatch):
+    depths = iter((0.002, -0.0005, 0.003))
+    monkeypatch.setattr("coupling.trajectory.Penetration.resting_depth", property(lambda run: next(depths)))
+    data = read_data(lawfit.Settings(runs=(of_three_beds,)))
+    assert len(data.placements) == 2 and any("seed 2" in note and "above" in note for note in data.notes)
