@@ -202,7 +202,8 @@ def _controller(settings: RobotSettings, folder: Path | None) -> Controller | No
     file, _, name = settings.controller.rpartition(":")
     path = Path(file) if folder is None else folder / CONTROLLER
     if not file or not path.is_file():
-        raise ValueError(say("no_such_controller" if file.endswith(".py") else "no_controller", s=settings, file=file))
+        named = file.endswith(".py")
+        raise ValueError(say("no_such_controller" if named else "no_controller", s=settings, file=file))
     spec = importlib.util.spec_from_file_location("hedgebed_controller", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
