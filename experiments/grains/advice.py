@@ -1,8 +1,9 @@
 """Before a run: what a bed too narrow, too shallow or too coarse does to its numbers, what would do, and its cost.
 
-K of a 12 mm spike in `sand-weak` was 54, 48, 36 and 33 N/m with 3, 4, 5 and 10 grains across the tip (docs/results:
-penetrate-coarse, -3mm, penetrate, -full), which is what `COARSE` holds, over the last. A run takes time with the number
-of grains and, as a step of the grains goes with their size, with its fourth power: 16 times for half the grain.
+K of a 12 mm spike in `sand` is 103, 80 and 62 N/m with 5, 8 and 12 grains across the tip, on a straight line in the
+size of the grains (docs/results/converge-flagship): 68 with ten, and 120 and 150 on that line with 4 and 3. `COARSE`
+holds these over that with ten. A run takes time with the number of grains and, as a step of the grains goes with their
+size, with its fourth power: 16 times for half the grain.
 """
 
 import math
@@ -20,7 +21,7 @@ ENOUGH_ACROSS = 10.0
 """Grains across a tip from which on nothing is said."""
 LEAST_BELOW = 2.0
 """Tips between the deepest point and the floor from which on nothing is said."""
-COARSE = ((3.0, 1.64), (4.0, 1.45), (5.0, 1.09), (10.0, 1.0))
+COARSE = ((3.0, 2.2), (4.0, 1.77), (5.0, 1.51), (8.0, 1.17), (10.0, 1.0))
 """Grains across a tip -> K over that of ten across [1] (see the module)."""
 
 

@@ -18,8 +18,8 @@ def test_of_a_bed_that_is_fine_and_wide_nothing_is_said():
     [
         ({"size": (0.048, 0.072, 0.05)}, ["4 tips wide", "0.072 m both ways", "1.5 times the time"]),
         ({"size": (0.072, 0.072, 0.03)}, ["1.5 tips below", "0.036 m in depth", "1.2 times the time"]),
-        ({"grain": 0.0024}, ["5 grains across", "9 % higher", "0.0012 m", "16 times the time"]),
-        ({"grain": 0.004}, ["3 grains across", "64 % higher", "0.0012 m", "1.2e+02 times the time"]),
+        ({"grain": 0.0024}, ["5 grains across", "51 % higher", "0.0012 m", "16 times the time"]),
+        ({"grain": 0.004}, ["3 grains across", "120 % higher", "0.0012 m", "1.2e+02 times the time"]),
     ],
 )
 def test_each_fault_is_said_with_what_would_do_and_its_cost(change, words):
