@@ -9,12 +9,12 @@ fitted.beyond(depth=0.02, speed=0.1)       # one sentence for each number outsid
 ```
 """
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from .checks import read_toml
 from .ground.grounds import SurfaceGround
 from .ground.laws import SurfaceLaw, find_law
 from .result import toml_value, write_text
@@ -184,12 +184,7 @@ def read_ground(path: str | Path) -> GroundFile:
     Raises ValueError naming the file and, a line for each fault, the key, what was found and what was expected.
     """
     path = Path(path)
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: is not TOML: {error}") from None
+    table = read_toml(path)
     try:
         return GroundFile(**table)
     except ValidationError as error:

@@ -4,10 +4,12 @@ Imports nothing of ours.
 """
 
 import math
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from difflib import get_close_matches
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "Coulomb", "Parameter", "check_above_zero", "check_counterweight", "check_friction", "check_not_negative",
-    "check_parameters", "check_simulated_gravity", "is_number", "nearest", "sample_times",
+    "check_parameters", "check_simulated_gravity", "is_number", "nearest", "read_toml", "sample_times",
 ]  # fmt: skip
 
 
@@ -150,3 +152,13 @@ def sample_times(
     if given[0] < 0 or given[-1] > duration:
         raise ValueError(f"times must lie within 0 to duration = {duration:g} s, not {given[0]:g} to {given[-1]:g} s")
     return given
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The table in the TOML file `path`. Raises ValueError, naming it, for one that is not there or is no TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: is not TOML: {error}") from None

@@ -1,6 +1,5 @@
 """Platforms from TOML files, those that ship and a user's own."""
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -8,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from rigid.checks import nearest
+from rigid.checks import nearest, read_toml
 
 from .actuation import Flywheel
 from .inertia import Part, combine
@@ -126,12 +125,7 @@ def read_platform(path: Path) -> Platform:
 
     Raises ValueError naming the file and, a line for each fault, the key, what was found and what was expected.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: is not TOML: {error}") from None
+    table = read_toml(path)
     try:
         parsed = _File(**table)
     except ValidationError as error:
