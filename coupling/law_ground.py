@@ -1,7 +1,7 @@
 """A surface law under each member of a body: `LawGround`. Heights are counted from the undisturbed surface."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from rigid.spatial.spatial import SpatialTrial
 from .ground import part_of, prefixed
 from .poses import Pose, Twist, Vector, chord_share, matrices
 
-__all__ = ["LawGround", "row_tips"]
+__all__ = ["LawGround", "LawPoints", "row_tips"]
 
 
 def row_tips(length: float, count: int) -> Vector:
@@ -24,7 +24,44 @@ def row_tips(length: float, count: int) -> Vector:
     return np.column_stack([-length * np.sin(angles), np.zeros(count), -length * np.cos(angles)])
 
 
-class LawGround:
+class LawPoints:
+    """What grounds of one law for each point share: the energy in them, and the state that a run goes back to."""
+
+    _depths: Vector  # Of the points [m], -inf far above
+
+    def _laws(self) -> Mapping[str, SpringDamper | SurfaceGround]:
+        """The law under each point, in the order of `_depths`: its name in a kept state -> itself."""
+        raise NotImplementedError
+
+    def energies(self) -> dict[str, float]:
+        """In the springs under the points [J]."""
+        laws = self._laws().values()
+        held = [law.stored(depth) for law, depth in zip(laws, self._depths, strict=True) if depth > 0]
+        return {"springs": float(sum(held))}
+
+    def checkpoint(self) -> State:
+        """The state that `rollback` goes back to."""
+        return self.state()
+
+    def rollback(self, kept: State) -> None:
+        """Go back to what `checkpoint` gave."""
+        self.restore(kept)
+
+    def state(self) -> State:
+        """Depths of the points, and what the laws remember."""
+        kept: State = {"depths": self._depths.copy()}
+        for name, law in self._laws().items():
+            kept |= prefixed(name, law.state())
+        return kept
+
+    def restore(self, state: State) -> None:
+        """Go back to what `state` gave."""
+        self._depths = np.array(state["depths"], dtype=float)
+        for name, law in self._laws().items():
+            law.restore(part_of(state, name))
+
+
+class LawGround(LawPoints):
     """A surface law under each row of spikes, its friction as a Coulomb bound that the body resolves.
 
     Parameters
@@ -120,28 +157,5 @@ class LawGround:
         sinkage = {int(row): float(self._depths[row]) for row in np.flatnonzero(self._depths > 0)}
         return Reaction(force, torque, tuple(contacts), sinkage)
 
-    def energies(self) -> dict[str, float]:
-        """In the springs under the tips [J]."""
-        held = [ground.stored(depth) for ground, depth in zip(self.grounds, self._depths, strict=True) if depth > 0]
-        return {"springs": float(sum(held))}
-
-    def checkpoint(self) -> State:
-        """The state that `rollback` goes back to."""
-        return self.state()
-
-    def rollback(self, kept: State) -> None:
-        """Go back to what `checkpoint` gave."""
-        self.restore(kept)
-
-    def state(self) -> State:
-        """Depths of the tips, and what the laws remember."""
-        kept: State = {"depths": self._depths.copy()}
-        for row, ground in enumerate(self.grounds):
-            kept |= prefixed(str(row), ground.state())
-        return kept
-
-    def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
-        self._depths = np.array(state["depths"], dtype=float)
-        for row, ground in enumerate(self.grounds):
-            ground.restore(part_of(state, str(row)))
+    def _laws(self) -> dict[str, SpringDamper | SurfaceGround]:
+        return {str(row): ground for row, ground in enumerate(self.grounds)}

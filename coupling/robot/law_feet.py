@@ -6,17 +6,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coupling.ground import part_of, prefixed
+from coupling.law_ground import LawPoints
 from coupling.poses import Pose, Twist, Vector, chord_share, matrices
-from rigid.ground.grounds import SurfaceGround
-from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
+from rigid.ground.grounds import SpringDamper, SurfaceGround
+from rigid.ground.reaction import Contact, Facts, Reaction, Turned
 
 from .feet import Foot
 
 __all__ = ["LawFeet", "refuse_pointless"]
 
 
-class LawFeet:
+class LawFeet(LawPoints):
     """A law of `rigid.ground.laws` under the feet of a robot, its friction as a Coulomb bound.
 
     Parameters
@@ -131,34 +131,8 @@ class LawFeet:
         sinkage = {int(point): float(self._depths[point]) for point in np.flatnonzero(self._depths > 0)}
         return Reaction(rows[:, :3].ravel(), rows[:, 3:].ravel(), tuple(contacts), sinkage)
 
-    def energies(self) -> dict[str, float]:
-        """In the springs under the points [J]."""
-        flat = [ground for own in self.grounds for ground in own]
-        held = [ground.stored(depth) for ground, depth in zip(flat, self._depths, strict=True) if depth > 0]
-        return {"springs": float(sum(held))}
-
-    def checkpoint(self) -> State:
-        """The state that `rollback` goes back to."""
-        return self.state()
-
-    def rollback(self, kept: State) -> None:
-        """Go back to what `checkpoint` gave."""
-        self.restore(kept)
-
-    def state(self) -> State:
-        """Depths of the points, and what the laws remember."""
-        kept: State = {"depths": self._depths.copy()}
-        for k, own in enumerate(self.grounds):
-            for j, ground in enumerate(own):
-                kept |= prefixed(f"{k}-{j}", ground.state())
-        return kept
-
-    def restore(self, state: State) -> None:
-        """Go back to what `state` gave."""
-        self._depths = np.array(state["depths"], dtype=float)
-        for k, own in enumerate(self.grounds):
-            for j, ground in enumerate(own):
-                ground.restore(part_of(state, f"{k}-{j}"))
+    def _laws(self) -> dict[str, SpringDamper | SurfaceGround]:
+        return {f"{k}-{j}": ground for k, own in enumerate(self.grounds) for j, ground in enumerate(own)}
 
 
 def refuse_pointless(feet: Sequence[Foot]) -> None:
