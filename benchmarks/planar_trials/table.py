@@ -1,8 +1,8 @@
 """Table and figures of docs/planar.md: `python -m benchmarks.planar_trials.table docs`.
 
 Both integrators and the batch on the paper's cases (two gravities, three torques, steel and brick), how the error at
-the end of a tumble falls with the step, and the list of effects. Writes into docs/planar.md between its marks, and
-docs/images/planar-*.png.
+the end of a tumble falls with the step, and the list of effects. Writes between the marks of docs/planar.md and
+docs/notes/planar.md, and docs/images/planar-*.png.
 """
 
 import math
@@ -67,7 +67,16 @@ def table() -> str:
 
 
 def effects() -> str:
-    """The list of effects, in Markdown."""
+    """The list of effects in Markdown, short: what each is, and its parameters with unit and default."""
+    lines = ["| effect | what it is | parameters |", "|---|---|---|"]
+    for term in EFFECTS.values():
+        own = ", ".join(f"`{p.name}` [{p.unit}] = {p.default:g}" for p in term.parameters)
+        lines.append(f"| `{term.id}` | {term.summary} | {own} |")
+    return "\n".join(lines)
+
+
+def details() -> str:
+    """The list of effects in Markdown, whole: what each acts on, what its parameters mean, source and limits."""
     lines = ["| effect | what it is | acts on | parameters | source | limits |", "|---|---|---|---|---|---|"]
     for term in EFFECTS.values():
         own = "; ".join(f"`{p.name}` [{p.unit}] = {p.default:g}: {p.summary}" for p in term.parameters)
@@ -133,13 +142,16 @@ def main(folder: str) -> None:
     docs = Path(folder)
     draw_orders(docs / "images" / "planar-orders.png")
     draw_states(docs / "images" / "planar-states.png")
-    page = docs / "planar.md"
-    text = page.read_text(encoding="utf-8")
-    for name, part in (("cases", table()), ("effects", effects())):
-        begin, end = (mark.format(name) for mark in MARKS)
-        before, rest = text.split(begin)
-        text = f"{before}{begin}\n{part}\n{end}{rest.split(end)[1]}"
-    page.write_text(text, encoding="utf-8")
+    for page, parts in (
+        (docs / "planar.md", {"cases": table(), "effects": effects()}),
+        (docs / "notes" / "planar.md", {"effects": details()}),
+    ):
+        text = page.read_text(encoding="utf-8")
+        for name, part in parts.items():
+            begin, end = (mark.format(name) for mark in MARKS)
+            before, rest = text.split(begin)
+            text = f"{before}{begin}\n{part}\n{end}{rest.split(end)[1]}"
+        page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
