@@ -1,7 +1,7 @@
-"""bench.json as tables: on the terminal, and in Markdown for docs/performance.md.
+"""bench.json as tables: on the terminal, and in Markdown for docs/notes/performance.md.
 
-python -m benchmarks.race.table DIR/bench.json                      # prints the Markdown
-python -m benchmarks.race.table DIR/bench.json docs/performance.md  # puts it between its two marks in that file
+python -m benchmarks.race.table DIR/bench.json                            # prints the Markdown
+python -m benchmarks.race.table DIR/bench.json docs/notes/performance.md  # puts it between its two marks in that file
 """
 
 import json
