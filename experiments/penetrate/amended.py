@@ -231,7 +231,8 @@ class AmendedGround:
         """The step it is to be driven at [s]."""
         self._own = law.own
         self._numbers = law.numbers(speed=speed, creep=_CREEP)
-        self._top = self._ever = self._gone = 0.0
+        self._top = self._ever = 0.0
+        self._gone = given_way(self._numbers[0], None, 0.0, 0.0, self._own)
 
     def describe(self) -> Json:
         """What it is, in plain numbers."""
@@ -246,20 +247,23 @@ class AmendedGround:
         speed = np.array([0.0, 0.0, 0.0, sinking])
         lane, path = np.zeros(1, np.int32), np.array([0, 4], np.int32)
         if middle > 0:
-            self._numbers[0, _SLOT["given_way"]] = given_way(self._numbers[0], self._gone, middle, 0.5 * dt)
+            gone = given_way(self._numbers[0], self._gone, middle, 0.5 * dt, self._own)
+            self._numbers[0, _SLOT["given_way"]] = gone.sum()
         force = float(push(self._numbers, lane, path, depth, speed, self._own)[0, 3])
         self._top = max(self._top, start, end) if end > 0 else 0.0
         self._ever = max(self._ever, end, 0.0)
-        self._gone = given_way(self._numbers[0], self._gone, middle, dt) if end > 0 else 0.0
+        gone = given_way(self._numbers[0], self._gone, middle, dt, self._own)
+        self._gone = gone if end > 0 else np.zeros_like(gone)
         return Reaction(np.array([0.0, 0.0, force]), np.zeros(3))
 
     def state(self) -> Json:
         """What it remembers."""
-        return {"top": np.array(self._top), "ever": np.array(self._ever), "given_way": np.array(self._gone)}
+        return {"top": np.array(self._top), "ever": np.array(self._ever), "given_way": self._gone.copy()}
 
     def restore(self, state: Json) -> None:
         """Take back what `state` gave."""
-        self._top, self._ever, self._gone = (float(state[name]) for name in ("top", "ever", "given_way"))
+        self._top, self._ever = (float(state[name]) for name in ("top", "ever"))
+        self._gone = np.array(state["given_way"], dtype=float).reshape(self._gone.shape)
 
 
 Runs = Mapping[str, Penetration]

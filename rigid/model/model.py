@@ -14,8 +14,8 @@ the numbers of the ground's law:
 - ``dry_friction(p, s)``: bounds on the vertical motion [N] and on the rotation [N m];
 - ``inner_start(p, s)``, ``inner(p, s)``: of the coordinate that a term has of its own, where there is one: at rest; its
   inertia, the force on it, and what is positive while its mode holds;
-- ``settle(p, s, depth, slip, lean)``, ``settled(p, s)``: how fast the ground under a tip gives way [m/s], and the share
-  of the depth at rest by which it has at the start;
+- ``settle[k](p, s, depth, slip, lean, gone)``, ``settled[k](p, s)``, of the k-th term that lets ground give way: how
+  fast it does under a tip [m/s], and the share of the whole depth at rest by which it has at the start;
 - ``added(p, depth)``: mass of ground that a tip carries along while it sinks [kg], its slope over depth [kg/m];
 - ``wall(p)``: slope of a crater's wall, 0 where craters are forgotten;
 - ``crater(p)``: share of the deepest depth at which a spike on the way up leaves the ground;
@@ -69,6 +69,8 @@ class Model:
 
     terms: tuple[Term, ...]
     law: SurfaceLaw
+    settle: tuple[Callable[..., Any], ...]
+    settled: tuple[Callable[..., Any], ...]
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Callable[..., Any]: ...
@@ -76,6 +78,9 @@ class Model:
     def __init__(self, terms: tuple[Term, ...], law: SurfaceLaw, functions: Mapping[str, Any]) -> None:
         self.terms, self.law = terms, law
         vars(self).update(functions)
+        self.settle, self.settled = (
+            tuple(functions[f"{hook}_{k}"] for k in range(self.settles)) for hook in ("settle", "settled")
+        )
 
     def has(self, *hooks: str) -> bool:
         """Whether any effect has one of these hooks."""
@@ -87,9 +92,9 @@ class Model:
         return any(set(fields) & set(hook.__code__.co_names) for hook in hooks)
 
     @property
-    def settles(self) -> bool:
-        """Whether the ground under a tip may give way for good."""
-        return self.has("settle", "settled")
+    def settles(self) -> int:
+        """Number of terms by which the ground under a tip may give way for good; each has a state of its own."""
+        return len(_settling(self.terms))
 
     @property
     def has_memory(self) -> bool:
@@ -116,6 +121,11 @@ def _calls(terms: Sequence[Term], hook: str, fixed: str) -> list[str]:
     return found
 
 
+def _settling(terms: Sequence[Term]) -> list[Term]:
+    """The terms by which the ground gives way for good."""
+    return [term for term in terms if {"settle", "settled"} & set(term.hooks)]
+
+
 def _bent_energy(terms: Sequence[Term]) -> list[str]:
     """Lines that integrate the force of unloading: whatever the law and its changes, no closed form holds for all.
 
@@ -135,11 +145,22 @@ def _yielding(every: Sequence[Term]) -> list[str]:
     """The functions of ground that gives way, is carried along, and keeps its craters."""
     out = ["def wall(p):", "    slope = 0.0"]
     out += [f"    slope = max(slope, {call})" for call in _calls(every, "wall", "")]
-    out += ["    return slope\n", "def settle(p, s, depth, slip, lean):", "    speed = 0.0"]
-    out += [f"    speed = speed + {call}" for call in _calls(every, "settle", "s, depth, slip, lean")]
-    out += ["    return speed\n", "def settled(p, s):", "    left = 1.0"]
-    out += [f"    left = left * (1.0 - {call})" for call in _calls(every, "settled", "s")]
-    out += ["    return 1.0 - left\n", "def added(p, depth):", "    mass = 0.0", "    slope = 0.0"]
+    out += ["    return slope\n"]
+    terms = _settling(every)
+    for k, term in enumerate(terms):
+        (speed,) = _calls([term], "settle", "s, depth, slip, lean, gone") or ["0.0"]
+        out += [f"def settle_{k}(p, s, depth, slip, lean, gone):", f"    return {speed}\n"]
+    # At rest each has given way by its share r of what the others leave: by r / (1 - r) of what the law reads.
+    out += ["def over_read(p, s):", "    more = 0.0"]
+    for call in _calls(every, "settled", "s"):
+        out += [f"    share = {call}", "    more = more + share / (1.0 - share)"]
+    out += ["    return more\n"]
+    for k, term in enumerate(terms):
+        (share,) = _calls([term], "settled", "s") or ["0.0"]
+        out += [f"def settled_{k}(p, s):", f"    share = {share}"]
+        out += ["    return share / (1.0 - share) / (1.0 + over_read(p, s))\n"]
+    out += ["def settled_share(p, s):", "    more = over_read(p, s)", "    return more / (1.0 + more)\n"]
+    out += ["def added(p, depth):", "    mass = 0.0", "    slope = 0.0"]
     for call in _calls(every, "added_mass", "depth"):
         out += [f"    more, steeper = {call}", "    mass = mass + more", "    slope = slope + steeper"]
     return [*out, "    return mass, slope\n"]

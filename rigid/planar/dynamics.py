@@ -137,9 +137,11 @@ class System:
         self.kept = max(self.crater, model.plastic_share(self.p))  # Of the deepest depth, in the crater that stays
         s.inner_mode = 1.0
         self.inner = bool(model.has("inner_mass") and model.inner(self.p, s)[0] > 0)
-        self.first = INNER_SPEED + 1 if self.inner else INNER  # Where in z the ground's givings way begin, one a spike
-        self.size = self.first + (trial.spike_count if self.settles else 0)
-        self.settled_share = model.settled(self.p, s)
+        self.first = INNER_SPEED + 1 if self.inner else INNER
+        """Where in z begins how far the ground has given way: for each term that makes it do so, one a spike."""
+        self.size = self.first + trial.spike_count * model.settles
+        self.settled_shares = [share(self.p, s) for share in model.settled]
+        self.settled_share = model.settled_share(self.p, s)
         self.mu_s, self.mu_d = trial.mu_s, trial.sliding_friction
         self.wheel_sign = 1.0 if trial.actuator == "motor" else -1.0
         # What the last evaluation found.
@@ -170,7 +172,11 @@ class System:
 
     def given_way(self, spike: int, z: Sequence[float]) -> float:
         """How far the ground under the tip has given way [m]."""
-        return z[self.first + spike] if self.settles else 0.0
+        return sum(z[k] for k in self.settling(spike))
+
+    def settling(self, spike: int) -> range:
+        """Where in z stands how far the ground under the tip has given way, term by term."""
+        return range(self.first + spike, self.size, self.trial.spike_count)
 
     def depth(self, spike: int, z: Sequence[float]) -> float:
         """How deep the tip is below the surface [m], which is where it has given way to."""
@@ -214,8 +220,8 @@ class System:
         """The spike touches: of the crater that it left there stays what is left at the tip's x."""
         share, _ = self._crater_left(spike, z, modes)
         modes.top[spike] *= share
-        if self.settles:
-            z[self.first + spike] *= share
+        for k in self.settling(spike):
+            z[k] *= share
         modes.out.discard(spike)
         modes.touch(spike, *self.depth_and_slip(spike, z))
 
@@ -225,8 +231,8 @@ class System:
             modes.out.add(spike)
         else:
             modes.top[spike] = 0.0
-            if self.settles:
-                z[self.first + spike] = 0.0
+            for k in self.settling(spike):
+                z[k] = 0.0
 
     def dry_speeds(self, z: Sequence[float]) -> list[float]:
         """Speeds that the dry frictions resist: vertical [m/s], rotation [rad/s]."""
@@ -277,10 +283,10 @@ class System:
             load = max(normal + grip, 0.0)
             power += lost * rate - side * slip
             into = rate  # the speed at which the spring is pressed
-            if self.settles:
-                settling[n] = model.settle(p, s, at + s.given_way, slip, d / s.length)
-                power += elastic * settling[n]
-                into = rate - settling[n]
+            for speed_of, k in zip(model.settle, self.settling(n), strict=True):
+                speed = settling[k - self.first] = speed_of(p, s, at + z[k], slip, d / s.length, z[k])
+                power += elastic * speed
+                into -= speed
             if self.sheds and at >= top and into > 0:
                 power += self._shed(at, slip, elastic) * into
             if self.carries and rate > 0:

@@ -118,8 +118,9 @@ def _sink(system: System, z: list[float], over: float, load: float) -> None:
 
 def _give_way(system: System, z: list[float]) -> None:
     """What the ground has given way under a platform at rest: a share of each tip's depth."""
-    for n in range(system.size - system.first):
-        z[system.first + n] = system.settled_share * max(system.arms(n, z)[0] - z[Y], 0.0)
+    for n in range(system.trial.spike_count):
+        for k, share in zip(system.settling(n), system.settled_shares, strict=True):
+            z[k] = share * max(system.arms(n, z)[0] - z[Y], 0.0)
 
 
 def _why_not(system: System, what: str) -> str:

@@ -119,14 +119,14 @@ class Push:
     | `damper`  | spring                                        | factor on the damper [1]                        |
     | `force`   | z, v, x, way, share, most, ever, radius_depth | force to add [N]                                |
     | `pull`    | the same                                      | force to subtract [N]                           |
-    | `settle`  | gone, z, span                                 | `gone` [m] after `span` [s] more in the bed     |
+    | `settle`  | gone, z, span                                 | `gone` [m] after `span` [s] more at the depth z |
     | `mass`    | z, x, reference                               | mass [kg] carried along while a drop sinks      |
 
     `grown`: the force so far; `x` = z / D; `at`: depth at which the loading curve is read; `most` and `ever`: deepest
     depth since it entered, and of all; `way`: direction of the motion, -1 to 1; `share`: of a friction that takes a
-    distance to turn round, -1 to 1; `gone`: how far the bed has given way for good, which the loading curve is read
-    short of; `radius_depth`: at which the tip is wholly in; `reference`: D. Depths in m, speeds
-    in m/s, downwards.
+    distance to turn round, -1 to 1; `gone`: how far the bed has given way for good by this effect (the loading curve is
+    read less deep by the sum over all effects); `z` of `settle`: the depth less what the other effects have given way;
+    `radius_depth`: at which the tip is wholly in; `reference`: D. Depths in m, speeds in m/s, downwards.
     """
 
     rank: int = LAST  # Place among the candidates, and in the law

@@ -28,9 +28,10 @@ parameters, by name, in any number.
 | `rate_force`         | s, depth, rate            | normal force [N] that dissipates, by the rate of sinking     |
 | `rate_pull`          | s, depth, rate, held      | the same of a term that depends on unloading, too            |
 | `side_force`         | s, depth, slip            | tangential force [N] on the tip against its slip speed       |
-| `settle`             | s, depth, slip, lean      | speed at which the ground under a touching tip gives way     |
-|                      |                           | for good [m/s]; lean: sine of the spike's angle              |
-| `settled`            | s                         | share of the depth at rest that has given way at the start   |
+| `settle`             | s, depth, slip, lean,     | speed at which the ground under a touching tip gives way     |
+|                      | gone                      | for good by this term [m/s]; lean: sine of the spike's angle;|
+|                      |                           | gone: how far it has given way by this term [m]              |
+| `settled`            | s                         | share of that depth at rest by which it has at the start, <1 |
 | `added_mass`         | depth                     | mass of ground [kg] that a tip carries along while it sinks, |
 |                      |                           | and its slope over depth [kg/m]; depth: since it touched     |
 | `wall`               |                           | slope of a crater's wall [1]; 0: a crater is forgotten once  |
@@ -45,8 +46,11 @@ parameters, by name, in any number.
 |                      |                           | square: of the distance from the start [m2]                  |
 
 `settle` moves the undisturbed surface under one tip: the ground's law, and what stands on it (`crater`, `unload`,
-`hold`), read the depth below the surface that is left, depth - s.given_way; `rate_force`, `side_force` and `settle`
-get the whole depth. What gives way takes the elastic force's work with it, so it never gives energy.
+`hold`), read the depth below the surface that is left, depth - s.given_way; `rate_force` and `side_force` get the
+whole depth. Each term with `settle` has a state of its own, `gone`, and s.given_way is the sum over these terms. Its
+`depth` is the whole depth less what the other terms have given way: with one such term, the whole depth. So each term
+takes its share of the force that the others leave. What gives way takes the elastic force's work with it, so it never
+gives energy.
 
 The four of `inner` go together and are for a term with something inside that moves: one coordinate `s.inner`, its rate
 `s.inner_speed` and one of two modes, `s.inner_mode` = 1 at the start, else 0. It is integrated beside the platform's
@@ -84,7 +88,7 @@ FIXED_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "rate_force": ("s", "depth", "rate"),
     "rate_pull": ("s", "depth", "rate", "held"),
     "side_force": ("s", "depth", "slip"),
-    "settle": ("s", "depth", "slip", "lean"),
+    "settle": ("s", "depth", "slip", "lean", "gone"),
     "settled": ("s",),
     "added_mass": ("depth",),
     "wall": (),

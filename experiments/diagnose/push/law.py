@@ -61,8 +61,8 @@ SLOTS = (
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
 direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
-depth of each row alone, all that came before it as it was); `given_way`: what a bed has given way before the first
-row."""
+depth of each row alone, all that came before it as it was); `given_way`: what a bed has given way beforehand [m], which
+stays."""
 PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
@@ -141,19 +141,44 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     return out
 
 
-def given_way(lane: NDArray[np.float64], gone: float, depth: float, span: float) -> float:
-    """How far the bed has given way [m] after `span` [s] more at `depth` [m], by the library's effects; `lane`: its
-    numbers, shape [slot_count]."""
-    for effect in _LIBRARY:
-        if "settle" in effect.law:
-            hook = effect.law["settle"]
-            asked = list(inspect.signature(hook).parameters)[len(_VALUES["settle"]) :]
-            gone = float(hook(gone, depth, span, *(float(lane[_SLOT[name]]) for name in asked)))
-    return gone
-
-
 _Own = tuple[tuple[Term, Push | None], ...]
 """Effects from files: the term, and the law of a push that its file declares in the place of the term's hooks."""
+
+
+def _parts(own: _Own) -> list[tuple[Mapping[str, Callable[..., Any]], Mapping[str, int]]]:
+    """Hooks of every effect, the library's first, and the places in a lane of the numbers that they ask for."""
+    at = len(SLOTS)
+    parts: list[tuple[Mapping[str, Callable[..., Any]], Mapping[str, int]]]
+    parts = [(effect.law, _SLOT) for effect in _LIBRARY]
+    for term, law in own:
+        names = tuple(p.name for p in term.parameters) if law is None else _slots_of(law)
+        functions = term.hooks if law is None else law.law
+        parts.append((functions, {name: at + place for place, name in enumerate(names)}))
+        at += len(names)
+    return parts
+
+
+def given_way(lane: NDArray[np.float64], gone: NDArray[np.float64] | None, depth: float, span: float,
+              own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]:  # fmt: skip
+    """How far the bed has given way [m] after `span` [s] more at `depth` [m], by each effect that makes it do so.
+
+    `lane`: its numbers, shape [slot_count]. `gone`: the same before, None: not at all. `own`: effects from files.
+    """
+    law = [one for one in _parts(tuple((e.term, e.push) for e in own)) if "settle" in one[0]]
+    after = np.zeros(len(law)) if gone is None else np.array(gone)
+    for k, share in _turns(len(law)):
+        hook, columns = law[k][0]["settle"], law[k][1]
+        asked = list(inspect.signature(hook).parameters)[len(_VALUES["settle"]) :]
+        others = float(after.sum() - after[k])
+        after[k] = hook(float(after[k]), depth - others, share * span, *(float(lane[columns[name]]) for name in asked))
+    return after
+
+
+def _turns(count: int) -> list[tuple[int, float]]:
+    """In which order `count` effects make the bed give way, each with its share of the time: there and back, so that
+    what one leaves to the others is right to the second order (Strang's splitting)."""
+    there = [(k, 0.5) for k in range(count - 1)]
+    return [*there, (count - 1, 1.0), *reversed(there)]
 
 
 def _compiled(lines: Mapping[str, Sequence[str]], hooks: Mapping[str, Callable[..., Any]], name: str) -> list[Any]:
@@ -176,18 +201,14 @@ _TERM_LINES: Mapping[str, tuple[str, tuple[str, ...]]] = {
 """Hooks of a term that a file has in the place of a law: in which function they are called, and how."""
 
 
-def _changes(own: _Own) -> list[Any]:
+def _changes(own: _Own) -> tuple[int, list[Any]]:
     """What the effects make of the loading curve, of where it is read on the way back, of the damper and the force;
-    what the terms of effects from files make of the spring's force, and the force that they add."""
-    at, parts = len(SLOTS), [(effect.law, _SLOT) for effect in _LIBRARY]
-    for term, law in own:
-        names = tuple(p.name for p in term.parameters) if law is None else _slots_of(law)
-        functions = term.hooks if law is None else law.law
-        parts.append((functions, {name: at + place for place, name in enumerate(names)}))
-        at += len(names)
+    what the terms of effects from files make of the spring's force, and the force that they add. Before them: how many
+    effects make the bed give way."""
     hooks: dict[str, Callable[..., Any]] = {}
     calls: dict[str, list[str]] = {name: [] for name in (*_VALUES, "own_spring", "own_force")}
-    for place, (functions, columns) in enumerate(parts):
+    settling: list[tuple[str, str]] = []
+    for place, (functions, columns) in enumerate(_parts(own)):
         for hook, function in functions.items():
             called, asked = f"{hook}_{place}", list(inspect.signature(function).parameters)
             hooks[called] = function
@@ -195,11 +216,17 @@ def _changes(own: _Own) -> list[Any]:
                 where, lines = _TERM_LINES[hook]
                 numbers = "".join(f", n[k, {columns[name]}]" for name in asked[len(FIXED_ARGUMENTS[hook]) :])
                 calls[where] += [line.format(called, numbers) for line in lines]
+            elif hook == "settle":
+                settling.append((called, "".join(f", n[k, {columns[name]}]" for name in asked[len(_VALUES[hook]) :])))
             else:
                 arguments = (name if name in _VALUES[hook] else f"n[k, {columns[name]}]" for name in asked)
                 calls[hook].append(f"{called}({', '.join(arguments)})")
+    for at, share in _turns(len(settling)):
+        called, numbers = settling[at]
+        others = f"z - (gone.sum() - gone[{at}])"
+        calls["settle"].append(f"gone[{at}] = {called}(gone[{at}], {others}, {share} * span{numbers})")
     n = "n: ti.template(), k"
-    return _compiled({
+    return len(settling), _compiled({
         f"loading_changed(before, depth, x, {n})":
             ["grown = before", *(f"grown = {call}" for call in calls["loading"]), "return grown"],
         f"unload_changed(z, ever, stiffness, {n})":
@@ -208,7 +235,7 @@ def _changes(own: _Own) -> list[Any]:
         f"damper_changed(spring, {n})":
             ["factor = 1.0", *(f"factor = factor * {call}" for call in calls["damper"]), "return factor"],
         f"settled(before, z, span, {n})":
-            ["gone = before", *(f"gone = {call}" for call in calls["settle"]), "return gone"],
+            ["gone = before", *calls["settle"], "return gone"],
         f"mass_changed(z, x, reference, {n})":
             ["total = 0.0", *(f"total = total + {call}" for call in calls["mass"]), "return total"],
         f"force_changed(before, {', '.join(_HERE)}, {n})":
@@ -219,15 +246,16 @@ def _changes(own: _Own) -> list[Any]:
     }, hooks, "of the library" + "".join(f"+{term.id}" for term, _ in own))  # fmt: skip
 
 
-def _functions(own: _Own) -> tuple[Any, Any, Any, Any]:
-    """The force on a spike; the share of its bound that a friction has which takes a way to turn round; how far the bed
-    has given way after a time; the mass that a spike carries along, over its own."""
+def _functions(own: _Own) -> tuple[int, Any, Any, Any, Any]:
+    """How many effects make the bed give way; the force on a spike; the share of its bound that a friction has which
+    takes a way to turn round; how far the bed has given way after a time, effect by effect; the mass that a spike
+    carries along, over its own."""
     from hedgebed_taichi import ti
 
     State = ti.types.struct(**dict.fromkeys(STATE_FIELDS, ti.f64))
-    loading_changed, unload_changed, damper_changed, settled, mass_changed, force_changed, own_spring, own_force = (
-        _changes(own)
-    )
+    settling, (
+        loading_changed, unload_changed, damper_changed, settled, mass_changed, force_changed, own_spring, own_force,
+    ) = _changes(own)  # fmt: skip
     OWN = any(law is None for _, law in own)
     MASS, GRAVITY, STIFFNESS, DAMPING = (_SLOT[name] for name in ("mass", "gravity", "stiffness", "damping"))
     REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
@@ -276,14 +304,14 @@ def _functions(own: _Own) -> tuple[Any, Any, Any, Any]:
             more = mass_changed(z, z / n[k, REFERENCE], n[k, REFERENCE], n, k) / n[k, MASS]
         return more
 
-    return force, taken, settled, carried
+    return settling, force, taken, settled, carried
 
 
 @lru_cache(maxsize=8)
 def _kernels(own: _Own) -> tuple[Any, Any]:
     from hedgebed_taichi import ti
 
-    force, taken, settled, carried = _functions(own)
+    settling, force, taken, settled, carried = _functions(own)
     GIVEN_WAY = _SLOT["given_way"]
     MASS, GRAVITY, SPEED_SCALE, SETTLED = _SLOT["mass"], _SLOT["gravity"], _SLOT["speed_scale"], _SETTLED
     SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (_SLOT[name] for name in ("shift_depth", "shift_row", "shift_speed"))
@@ -299,11 +327,13 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
             top, deepest = 0.0, 0.0
-            before, share, gone = 0.0, 0.0, numbers[k, GIVEN_WAY]
+            before, share = 0.0, 0.0
+            gone = ti.Vector([0.0 for _ in ti.static(range(settling))])
             for row in range(starts[path], starts[path + 1]):
                 z, v = depth[row] + numbers[k, SHIFT_DEPTH], speed[row] + numbers[k, SHIFT_SPEED]
                 if z <= 0.0:
-                    top, before, share, gone = 0.0, 0.0, 0.0, numbers[k, GIVEN_WAY]
+                    top, before, share = 0.0, 0.0, 0.0
+                    gone.fill(0.0)
                 else:
                     if row > starts[path]:
                         gone = settled(gone, 0.5 * (z + before), times[row] - times[row - 1], numbers, k)
@@ -312,7 +342,8 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                 way = ti.tanh(v / numbers[k, SPEED_SCALE])
                 here = z + numbers[k, SHIFT_ROW]
-                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, gone, numbers, k)
+                given = gone.sum() + numbers[k, GIVEN_WAY]
+                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, given, numbers, k)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
@@ -321,7 +352,8 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
             m, g = numbers[k, MASS], numbers[k, GRAVITY]
             z, v, t, way = 0.0, speeds[path], 0.0, 1.0
             top, deepest = 0.0, 0.0
-            turn_z, turn_w, gone = 0.0, 0.0, 0.0
+            turn_z, turn_w = 0.0, 0.0
+            gone = ti.Vector([0.0 for _ in ti.static(range(settling))])
             inside, resting = 1, 0
             for row in range(starts[path], starts[path + 1]):
                 until, at = times[row], row - starts[path]
@@ -348,7 +380,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                             a = g
                             if inside == 1:
                                 here = ti.max(zs, 1e-300)
-                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, half, numbers, k) / m
+                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, half.sum(), numbers, k) / m
                                 a = a / (1.0 + carried(here, way, numbers, k))
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
@@ -376,7 +408,8 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                             if found and crossed:
                                 z = 0.0
                                 if inside == 1:
-                                    inside, top, gone = 0, 0.0, 0.0
+                                    inside, top = 0, 0.0
+                                    gone.fill(0.0)
                                 else:
                                     inside, way = 1, 1.0
                                     # On what supports it at the surface it would hop for ever, ever less.
@@ -388,9 +421,10 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                                 v = 0.0
                                 turn_z, turn_w = z, taken(z, way, turn_z, turn_w, numbers, k)
                                 down, up = 0.0, 0.0
+                                given = gone.sum()
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
-                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, gone, numbers, k) / m
+                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, given, numbers, k) / m
                                     if side == 0:
                                         down = a
                                     else:
@@ -406,7 +440,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                     else:
                         pushed, more = 0.0, 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone, numbers, k)
+                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone.sum(), numbers, k)
                             more = carried(z, way, numbers, k)
                         out[k, at, 0] = z
                         out[k, at, 1] = v

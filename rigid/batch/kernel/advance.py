@@ -42,9 +42,9 @@ def make_advance(parts: SimpleNamespace) -> Any:
             c = parts.trial_numbers(numbers, i, s, p)
             top = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.MEMORY else 1))])
             held = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.HOLDS else 1))])
-            # How far the ground under each tip has given way, how fast it does, and where the tip was last in it.
-            gone = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.SETTLES else 1))])
-            settling = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.SETTLES else 1))])
+            # How far the ground under each tip has given way by each term, how fast it does, where the tip left.
+            gone = ti.Vector([0.0 for _ in ti.static(range(parts.count * parts.SETTLES or 1))])
+            settling = ti.Vector([0.0 for _ in ti.static(range(parts.count * parts.SETTLES or 1))])
             place = ti.Vector([0.0 for _ in ti.static(range(parts.count if parts.WALLS else 1))])
             y_start = poses[i, 0]
             now = parts.Motion(y=y_start, theta=poses[i, 1], wheel=numbers[i, 11])
@@ -199,12 +199,12 @@ def make_memory(parts: SimpleNamespace) -> Any:
         s: ti.template(), p: ti.template(), c: ti.template(), now: ti.template(), top: ti.template(),
         held: ti.template(), gone: ti.template(),
     ):  # fmt: skip
-        share = parts.settled(p, s)
+        share = parts.settled_share(p, s)
         for n in ti.static((0, parts.count - 1)):
             angle = now.theta + parts.HALF + n * parts.BETA
             depth = ti.max((s.length - c.radius) * ti.cos(angle) + c.radius - now.y, 0.0)
-            if ti.static(parts.SETTLES):
-                gone[n] = share * depth
+            for k in ti.static(range(parts.SETTLES)):
+                gone[parts.count * k + n] = parts.settled[k](p, s) * depth
             if ti.static(parts.MEMORY):
                 top[n] = (1.0 - share) * depth
             if ti.static(parts.HOLDS):
@@ -220,9 +220,10 @@ def make_memory(parts: SimpleNamespace) -> Any:
                 n = (m.lowest + j - 1 + parts.count) % parts.count
                 if dt > 0.0:
                     whole = spikes.depth[j]
-                    if ti.static(parts.SETTLES):
-                        whole += gone[n] + dt * settling[n]
-                        gone[n] += 0.5 * dt * (settling[n] + spikes.settling[j])
+                    for k in ti.static(range(parts.SETTLES)):
+                        at = parts.count * k + n
+                        whole += gone[at] + dt * settling[at]
+                        gone[at] += 0.5 * dt * (settling[at] + spikes.settling[3 * k + j])
                     if (m.touch & (1 << n)) != 0:
                         if ti.static(parts.MEMORY):
                             top[n] = ti.max(top[n], spikes.depth[j])
@@ -233,15 +234,15 @@ def make_memory(parts: SimpleNamespace) -> Any:
                             m.out |= 1 << n
                         else:
                             forget(n, top, gone)
-                if ti.static(parts.SETTLES):
-                    settling[n] = spikes.settling[j]
+                for k in ti.static(range(parts.SETTLES)):
+                    settling[parts.count * k + n] = spikes.settling[3 * k + j]
 
     @ti.func
     def forget(n, top: ti.template(), gone: ti.template()):
         if ti.static(parts.MEMORY):
             top[n] = 0.0
-        if ti.static(parts.SETTLES):
-            gone[n] = 0.0
+        for k in ti.static(range(parts.SETTLES)):
+            gone[parts.count * k + n] = 0.0
 
     return begin_memory, remember
 

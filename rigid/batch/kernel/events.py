@@ -95,13 +95,13 @@ def make_events(parts: SimpleNamespace) -> Any:
             if ti.static(parts.WALLS):
                 angle = now.theta + parts.HALF + which * parts.BETA
                 given_way = 0.0
-                if ti.static(parts.SETTLES):
-                    given_way = gone[which]
+                for k in ti.static(range(parts.SETTLES)):
+                    given_way += gone[parts.count * k + which]
                 x = now.x - (s.length - c.radius) * ti.sin(angle)
                 left, fall = parts.crater_left(c, m.out & bit, x, top[which], given_way, place[which])
                 top[which] *= left
-                if ti.static(parts.SETTLES):
-                    gone[which] *= left
+                for k in ti.static(range(parts.SETTLES)):
+                    gone[parts.count * k + which] *= left
                 m.out &= ~bit
             if ti.static(parts.HOLDS):
                 held[which] = 0.0

@@ -41,11 +41,13 @@ def make_contacts(parts: SimpleNamespace) -> Any:
             sine = low_sin * parts.TURN_COS[j] + low_cos * parts.TURN_SIN[j]
             h, d = parts.arms(cosine, sine, s.length, c.radius)
             depth = h - then.y
+            s.given_way = 0.0
+            for k in ti.static(range(parts.SETTLES)):
+                s.given_way += gone[parts.count * k + n] + dt * settling[parts.count * k + n]
+                spikes.settling[3 * k + j] = 0.0
             if ti.static(parts.SETTLES):  # the depth that the ground's law reads
-                s.given_way = gone[n] + dt * settling[n]
                 depth -= s.given_way
             spikes.depth[j] = depth
-            spikes.settling[j] = 0.0
             deepest = depth
             if ti.static(parts.MEMORY):
                 deepest = ti.max(top[n], depth)
@@ -60,9 +62,10 @@ def make_contacts(parts: SimpleNamespace) -> Any:
                     p, s, q, at, rate, slip, ti.max(deepest, at), ti.max(since, at)
                 )
                 into = rate
-                if ti.static(parts.SETTLES):
-                    spikes.settling[j] = parts.settle(p, s, at + s.given_way, slip, d / s.length)
-                    into -= spikes.settling[j]
+                for k in ti.static(range(parts.SETTLES)):
+                    own = gone[parts.count * k + n] + dt * settling[parts.count * k + n]
+                    spikes.settling[3 * k + j] = parts.settle[k](p, s, at + own, slip, d / s.length, own)
+                    into -= spikes.settling[3 * k + j]
                 if ti.static(parts.CARRIES):
                     if rate > 0.0:
                         more, slope = parts.added(p, at - c.crater * deepest)

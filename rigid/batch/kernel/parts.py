@@ -57,7 +57,7 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     inertia, applied, dry_friction = model.inertia, model.applied, model.dry_friction
     inner_start, inner, crater_of = model.inner_start, model.inner, model.crater
     contact, arms, divide_mass = model.contact, model.contact_arms, model.divide_mass
-    settle, settled, added = model.settle, model.settled, model.added
+    settle, settled, settled_share, added = model.settle, model.settled, model.settled_share, model.added
     plastic_share, wall_of = model.plastic_share, model.wall
     Motion, Tally, Numbers = (
         ti.types.struct(**dict.fromkeys(fields, ti.f64)) for fields in (_MOTION, _TALLY, _NUMBERS)
@@ -66,11 +66,12 @@ def make_parts(terms: tuple[Term, ...], ground: str, count: int) -> SimpleNamesp
     Forces = ti.types.struct(**dict.fromkeys(_FORCES, ti.f64), **pair)
     Modes = ti.types.struct(**dict.fromkeys(_MODES, ti.i32), slide=ti.types.vector(2, ti.i32))
     Event = ti.types.struct(ahead=ti.f64, kind=ti.i32, which=ti.i32)  # at this share of the step; 0: none (`events`)
-    Spikes = ti.types.struct(**dict.fromkeys(("h", "d", "depth", "settling"), ti.types.vector(3, ti.f64)))
     MEMORY = model.has_memory
     SHEDS = model.law.has_memory or model.has("crater", "unload")
     HOLDS = model.has("hold", "rate_pull")
     SETTLES = model.settles
+    three = dict.fromkeys(("h", "d", "depth"), ti.types.vector(3, ti.f64))
+    Spikes = ti.types.struct(**three, settling=ti.types.vector(3 * max(SETTLES, 1), ti.f64))  # spike by spike of a term
     CARRIES = model.has("added_mass")
     WALLS = model.has("wall")
     DRY = model.has("vertical_friction", "rotation_friction")

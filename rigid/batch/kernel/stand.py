@@ -33,7 +33,7 @@ def make_stand(parts: SimpleNamespace) -> Any:
                     low = middle
                 else:
                     high = middle
-            left = 1.0 - parts.settled(p, s)  # of the depth: the rest has given way
+            left = 1.0 - parts.settled_share(p, s)  # of the depth: the rest has given way
             y = (s.length - radius) * ti.cos(parts.HALF) + radius - high / left
             theta = 0.0
             depth = high / left

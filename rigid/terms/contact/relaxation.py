@@ -8,12 +8,12 @@ from rigid.terms.term import Parameter, Term
 SOON = 0.05  # [s]
 
 
-def creeping(s, depth, slip, lean, share, soon):
+def creeping(s, depth, slip, lean, gone, share, soon):
     """c z / tau exp(-e / (c z)): at a constant depth z the ground gives way by e = c z ln(1 + t / tau)."""
     speed = 0.0
     if share > 0.0:
         size = share * max(depth, 1e-12)
-        speed = size / soon * exp(-s.given_way / size)
+        speed = size / soon * exp(-gone / size)
     return speed
 
 

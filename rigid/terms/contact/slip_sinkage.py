@@ -6,9 +6,9 @@ from rigid.terms.term import Parameter, Term
 WAY = 0.018  # [m]: Janosi and Hanamoto's shear displacement of a lunar soil
 
 
-def slipping(s, depth, slip, lean, share, way, bias):
+def slipping(s, depth, slip, lean, gone, share, way, bias):
     """|u| max(q z - e, 0) / j: e has given way of the depth z; more or less by the side to which the spike leans."""
-    left = max(share * depth - s.given_way, 0.0)
+    left = max(share * depth - gone, 0.0)
     return max(abs(slip) - bias * lean * slip, 0.0) * left / way
 
 
@@ -27,8 +27,7 @@ TERM = Term(
            "J. Terramechanics 47:21, from memory; Ding et al. 2010, J. Cent. South Univ. Technol. 17:129, for lunar "
            "rovers); an exponential of the shear displacement, j = 18 mm of a lunar soil (Janosi and Hanamoto 1961)",
     limits="no heap and no furrow; what has given way never comes back; forgotten where the tip leaves the undisturbed "
-           "surface, unless craters have walls; together with relaxation each counts what the other has given way as "
-           "its own, so both act too little",
+           "surface, unless craters have walls",
     hooks={"settle": slipping},
 )  # fmt: skip
 

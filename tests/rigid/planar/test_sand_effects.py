@@ -1,6 +1,7 @@
 """Effects of sand against closed forms: ground that gives way, that is carried along, that keeps its craters."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -48,11 +49,10 @@ def test_a_tip_that_slides_under_a_load_sinks_to_its_depth_at_rest_over_one_less
 def test_a_tip_that_slides_ahead_of_its_shaft_sinks_more_than_one_that_trails():
     speed = EFFECTS["slip-sinkage"].hooks["settle"]
     s = System(in_rig()).s
-    ahead, behind = (speed(s, 0.01, 0.1, lean, 0.6, 0.018, 1.0) for lean in (-0.38, 0.38))
+    ahead, behind = (speed(s, 0.01, 0.1, lean, 0.0, 0.6, 0.018, 1.0) for lean in (-0.38, 0.38))
     assert ahead / behind == pytest.approx(1.38 / 0.62)
-    assert speed(s, 0.01, 0.1, 0.38, 0.6, 0.018, 0.0) == pytest.approx(0.1 * 0.6 * 0.01 / 0.018)
-    s.given_way = 0.006  # all that gives way
-    assert speed(s, 0.01, 0.1, 0.38, 0.6, 0.018, 0.0) == 0.0
+    assert speed(s, 0.01, 0.1, 0.38, 0.0, 0.6, 0.018, 0.0) == pytest.approx(0.1 * 0.6 * 0.01 / 0.018)
+    assert speed(s, 0.01, 0.1, 0.38, 0.006, 0.6, 0.018, 0.0) == 0.0  # all that gives way has
 
 
 def test_a_platform_that_stands_sinks_with_the_logarithm_of_time():
@@ -68,8 +68,8 @@ def test_a_platform_that_stands_sinks_with_the_logarithm_of_time():
     speed = EFFECTS["relaxation"].hooks["settle"]
     s = System(trial).s
     for t in (0.0, 0.1, 30.0):
-        s.given_way = c * 0.01 * math.log(1 + t / tau)
-        assert speed(s, 0.01, 0.0, 0.0, c, tau) == pytest.approx(c * 0.01 / (tau + t), rel=1e-12)
+        gone = c * 0.01 * math.log(1 + t / tau)
+        assert speed(s, 0.01, 0.0, 0.0, gone, c, tau) == pytest.approx(c * 0.01 / (tau + t), rel=1e-12)
 
 
 def test_a_platform_that_has_stood_for_long_starts_deeper_and_hardly_sinks():
@@ -81,6 +81,49 @@ def test_a_platform_that_has_stood_for_long_starts_deeper_and_hardly_sinks():
     assert 0 < run.y[0] - run.y[-1] < 1e-3 * 0.5 * trial.weight / trial.stiffness
     leaned = simulate(trial, duration=0.01, lean=0.2)
     assert LENGTH * math.cos(0.2 - G0) - leaned.y[0] == pytest.approx(trial.weight / trial.stiffness / left, rel=1e-9)
+
+
+def sliding_on_ground_that_also_relaxes(stood=0.0):
+    """A trial that slides at 10 mm/s on ground with slip-sinkage and relaxation, and its sinkage over time.
+
+    Each takes its share of the force that the other leaves. Under a constant load this force, and so z - e_s - e_r, is
+    constant: each then has its own closed form, and the sinkages add up. z_0 + e_r = z_0 / (1 - r) after a rest with
+    r = c ln(1 + T / tau).
+    """
+    q, j, c, tau = 0.4, 0.018, 0.03, 0.05
+    effects = (effect("slip-sinkage", share=q, way=j), effect("relaxation", share=c, soon=tau, stood=stood))
+    trial = in_rig(mu_s=0.0, effects=effects, **STILL)
+    rest = 0.5 * trial.weight / trial.stiffness
+    rested = c * math.log(1 + stood / tau)
+    start = rest * rested / (1 - rested)
+    crept = solve_ivp(lambda t, e: c * (rest + e) / tau * np.exp(-e / (c * (rest + e))), (0, 9), [start],
+                      rtol=1e-10, atol=1e-14, dense_output=True)  # fmt: skip
+
+    def sunk(t, x):
+        return rest + q * rest / (1 - q) * (1 - np.exp(-(1 - q) * np.asarray(x) / j)) + crept.sol(t)[0]
+
+    return trial, sunk
+
+
+@pytest.mark.parametrize("stood", [0.0, 60.0])
+def test_slip_sinkage_and_relaxation_at_once_add_up_under_a_constant_load(stood):
+    trial, sunk = sliding_on_ground_that_also_relaxes(stood)
+    rows, _ = moved(trial, 8.0, change={3: 0.01})
+    assert LENGTH * math.cos(G0) - rows[0][2] == pytest.approx(sunk(0.0, 0.0), rel=2e-3)  # with what it has stood
+    for t, x, y, *_ in rows[len(rows) // 3 :: len(rows) // 9]:
+        assert LENGTH * math.cos(G0) - y == pytest.approx(sunk(t, x), rel=5e-3)
+    assert sunk(8.0, 0.08) - sunk(8.0, 0.0) > 0.3 * sunk(0.0, 0.0)  # a slide sinks beside what relaxes
+
+
+def test_the_order_of_two_effects_that_give_way_does_not_matter():
+    trial, _ = sliding_on_ground_that_also_relaxes(60.0)
+    one, other = (System(replace(trial, effects=effects)) for effects in (trial.effects, trial.effects[::-1]))
+    assert one.settled_share == other.settled_share > 0
+    (z, modes), (z2, _) = standing(one), standing(other)
+    assert one.given_way(0, z) == other.given_way(0, z2) > 0
+    z[3] = z2[3] = 0.1
+    modes.slip = [1] * 8
+    assert one.derivative(0.0, z, modes)[:9] == pytest.approx(other.derivative(0.0, z2, modes)[:9], rel=1e-12)
 
 
 def test_ground_that_a_tip_carries_along_shares_its_momentum():
@@ -150,7 +193,10 @@ def on_sand(rng, ids):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("ids", [*((id,) for id in ON_SAND), tuple(ON_SAND)], ids="+".join)
+BOTH = ("slip-sinkage", "relaxation")
+
+
+@pytest.mark.parametrize("ids", [*((id,) for id in ON_SAND), BOTH, tuple(ON_SAND)], ids="+".join)
 @pytest.mark.long
 def test_on_sand_the_batch_keeps_its_published_tolerance(ids):
     rng = np.random.default_rng(5)

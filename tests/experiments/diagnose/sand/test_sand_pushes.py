@@ -19,7 +19,8 @@ from scipy.integrate import solve_ivp
 
 from experiments.campaign import Recording
 from experiments.diagnose.core.diagnosis import diagnose
-from experiments.diagnose.push.law import SLOTS, fall, given_way, push, slot_table
+from experiments.diagnose.fit.forms import load_own
+from experiments.diagnose.push.law import SLOTS, fall, given_way, push, slot_places, slot_table
 from experiments.diagnose.push.problem import make_problem
 
 C_RELAX, SOON, B = 0.04, 0.1, 8.0
@@ -46,10 +47,68 @@ def test_a_spike_that_is_held_loses_force_with_the_logarithm_of_time():
     coarse = push(numbers, *path_of(2), depth[:2], np.zeros(2), times=time[[0, -1]])[0]
     assert coarse[-1] == pytest.approx(force[-1], rel=1e-12)  # whatever the rows
     assert (push(numbers, *path_of(401), depth, np.zeros(401))[0] == STIFFNESS * 0.02).all()  # no time, no loss
-    gone = given_way(numbers[0], 0.0, 0.02, 20.0)
+    (gone,) = given_way(numbers[0], None, 0.02, 20.0)
     assert gone == pytest.approx(C_RELAX * 0.02 * math.log(201), rel=1e-12)
     numbers[0, SLOTS.index("given_way")] = gone  # as a ground that is stepped has it
     assert push(numbers, *path_of(2), depth[:2], np.zeros(2))[0, 1] == pytest.approx(force[-1], rel=1e-12)
+
+
+SLOWLY = '''
+from math import exp
+
+from rigid.terms.candidate import Candidate, Form, Push, amplitude
+from rigid.terms.term import Parameter, Term
+
+
+def flowing(gone, z, span, flow_rate):
+    """de/dt = r (z - e): the bed flows away as honey does."""
+    return z + (gone - z) * exp(-flow_rate * span)
+
+
+TERM = Term(id="flow", summary="the bed flows", acts="contact", source="a test", limits="none",
+            parameters=(Parameter("rate", "1/s", 0.0, "r", lowest=0.0),))
+CANDIDATE = Candidate(
+    meaning="the bed flows", confirm="hold it",
+    push=Push(law={"settle": flowing}, forms=(Form("flow", (amplitude("flow_rate", "plain", 0.1, 0.0, 9.0),), ()),)),
+)
+'''
+
+
+def test_two_effects_that_give_way_keep_a_state_each_on_pushes_and_drops(tmp_path):
+    (tmp_path / "flow.py").write_text(SLOWLY)
+    own = (load_own(tmp_path / "flow.py"),)
+    table = slot_table(1, own)
+    table[0, : len(SLOTS)] = lane(relax_share=C_RELAX, relax_soon=SOON, damping=DAMPING)[0]
+    table[0, slot_places(own)["flow_rate"]] = rate = 0.3
+
+    def rates(z, e):
+        flown, crept = e  # each gives way by its share of what the other leaves
+        size = C_RELAX * np.maximum(z - flown, 1e-12)
+        return [rate * (z - crept - flown), size / SOON * np.exp(-crept / size)]
+
+    time, depth = np.linspace(0, 8, 2001), np.full(2001, 0.02)
+    force = push(table, *path_of(2001), depth, np.zeros(2001), own, time)[0]
+    exact = solve_ivp(lambda t, e: rates(0.02, e), (0, 8), [0.0, 0.0], t_eval=time, rtol=1e-10, atol=1e-14)
+    left = 0.02 - exact.y.sum(axis=0)
+    assert force == pytest.approx(STIFFNESS * left, rel=2e-4)
+    assert left[-1] < 0.8 * min(0.02 - exact.y[0, -1], 0.02 - exact.y[1, -1])  # both act
+    gone = None
+    for _ in range(2000):  # as a ground that is stepped has it, bit by bit
+        gone = given_way(table[0], gone, 0.02, 8 / 2000, own)
+    assert gone.shape == (2,)
+    assert STIFFNESS * (0.02 - gone.sum()) == pytest.approx(force[-1], rel=1e-12)
+
+    time = np.linspace(0, 0.15, 151)
+    found = fall(table, *path_of(151), time, np.array([0.5]), own)[0]
+
+    def falling(t, y):
+        z, v = y[:2]
+        bed = max(STIFFNESS * (z - y[2] - y[3]), 0.0) + DAMPING * max(v, 0.0) if z > 0 else 0.0
+        return [v, GRAVITY - bed / MASS, *(rates(z, y[2:]) if z > 0 else (0.0, 0.0))]
+
+    exact = solve_ivp(falling, (0, 0.15), [0.0, 0.5, 0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12, max_step=1e-4)
+    inside = exact.y[0] > 1e-3
+    assert found[inside, 0] == pytest.approx(exact.y[0][inside], abs=2e-7)
 
 
 def test_a_drop_into_a_bed_that_relaxes_is_that_of_its_equations():
