@@ -9,7 +9,7 @@ WORKERS ?= 2
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test fast long slow fuzz torture tiers cover validate experiments bench gpu doctor format clean distclean
+.PHONY: help run test fast long slow fuzz torture tiers cover docs validate experiments bench gpu doctor format clean distclean
 
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
@@ -47,6 +47,10 @@ tiers: $(VENV)/.installed-test  ## measure again which files of tests `make fast
 
 cover: $(VENV)/.installed-test  ## the tests of `make test`, counting the lines they reach: several times as long
 	$(PYTEST) --cov --cov-report=term $(ARGS)
+
+docs: $(VENV)/.installed-docs  ## the documentation as a site in build/site; a broken link fails
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet $(ARGS)
+	@echo "wrote build/site/index.html"
 
 validate: $(VENV)/.installed  ## the bed against closed forms, published figures and other codes; writes docs/validation.md
 	$(BIN)/hedgebed validate $(ARGS)
@@ -114,6 +118,12 @@ $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[quadrants]'
 	$(WITH_X11)
 	@touch $@
+
+$(VENV)/.installed-docs: pyproject.toml | $(VENV)/bin/python
+	@echo "installing hedgebed, what it needs and what makes its site into $(VENV) (the first time about 1.4 GB)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[quadrants,docs]'
+	$(WITH_X11)
+	@touch $(VENV)/.installed $@
 
 $(VENV)/.installed-test: pyproject.toml | $(VENV)/bin/python
 	@echo "installing hedgebed, what it needs and what tests it into $(VENV) (the first time about 1.4 GB)"

@@ -411,6 +411,13 @@ def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any
     Options: hold [s] (0.02), retreat (True), retreat_speed [m/s] (as speed), substeps of the ground in a macro step
     (10), start_depth [m, negative] (just clear of the grains), and `on_step`, `on_frame`, `frame_interval`, `progress`
     of `Stepper.follow`. Raises ValueError, naming key and value, for what cannot be; and what the ground raises.
+
+    On the spring-damper, the force is K z + C v while the spike goes in:
+
+    >>> from rigid import SpringDamper
+    >>> run = drive(Spike(), into=SpringDamper(stiffness=1875, damping=7.5), speed=0.1, depth=0.01)
+    >>> print(f"{run.force.max():.1f} N at most; {1e3 * run.work_in:.1f} mJ in, {1e3 * run.work_out:.1f} mJ recovered")
+    19.4 N at most; 101.3 mJ in, 93.8 mJ recovered
     """
     return _done(Drive, spike, into, speed=speed, depth=depth, **options)
 
@@ -420,6 +427,11 @@ def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetratio
 
     Options: mass [kg] (the spike's), load [N] (mass * gravity), gravity [m/s2] (9.80665), rest_time [s],
     rest_tolerance [1], max_depth [m], max_time [s], and those of `drive` that are not about the way out.
+
+    >>> from rigid import SpringDamper
+    >>> run = drop(Spike(mass=0.5), into=SpringDamper(stiffness=1875, damping=7.5), speed=0.1)
+    >>> print(f"{1e3 * run.depth.max():.1f} mm at the deepest, {1e3 * run.depth[-1]:.1f} mm at rest")
+    4.7 mm at the deepest, 2.6 mm at rest
     """
     return _done(Drop, spike, into, speed=speed, **options)
 
@@ -428,6 +440,11 @@ def set_down(spike: Spike, *, onto: Any, load: float, **options: Any) -> Penetra
     """Place `spike` `onto` a ground (or a bed) under `load` [N], slowed by a drag, to the resting sinkage.
 
     Options: lowering_speed [m/s] (0.03), mass [kg] that counts during placement, and those of `drop`.
+
+    >>> from rigid import SpringDamper
+    >>> run = set_down(Spike(), onto=SpringDamper(stiffness=1875, damping=7.5), load=0.5)
+    >>> print(f"{1e3 * run.depth[-1]:.2f} mm")  # load / K = 0.27 mm
+    0.27 mm
     """
     return _done(SetDown, spike, onto, load=load, **options)
 

@@ -257,7 +257,11 @@ class _Contact:
 
 
 def escape_speed(gravity: float, radius: float) -> float:
-    """sqrt(2 g R) [m/s] at the surface of a round body."""
+    """sqrt(2 g R) [m/s] at the surface of a round body.
+
+    >>> print(f"{escape_speed(gravity=1e-3, radius=300):.3f} m/s")
+    0.775 m/s
+    """
     return math.sqrt(2 * gravity * radius)
 
 
@@ -267,6 +271,10 @@ def flight(speed: float, angle: float, *, gravity: float, radius: float | None =
     On a flat ground v^2 sin(2 angle) / g. On a body of `radius` R [m], with q = v^2 / (g R), it lands at the angle
     2 atan2(q sin cos, 1 - q cos^2) around the body, after Kepler's time; from q = 2 on it escapes. Raises ValueError
     for a gravity or radius of 0 or less, or an angle not between 0 and pi.
+
+    >>> hop = flight(0.07, math.radians(45), gravity=1e-3)
+    >>> print(f"{hop.distance:.2f} m in {hop.time:.0f} s")
+    4.90 m in 99 s
     """
     _check_ballistics(gravity, radius)
     if not 0 <= angle <= math.pi:
@@ -294,6 +302,9 @@ def launch_speed_for(distance: float, angle: float, *, gravity: float, radius: f
 
     On a round body q = tan(f / 2) / (sin cos + cos^2 tan(f / 2)), f = distance / R. Raises ValueError where the body is
     escaped first, and for a distance of 0 or less.
+
+    >>> print(f"{launch_speed_for(5, math.radians(45), gravity=1e-3):.4f} m/s")
+    0.0707 m/s
     """
     _check_ballistics(gravity, radius)
     check_above_zero("m", distance=distance)

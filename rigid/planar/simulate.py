@@ -50,6 +50,13 @@ def simulate(
 
     Raises ValueError: a number that cannot be, named; a platform that cannot stand; a time step too long for the
     ground. RuntimeError: the motion is no longer finite.
+
+    >>> trial = Trial(gravity_sim=0.0834, counterweight=5.21, torque=0.22, stiffness=7500, damping=30)
+    >>> run = simulate(trial, duration=1)
+    >>> [state for time, state, angle in run.transitions]
+    ['slip', 'hop']
+    >>> print(f"{math.degrees(run.trajectory_angle):.1f} degrees at lift-off")
+    38.8 degrees at lift-off
     """
     if method not in get_args(Method):
         raise ValueError(f"method = {method!r} must be one of {', '.join(get_args(Method))}")

@@ -107,7 +107,11 @@ def platform_names() -> list[str]:
 
 
 def find_platform(name: str | Path) -> Platform:
-    """The platform in the TOML file `name`, or the one of that name that ships. Raises as `read_platform`."""
+    """The platform in the TOML file `name`, or the one of that name that ships. Raises as `read_platform`.
+
+    >>> find_platform("hedgehog").mass
+    5.3
+    """
     path = Path(name)
     if path.suffix == ".toml":
         return read_platform(path)

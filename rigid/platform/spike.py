@@ -41,6 +41,10 @@ class Spike:
     """A spike of the platform, or a penetrometer: geometry, mass and surface.
 
     Raises ValueError, naming the parameter, its value and what is allowed, for a body that cannot be.
+
+    >>> spike = Spike(tip="cone", diameter=0.012, cone_angle=60)
+    >>> [(section.shape, round(1e3 * section.top, 1)) for section in spike.sections]
+    [('cone', 10.4), ('cylinder', 60.0)]
     """
 
     tip: Tip = "sphere"  # Shape of the end: "sphere", "cone" or "flat"
