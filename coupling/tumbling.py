@@ -25,7 +25,7 @@ from .platform_run import REST_TIME, PlatformRun
 from .poses import Twist, Vector, Wrench
 from .stepper import Reporting
 
-__all__ = ["MOST_REVERSAL", "CoupledTumble"]
+__all__ = ["MOST_REVERSAL", "CoupledTumble", "level_of", "sinkage_under"]
 
 MOST_REVERSAL = 1e-3
 """A larger `CoupledTumble.dissipation_reversal` is worth a warning [1]: a lossless collision leaves 3e-4 to 7e-4 of its
@@ -76,12 +76,10 @@ class CoupledTumble(PlatformRun):
         **options: Any,
     ) -> None:
         self.tip_radius = tip_radius
-        half = math.pi / trial.spike_count
-        self.level = (trial.spike_length - tip_radius) * math.cos(half) + tip_radius
-        """Height of the centre with the lowest tips at the surface [m]."""
+        self.level = level_of(trial, tip_radius)
         start = self.level if height is None else float(height)
         if height is None and isinstance(ground, LawGround):
-            start -= _sinkage(ground, 0.5 * trial.weight)
+            start -= sinkage_under(ground, 0.5 * trial.weight)
         rests = lowering_speed is None and height is None
         carried = Wrench(np.array([0.0, 0.0, trial.weight if rests else 0.0]), np.zeros(3))
         super().__init__(
@@ -250,8 +248,16 @@ class CoupledTumble(PlatformRun):
         super().restore(state)
 
 
-def _sinkage(ground: LawGround, load: float) -> float:
-    """Depth at which the first row's law carries `load` [N] at rest [m], by bisection."""
+def level_of(trial: Trial, tip_radius: float = 0.0) -> float:
+    """Height of the centre with the lowest two rows at the surface [m]; `tip_radius` of the balls at their ends [m]."""
+    return (trial.spike_length - tip_radius) * math.cos(math.pi / trial.spike_count) + tip_radius
+
+
+def sinkage_under(ground: LawGround, load: float) -> float:
+    """Depth at which the first row's law carries `load` [N] at rest [m], by bisection.
+
+    Raises ValueError where it does not down to 1 m.
+    """
     law, low, high = ground.grounds[0], 0.0, 1e-6
     while float(law.force(high, 0.0)) < load:
         low, high = high, 2 * high

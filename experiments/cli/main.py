@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from cyclopts import App, CycloptsError, Group, Parameter
 
 from experiments.cli.benching import spelled_out
-from experiments.cli.options import as_typed, option_of, reserved_option
+from experiments.cli.options import as_typed, option_of, reserved_option, with_parameters
 from experiments.cli.runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, redraw_old_report, show_folder
 from experiments.runs import registry
 from experiments.runs.folder import RunFolder, fresh_path, write_json
@@ -149,7 +149,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     parameters += [*flags, *map(reserved_option, ("out", "json", "quiet"))]
     parameters += [reserved_option("verbose")] if experiment.headline else []
     command.__name__ = experiment.name.replace(" ", "_")
-    return _with_parameters(command, parameters)
+    return with_parameters(command, parameters)
 
 
 def _damage(run: RunFolder) -> str:
@@ -293,14 +293,7 @@ def _campaign_from_run() -> Callable[..., int]:
     hints = {name: Annotated[Path, Parameter(help=text, negative="")] for name, text in places.items()}
     kind = inspect.Parameter.POSITIONAL_ONLY
     parameters = [inspect.Parameter(name, kind, annotation=hint) for name, hint in hints.items()]
-    return _with_parameters(command, [*parameters, *(option_of(name, field) for name, field in fields.items())])
-
-
-def _with_parameters(command: Callable[..., int], parameters: list[inspect.Parameter]) -> Callable[..., int]:
-    """`command`, which takes ``**given``, as a function with these parameters."""
-    command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
-    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return command
+    return with_parameters(command, [*parameters, *(option_of(name, field) for name, field in fields.items())])
 
 
 def _effects(
@@ -363,9 +356,12 @@ def build_app() -> App:
         )
     app.command(_resume, name="resume", group=GROUPS["keep"])
     if "tumble" in registry.EXPERIMENTS:
+        from experiments.cli.fmu import fmu_command
         from experiments.cli.render import render
         from experiments.cli.view import view
 
+        about = "Write platform, rig and ground as an FMU (FMI 3, co-simulation) for another simulation program."
+        app.command(fmu_command(), name="fmu", help=about, group=GROUPS["simulate"])
         app.command(render, name="render", group=GROUPS["keep"])
         app.command(view, name="view", group=GROUPS["keep"])
         from experiments.suite.commands import add_suite_commands

@@ -13,7 +13,7 @@ from pydantic_core import PydanticUndefined
 from experiments.runs.strict import may_be_empty, plain_kinds
 from experiments.runs.units import find_unit, has_unit
 
-__all__ = ["as_typed", "option_of", "reserved_option"]
+__all__ = ["as_typed", "option_of", "reserved_option", "with_parameters"]
 
 _RESERVED = {
     "case": (Path | None, None, "TOML file of settings, or the name of a case that ships; options override it."),
@@ -105,3 +105,10 @@ def reserved_option(name: str) -> inspect.Parameter:
     kind = inspect.Parameter.POSITIONAL_ONLY if name == "case" else inspect.Parameter.KEYWORD_ONLY
     annotation = Annotated[hint, Parameter(help=text, negative="", show_default=False)]  # type: ignore[valid-type]
     return inspect.Parameter(name, kind, default=default, annotation=annotation)
+
+
+def with_parameters(command: Callable[..., int], parameters: list[inspect.Parameter]) -> Callable[..., int]:
+    """`command`, which takes ``**given``, as a function with these parameters."""
+    command.__signature__ = inspect.Signature(parameters, return_annotation=int)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return command
