@@ -1,0 +1,80 @@
+"""What a user of pip gets: the wheel, made from the sdist, works without the checkout."""
+
+import os
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+from import_graph import ROOT
+
+pytestmark = pytest.mark.long
+TOP = {"dem", "rigid", "coupling", "experiments", "vis", "hedgebed.py", "hedgebed_renamed.py", "hedgebed_taichi.py"}
+BUILD = "import sys; from setuptools import build_meta as b; getattr(b, sys.argv[1])(sys.argv[2])"
+COMMANDS = """
+import sys
+from pathlib import Path
+import hedgebed
+from experiments.cli.main import main
+
+assert Path(hedgebed.__file__).is_relative_to(sys.argv[1]), hedgebed.__file__
+for command in (
+    "penetrate --tip-diameter 0.012 --grain 0.004 --allow-coarse --bed-size 0.048 0.048 0.03 --depth 0.004 --seeds 1"
+    " --speeds 0.4 --drop-speeds 0.2 --frame-count 0 --threads 1 --max-overlap 0.1 --out runs/bed",
+    "tumble --out runs/tumble",
+    "hop --out runs/hop",
+    "campaign new mine --kind penetration",
+    "diagnose mine --out runs/diagnosis",
+    "view runs/tumble --no-open",
+    "experiments list",
+    "effects",
+):
+    code = main([*command.split()])
+    assert code == 0, (command, code)
+"""
+
+
+def run(*words: str, cwd: Path, **environment: str) -> str:
+    """Stdout of a command; fails with its stderr."""
+    done = subprocess.run(
+        words, cwd=cwd, env=os.environ | environment, capture_output=True, text=True, timeout=600, check=False
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel, built from the unpacked sdist, and the sdist from what git would ship."""
+    folder = tmp_path_factory.mktemp("wheel")
+    files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    source = folder / "source"
+    for name in files.split("\0"):
+        if (ROOT / name).is_file() and not name.startswith(("docs/", "tests/", "benchmarks/")):
+            (source / name).parent.mkdir(parents=True, exist_ok=True)
+            (source / name).write_bytes((ROOT / name).read_bytes())
+    run(sys.executable, "-c", BUILD, "build_sdist", str(folder), cwd=source)
+    with tarfile.open(next(folder.glob("*.tar.gz"))) as archive:
+        archive.extractall(folder, filter="data")
+    unpacked = next(path for path in folder.glob("hedgebed-*") if path.is_dir())
+    run(sys.executable, "-c", BUILD, "build_wheel", str(folder), cwd=unpacked)
+    return next(folder.glob("*.whl"))
+
+
+def test_the_wheel_has_every_data_file_and_only_the_documented_top_level_names(wheel):
+    inside = set(zipfile.ZipFile(wheel).namelist())
+    assert {name.split("/")[0] for name in inside if ".dist-info" not in name} == TOP
+    tracked = subprocess.run(["git", "ls-files", *TOP], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert set(tracked.split()) - inside == set()
+    page = (ROOT / "docs/install.md").read_text(encoding="utf-8")
+    assert [name for name in TOP if f"`{name.removesuffix('.py')}`" not in page] == []
+
+
+def test_the_commands_work_from_the_wheel_in_another_folder(wheel, tmp_path):
+    site = tmp_path / "site"
+    run(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", str(site), str(wheel), cwd=tmp_path)
+    out = run(sys.executable, "-c", COMMANDS, str(site), cwd=tmp_path, PYTHONPATH=str(site))
+    assert {path.parent.name for path in tmp_path.glob("runs/*/report.html")} >= {"bed", "tumble", "hop", "diagnosis"}
+    assert "stiffness" in out
