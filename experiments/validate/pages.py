@@ -58,8 +58,8 @@ def _page(result: Mapping[str, Any], command: str, details: str) -> Iterator[str
     numbers = [one for row in ran for one in row["comparisons"]]
     yield from ("# Verification of the bed", "")
     yield "This page compares the bed of grains with closed forms, published results, other codes and measurements."
-    yield f"It is for readers who want to know how far they can trust the bed. [{details}]({details}) has all numbers,"
-    yield "formulas and remarks of each case. The page is made by code; do not edit it."
+    yield f"It shows how far the bed can be trusted. [{details}]({details}) has all numbers, formulas and remarks."
+    yield "The page is made by code; do not edit it."
     yield ""
     met = sum(one["passes"] for one in numbers)
     yield f"**{result['title'].partition(': ')[2].capitalize()}.** {met} of {len(numbers)} numbers are in their bands."
@@ -68,16 +68,15 @@ def _page(result: Mapping[str, Any], command: str, details: str) -> Iterator[str
         yield "Cases that were computed alone have a date and a code of their own in the details."
     yield ""
     yield "- The **band** is the largest difference that passes. Some bands are published; the others are ours."
-    yield "- A row of a case shows the number that takes the largest share of its band."
-    yield "- A case that fails stays in the table, with the reason as far as it is known."
+    yield "- A row of a case shows the number that takes the largest share of its band, in the unit of the case or in %."
     yield from ("", "| group | cases | pass | numbers in their bands |", "|---|---|---|---|")
     for family, rows in groupby(cases, key=lambda row: row["family"]):
         yield _family(family, list(rows))
     yield from _failing(cases, details)
     for family, rows in groupby(cases, key=lambda row: row["family"]):
         yield from ("", f"## {family}", "")
-        yield "| case | compared with | expected | bed | difference | band | |"
-        yield "|---|---|---|---|---|---|---|"
+        yield "| case | compared with | difference | band | |"
+        yield "|---|---|---|---|---|"
         for row in rows:
             yield _overview(row, details)
 
@@ -90,7 +89,7 @@ def _family(name: str, rows: Sequence[Json]) -> str:
 
 
 def _overview(row: Mapping[str, Any], details: str) -> str:
-    cells = _cells(row["worst"]) if row.get("worst") else "– | – | – | –"
+    cells = " | ".join(_error(row["worst"], units=True)) if row.get("worst") else "– | –"
     why = "" if row.get("worst") else row.get("waits_for") or row.get("skipped") or ""
     mark = ": ".join(filter(None, (_MARKS.get(row["status"], row["status"]), why)))
     name = f"[{row['id']}]({details}#{row['id']})" if row["status"] in RAN else row["id"]
@@ -110,15 +109,23 @@ def _failing(cases: Sequence[Json], details: str) -> Iterator[str]:
 
 
 def _cells(row: Mapping[str, Any]) -> str:
-    """Expected, found, difference and band: in per cent of the reference, or in the unit."""
-    unit = "" if row["unit"] == "1" else f" {row['unit']}"
-    scale, sign = (100, " %") if row["relative"] else (1, "")
-    wanted, ours = ("–" if row[key] is None else f"{row[key]:.5g}{unit}" for key in ("reference", "ours"))
+    """Expected, found, difference and band."""
+    wanted, ours = ("–" if row[key] is None else f"{row[key]:.5g}{_unit(row)}" for key in ("reference", "ours"))
+    return " | ".join((wanted, ours, *_error(row)))
+
+
+def _unit(row: Mapping[str, Any]) -> str:
+    return "" if row["unit"] == "1" else f" {row['unit']}"
+
+
+def _error(row: Mapping[str, Any], *, units: bool = False) -> tuple[str, str]:
+    """Difference and band: in per cent of the reference, or in the unit, which is written where `units` is true."""
+    scale, sign = (100, " %") if row["relative"] else (1, _unit(row) if units else "")
     difference, band = "not a number", f"±{scale * row['band']:.2g}{sign}"
     if row["difference"] is not None:
         size = abs(row["reference"]) if row["relative"] else 1
         difference = f"{scale * row['difference'] / size:+.2g}{sign}"
-    return f"{wanted} | {ours} | {difference} | {band}"
+    return difference, band
 
 
 def _notes(result: Mapping[str, Any], page: str) -> Iterator[str]:
