@@ -68,7 +68,7 @@ def _page(result: Mapping[str, Any], command: str, details: str) -> Iterator[str
         yield "Cases that were computed alone have a date and a code of their own in the details."
     yield ""
     yield "- The **band** is the largest difference that passes. Some bands are published; the others are ours."
-    yield "- A row of a case shows the number that takes the largest share of its band, in the unit of the case or in %."
+    yield "- A row of a case shows the number that takes the largest share of its band, in its unit or in %."
     yield from ("", "| group | cases | pass | numbers in their bands |", "|---|---|---|---|")
     for family, rows in groupby(cases, key=lambda row: row["family"]):
         yield _family(family, list(rows))
