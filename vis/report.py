@@ -26,6 +26,7 @@ _REPORTS = {
     "bed test shear": ("vis.bed.tests", "write_shear_report"),
     "bed test repose": ("vis.bed.tests", "write_test_report"),
     "bed test cone": ("vis.bed.tests", "write_test_report"),
+    "bed test plates": ("vis.bed.tests", "write_test_report"),
     "bed test cut": ("vis.bed.tests", "write_test_report"),
     "bed calibrate": ("vis.bed.calibrate", "write_calibration_report"),
     "calibrate": ("vis.penetrate.lawfit", "write_lawfit_report"),

@@ -1,8 +1,8 @@
-"""Beds prepared as in a laboratory, and tests of their strength: shear, repose, cone, vertical cut.
+"""Beds prepared as in a laboratory, and tests of their strength: shear, repose, cone, cut, plates.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed bed make`; calling one imports what computes.
 
-Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `vis`.
+Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `rigid.ground`, `vis`.
 """
 
 from experiments.runs.registry import face

@@ -1,6 +1,7 @@
-"""Settings of `hedgebed bed test repose`, `cone`, `cut` and `shear`."""
+"""Settings of `hedgebed bed test repose`, `cone`, `cut`, `plates` and `shear`."""
 
-from typing import Self
+from pathlib import Path
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -9,8 +10,13 @@ from experiments.runs.strict import Positive, StrictSettings, Threads
 
 from .settings import say
 
-__all__ = ["BedConeSettings", "BedCutSettings", "BedReposeSettings", "BedShearSettings", "BedTestSettings"]
+__all__ = [
+    "BedConeSettings", "BedCutSettings", "BedPlatesSettings", "BedReposeSettings", "BedShearSettings",
+    "BedTestSettings",
+]  # fmt: skip
 
+SHAPES = ("ball", "cone", "cylinder")
+"""Bodies of `bed test plates` that need no file."""
 _OF_BED = ("material", "size", "grain", "spread", "packing", "gravity", "seeds")
 
 
@@ -66,6 +72,51 @@ class BedConeSettings(BedTestSettings):
     max_overlap: float | None = Field(None, ge=0.01, le=0.15)
     """Largest overlap of grains under the cone [of a diameter]; the bound of the bed if not given."""
     pushes: int = Field(2, ge=1, le=20, description="Pushes into each bed, each into a new copy at another place.")
+
+
+class BedPlatesSettings(BedTestSettings):
+    """Plates at several angles and directions of motion: the table of 3D-RFT of the bed, checked with other bodies."""
+
+    size: BedSize = (0.064, 0.064, 0.052)
+    side: Positive = Field(0.024, description="Side of the square plates [m].")
+    thickness: Positive = Field(0.003, description="Thickness of the plates [m].")
+    betas: tuple[Annotated[float, Field(gt=-90, lt=180)], ...] = Field((0.0, 30.0, 60.0, 90.0, 120.0), min_length=1)
+    """Angles of the plates [degrees]. 0: the plate faces down; 90: it faces forward."""
+    gammas: tuple[Annotated[float, Field(ge=0, le=90)], ...] = Field((90.0, 45.0, 0.0), min_length=1)
+    """Directions of motion, below the horizontal [degrees]. 90: straight down; 0: level; none between 0 and 20."""
+    depth: Positive = Field(0.02, description="Depth of the middle of a plate, and of the foot of a shape [m].")
+    shallow: float = Field(0.4, ge=0, lt=1)
+    """Plates that go down count from this share of the depth on [1]."""
+    travel: Positive = Field(0.018, description="Way of a body that is dragged level [m]; its second half counts.")
+    speed: Positive | None = Field(None, description="Speed [m/s]; that of the inertial number if not given.")
+    inertial_number: float = Field(0.1, gt=0, le=0.2)
+    """Inertial number, speed / side x d sqrt(density / pressure), of the bed at half a side's depth [1]."""
+    shapes: tuple[Annotated[str, Field(min_length=1)], ...] = ("ball", "cone")
+    """Bodies that the table has not seen, pushed into the same beds: ball, cone, cylinder, or files of closed surfaces
+    (STL, OBJ)."""
+    shape_size: Positive = Field(0.024, description="Diameter of a ball, cone or cylinder [m].")
+    shape_scale: Positive = Field(1.0, description="Unit of the files [m]: 0.001 for millimetres.")
+    shape_gammas: tuple[Annotated[float, Field(ge=0, le=90)], ...] = (90.0, 45.0)
+    """Directions of motion of these bodies [degrees]."""
+    friction: float | None = Field(None, ge=0, le=10)
+    """Friction coefficient between grains and bodies [1]; that of the grains if not given."""
+    max_overlap: float = Field(0.15, ge=0.01, le=0.2)
+    """Largest overlap of grains at a body [of a diameter]."""
+
+    @model_validator(mode="after")
+    def _can_be_pushed(self) -> Self:
+        for key in ("gammas", "shape_gammas"):
+            if flat := [gamma for gamma in getattr(self, key) if 0 < gamma < 20]:
+                raise ValueError(say("flat_gamma", key=key, gamma=flat[0]))
+        for key in ("betas", "gammas", "shape_gammas", "shapes"):
+            if len(set(getattr(self, key))) < len(getattr(self, key)):
+                raise ValueError(f"{key} holds a value twice: each once would do")
+        for shape in self.shapes:
+            if shape not in SHAPES and not Path(shape).is_file():
+                raise ValueError(say("no_shape", shape=shape, known=", ".join(SHAPES)))
+        if self.thickness > 0.5 * self.side:
+            raise ValueError(say("thick_plate", s=self))
+        return self
 
 
 class BedCutSettings(BedTestSettings):

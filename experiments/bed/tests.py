@@ -19,7 +19,7 @@ from dem.prepare.prepare import bound_of_mean, check_options
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.kept_material import keep_material
 from experiments.penetrate.fit import spread
-from experiments.runs.folder import RunFolder
+from experiments.runs.folder import RunFolder, write_text
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
@@ -129,10 +129,11 @@ def bed_test(
 ) -> tuple[Callable[..., Result], Callable[..., Result]]:
     """`run` and `resume` of a test of beds: every bed is tested, unless a stopped run has; then result and report.
 
-    `test` takes a bed, what is known of it, the number of the copy, and a function for the share done; `result` makes
-    title, quantities, tables and warnings of all runs. `copies`: tests of each bed, each of a fresh copy. `bearing`:
-    pressure of the test over what lies on the floor [1], for which the grains of prepared beds are made stiff enough;
-    None: stiff enough for a tip in half the bed's depth, as ``Bed.prepare`` has it.
+    `test` takes a bed, what is known of it, the number of the copy, and a function for the share done. `result` makes
+    title, quantities, tables and warnings of all runs, and `files` for the folder (name -> text). `copies`: tests of
+    each bed, each of a fresh copy. `bearing`: pressure of the test over what lies on the floor [1], for which the
+    grains of prepared beds are made stiff enough; None: stiff enough for a tip in half the bed's depth, as
+    ``Bed.prepare`` has it.
     """
 
     def compute(settings: Settings, folder: RunFolder, progress: Progress) -> Result:
@@ -154,6 +155,8 @@ def bed_test(
                     bed = None  # its engine serves the next
                 runs.append(folder.done_data(which))
         entries: Json = {"warnings": []} | result(settings, runs)
+        for file, text in entries.pop("files", {}).items():
+            write_text(folder.path / file, text)
         own = [*entries.pop("warnings"), *dict.fromkeys(w for run in runs for w in run["warnings"])]
         return Result.make(command, **entries, warnings=own, runs=runs)
 

@@ -8,7 +8,8 @@ then does the same hop from ground that gives (`experiments.hop.on_surface`): bo
 import math
 from dataclasses import asdict
 
-from experiments.platform.ground_file import range_warnings, with_kept_ground
+from experiments.platform.ground_file import law_warnings, range_warnings, with_kept_ground
+from experiments.platform.law_spread import Answer, spread_of_law, with_spread
 from experiments.platform.numbers import keep_platform
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
@@ -16,16 +17,23 @@ from experiments.runs.result import Result, quantities_of, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.tumble.result import trajectory_columns
+from rigid.ground_file import GroundFile
 from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch_speed_for, least_viable_angle
 from rigid.model.trial import Trial
 from rigid.planar.simulate import simulate
 
-from .numbers import HopPlan
+from .numbers import HopPlan, plan_on
 from .on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial, wheel_speed_on_surface
 from .search import Hop, find_hop, longest_flight
 from .settings import HopSettings, say
 
 __all__ = ["NEAR_ESCAPE", "check", "resume", "run"]
+
+OF_THE_LAW = (
+    "model_wheel_speed", "model_launch_speed", "model_launch_angle", "model_flight_time", "model_peak_height",
+    "model_distance", "speed_factor", "distance_factor", "model_escape_ratio",
+)  # fmt: skip
+"""Quantities that depend on the law of the ground."""
 
 
 def check(settings: HopSettings) -> None:
@@ -42,17 +50,39 @@ def _compute(settings: HopSettings, folder: RunFolder, progress: Progress) -> Re
     for sentence in plan.sentences():
         progress.message(sentence)
     progress.stage("hop", total=1.0)
-    given, sought, trial = None, None, _trial(settings, plan, hop)
-    if trial is not None:  # the same hop by the planar model, and the braked wheel's speed for the distance there
-        longest, radius = longest_flight(plan, hop.launch), settings.body_radius
-        given = hop_on_surface(trial, expected_time=hop.launch.time, longest=longest, radius=radius)
-        if settings.actuator == "brake" and plan.distance is not None:
-            sought = wheel_speed_on_surface(
-                trial, given, distance=plan.distance, max_speed=plan.wheel.max_speed, longest=longest, radius=radius
-            )
+    given, sought = _on_given_ground(settings, plan, hop)
     progress.update(1.0)
     _write_series(settings, folder, hop, given)
     return _result(settings, plan, hop, given, sought)
+
+
+def _on_given_ground(settings: HopSettings, plan: HopPlan, hop: Hop) -> tuple[SurfaceHop | None, float | None]:
+    """The same hop by the planar model, and the speed of a braked wheel for the distance there [rad/s]."""
+    trial = _trial(settings, plan, hop)
+    if trial is None:
+        return None, None
+    longest, radius = longest_flight(plan, hop.launch), settings.body_radius
+    given = hop_on_surface(trial, expected_time=hop.launch.time, longest=longest, radius=radius)
+    if settings.actuator != "brake" or plan.distance is None:
+        return given, None
+    return given, wheel_speed_on_surface(
+        trial, given, distance=plan.distance, max_speed=plan.wheel.max_speed, longest=longest, radius=radius
+    )
+
+
+def _with_the_law_s(settings: HopSettings, plan: HopPlan, hop: Hop, best: dict[str, Json]) -> dict[str, Json]:
+    """The quantities `best`, with the standard deviation that follows from that of the ground file's parameters."""
+    assert plan.fitted is not None
+    escape = best["escape_speed"]["value"]
+
+    def answer(fitted: GroundFile) -> Answer:
+        other = plan_on(plan, fitted)
+        given, sought = _on_given_ground(settings, other, hop)
+        found = _model_quantities(other, hop, given, escape)
+        return {name: entry["value"] for name, entry in found.items()} | {"model_wheel_speed": sought}
+
+    of_the_law = {name: entry["value"] for name, entry in best.items() if name in OF_THE_LAW}
+    return with_spread(best, spread_of_law(plan.fitted, answer, of_the_law))
 
 
 def _trial(settings: HopSettings, plan: HopPlan, hop: Hop) -> Trial | None:
@@ -106,6 +136,8 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "escape_speed": quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
         "escape_ratio": quantity(left.speed / escape if escape else None, "1", say("of_escape")),
     } | _model_quantities(plan, hop, given, escape)
+    if plan.fitted is not None and given is not None:
+        quantities = _with_the_law_s(settings, plan, hop, quantities)
     said = _sentences(plan, hop, given, speed=speed, by_brake=by_brake, sought=sought)
     asked = {"distance": f"of {plan.distance or 0:g} m", "wheel_speed": f"from {settings.wheel_speed_0 or 0:g} rad/s"}
     asked["torque"] = f"by {settings.torque or 0:g} N m"
@@ -208,7 +240,7 @@ def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float |
     found, left, flown = [], hop.launch, hop.flight
     if given is not None:
         of_grains = {"gravity": plan.tumbler.gravity, "diameter": plan.tip_diameter}
-        found += range_warnings(plan.fitted, given.trajectory, **of_grains)
+        found += range_warnings(plan.fitted, given.trajectory, **of_grains) + law_warnings(plan.fitted)
     other = given.launch if given is not None else None
     if given is None:
         found.append(say("taken_as_rigid", plan=plan))

@@ -18,7 +18,7 @@ from rigid.platform.platform import Platform
 
 from .settings import DEFAULT_DISTANCE, HopSettings, say
 
-__all__ = ["HopPlan", "plan_hop"]
+__all__ = ["HopPlan", "plan_hop", "plan_on"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,3 +114,11 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
         distance=numbers.value("distance") if settings.asks_for == "distance" else None, numbers=numbers,
         choices=choices, warnings=tuple(warnings),
     )  # fmt: skip
+
+
+def plan_on(plan: HopPlan, fitted: GroundFile) -> HopPlan:
+    """The same hop on the law of another ground file."""
+    if fitted.law != "spring-damper":
+        return replace(plan, fitted=fitted)
+    stiffness, damping = (SPIKES_PER_ROW * fitted.values[name] for name in ("stiffness", "damping"))
+    return replace(plan, fitted=fitted, stiffness=stiffness, damping=damping)

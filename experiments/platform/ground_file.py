@@ -13,7 +13,9 @@ from rigid.planar.trajectory import Trajectory
 from . import say
 from .numbers import ball_radius, tip_angles, tip_depth
 
-__all__ = ["GROUND_COPY", "SPIKES_PER_ROW", "fitted_ground", "range_warnings", "reached", "with_kept_ground"]
+__all__ = [
+    "GROUND_COPY", "SPIKES_PER_ROW", "fitted_ground", "law_warnings", "range_warnings", "reached", "with_kept_ground",
+]  # fmt: skip
 
 GROUND_COPY = "ground.toml"
 """The copy's name in the run's folder."""
@@ -78,3 +80,12 @@ def range_warnings(
         say("beyond_range", sentence=sentence, fitted=fitted)
         for sentence in fitted.beyond(**most, gravity=gravity, diameter=diameter)
     ]
+
+
+def law_warnings(fitted: GroundFile | None) -> list[str]:
+    """What no law under a platform can tell of grains, and whether the answer has an uncertainty."""
+    if fitted is None:
+        return []
+    sure = [name for name, estimate in fitted.parameters.items() if estimate.std == 0]
+    said = [say("law_knows_not", fitted=fitted)]
+    return said + ([say("law_is_exact", fitted=fitted)] if len(sure) == len(fitted.parameters) else [])

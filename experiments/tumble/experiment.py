@@ -5,19 +5,25 @@ on the spring-damper (`coupled`), or the planar model, for which a sweep and a c
 trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json, figures and a report.
 """
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 from experiments.campaign.files import keep_model
 from experiments.platform.ground_file import with_kept_ground
-from experiments.platform.numbers import keep_platform, platform_numbers, torque_within_limit
+from experiments.platform.law_spread import Answer, spread_of_law, with_spread
+from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
+from experiments.runs.types import Json
 from experiments.runs.whole_runs import publish, whole_run
+from rigid.ground_file import GroundFile
 from rigid.planar.simulate import PAPER_STEP, check_step, simulate
 from rigid.planar.trajectory import Trajectory
 
-from .result import motion_columns, result_of, trajectory_columns
+from . import say
+from .result import motion_columns, quantities_of, result_of, trajectory_columns
 from .settings import TumbleSettings
 from .sweep import Sweep
 from .sweep_ranges import swept_gravities
@@ -74,6 +80,21 @@ def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -
     return simulate(trial, duration=duration, method=method, sample_interval=interval), full
 
 
+def _with_the_law_s(
+    settings: TumbleSettings, plan: TumblePlan, best: dict[str, Json], copied: Path | None, platform: PlatformNumbers
+) -> dict[str, Json]:
+    """The quantities `best`, with the standard deviation that follows from that of the ground file's parameters."""
+    assert plan.fitted is not None
+
+    def answer(fitted: GroundFile) -> Answer:
+        other = replace(plan, trial=plan_tumble(settings, model_file=copied, platform=platform, fitted=fitted).trial)
+        trajectory, _ = _integrate(settings, other, duration=settings.duration)
+        return {name: entry["value"] for name, entry in quantities_of(trajectory).items()}
+
+    of_the_law = {name: best[name]["value"] for name in best if name != "energy_residual"}
+    return with_spread(best, spread_of_law(plan.fitted, answer, of_the_law))
+
+
 def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
     """A tumble on the spring-damper or another law, with its sweep and its campaign where they are asked for."""
     settings = with_kept_ground(settings, folder.path)
@@ -81,6 +102,8 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))
     sweep = Sweep(settings, model_file=copied, platform=platform) if settings.sweep else None
     plan = sweep.plans[sweep.shown] if sweep else plan_tumble(settings, model_file=copied, platform=platform)
+    if settings.threads is not None:
+        progress.message(say("threads_on_law", s=settings))
     for sentence in [*(swept_gravities(sweep.ranges) if sweep else ()), *plan.announcement()]:
         progress.message(sentence)
     progress.stage("tumble", total=1.0)
@@ -91,6 +114,8 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     else:
         trajectory, full = _integrate(settings, plan, duration=settings.duration)
         result = result_of(settings, plan, trajectory, full)
+        if plan.fitted is not None and sweep is None:
+            result["quantities"] = _with_the_law_s(settings, plan, result["quantities"], copied, platform)
     progress.update(1.0)
     write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
     folder.write_series("motion", motion_columns(trajectory))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.platform.ground_file import range_warnings
+from experiments.platform.ground_file import law_warnings, range_warnings
 from experiments.platform.numbers import ball_radius, tip_depth
 from experiments.runs.result import quantity
 from experiments.runs.types import Json
@@ -107,6 +107,7 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         warnings.append(stayed_words(trajectory))
     fitted = plan.fitted
     warnings += range_warnings(fitted, trajectory, gravity=trial.gravity, diameter=plan.spikes.diameter)
+    warnings += law_warnings(fitted)
     return {
         "title": title_of(plan),
         "status": "done",

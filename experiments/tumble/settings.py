@@ -177,6 +177,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
             if key := self._beyond_the_torque() or self._first_given("sweep", "campaign"):
                 return say("not_coupled", key=key)
         if not on_bed:
+            given = [name for name in given if name != "threads"]  # of no effect, and said to be so
             if not given:
                 return None
             both = " or method = 'coupled'" if given[0] in OF_THE_MASTER else ""

@@ -70,9 +70,11 @@ def plan_tumble(
     model_file: Path | None = None,
     platform: PlatformNumbers | None = None,
     spikes: Spikes | None = None,
+    fitted: GroundFile | None = None,
 ) -> TumblePlan:
     """The trial that `settings` describe. `model_file` stands in for ``settings.model``, where that was copied,
-    `platform` for ``settings.platform``, where that was read, and `spikes` for the platform's.
+    `platform` for ``settings.platform``, where that was read, `spikes` for the platform's, and `fitted` for the ground
+    file of ``settings.ground``.
 
     Raises ValueError, naming the setting, for a surface, law, effect or parameter there is not, a model that cannot be
     read, and numbers that no platform or rig can have.
@@ -83,7 +85,7 @@ def plan_tumble(
     platform = platform_numbers(settings.platform) if platform is None else platform
     numbers.settle_platform(platform, model=model)
     check_spike_length(numbers)
-    fitted = fitted_ground(settings.ground)
+    fitted = fitted_ground(settings.ground) if fitted is None else fitted
     surface, warnings = numbers.settle_surface(
         settings.surface, model=model, fitted=fitted, row_of=SPIKES_PER_ROW
     )  # fmt: skip

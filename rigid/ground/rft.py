@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ball_profile", "flat_plate", "sideways_capacity", "stress_gradient", "tractions"]
+__all__ = ["ball_profile", "flat_plate", "function_of", "sideways_capacity", "stress_gradient", "tractions"]
 
 # One row per monomial, in the order of `tractions`; columns f1, f2, f3.
 _COEFFICIENTS = np.array(
@@ -38,11 +38,13 @@ def stress_gradient(*, bulk_density: float, friction: float, gravity: float) -> 
     return bulk_density * gravity * (894 * mu**3 - 386 * mu**2 + 89 * mu)
 
 
-def tractions(normals: ArrayLike, direction: ArrayLike, *, surface_friction: float) -> NDArray[np.float64]:
+def tractions(
+    normals: ArrayLike, direction: ArrayLike, *, surface_friction: float, factors: ArrayLike = (1.0, 1.0, 1.0)
+) -> NDArray[np.float64]:
     """alpha: the traction on pieces of surface over xi_n times depth [1], shape [n, 3], world axes, z up.
 
     `normals`: outward, of length 1, shape [n, 3]. `direction`: of the motion, of length 1, shape (3,). Pieces that move
-    away from the grains (n.v < 0) bear nothing.
+    away from the grains (n.v < 0) bear nothing. `factors`: of f1, f2 and f3, which a fit to other grains changes.
     """
     n = np.asarray(normals, dtype=float)
     v = np.asarray(direction, dtype=float)
@@ -54,7 +56,7 @@ def tractions(normals: ArrayLike, direction: ArrayLike, *, surface_friction: flo
         ],
         axis=1,
     )  # fmt: skip
-    f1, f2, f3 = (monomials @ _COEFFICIENTS).T
+    f1, f2, f3 = (monomials @ _COEFFICIENTS).T * np.asarray(factors, dtype=float)[:, None]
     up = np.array([0.0, 0.0, 1.0])
     generic = f1[:, None] * n + f2[:, None] * v - f3[:, None] * up
     normal = -np.einsum("ij,ij->i", generic, n)  # how much it is pushed back along -n
@@ -63,6 +65,39 @@ def tractions(normals: ArrayLike, direction: ArrayLike, *, surface_friction: flo
     size = np.linalg.norm(along, axis=1)
     held = np.minimum(1.0, surface_friction * normal / np.maximum(size, 1e-300))
     return np.where((x3 >= -1e-12)[:, None], -normal[:, None] * n + held[:, None] * along, 0.0)
+
+
+_FUNCTION = '''"""Slow push into {material}: force on a body by 3D-RFT (`hedgebed bed test plates`). Needs numpy."""
+import numpy as np
+
+XI = np.array({factors})  # of f1, f2, f3 [N/m3]
+FRICTION = {friction}  # of grains and body [1]
+TABLE = np.array({table})
+
+
+def force(points, normals, areas, direction):
+    """Force [N], shape [3]: middles [m], outward unit normals, areas [m2] of its pieces; surface at z = 0."""
+    n, v = np.asarray(normals, float), np.asarray(direction, float) / np.linalg.norm(direction)
+    a, b, c = np.full(len(n), -v[2]), -n[:, 2], n @ v
+    powers = np.stack([a**0, a, b, c, a*a, b*b, c*c, a*b, b*c, c*a, a**3, b**3, c**3,
+                       a*b*b, b*a*a, b*c*c, c*b*b, c*a*a, a*c*c, a*b*c], axis=1)
+    f1, f2, f3 = (powers @ TABLE * XI).T[:, :, None]
+    t = f1 * n + f2 * v - f3 * np.array([0, 0, 1.0])
+    normal = -np.sum(t * n, axis=1, keepdims=True)
+    along, normal = t + normal * n, np.maximum(normal, 0)
+    held = np.minimum(1, FRICTION * normal / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300))
+    depth = np.maximum(-np.asarray(points, float)[:, 2], 0)
+    return ((c >= -1e-12) * depth * np.asarray(areas)) @ (held * along - normal * n)
+'''
+
+
+def function_of(factors: ArrayLike, surface_friction: float, material: str) -> str:
+    """A Python file with a function `force` that is the law with `factors` [N/m3], for use without this package."""
+    table = np.array2string(_COEFFICIENTS, separator=", ", threshold=1000)
+    return _FUNCTION.format(
+        material=material, factors=[float(f"{f:.6g}") for f in np.asarray(factors)], friction=surface_friction,
+        table=table.replace("\n", "\n                  "),
+    )  # fmt: skip
 
 
 def flat_plate() -> float:

@@ -164,6 +164,45 @@ def _cone_side(report: Report) -> list[Block]:
     return _side_plot(report, run, draw, "cone_side", top=2.0, shown=behind)
 
 
+# Plates are pushed ----------------------------------------------------------------------------------------------------
+
+
+def _plates_tiles(result: Result) -> list[Tile]:
+    quantities = result["quantities"]
+
+    def share(name: str) -> str:
+        return f"{100 * quantities[name]['value']:.0f} %"
+
+    tiles = [
+        Tile("Stress gradient", quoted(quantities["gradient_1"], 1e-6, " MN/m3"), "xi_1 of 3D-RFT"),
+        Tile("Error, unseen plates", share("unseen_error"), "of the force, rms"),
+    ]
+    if "shape_error" in quantities:
+        tiles.append(Tile("Error, other shapes", share("shape_error"), "of the force, rms; none was fitted"))
+    return tiles
+
+
+def _forces_of_plates(report: Report) -> list[Block]:
+    """Measured beside predicted forces of all plates and shapes, each component a panel."""
+    rows = [*report.result["plates"], *report.result["shapes"]]
+    names = [f"{row['body']}, {row['gamma']:g}°" for row in rows]
+    place = np.arange(len(rows))
+    drawing, panels = new_panels(2, height=1.2 + 0.24 * len(rows), sharey=True)
+    for axis, key, label in zip(panels, ("x", "z"), ("along the motion, -F_x", "upwards, F_z"), strict=True):
+        sign = -1.0 if key == "x" else 1.0
+        measured = [sign * row[f"force_{key}"] for row in rows]
+        axis.errorbar(
+            measured, place, xerr=[row[f"std_{key}"] or 0.0 for row in rows], fmt="o", color=BED, ms=4, capsize=2
+        )
+        axis.plot([sign * row[f"law_{key}"] for row in rows], place, "x", color=MODEL, ms=6)
+        axis.axhline(len(report.result["plates"]) - 0.5, color="#999999", lw=0.8)
+        axis.set(xlabel=f"force {label} [N]")
+    panels[0].set_yticks(place, names)
+    panels[0].invert_yaxis()
+    legend_above(drawing, [handle("bed, ± std between beds", BED), handle("fitted law", MODEL)])
+    return [report.draw("plates", drawing)]
+
+
 # A face is cut --------------------------------------------------------------------------------------------------------
 
 
@@ -321,6 +360,7 @@ def thicknesses(
 _Drawer = Callable[[Report], list[Block]]
 _TESTS: dict[str, tuple[tuple[_Drawer, ...], Callable[[Result], list[Tile]], tuple[str, ...]]] = {
     "cone": ((_indices, _cone_side), _cone_tiles, (say("cone_method_1"), say("cone_method_2"))),
+    "plates": ((_forces_of_plates,), _plates_tiles, (say("plates_method_1"), say("plates_method_2"))),
     "cut": ((_cut_side, _cut_profiles, _trials), _cut_tiles, (say("cut_method_1"), say("cut_method_2"))),
     "repose": ((_repose_side, _repose_profiles), _repose_tiles, (say("repose_method_1"), say("repose_method_2"))),
 }

@@ -7,9 +7,10 @@ from experiments import hop, paper, penetrate, tumble
 from experiments.hop.numbers import plan_hop
 from experiments.paper.experiment import plan_jobs
 from experiments.platform.ground_file import reached
+from experiments.platform.law_spread import moved, spread_of_law
 from experiments.runs.folder import read_series
 from experiments.tumble.trial import plan_tumble
-from rigid.ground_file import GroundFile
+from rigid.ground_file import GroundFile, read_ground
 from rigid.planar.simulate import simulate
 
 WIDE = {"load": (0, 50), "depth": (0, 0.1), "speed": (0, 5), "gravity": (0, 10), "diameter": (0.01, 0.012)}
@@ -19,11 +20,12 @@ CROSSLEY = {"stiffness": 2.1e5, "dissipation": 0.2, "exponent": 1.5}
 
 @pytest.fixture
 def written(tmp_path):
-    def write(law="spring-damper", values=SOFT, limits=WIDE, material="sand"):
+    def write(law="spring-damper", values=SOFT, limits=WIDE, material="sand", stds=None):
+        stds = dict.fromkeys(values, 0.1) if stds is None else stds
         made = GroundFile(
             format="hedgebed-ground/1", law=law, material=material, source="a test", range=limits,
             foot={"tip": "sphere", "diameter": 0.012},
-            parameters={name: {"value": value, "std": 0.1} for name, value in values.items()},
+            parameters={name: {"value": value, "std": stds[name]} for name, value in values.items()},
         )  # fmt: skip
         return str(made.write(tmp_path / "ground.toml"))
 
@@ -121,3 +123,47 @@ def test_what_cannot_stand_beside_a_file_is_refused(written):
     for kind in (tumble, hop, paper, penetrate):
         with pytest.raises(ValueError, match=r"nowhere\.toml: cannot be read"):
             kind.check(kind.Settings(ground="nowhere.toml"))
+
+
+def test_the_deviation_of_an_answer_is_that_of_a_closed_form(written, tmp_path):
+    """At rest the platform sinks W / 4K: with K = 62 +- 3 its std is 3/62 of it to second order; C is of no effect."""
+    fitted = read_ground(written(stds={"stiffness": 3.0, "damping": 0.1}))
+    best = {"sinkage": 10.0 / fitted.values["stiffness"], "none": None}
+    stds = spread_of_law(fitted, lambda file: {"sinkage": 10.0 / file.values["stiffness"], "none": None}, best)
+    assert stds["sinkage"] == pytest.approx(best["sinkage"] * 3 / 62, rel=(3 / 62) ** 2 * 1.01)
+    assert stds["none"] is None
+    result = tumble.run(
+        tumble.Settings(ground=str(tmp_path / "ground.toml"), torque=0.0, duration=0.05), tmp_path / "r"
+    )
+    start = result["quantities"]["sinkage_start"]
+    assert start["std"] == pytest.approx(start["value"] * 3 / 62, rel=5e-3)
+
+
+def test_a_parameter_at_the_end_of_what_its_law_allows_moves_one_way(written):
+    """C = 0.1 +- 0.3 N s/m is moved to 0 and to 0.4; a linear answer has the std of its slope all the same."""
+    fitted = read_ground(written(values={"stiffness": 62.0, "damping": 0.1}, stds={"stiffness": 0.0, "damping": 0.3}))
+    ((name, lower, higher),) = moved(fitted)
+    assert name == "damping" and lower.values["damping"] == pytest.approx(0.0, abs=1e-6)
+    assert higher.values["damping"] == pytest.approx(0.4)
+    stds = spread_of_law(fitted, lambda file: {"force": 5 * file.values["damping"]}, {"force": 0.5})
+    assert stds["force"] == pytest.approx(1.5)
+
+
+def test_a_tumble_and_a_hop_on_a_file_state_deviations_and_what_no_law_knows(written, tmp_path):
+    path = written(stds={"stiffness": 3.0, "damping": 0.1})
+    on_law = tumble.run(tumble.Settings(ground=path, duration=1.0, threads=2), tmp_path / "a")
+    angle = on_law["quantities"]["trajectory_angle"]
+    assert 0 < angle["std"] < 0.2 * abs(angle["value"])
+    hopped = hop.run(hop.Settings(ground=path), tmp_path / "b")
+    for name in ("model_launch_speed", "model_distance"):
+        assert 0 < hopped["quantities"][name]["std"] < 0.2 * hopped["quantities"][name]["value"]
+    assert hopped["quantities"]["launch_speed"]["std"] == 0
+    for result in (on_law, hopped):
+        assert sum("ploughing" in text for text in result["warnings"]) == 1
+
+
+def test_a_file_without_deviations_says_that_the_answer_has_none(written, tmp_path):
+    path = written(stds={"stiffness": 0.0, "damping": 0.0})
+    result = tumble.run(tumble.Settings(ground=path, duration=0.3), tmp_path / "run")
+    assert any("no parameter" in text for text in result["warnings"])
+    assert result["quantities"]["sinkage_start"]["std"] == 0

@@ -1,0 +1,157 @@
+"""What `hedgebed bed test plates` says: the table, the fit of 3D-RFT, other shapes beside it, the files."""
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from experiments.penetrate.fit import spread
+from experiments.runs.types import Json
+from rigid.ground.rft import function_of
+from rigid.ground.rft_table import RFT_FORMAT, Pieces, RftTable
+
+from .plates_fit import Fit, fit_of, measured_force, predicted_force
+from .settings import say
+from .test_settings import BedPlatesSettings
+from .tests import of_beds, quantity, table
+
+__all__ = ["FUNCTION_FILE", "TABLE_FILE", "result_of"]
+
+TABLE_FILE, FUNCTION_FILE = "rft.json", "rft_force.py"
+GOAL = 0.15  # error of a shape that was not seen [1], above which a warning says so
+FINE = 10.0  # grains across a plate from which its size hardly counts
+
+
+def result_of(settings: BedPlatesSettings, runs: list[Json], surfaces: Mapping[str, Pieces], friction: float) -> Json:
+    """Title, quantities, tables, warnings and files of the finished `runs`.
+
+    `surfaces`: pieces of each body by its name; `friction`: of grains and bodies.
+    """
+    runs = [run | {"bed": run["id"].rpartition("-")[0]} for run in runs]
+    plates = [run for run in runs if run["beta"] is not None]
+    fits = {terms: fit_of(plates, surfaces, friction, terms=terms) for terms in (1, 3)}
+    terms = min(fits, key=lambda count: (fits[count].unseen, count))
+    fit = fits[terms]
+    kept = _table(settings, plates, surfaces, fit, friction)
+    rows = [_row(own, surfaces, fit, friction) for own in _alike(plates)]
+    others = [_row(own, surfaces, fit, friction) for own in _alike([run for run in runs if run["beta"] is None])]
+    of = partial(quantity, runs)
+    law = {
+        f"gradient_{k + 1}": {"value": fit.gradients[k], "std": fit.stds[k] or None, "unit": "N/m3", "note": note}
+        for k, note in enumerate(say(f"gradient_{k}") for k in (1, 2, 3))
+    }
+    quantities = law | {
+        "terms": _number(terms, say("terms")),
+        "seen_error": _number(fit.seen, say("seen_error")),
+        "unseen_error": _number(fit.unseen, say("unseen_error")),
+        "unseen_error_one": _number(fits[1].unseen, say("unseen_error_n", terms=1)),
+        "unseen_error_three": _number(fits[3].unseen, say("unseen_error_n", terms=3)),
+    }  # fmt: skip
+    if others:
+        worst = max(others, key=lambda row: row["error"])
+        rms = float(np.sqrt(np.mean([row["error"] ** 2 for row in others])))
+        quantities |= {
+            "shape_error": _number(rms, say("shape_error")),
+            "shape_error_worst": _number(worst["error"], f"{worst['body']}, gamma = {worst['gamma']:g} degrees"),
+        }
+    quantities |= {"speed": of("speed", "m/s", "of the bodies")} | of_beds(runs, "grains of a bed")
+    tables = [table(say("table_title"), rows, _PLATE_COLUMNS | _COLUMNS)]
+    if others:
+        tables.append(table(say("shapes_title"), others, _SHAPE_COLUMNS | _COLUMNS))
+    return {
+        "title": say("plates_title", material=runs[0]["material"], side=1e3 * settings.side, runs=len(runs)),
+        "quantities": quantities,
+        "tables": tables,
+        "plates": rows,
+        "shapes": others,
+        "warnings": _warnings(settings, runs, fit, others),
+        "files": {TABLE_FILE: kept.to_json(), FUNCTION_FILE: function_of(kept.gradients, friction, kept.material)},
+    }
+
+
+def _number(value: float, note: str) -> Json:
+    return {"value": value, "std": None, "unit": "1", "note": note}
+
+
+def _alike(runs: list[Json]) -> list[list[Json]]:
+    """The runs of each body and direction, of all beds."""
+    found: dict[tuple[str, float], list[Json]] = {}
+    for run in runs:
+        found.setdefault((run["body"], run["gamma"]), []).append(run)
+    return list(found.values())
+
+
+def _row(own: list[Json], surfaces: Mapping[str, Pieces], fit: Fit, friction: float) -> Json:
+    """One body and direction: mean force over beds [N], its standard deviation, what the law says, stress per depth."""
+    measured = np.array([measured_force(run) for run in own])
+    mean = measured.mean(axis=0)
+    pieces = surfaces[own[0]["body"]]
+    law = np.mean([predicted_force(fit.gradients, friction, run, pieces) for run in own], axis=0)
+    depths = [float(np.mean([row[0] for row in run["samples"]])) for run in own]
+    between = [spread(measured[:, k].tolist()) for k in (0, 2)]
+    return {
+        "body": own[0]["body"], "beta": own[0]["beta"], "gamma": own[0]["gamma"], "beds": len(own),
+        "force_x": float(mean[0]), "force_z": float(mean[2]), "std_x": between[0], "std_z": between[1],
+        "law_x": float(law[0]), "law_z": float(law[2]), "depth": float(np.mean(depths)),
+        "error": float(np.linalg.norm(law - mean) / np.linalg.norm(mean)),
+        "size_ratio": float(np.linalg.norm(law) / np.linalg.norm(mean)),
+    }  # fmt: skip
+
+
+def _table(
+    settings: BedPlatesSettings, plates: list[Json], surfaces: Mapping[str, Pieces], fit: Fit, friction: float
+) -> RftTable:
+    one = plates[0]
+    entries = []
+    for own in _alike(plates):
+        row = _row(own, surfaces, fit, friction)
+        per = 1.0 / (settings.side**2 * row["depth"])  # area and depth of the middle
+        beds = len(own)
+        error_x, error_z = ((row[key] or float("nan")) * per / beds**0.5 for key in ("std_x", "std_z"))
+        entry = {
+            "beta": row["beta"], "gamma": row["gamma"], "stress_x": row["force_x"] * per,
+            "stress_z": row["force_z"] * per, "fitted_x": row["law_x"] * per, "fitted_z": row["law_z"] * per,
+        }  # fmt: skip
+        if beds > 1:
+            entry |= {"error_x": error_x, "error_z": error_z}
+        entries.append(entry)
+    return RftTable(
+        format=RFT_FORMAT, material=one["material"], source="hedgebed bed test plates", gravity=one["gravity"],
+        grain=one["grain"], bulk_density=float(np.mean([run["packing_fraction"] for run in plates])) * one["density"],
+        surface_friction=friction, gradients=fit.gradients, stds=fit.stds, left_out=fit.left_out, unseen=fit.unseen,
+        depth=(settings.shallow * settings.depth, settings.depth), side=settings.side, speed=one["speed"],
+        plates=tuple(entries), notes=(say("no_history"),),
+    )  # fmt: skip
+
+
+def _warnings(settings: BedPlatesSettings, runs: list[Json], fit: Fit, others: list[Json]) -> list[str]:
+    said = []
+    across = settings.side / runs[0]["grain"]
+    if across < FINE:
+        said.append(say("coarse_plate", across=across))
+    if len(fit.left_out) < 3:
+        said.append(say("few_plate_beds", beds=max(1, len(fit.left_out))))
+    for row in others:
+        if row["error"] > GOAL:
+            more = "more" if row["size_ratio"] > 1 else "less"
+            said.append(say("shape_missed", row=row, error=100 * row["error"], more=more,
+                            ratio=100 * abs(row["size_ratio"] - 1)))  # fmt: skip
+    return said
+
+
+def _with_std(value: float, std: float | None) -> str:
+    return f"{value:.3g}" if std is None else f"{value:.3g} ± {std:.2g}"
+
+
+_PLATE_COLUMNS = {
+    "beta [degrees]": lambda row: f"{row['beta']:g}",
+    "gamma [degrees]": lambda row: f"{row['gamma']:g}",
+}
+_SHAPE_COLUMNS = {"shape": lambda row: str(row["body"]), "gamma [degrees]": lambda row: f"{row['gamma']:g}"}
+_COLUMNS = {
+    "force x [N]": lambda row: _with_std(row["force_x"], row["std_x"]),
+    "force z [N]": lambda row: _with_std(row["force_z"], row["std_z"]),
+    "predicted x": lambda row: f"{row['law_x']:.3g}",
+    "predicted z": lambda row: f"{row['law_z']:.3g}",
+    "difference": lambda row: f"{100 * row['error']:.0f} %",
+}

@@ -1,0 +1,105 @@
+"""`hedgebed bed test plates`: which plates are pushed, the fit of made-up forces, what is refused, one small bed."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from experiments.bed import plates
+from experiments.bed.plates_fit import fit_of, predicted_force
+from experiments.bed.test_settings import BedPlatesSettings
+from experiments.cli.main import BAD_INPUT, DONE, main
+from rigid.ground.rft_table import read_rft
+
+SMALL = [
+    "--size", "0.036", "0.036", "0.03", "--grain", "0.004", "--side", "0.012", "--depth", "0.006", "--travel", "0.004",
+    "--shape-size", "0.012", "--seeds", "1", "--betas", "0", "60", "90", "--gammas", "90", "0", "--shapes", "ball",
+    "--shape-gammas", "90", "--inertial-number", "0.2", "--threads", "1", "--quiet",
+]  # fmt: skip
+
+
+def made_up(gradients, *, scatter=0.0, beds=3):
+    """Runs of the default plates with forces of 3D-RFT, each bed's times its own factor; and their surfaces."""
+    settings = BedPlatesSettings(shapes=())
+    asked = plates.pushes(settings)
+    surfaces = {push.name: plates.plate_of(push.beta, settings.side, settings.thickness).pieces for push in asked}
+    factors = 1 + scatter * np.random.default_rng(3).standard_normal(beds)
+    runs = []
+    for bed, factor in enumerate(factors):
+        for push in asked:
+            run = {"bed": f"seed{bed}", "gamma": push.gamma, "beta": push.beta, "body": push.name}
+            run["samples"] = [[depth, 0, 0, 0] for depth in (0.012, 0.016, 0.02)]
+            force = factor * predicted_force(gradients, 0.5, run, surfaces[push.name])
+            run["samples"] = [[row[0], *force] for row in run["samples"]]
+            runs.append(run)
+    return runs, surfaces
+
+
+def test_plates_that_hardly_face_their_motion_and_mirror_images_are_left_out():
+    asked = plates.pushes(BedPlatesSettings(betas=(-30.0, 0.0, 30.0, 90.0), gammas=(90.0, 0.0), shapes=()))
+    assert [(push.gamma, push.beta) for push in asked] == [(90, 0), (90, 30), (0, 30), (0, 90)]
+
+
+def test_a_plate_is_turned_as_its_angle_says():
+    """The face whose normal is (sin beta, 0, -cos beta) is the largest that meets the grains."""
+    for beta in (0.0, 30.0, 90.0, 120.0):
+        shape = plates.plate_of(beta, 0.02, 0.001)
+        normal = np.array([math.sin(math.radians(beta)), 0.0, -math.cos(math.radians(beta))])
+        facing = shape.pieces.areas[shape.pieces.normals @ normal > 0.999].sum()
+        assert facing == pytest.approx(0.02**2)
+        assert shape.pieces.points[:, 2].min() == pytest.approx(shape.low, abs=0.002)
+
+
+@pytest.mark.parametrize("gradients", [(3e5, 3e5, 3e5), (3e5, 2.4e5, 3.9e5)])
+def test_made_up_forces_give_their_factors_back(gradients):
+    runs, surfaces = made_up(gradients)
+    fit = fit_of(runs, surfaces, 0.5, terms=3)
+    assert fit.gradients == pytest.approx(gradients, rel=1e-4)
+    assert fit.unseen < 1e-3 and max(fit.stds) < 1e-3 * gradients[0]
+
+
+def test_beds_that_differ_as_a_whole_give_the_standard_error_of_their_mean():
+    """All forces of a bed times one factor: the scale's std is that of the mean of the factors, s / sqrt(n)."""
+    runs, surfaces = made_up((3e5, 3e5, 3e5), scatter=0.1, beds=5)
+    factors = 1 + 0.1 * np.random.default_rng(3).standard_normal(5)
+    fit = fit_of(runs, surfaces, 0.5, terms=1)
+    assert fit.gradients[0] == pytest.approx(3e5 * factors.mean(), rel=1e-6)
+    assert fit.stds[0] == pytest.approx(3e5 * factors.std(ddof=1) / math.sqrt(5), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--betas", "0", "--gammas", "90"], "betas"),
+        (["--gammas", "10"], "gammas"),
+        (["--betas", "30", "30"], "betas"),
+        (["--shapes", "none.stl"], "none.stl"),
+        (["--side", "0.008"], "side"),
+        (["--side", "0.04"], "size"),
+        (["--depth", "0.045"], "depth"),
+        (["--thickness", "0.02"], "thickness"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_any_bed_is_made(options, named, tmp_path, capsys):
+    assert main(["bed", "test", "plates", *options, "--out", str(tmp_path / "run"), "--quiet"]) == BAD_INPUT
+    assert named in capsys.readouterr().err
+    assert not (tmp_path / "run" / "checkpoint").exists()
+
+
+@pytest.mark.long
+def test_one_small_bed_gives_a_table_that_predicts_a_ball(tmp_path):
+    """Three grains across a plate: the signs are right, the files are there, and their force is the table's."""
+    out = tmp_path / "run"
+    assert main(["bed", "test", "plates", *SMALL, "--out", str(out)]) == DONE
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    down = next(row for row in result["plates"] if row["beta"] == 0)
+    level = next(row for row in result["plates"] if row["beta"] == 90 and row["gamma"] == 0)
+    assert down["force_z"] > 5 * abs(down["force_x"]) and level["force_x"] < 0
+    table = read_rft(out / "rft.json")
+    ball = result["shapes"][0]
+    run = next(run for run in result["runs"] if run["shape"] == "ball")
+    pieces = plates.shaped("ball", 0.012, 1.0).pieces
+    force = np.mean([table.force(pieces, depth=row[0], direction=(0, 0, -1))[0][2] for row in run["samples"]])
+    assert force == pytest.approx(ball["law_z"], rel=1e-6)
+    assert (out / "rft_force.py").is_file() and (out / "figures" / "plates.png").is_file()
