@@ -80,7 +80,7 @@ class BedPlatesSettings(BedTestSettings):
     size: BedSize = (0.064, 0.064, 0.052)
     side: Positive = Field(0.024, description="Side of the square plates [m].")
     thickness: Positive = Field(0.003, description="Thickness of the plates [m].")
-    betas: tuple[Annotated[float, Field(gt=-90, lt=180)], ...] = Field((0.0, 30.0, 60.0, 90.0, 120.0), min_length=1)
+    betas: tuple[Annotated[float, Field(gt=-90, lt=180)], ...] = Field((0.0, 30.0, 60.0, 90.0), min_length=1)
     """Angles of the plates [degrees]. 0: the plate faces down; 90: it faces forward."""
     gammas: tuple[Annotated[float, Field(ge=0, le=90)], ...] = Field((90.0, 45.0, 0.0), min_length=1)
     """Directions of motion, below the horizontal [degrees]. 90: straight down; 0: level; none between 0 and 20."""
