@@ -5,7 +5,7 @@ import shutil
 import sys
 import textwrap
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
@@ -112,6 +112,14 @@ def _number(value: Any, std: Any = 0.0) -> str:
     return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else f"{value:.4g}"
 
 
+def _interval(ends: Sequence[float] | None) -> str:
+    """Both ends of an interval, to three digits of the larger one; a dash where there is none."""
+    if not ends:
+        return "-"
+    digits = max(0, 2 - math.floor(math.log10(max(map(abs, ends), default=0.0) or 1.0)))
+    return " to ".join(f"{end:.{digits}f}" for end in ends)
+
+
 _NARROW = 24
 """Characters of a first column that is not broken into lines."""
 
@@ -150,10 +158,14 @@ def _show_all(result: Mapping[str, Any], console: Console) -> None:
     if spreads:
         fitted = result.get("experiment") == "diagnose"
         table.add_column("standard error" if fitted else "spread (std)", justify="right")
+    intervals = any(quantity.get("interval") for quantity in quantities.values())
+    if intervals:
+        table.add_column("90 % interval", justify="right")
     table.add_column("unit")
     for name, quantity in quantities.items():
         value, std = quantity.get("value"), quantity.get("std")
         cells = [_number(std, None) if std != 0 else "exact"] if spreads else []
+        cells += [_interval(quantity.get("interval"))] if intervals else []
         table.add_row(name, _number(value, std), *cells, _unit(quantity.get("unit", ""), value))
     if quantities:
         console.print(table, markup=False)

@@ -8,6 +8,7 @@ spike set down that has come to rest under its load.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from coupling import Penetration
 from experiments.penetrate.fit import fit_rows
 
-__all__ = ["Array", "Data", "Foundation", "Placement", "PushRun", "binned", "reached"]
+__all__ = ["Array", "Data", "Drag", "Foundation", "Placement", "PushRun", "Unloading", "binned", "reached"]
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,29 @@ class Placement:
 
 
 @dataclass(frozen=True)
+class Unloading:
+    """A tip that was driven to a depth, raised by 0.05 of its diameter, and driven on by as much."""
+
+    bed: str
+    depth: float  # [m]
+    force: float  # Before it was raised, mean over the last twentieth of the way [N]
+    stiffness: float  # Force lost over the way up, until a fifth is left [N/m]
+    returned: float  # Work of the way up over that of the way down [1]
+    again: float  # Mean force while it is driven on, over `force` [1]
+
+
+@dataclass(frozen=True)
+class Drag:
+    """A tip that was driven to a depth and moved sideways by its diameter; forces are means of the second half."""
+
+    bed: str
+    depth: float  # [m]
+    side: float  # Against the motion [N]
+    up: float  # On the tip, while it is moved sideways [N]
+    before: float  # The same before, mean over the last twentieth of the way down [N]
+
+
+@dataclass(frozen=True)
 class Data:
     """All runs of one fit, and the placements that it may be checked with."""
 
@@ -66,6 +90,8 @@ class Data:
     runs: tuple[PushRun, ...]
     placements: tuple[Placement, ...] = ()
     sources: tuple[str, ...] = ()  # The run folders
+    unloadings: tuple[Unloading, ...] = ()
+    drags: tuple[Drag, ...] = ()
     notes: tuple[str, ...] = field(default=())  # What a reader must know of the runs, a sentence each
 
     @property
@@ -78,13 +104,22 @@ class Data:
         """The speeds that were set, in rising order [m/s]."""
         return sorted({run.speed for run in self.runs})
 
-    def only(self, keep: Callable[[PushRun], bool]) -> "Data":
+    def only(self, keep: Callable[[PushRun], bool]) -> Self:
         """The same with those runs for which `keep` is true."""
         return replace(self, runs=tuple(run for run in self.runs if keep(run)))
 
-    def without_bed(self, bed: str) -> "Data":
+    def without_bed(self, bed: str) -> Self:
         """The same without the runs of one bed."""
         return self.only(lambda run: run.bed != bed)
+
+    def rows(self, keep: Callable[[PushRun], NDArray[np.bool_]]) -> Self:
+        """The same with those rows of each run for which `keep` is true, and without runs that have none left."""
+        kept = []
+        for run in self.runs:
+            if (rows := keep(run)).any():
+                names = ("depth", "rate", "acceleration", "force")
+                kept.append(replace(run, **{name: getattr(run, name)[rows] for name in names}))
+        return replace(self, runs=tuple(kept))
 
     def _joined(self, name: str) -> Array:
         return np.concatenate([getattr(run, name) for run in self.runs])

@@ -6,7 +6,9 @@ rule that stops at the first narrow one would choose those. `experiments.lawfit.
 Every bed gets the same drives, drops and a placement under the load. After each step the spring-damper is fitted. How
 sure it is, is half of the 90 % interval of its force at the middle of the depth and the fastest speed, over the force.
 If C is not told from 0, and is most of it, each bed gets one more drive at twice the fastest speed. Else another bed is
-added. Costs are estimates made beforehand, so that the same settings lead to the same runs on every machine.
+added. Of several cells (`experiments.lawfit.cells`) each begins with two beds, and the next step is always made in the
+one that is least sure. Costs are estimates made beforehand, so that the same settings lead to the same runs on every
+machine.
 """
 
 from collections.abc import Sequence
@@ -15,25 +17,24 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.converge.design import BASE, MOST_OVERLAP, ROOM, Member, Variant
+from experiments.converge.costs import core_hours
+from experiments.converge.design import BASE, Member, Variant
 from experiments.converge.members import finished_member, make_member
-from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
-from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.types import Json
 
+from .cells import FASTER, Cell, cells_of
 from .data import Data
 from .fit import Estimated, LawFit, fit_law, interval
-from .laws import CANDIDATES
+from .further import cost_of_further, make_further
+from .laws import CANDIDATES, Candidate
 from .reading import read_folders
 from .settings import LawFitSettings, say
 
 __all__ = ["Designed", "check_design", "compute_runs", "how_sure", "middle_force", "sure_enough"]
 
-FASTER = 2.0
-"""Speed of a drive that is added, over the fastest of the settings [1]; the modulus of the grains allows for it."""
 LEAST_BEDS = 4
 """Beds below which no interval is narrow enough to stop at [1]."""
 
@@ -42,26 +43,55 @@ LEAST_BEDS = 4
 class Designed:
     """What was computed, why, and what it told."""
 
-    data: Data
+    cells: dict[str, Data] = field(default_factory=dict)  # Name of the cell -> its runs
     steps: list[Json] = field(default_factory=list)
-    """For each step: why, the run folders, their cost by estimate [s], and how sure the force was after it [1]."""
+    """For each step: cell, why, run folders, their cost by estimate [s], and how sure the force was after it [1]."""
     notes: list[str] = field(default_factory=list)  # Why it ended
 
 
-def _base(settings: LawFitSettings) -> PenetrateSettings:
-    """The runs of one bed, their grains stiff enough for the fastest drive that may be added."""
-    plain = {name: getattr(settings, name) for name in PenetrateSettings.model_fields}
-    plain |= {"other_speeds": settings.speeds, "other_drop_speeds": settings.drop_speeds}
-    base = PenetrateSettings.model_construct(**plain)
-    if base.young is None:
-        fastest = base.model_copy(update={"speeds": (*base.speeds, FASTER * max(base.speeds))})
-        room = min(MOST_OVERLAP, ROOM * base.max_overlap)  # one modulus for all beds: a run does not make it stiffer
-        base = base.model_copy(update={"young": beds.choose_softness(fastest).young, "max_overlap": room})
-    return base
+@dataclass
+class _Growing:
+    """A cell to which beds are added."""
+
+    cell: Cell
+    seeds: list[int]
+    beds: int = 0
+    fast: bool = False  # Whether each bed has the faster drive
+    paths: list[Path] = field(default_factory=list)
+    data: Data | None = None
+    sure: float = float("inf")
+    of_rate: bool = False  # Whether C is most of what is not known, and cannot be told from 0
+    ended: bool = False
+
+    def next_step(self, tolerance: float) -> tuple[str, list[Member]]:
+        """Why more runs are needed, and which."""
+        numbers = {"now": self.sure, "tolerance": tolerance, "least": LEAST_BEDS}
+        if not self.beds:
+            return say("first"), [_member(self.cell, seed) for seed in self.seeds[:2]]
+        if not self.fast and self.of_rate:
+            speed = FASTER * max(self.cell.base.speeds)
+            own = self.seeds[: self.beds]
+            return say("faster", speed=speed), [_member(self.cell, seed, faster=True) for seed in own]
+        why, seed = say("more_beds" if self.sure > tolerance else "least_beds", **numbers), self.seeds[self.beds]
+        more = [_member(self.cell, seed, faster=True)] if self.fast else []
+        return why, [_member(self.cell, seed), *more]
+
+    def take(self, members: Sequence[Member], home: Path, settings: LawFitSettings) -> None:
+        """Fit the runs that were made, `members` being new."""
+        self.fast = self.fast or any(member.variant.what != BASE for member in members)
+        self.paths += [home / member.folder for member in members]
+        self.beds = len({member.seed for member in members} | set(self.seeds[: self.beds]))
+        self.data = read_folders([(path.name, path) for path in self.paths], settings)
+        pair = CANDIDATES["spring-damper"](self.data.foundation)
+        assert pair is not None
+        fitted = fit_law(pair, self.data)
+        self.sure, share = how_sure(fitted)
+        self.of_rate = share > 0.5 and fitted.parameter("damping").low <= 0
 
 
-def _member(base: PenetrateSettings, seed: int, *, faster: bool = False) -> Member:
+def _member(cell: Cell, seed: int, *, faster: bool = False) -> Member:
     """All runs in the bed of `seed`, or only the faster drive in it."""
+    base = cell.base
     if not faster:
         return Member(Variant(BASE, 1.0, base), seed, 1)
     speed = (float(f"{FASTER * max(base.speeds):.6g}"),)
@@ -77,62 +107,79 @@ def _seeds(settings: LawFitSettings) -> list[int]:
 
 def check_design(settings: LawFitSettings) -> None:
     """Raise ValueError for runs that cannot be computed, and a budget below what the first two beds cost."""
-    base = _base(settings)
-    penetrate.check(base)
-    least = sum(_cost([_member(base, seed) for seed in _seeds(settings)[:2]]))
+    cells, seeds = cells_of(settings), _seeds(settings)[:2]
+    for cell in cells:
+        for load in (cell.base.weight, *cell.loads):
+            penetrate.check(cell.base.model_copy(update={"load": load}) if cell.loads else cell.base)
+    least = sum(_cost(cell, [_member(cell, seed) for seed in seeds]) for cell in cells)
     budget = settings.budget or 0.0
     if least > budget:
-        drives, drops = len(base.speeds), len(base.drop_speeds)
-        raise ValueError(say("small_budget", budget=budget, least=least, drives=drives, drops=drops))
+        base = cells[0].base
+        several = say("for_each", count=len(cells)) if len(cells) > 1 else ""
+        numbers = {"drives": len(base.speeds), "drops": len(base.drop_speeds), "cells": several}
+        raise ValueError(say("small_budget", budget=budget, least=least, **numbers))
 
 
-def _cost(members: Sequence[Member]) -> list[float]:
-    return [3600 * member.core_hours for member in members]
+def _cost(cell: Cell, members: Sequence[Member]) -> float:
+    """What `members` take one core, by estimate [s]."""
+    plain = [core_hours(member.settings, bed=cell.new_bed) for member in members if member.variant.what == BASE]
+    further = len(plain) * cost_of_further(cell)
+    return further + 3600 * sum([*plain, *(member.core_hours for member in members if member.variant.what != BASE)])
 
 
 def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress) -> Designed:
-    """Compute runs, or find them done, until the force is sure or the budget is used up.
+    """Compute runs, or find them done, until the force is sure in every cell or the budget is used up.
 
     Raises RuntimeError where a run fails: what was computed is kept, and resuming goes on with it.
     """
-    base, seeds = _base(settings), _seeds(settings)
     home = Path(settings.members) if settings.members else folder.path / "members"
-    budget, spent, fast, beds_made = settings.budget or 0.0, 0.0, False, 0
-    why, todo = say("first"), [_member(base, seed) for seed in seeds[:2]]
-    paths: list[Path] = []
-    designed: Designed | None = None
-    while True:
-        costs = _cost(todo)
-        if designed is not None and spent + sum(costs) > budget:
-            now = designed.steps[-1]["sure"]
-            said = {"now": now, "tolerance": settings.tolerance, "spent": spent, "budget": budget, "beds": beds_made}
-            said["least"] = LEAST_BEDS
-            designed.notes.append(say("spent", **said, more=spent + sum(costs) - budget))
-            return designed
-        progress.message(why)
+    growing = [_Growing(cell, _seeds(settings)) for cell in cells_of(settings)]
+    budget, spent, designed = settings.budget or 0.0, 0.0, Designed()
+    while going := [one for one in growing if not one.ended]:
+        one = max(going, key=lambda one: one.sure)  # the first of those that are alike
+        why, todo = one.next_step(settings.tolerance)
+        cost = _cost(one.cell, todo)
+        if one.beds and spent + cost > budget:
+            numbers = {"now": one.sure, "tolerance": settings.tolerance, "spent": spent, "budget": budget}
+            numbers |= {"beds": one.beds, "least": LEAST_BEDS, "more": spent + cost - budget}
+            designed.notes.append(_of_cell(one, growing, say("spent", **numbers)))
+            break
+        progress.message(_of_cell(one, growing, why))
         for member in todo:
             _make(member, home / member.folder, progress)
-        spent += sum(costs)
-        paths += [home / member.folder for member in todo]
-        beds_made = len({member.seed for member in todo} | set(seeds[:beds_made]))
-        data = read_folders([(path.name, path) for path in paths], settings)
-        fitted = fit_law(CANDIDATES["spring-damper"](data.foundation), data)  # type: ignore[arg-type]
-        sure, of_rate = how_sure(fitted)
-        step: Json = {"why": why, "runs": [path.name for path in paths[-len(todo) :]], "cost": sum(costs), "sure": sure}
-        designed = Designed(data, [*(designed.steps if designed else []), step])
-        numbers = {"now": sure, "tolerance": settings.tolerance, "least": LEAST_BEDS}
-        if sure_enough(sure, beds_made, settings.tolerance):
-            designed.notes.append(say("told", **numbers))
-            return designed
-        if not fast and of_rate > 0.5 and fitted.parameter("damping").low <= 0:
-            fast, why = True, say("faster", speed=FASTER * max(base.speeds))
-            todo = [_member(base, seed, faster=True) for seed in seeds[:beds_made]]
-            continue
-        if beds_made == len(seeds):
-            designed.notes.append(say("enough_beds", beds=beds_made, **numbers))
-            return designed
-        why, seed = say("more_beds" if sure > settings.tolerance else "least_beds", **numbers), seeds[beds_made]
-        todo = [_member(base, seed), *([_member(base, seed, faster=True)] if fast else [])]
+            if member.variant.what == BASE:
+                _make_further(one.cell, member, home / member.folder, progress)
+        spent += cost
+        one.take(todo, home, settings)
+        step: Json = {"cell": one.cell.name, "why": why, "runs": [path.name for path in one.paths[-len(todo) :]]}
+        designed.steps.append(step | {"cost": cost, "sure": one.sure})
+        if ended := _ended(one, settings.tolerance):
+            one.ended = True
+            designed.notes.append(_of_cell(one, growing, ended))
+    designed.cells = {one.cell.name: one.data for one in growing if one.data is not None}
+    return designed
+
+
+def _ended(one: _Growing, tolerance: float) -> str:
+    """Why a cell gets no more runs; empty where it does."""
+    numbers = {"now": one.sure, "tolerance": tolerance, "least": LEAST_BEDS}
+    if sure_enough(one.sure, one.beds, tolerance):
+        return say("told", **numbers)
+    if one.beds == len(one.seeds) and (one.fast or not one.of_rate):
+        return say("enough_beds", beds=one.beds, **numbers)
+    return ""
+
+
+def _of_cell(one: _Growing, growing: Sequence[_Growing], text: str) -> str:
+    """The sentence, with the name of the cell before it where there are several."""
+    return f"{one.cell.name}: {text}" if len(growing) > 1 else text
+
+
+def _make_further(cell: Cell, member: Member, path: Path, progress: Progress) -> None:
+    try:
+        make_further(cell, member.seed, path, progress)
+    except RuntimeError as error:
+        raise RuntimeError(say("member_failed", name=path.name, reason=error)) from error
 
 
 def _make(member: Member, path: Path, progress: Progress) -> None:
@@ -148,7 +195,7 @@ def sure_enough(sure: float, beds: int, tolerance: float) -> bool:
     return beds >= LEAST_BEDS and sure <= tolerance
 
 
-def middle_force(fitted: LawFit) -> Estimated:
+def middle_force(fitted: LawFit[Candidate]) -> Estimated:
     """The force at half the depth and the fastest speed [N].
 
     Its interval is from the forces of the fits that leave out one bed each: K and C are not independent.
@@ -159,7 +206,7 @@ def middle_force(fitted: LawFit) -> Estimated:
     return interval(forces[0], np.array(forces[1:]))
 
 
-def how_sure(fitted: LawFit) -> tuple[float, float]:
+def how_sure(fitted: LawFit[Candidate]) -> tuple[float, float]:
     """Half of the 90 % interval of `middle_force` over it, and the share that C has in its variance [1]."""
     depth, speed, found = 0.5 * float(fitted.data.depth.max()), max(fitted.data.speeds), middle_force(fitted)
     parts = [(fitted.parameter(name).std * arm) ** 2 for name, arm in (("stiffness", depth), ("damping", speed))]

@@ -1,16 +1,11 @@
 """`hedgebed calibrate RUN ...`: laws fitted to finished runs, compared, and written as ground files.
 
 result.json holds the numbers; series/bins.csv what was fitted with what each law says there; ground.toml the
-spring-damper and laws/NAME.toml every law that a ground can be.
+spring-damper and laws/NAME.toml every law that a ground can be. Of several tips or gravities these are of the first,
+and cells/NAME has the same of each.
 """
 
-import math
-from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.platform.surfaces import surface_of_grains
@@ -19,264 +14,97 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import publish, whole_run
-from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
 
-from .data import Data
+from .crossed import crossed_result
 from .design import check_design, compute_runs
-from .fit import Estimated, LawFit, fit_law, fit_usable, interval
-from .identify import identified, influences
-from .laws import ADDED_MASS, RATES, Candidate, candidates_for
-from .reading import read_data
+from .further import further_rows
+from .one_cell import OneCell, fit_cell
+from .reading import read_cells
 from .settings import LawFitSettings, say
-from .trust import error_map, held_out, sinkage_check, sinkage_range, within
-from .words import closing, law_rows, ranked
+from .words import beyond_rows, cell_rows, law_rows
 
-__all__ = ["check", "ground_file", "resume", "run"]
-
-PAIR = "spring-damper"
-_LOADS = (0.1, 0.25, 0.5, 0.75, 1.0)
-"""Loads of the table of tangents, over the largest mean force of a bin [1]."""
+__all__ = ["check", "resume", "run"]
 
 
 def check(settings: LawFitSettings) -> None:
     """Raise ValueError for runs that cannot be read, be fitted together or be computed within the budget."""
     if settings.runs:
-        read_data(settings)
+        read_cells(settings)
     else:
         check_design(settings)
 
 
 def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) -> Result:
     designed = None if settings.runs else compute_runs(_with_material(settings, folder), folder, progress)
-    data = read_data(settings) if designed is None else designed.data
-    names = tuple(dict.fromkeys((PAIR, *settings.laws)))
-    candidates, left = candidates_for(data, names)
-    progress.message(say("read", data=data, beds=len(data.beds), runs=len(data.runs), f=data.foundation))
-    progress.stage("laws", total=float(len(candidates)))
-    fits: dict[str, LawFit] = {}
-    laws: list[Json] = []
-    told: list[str] = []
-    contributed: list[Json] = []
-    for done, candidate in enumerate(candidates, 1):
-        free = fit_law(candidate, data)
-        fits[candidate.name] = fit_usable(free)
-        told += identified(free) if candidate.name == PAIR else []
-        contributed += influences(free) if candidate.name == PAIR else []
-        laws.append(_law_entry(settings, fits[candidate.name]))
-        progress.update(done)
-    laws = ranked(laws)
-    best = laws[0]["name"]
-    pair, entries = fits[PAIR], {law["name"]: law for law in laws}
-    beyond = {name: text for name, fit in fits.items() for text in _beyond_the_law(fit)}
-    for name, fit in fits.items():
-        if name != ADDED_MASS and name not in beyond:
-            ground_file(fit, data, told).write(folder.path / "laws" / f"{name}.toml")
-    ground_file(pair, data, told).write(folder.path / "ground.toml")
-    folder.write_series("bins", _columns(data, fits))
-    others = [law["name"] for law in laws if law["name"] not in (PAIR, ADDED_MASS)]
-    tangents = _tangents(fits, data, (PAIR, *others[:1]))
-    warnings = [
-        *(designed.notes if designed else []),
-        *told,
-        *data.notes,
-        *(say(why, name=name, f=data.foundation) for name, why in left.items()),
-    ]
-    warnings += [say("few_beds", beds=len(data.beds))] if len(data.beds) < 3 else []
-    if (shown := entries[PAIR]["map"]) is not None and shown["left"]:
-        warnings.append(say("not_in_map", mm=1e3 * shown["depth"][-1], runs=", ".join(shown["left"])))
-    warnings += [f"{law['name']}: {text}" for law in laws for text in law["notes"]] + list(beyond.values())
+    runs = read_cells(settings) if designed is None else designed.cells
+    cells = [fit_cell(settings, name, data, progress) for name, data in runs.items()]
+    first, several = cells[0], len(cells) > 1
+    first.write(folder.path)
+    folder.write_series("bins", first.columns())
+    for cell in cells if several else ():
+        cell.write(folder.path / "cells" / cell.name)
+        folder.write_series(f"bins-{cell.name}", cell.columns())
+    crossed = crossed_result(runs, progress) if several else None
+    laws = {cell.name: cell.laws for cell in cells}
+    tables = [{"title": say("table_laws"), **law_rows(first.laws)}, *_more_tables(cells)]
+    warnings = [*(designed.notes if designed else []), *_named(cells, "warnings")]
+    sentences = _named(cells, "sentences")
+    entries: Json = {}
+    if crossed is not None:
+        tables = [{"title": say("table_cells"), **cell_rows(laws)}, *crossed.tables, *tables[1:]]
+        sentences, warnings = [*crossed.sentences, *sentences], [*crossed.warnings, *warnings]
+        entries = {"crossed": crossed.laws, "crossed_tangents": crossed.tangents}
+        entries["cells"] = [{"name": cell.name, **_entries(cell), "quantities": cell.quantities} for cell in cells]
     return Result.make(
         "calibrate",
-        title=say("title", f=data.foundation, mm=1e3 * data.foundation.diameter),
-        quantities=_quantities(settings, pair, entries[PAIR], entries[best]),
-        departures={"sentences": closing(settings, data, entries, best)},
-        foundation=asdict(data.foundation),
-        best=best,
-        laws=laws,
-        placements=[asdict(place) for place in data.placements],
-        tangents=tangents,
-        contributions=contributed,
-        sources=list(data.sources),
+        title=_title(cells),
+        quantities=first.quantities,
+        departures={"sentences": sentences},
+        **_entries(first),
+        **entries,
+        sources=[source for cell in cells for source in cell.data.sources],
         design=[] if designed is None else designed.steps,
-        tables=[{"title": say("table_laws"), **law_rows(laws)}],
-        surface=surface_of_grains(data.foundation.material),
-        warnings=warnings,
+        tables=tables,
+        surface=surface_of_grains(first.data.foundation.material),
+        warnings=list(dict.fromkeys(warnings)),
     )  # fmt: skip
+
+
+def _entries(cell: OneCell) -> Json:
+    """What result.json says of one cell."""
+    data = cell.data
+    return {
+        "foundation": asdict(data.foundation), "best": cell.best, "laws": cell.laws,
+        "placements": [asdict(place) for place in data.placements],
+        "unloadings": [asdict(one) for one in data.unloadings], "drags": [asdict(one) for one in data.drags],
+        "tangents": cell.tangents, "contributions": cell.contributions,
+    }  # fmt: skip
+
+
+def _more_tables(cells: list[OneCell]) -> list[Json]:
+    """Errors beyond the runs, and what further runs found, where there are any."""
+    beyond = beyond_rows({cell.name: cell.laws for cell in cells})
+    further = further_rows({cell.name: cell.data for cell in cells})
+    found = [{"title": say("table_beyond"), **beyond}, {"title": say("table_further"), **further}]
+    return [one for one in found if one["rows"]]
+
+
+def _named(cells: list[OneCell], what: str) -> list[str]:
+    """The sentences of all cells, each with the name of its cell where there are several."""
+    before = {cell.name: f"{cell.name}: " if len(cells) > 1 else "" for cell in cells}
+    return [f"{before[cell.name]}{text}" for cell in cells for text in getattr(cell, what)]
+
+
+def _title(cells: list[OneCell]) -> str:
+    of = cells[0].data.foundation
+    if len(cells) > 1:
+        return say("title_crossed", f=of, count=len(cells))
+    return say("title", f=of, mm=1e3 * of.diameter)
 
 
 def _with_material(settings: LawFitSettings, folder: RunFolder) -> LawFitSettings:
     """`settings` whose material, if it is a file, is the copy in the folder."""
     return settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
-
-
-def _law_entry(settings: LawFitSettings, fitted: LawFit) -> Json:
-    """What result.json says of one law."""
-    candidate, found = fitted.candidate, error_map(fitted)
-    parameters = {
-        name: asdict(found) | {"unit": _unit(candidate, name)} for name, found in _fitted_parameters(fitted).items()
-    }
-    entry: Json = {
-        "name": candidate.name, "summary": candidate.law.summary, "parameters": parameters,
-        "fixed": {name: value for name, value in candidate.fixed.items() if name not in parameters},
-        "bed_spread": fitted.bed_spread, "sigma": fitted.sigma, "information": fitted.information,
-        "log_likelihood": fitted.log_likelihood, "held_out": held_out(fitted),
-        "sinkage": [asdict(one) for one in sinkage_check(fitted)], "notes": _notes(fitted),
-        "map": None, "within": [], "sinkage_range": None,
-    }  # fmt: skip
-    if found is not None:
-        entry["map"] = {
-            "speeds": list(found.speeds), "depth": found.depth.tolist(), "force": found.force.tolist(),
-            "error": found.error.tolist(), "left": list(found.left),
-        }  # fmt: skip
-        entry["within"] = [asdict(one) for one in within(found, settings.force_error)]
-        entry["sinkage_range"] = sinkage_range(fitted, found, settings.sinkage_error)
-    return entry
-
-
-def _unit(candidate: Candidate, name: str) -> str:
-    return next(parameter.unit for parameter in candidate.law.parameters if parameter.name == name)
-
-
-def _fitted_parameters(fitted: LawFit) -> dict[str, Estimated]:
-    """All fitted parameters within what the law allows: a rate below 0 is 0, with the rest of its interval."""
-    found = {name: fitted.parameter(name) for name in fitted.candidate.free}
-    if (free := fitted.free_rate) is not None:
-        rate = next(name for name in RATES if name in fitted.candidate.fixed)
-        found[rate] = Estimated(0.0, free.std, 0.0, max(free.high, 0.0))
-    return found
-
-
-def _notes(fitted: LawFit) -> list[str]:
-    """Which parameters came out at a bound."""
-    candidate, said = fitted.candidate, []
-    for name, found in _fitted_parameters(fitted).items():
-        unit = f" {_unit(candidate, name)}".removesuffix(" 1")
-        if name not in candidate.free:
-            said.append(say("negative_rate", key=name, found=fitted.free_rate, unit=unit))
-        elif fitted.at_bound(name):
-            said.append(say("at_bound", key=name, found=found, unit=unit))
-    return said
-
-
-def _beyond_the_law(fitted: LawFit) -> list[str]:
-    """Why a law cannot be a ground with these parameters; a rate below 0 becomes 0 instead."""
-    candidate, said = fitted.candidate, []
-    for parameter in candidate.law.parameters:
-        if parameter.name in candidate.free and fitted.parameter(parameter.name).value > parameter.highest:
-            found = fitted.parameter(parameter.name)
-            unit = f" {parameter.unit}".removesuffix(" 1")
-            about = {"key": parameter.name, "unit": unit, "most": parameter.highest}
-            said.append(say("not_a_ground", name=candidate.name, found=found, **about))
-    return said
-
-
-def ground_file(fitted: LawFit, data: Data, told: Sequence[str]) -> GroundFile:
-    """The law as a file: parameters within what a law may have, the range of the runs, and what a reader must know."""
-    candidate, foundation = fitted.candidate, data.foundation
-    known = {parameter.name: parameter for parameter in candidate.law.parameters}
-    parameters, estimates = {}, _fitted_parameters(fitted)
-    for name, parameter in known.items():
-        if name not in estimates:
-            note = say("unloading") if name == "rebound" else say("fixed")
-            parameters[name] = Estimate(value=candidate.fixed[name], std=0.0, note=note)
-            continue
-        found = estimates[name]
-        low, high = parameter.lowest, parameter.highest
-        value = float(np.clip(found.value, low, high))
-        ends = [float(np.clip(end, low, high)) for end in (found.low, found.high)]
-        note = "" if name in candidate.free else say("clipped", value=fitted.free_rate.value)  # type: ignore[union-attr]
-        if name == "bulk_density":
-            note = say("scaled", own=foundation.bulk_density, scale=value / foundation.bulk_density)
-        limits = (min(ends[0], value), max(ends[1], value))
-        parameters[name] = Estimate(value=value, std=found.std, interval=limits, note=note)
-    drops = any(run.kind == "drop" for run in data.runs)
-    slowest = 0.0 if drops or data.placements else min(data.speeds)
-    tall = [float(run.depth.max()) for run in data.runs]
-    return GroundFile(
-        format=GROUND_FORMAT, law=candidate.law.name, material=foundation.material, source=say("source"),
-        runs=data.sources, notes=tuple(told),
-        foot=Foot(tip=foundation.tip, diameter=foundation.diameter, cone_angle=foundation.cone_angle),
-        parameters=parameters,
-        range={
-            "load": (0.0, float(data.force.max())), "depth": (0.0, max(tall)),
-            "speed": (slowest, max(data.speeds)), "gravity": (foundation.gravity, foundation.gravity),
-            "diameter": (foundation.diameter, foundation.diameter),
-        },
-    )  # fmt: skip
-
-
-def _columns(data: Data, fits: dict[str, LawFit]) -> dict[str, NDArray[Any]]:
-    """The rows that were fitted, and each law's force there."""
-    columns: dict[str, NDArray[Any]] = {
-        "run": data.run_of_row, "bed": data.bed_of_row, "depth_m": data.depth, "rate_m_s": data.rate,
-        "acceleration_m_s2": data.acceleration, "force_N": data.force,
-    }  # fmt: skip
-    return columns | {f"{name}_N": fit.predicted for name, fit in fits.items()}
-
-
-def _tangents(fits: dict[str, LawFit], data: Data, names: Sequence[str]) -> list[Json]:
-    """K and C of the spring-damper that is right at a load and a speed, by the laws `names`, each with its spread."""
-    largest = float(np.mean([run.force[-1] for run in data.runs if run.kind == "driven"] or [data.force.max()]))
-    deepest = max(float(run.depth.max()) for run in data.runs)
-    speeds = sorted({run.speed for run in data.runs})
-    rows: list[Json] = []
-    for name in dict.fromkeys(names):
-        fitted = fits[name]
-        for share in _LOADS:
-            for speed in speeds:
-                load = float(f"{share * largest:.2g}")
-                parts = _tangent_parts(fitted, load, speed)
-                if parts and parts[2].value <= deepest:
-                    kinds = zip(("stiffness", "damping", "depth"), parts, strict=True)
-                    rows.append(
-                        {"law": name, "load": load, "speed": speed} | {kind: asdict(one) for kind, one in kinds}
-                    )
-    return rows
-
-
-def _tangent_parts(fitted: LawFit, load: float, speed: float) -> list[Estimated]:
-    """K, C and depth at a load [N] and a speed [m/s], each with its uncertainty over beds; none where one has none."""
-    found = [_tangent(fitted, theta, load, speed) for theta in (fitted.theta, *fitted.left_out)]
-    if any(None in one for one in found):
-        return []
-    return [interval(float(column[0]), column[1:]) for column in np.array(found, dtype=float).T]
-
-
-def _tangent(fitted: LawFit, theta: Any, load: float, speed: float) -> tuple[float | None, float | None, float | None]:
-    """dF/dz, dF/dv and the depth where the law bears `load`; three None where it bears it at once, or never."""
-    candidate, deepest = fitted.candidate, 10 * float(fitted.data.depth.max())
-    depth = candidate.depth_at(theta, load, speed, deepest=deepest)
-    if not depth:
-        return None, None, None
-    by, fast = 1e-4 * depth, 1e-4 * speed
-    z = np.array([depth + by, depth - by, depth, depth])
-    v = np.array([speed, speed, speed + fast, speed - fast])
-    above, below, faster, slower = (float(force) for force in candidate.force(theta, z, v))
-    return (above - below) / (2 * by), (faster - slower) / (2 * fast), depth
-
-
-def _quantities(settings: LawFitSettings, pair: LawFit, own: Json, best: Json) -> dict[str, Json]:
-    """The numbers that a person would quote."""
-    found: dict[str, Json] = {}
-    for name, one in _fitted_parameters(pair).items():
-        note = say("of_pair", found=one, bound="" if name in pair.candidate.free else say("is_bound"))
-        found[name] = {"value": one.value, "std": one.std, "unit": _unit(pair.candidate, name), "note": note}
-    load = list(own["sinkage"])
-    found["bed_spread"] = {"value": own["bed_spread"], "std": None, "unit": "1", "note": say("of_bed_spread")}
-    for key, entry in (("held_out_error", own), ("held_out_error_best", best)):
-        note = say("of_held_out", law=entry["name"])
-        out = entry["held_out"]
-        found[key] = {"value": out["beds"], "std": out["beds_std"], "unit": "1", "note": note}
-    if load:
-        note = say("of_sinkage_error", one=load[0])
-        error = {"value": load[0]["error"], "std": load[0]["error_std"], "unit": "1", "note": note}
-        rms = {"value": load[0]["rms"], "std": None, "unit": "1", "note": say("of_sinkage_rms")}
-        found |= {"held_out_sinkage_error": error, "held_out_sinkage_rms": rms}
-    if own["sinkage_range"] is not None:
-        for key, value in zip(("load_least", "load_largest"), own["sinkage_range"], strict=True):
-            note = say("of_load", percent=100 * settings.sinkage_error)
-            found[key] = {"value": value, "std": None, "unit": "N", "note": note}
-    return {name: one for name, one in found.items() if not math.isnan(one["value"])}
 
 
 def _carry_out(settings: LawFitSettings, folder: RunFolder, progress: Progress) -> Result:

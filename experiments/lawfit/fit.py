@@ -14,15 +14,27 @@ likelihood but from leaving out one bed at a time, with the largest of the usual
 
 import math
 from dataclasses import dataclass, replace
+from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
+from scipy.stats import chi2
 from scipy.stats import t as student_t
 
 from .data import Array, Data
-from .laws import Candidate
 
-__all__ = ["CONFIDENCE", "Estimated", "LawFit", "fit_law", "fit_usable", "interval", "mean_of", "solve_law"]
+__all__ = [
+    "CONFIDENCE",
+    "Estimated",
+    "Fittable",
+    "Law",
+    "LawFit",
+    "fit_law",
+    "fit_usable",
+    "interval",
+    "mean_of",
+    "solve_law",
+]
 
 CONFIDENCE = 0.9
 """Of all intervals."""
@@ -40,11 +52,42 @@ class Estimated:
     high: float
 
 
+class Fittable(Protocol):
+    """What can be fitted: a law with free parameters."""
+
+    @property
+    def name(self) -> str:
+        """Of the law."""
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the free parameters."""
+
+    @property
+    def rate_parameter(self) -> str | None:
+        """The free parameter that the rate enters by; None if there is none."""
+
+    def without_rate(self) -> Self:
+        """The same with that parameter kept at 0."""
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Smallest and largest value of each free parameter, shapes [parameter_count]."""
+
+    def start(self, data: Data) -> Array:
+        """A first guess, shape [parameter_count]."""
+
+    def predict(self, theta: Array, data: Data) -> Array:
+        """What `data.force` would be, shape [row_count]."""
+
+
+Law = TypeVar("Law", bound=Fittable)
+
+
 @dataclass(frozen=True)
-class LawFit:
+class LawFit(Generic[Law]):
     """A candidate fitted to `data`."""
 
-    candidate: Candidate
+    candidate: Law
     data: Data
     theta: Array  # Free parameters, shape [parameter_count]
     left_out: Array  # theta without each bed, shape [bed_count, parameter_count]; empty where it was not asked for
@@ -60,9 +103,20 @@ class LawFit:
         return math.sqrt(self.share) * self.sigma
 
     @property
+    def bed_spread_interval(self) -> tuple[float, float]:
+        """90 % interval of `bed_spread` [1]: that of a standard deviation of as many normal factors as there are beds.
+
+        The noise within a bed is not counted, so that it is narrow where that noise is most of what beds differ by.
+        """
+        free = len(self.data.beds) - 1
+        ends = (0.5 + 0.5 * CONFIDENCE, 0.5 - 0.5 * CONFIDENCE)
+        low, high = (self.bed_spread * math.sqrt(free / float(chi2.ppf(end, free))) for end in ends)
+        return low, high
+
+    @property
     def predicted(self) -> Array:
         """Force of the law at every bin [N], shape [row_count]."""
-        return self.candidate.force(self.theta, self.data.depth, self.data.rate, self.data.acceleration)
+        return self.candidate.predict(self.theta, self.data)
 
     @property
     def information(self) -> float:
@@ -105,7 +159,7 @@ def _within(value: float, std: float, count: int) -> Estimated:
     return Estimated(value, std, value - half, value + half)
 
 
-def fit_usable(fitted: LawFit) -> LawFit:
+def fit_usable(fitted: LawFit[Law]) -> LawFit[Law]:
     """`fitted`, or where its parameter of the rate is below 0, which no law allows, a fit with it at 0."""
     rate = fitted.candidate.rate_parameter
     if rate is None or fitted.parameter(rate).value >= 0:
@@ -113,7 +167,7 @@ def fit_usable(fitted: LawFit) -> LawFit:
     return replace(fit_law(fitted.candidate.without_rate(), fitted.data), free_rate=fitted.parameter(rate))
 
 
-def fit_law(candidate: Candidate, data: Data, *, jackknife: bool = True) -> LawFit:
+def fit_law(candidate: Law, data: Data, *, jackknife: bool = True) -> LawFit[Law]:
     """Fit `candidate` to `data`; with `jackknife` also without each bed.
 
     Raises ValueError for fewer than two beds with `jackknife`, and RuntimeError where the fit does not converge.
@@ -124,7 +178,7 @@ def fit_law(candidate: Candidate, data: Data, *, jackknife: bool = True) -> LawF
     left_out = np.empty((0, len(theta)))
     if jackknife:
         left_out = np.array([solve_law(candidate, data.without_bed(bed), theta, share)[0] for bed in data.beds])
-    force = candidate.force(theta, data.depth, data.rate, data.acceleration)
+    force = candidate.predict(theta, data)
     size, (square, spread) = len(data.force), _moments(data, force)
     best = float(np.sum(square - share * spread[0] ** 2 / (1 + share * spread[1])))
     sigma = math.sqrt(max(best, 1e-300) / size)
@@ -157,13 +211,13 @@ def _best_share(data: Data, force: Array) -> float:
     return math.exp(float(found.x)) / scale if float(found.fun) < none - 1e-9 else 0.0
 
 
-def solve_law(candidate: Candidate, data: Data, theta: Array, share: float | None) -> tuple[Array, float]:
+def solve_law(candidate: Fittable, data: Data, theta: Array, share: float | None) -> tuple[Array, float]:
     """theta and lambda; `share`: a lambda that is kept."""
     size = np.where(theta != 0, np.abs(theta), 1.0)
     low, high = candidate.bounds()
     theta = np.clip(theta, low + 1e-9 * size, high - 1e-9 * size)
     beds, count = data.bed_of_row, len(data.beds)
-    force = candidate.force(theta, data.depth, data.rate, data.acceleration)
+    force = candidate.predict(theta, data)
     kept = 0.0 if share is None else share
     for turn in range(_ROUNDS):
         own = np.bincount(beds, weights=force * force, minlength=count)
@@ -171,7 +225,7 @@ def solve_law(candidate: Candidate, data: Data, theta: Array, share: float | Non
         pull = (1 - 1 / np.sqrt(1 + kept * own)) / np.where(own > 0, own, 1.0)
 
         def whitened(x: Array, frozen: Array = force, pull: Array = pull) -> Array:
-            left = data.force - candidate.force(x * size, data.depth, data.rate, data.acceleration)
+            left = data.force - candidate.predict(x * size, data)
             cross = np.bincount(beds, weights=frozen * left, minlength=count)
             return left - (pull * cross)[beds] * frozen
 
@@ -182,7 +236,7 @@ def solve_law(candidate: Candidate, data: Data, theta: Array, share: float | Non
             raise RuntimeError(f"the fit of {candidate.name} did not converge: {found.message}")
         moved = float(np.max(np.abs(found.x - theta / size) / np.maximum(np.abs(found.x), 1e-3)))
         theta = found.x * size
-        force = candidate.force(theta, data.depth, data.rate, data.acceleration)
+        force = candidate.predict(theta, data)
         before, kept = kept, _best_share(data, force) if share is None else share
         if turn and moved < 1e-5 and abs(kept - before) <= 1e-3 * max(kept, before):
             break

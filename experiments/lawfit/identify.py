@@ -6,6 +6,7 @@ from experiments.grains.similarity import inertial_number
 from experiments.runs.types import Json
 
 from .fit import LawFit, solve_law
+from .laws import Candidate
 from .settings import say
 
 __all__ = ["identified", "influences", "speed_to_add"]
@@ -16,7 +17,7 @@ VISIBLE = 0.2
 """Share of the force that the rate should have in a run that is to tell C [1]."""
 
 
-def speed_to_add(fitted: LawFit) -> float:
+def speed_to_add(fitted: LawFit[Candidate]) -> float:
     """Speed of a run that would tell C [m/s]: where the upper end of C's interval makes up `VISIBLE` of the mean force.
 
     At least twice the fastest speed there is.
@@ -27,7 +28,7 @@ def speed_to_add(fitted: LawFit) -> float:
     return float(f"{max(2 * fastest, min(wanted, 10 * fastest)):.1g}")
 
 
-def identified(fitted: LawFit) -> list[str]:
+def identified(fitted: LawFit[Candidate]) -> list[str]:
     """Sentences about what a spring-damper fitted to these runs leaves open; none where K and C are told."""
     data, found, said = fitted.data, fitted.parameter("damping"), []
     foundation = data.foundation
@@ -47,7 +48,7 @@ def identified(fitted: LawFit) -> list[str]:
     return said
 
 
-def influences(fitted: LawFit) -> list[Json]:
+def influences(fitted: LawFit[Candidate]) -> list[Json]:
     """Of each run its rms error over its rms force, and K and C without it."""
     data, found = fitted.data, []
     error = fitted.predicted - data.force

@@ -68,6 +68,10 @@ class Candidate:
             force += self.values(theta)["drag"] * depth * acceleration
         return force
 
+    def predict(self, theta: Array, data: Data) -> Array:
+        """Force of loading at every bin of `data` [N], shape [row_count]."""
+        return self.force(theta, data.depth, data.rate, data.acceleration)
+
     def depth_at(self, theta: Array, load: float, rate: float = 0.0, *, deepest: float = 1.0) -> float | None:
         """Depth at which the force of loading is `load` [N] at `rate` [m/s]; 0 if it is more at once, None if less
         down to `deepest` [m]."""

@@ -12,21 +12,20 @@ from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.types import Json
 
-from .data import Data, Foundation, Placement, binned, reached
+from .cells import Cell
+from .data import Data, Drag, Foundation, Placement, Unloading, binned, reached
+from .further import read_further
 from .settings import LawFitSettings, say
 
-__all__ = ["read_data", "read_folders"]
+__all__ = ["read_cells", "read_folders"]
 
 _OF_BED = (
     "bed", "seed", "bed_size", "grain", "spread", "coarse", "fine_radius", "fine_depth", "packing", "bed_stages",
     "gravity", "young", "max_overlap", "time_step",
 )  # fmt: skip
 """Settings that decide which bed a run begins in: the same run twice is one that has them all in common."""
-_SHARED = {
-    "material": "grains", "tip": "tip", "tip_diameter": "diameter of the tip [m]", "cone_angle": "cone_angle [degrees]",
-    "gravity": "gravity [m/s2]", "grain": "grain [m]", "spike_friction": "friction of spike and grains [1]",
-}  # fmt: skip
-"""Settings that all runs of one fit must have in common, and what they are."""
+_SHARED = {"material": "grains", "grain": "grain [m]", "spike_friction": "friction of spike and grains [1]"}
+"""Settings that all runs must have in common, and what they are."""
 _MAY_DIFFER = {
     "bed_size": "bed_size [m]",
     "young": "Young's modulus [Pa]",
@@ -46,20 +45,33 @@ class _Source:
     result: Json
 
 
-def read_data(settings: LawFitSettings) -> Data:
-    """All runs of `settings` as the data of one fit.
+def read_cells(settings: LawFitSettings) -> dict[str, Data]:
+    """All runs of `settings`: name of each tip and gravity (`Cell.name`) -> the data of its fits.
 
     Raises ValueError, naming the folder and what was found: for no finished run of penetrate in a bed, for a kept
-    result without series, for runs of different grains, tips or gravities, for a run that is there twice, for fewer
-    than two beds, and for runs at one speed, which cannot tell C from K.
+    result without series, for runs of different grains, for a run that is there twice; and for a tip and gravity with
+    fewer than two beds, or with runs at one speed, which cannot tell C from K.
     """
-    return read_folders([pair for given in settings.runs for pair in _folders(given)], settings)
+    sources = [_read(name, path) for given in settings.runs for name, path in _folders(given)]
+    _refuse_mixed(sources)
+    found: dict[str, list[_Source]] = {}
+    for source in sources:
+        found.setdefault(Cell(source.settings).name, []).append(source)
+    cells = {}
+    for name, own in found.items():
+        try:
+            cells[name] = _data(own, settings)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}" if len(found) > 1 else str(error)) from None
+    return cells
 
 
 def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) -> Data:
-    """The runs in `folders` (name, path) as the data of one fit; raises as `read_data`."""
-    sources = [_read(name, path) for name, path in folders]
-    _refuse_mixed(sources)
+    """The runs in `folders` (name, path), of one tip and gravity; raises as `read_cells`."""
+    return _data([_read(name, path) for name, path in folders], settings)
+
+
+def _data(sources: Sequence[_Source], settings: LawFitSettings) -> Data:
     loaded: list[tuple[Penetration, Json]] = []
     placements: list[Placement] = []
     above: list[str] = []  # Beds whose grains carry the spike at the surface or above it
@@ -85,6 +97,10 @@ def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) 
                     above.append(bed)
                 continue
             loaded.append((run, {"id": f"{source.name}/{entry['id']}", "bed": bed, "speed": speed}))
+    more = [
+        one for source in sources for one in read_further(source.folder, _bed_of(source.settings, _seed(source))[1])
+    ]
+    placements += [one for one in more if isinstance(one, Placement)]
     deepest = max((reached(run) for run, _ in loaded), default=0.0)
     made = [(about["id"], binned(run, **about, bins=settings.bins, deepest=deepest)) for run, about in loaded]
     notes = list(_notes(sources))
@@ -96,7 +112,8 @@ def read_folders(folders: Sequence[tuple[str, Path]], settings: LawFitSettings) 
         notes.append(say("one_seed", beds=", ".join(shared)))
     data = Data(
         _foundation(sources), tuple(run for _, run in made if run is not None), tuple(placements),
-        tuple(source.name for source in sources), tuple(notes),
+        tuple(source.name for source in sources), unloadings=tuple(one for one in more if isinstance(one, Unloading)),
+        drags=tuple(one for one in more if isinstance(one, Drag)), notes=tuple(notes),
     )  # fmt: skip
     _refuse_few(data)
     return data
@@ -165,11 +182,14 @@ def _bed_of(settings: PenetrateSettings, seed: int) -> tuple[str, str]:
     return " ".join(str(value) for value in values), bed
 
 
+def _seed(source: _Source) -> int:
+    """Of the first bed; further runs are made only where there is one."""
+    return int(source.settings.seeds[0])
+
+
 def _shared(settings: PenetrateSettings, name: str) -> Any:
     value = getattr(settings, name)
-    if name == "material":
-        return material(value)
-    return 60.0 if name == "cone_angle" and settings.tip != "cone" else value
+    return material(value) if name == "material" else value
 
 
 def _refuse_mixed(sources: Sequence[_Source]) -> None:

@@ -1,12 +1,14 @@
 """Settings of `hedgebed calibrate`."""
 
-from typing import Self
+import re
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.reading import nearest
 from experiments.runs.strict import Positive
+from experiments.runs.units import find_unit
 from vis.page.sentences import Sentences
 
 __all__ = ["LAWS", "LawFitSettings", "say"]
@@ -17,6 +19,28 @@ LAWS = (
     "spring-damper", "hunt-crossley", "power-irreversible", "katsuragi-durian", "katsuragi-durian-added-mass",
     "bekker", "rft",
 )  # fmt: skip
+
+
+_OF_DESIGN = ("tips", "gravities", "loads", "unload_depths", "drag_depths")
+_TIP = re.compile(r"(ball|sphere|flat|cone):([^:]+)(?::([0-9.]+))?")
+_SHAPES = {"ball": "sphere"}
+"""What a tip may also be called."""
+
+
+def _tip_of(text: str) -> tuple[str, float, float]:
+    """Shape, diameter [m] and cone angle [degrees] of a tip such as ball:12mm. Raises ValueError for another text."""
+    found, unit = _TIP.fullmatch(text), find_unit("[m]")
+    assert unit is not None
+    try:
+        if found is None:
+            raise ValueError
+        diameter = float(found[2]) if re.fullmatch(r"[0-9.]+(e-?[0-9]+)?", found[2]) else unit.value_of(found[2])
+        angle = float(found[3] or 60.0)
+    except ValueError:
+        raise ValueError(say("bad_tip", tip=text)) from None
+    if not 0 < diameter < 1 or not 1 <= angle < 180 or (found[3] and found[1] != "cone"):
+        raise ValueError(say("bad_tip", tip=text))
+    return _SHAPES.get(found[1], found[1]), diameter, angle
 
 
 class LawFitSettings(PenetrateSettings):
@@ -39,9 +63,18 @@ class LawFitSettings(PenetrateSettings):
     members: str | None = Field(None, min_length=1)
     """Folder where the computed runs are kept, each found again by its settings; 'members' in the run's folder if not
     given."""
-    tip_diameter: Positive = Field(
-        0.012, description="Diameter of the tip [m].", json_schema_extra={"option_alias": "--spike-diameter"}
-    )
+    tips: tuple[str, ...] = ()
+    """Tips of a crossed design, such as ball:12mm, flat:16mm, cone:12mm or cone:12mm:90 (full angle in degrees). The
+    settings of the runs are those of the first tip; the others have similar runs (docs/calibrate.md)."""
+    gravities: tuple[Positive, ...] = ()
+    """Gravities of a crossed design [m/s2], such as 1g or 0.1g. The settings of the runs are those of the first one;
+    under the others speeds, times and loads follow."""
+    loads: tuple[Positive, ...] = ()
+    """Further loads under which the tip is set down in each bed [N]."""
+    unload_depths: tuple[Positive, ...] = ()
+    """Depths at which the tip is unloaded and loaded again in each bed [m]."""
+    drag_depths: tuple[Positive, ...] = ()
+    """Depths at which the tip is moved sideways by its diameter in each bed [m]."""
     speeds: tuple[Positive, ...] = Field(
         (0.1, 0.4), min_length=2, description="Speeds of the drives in each bed [m/s]."
     )
@@ -67,11 +100,44 @@ class LawFitSettings(PenetrateSettings):
         0.15, gt=0, lt=1, description="Error of the sinkage up to which a law is said to hold [1]."
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _first_of_each(cls, given: Any) -> Any:
+        """Tip and gravity of a crossed design are the first of each list. Raises ValueError for others beside it."""
+        if not isinstance(given, dict):
+            return given
+        found: dict[str, Any] = {}
+        if (tips := given.get("tips")) and isinstance(tips, list | tuple):
+            found |= dict(zip(("tip", "tip_diameter", "cone_angle"), _tip_of(str(tips[0])), strict=True))
+        if (gravities := given.get("gravities")) and isinstance(gravities, list | tuple):
+            unit, own = find_unit("[m/s2]"), gravities[0]
+            assert unit is not None
+            found["gravity"] = unit.value_of(own) if isinstance(own, str) else own
+        for name, value in found.items():
+            if name in given and given[name] != value:
+                raise ValueError(say("beside_list", key=name, value=given[name], first=value))
+        return given | found
+
+    @property
+    def tip_shapes(self) -> tuple[tuple[str, float, float], ...]:
+        """Shape, diameter [m] and cone angle [degrees] of each of `tips`."""
+        return tuple(_tip_of(text) for text in self.tips)
+
+    @property
+    def crossed(self) -> bool:
+        """Whether there is more than one tip or gravity."""
+        return max(len(self.tips), len(self.gravities)) > 1
+
     @model_validator(mode="after")
     def _known(self) -> Self:
         for name in self.laws:
             if name not in LAWS:
                 raise ValueError(f"laws = {name!r} is not known; {nearest(name, LAWS)}")
+        if len(set(self.tip_shapes)) < len(self.tips) or len(set(self.gravities)) < len(self.gravities):
+            raise ValueError(say("cell_twice", s=self))
+        for key in ("unload_depths", "drag_depths"):
+            if (deep := max(getattr(self, key), default=0.0)) > self.depth:
+                raise ValueError(say("below_depth", key=key, value=deep, depth=self.depth))
         if len(set(self.runs)) < len(self.runs):
             raise ValueError(f"runs = {list(self.runs)} holds a folder twice: each once was expected")
         if bool(self.runs) == (self.budget is not None):
@@ -86,6 +152,6 @@ class LawFitSettings(PenetrateSettings):
     def _refuse_settings_of_runs(self) -> None:
         """Raise ValueError for a setting that the finished runs have decided already."""
         fields = type(self).model_fields
-        for name in (*PenetrateSettings.model_fields, "members"):
+        for name in (*PenetrateSettings.model_fields, "members", *_OF_DESIGN):
             if getattr(self, name) != fields[name].default:
                 raise ValueError(say("of_computed_runs", key=name, value=getattr(self, name)))

@@ -9,10 +9,12 @@ import numpy as np
 from experiments.runs.types import Json
 
 from .data import Array, Data, PushRun
-from .fit import Estimated, LawFit, fit_law, mean_of
+from .fit import Estimated, Law, LawFit, fit_law, interval, mean_of
+from .laws import Candidate
 
 __all__ = [
-    "ErrorMap", "SinkageCheck", "Within", "error_map", "held_out", "paired", "sinkage_check", "sinkage_range", "within",
+    "Beyond", "ErrorMap", "SinkageCheck", "Within", "beyond", "error_map", "held_out", "paired", "sinkage_check",
+    "sinkage_range", "within",
 ]  # fmt: skip
 
 
@@ -27,7 +29,7 @@ class ErrorMap:
     left: tuple[str, ...] = ()  # Drives that are not in it, as they do not fill the same intervals of depth
 
 
-def error_map(fitted: LawFit) -> ErrorMap | None:
+def error_map(fitted: LawFit[Candidate]) -> ErrorMap | None:
     """The map of a fit, in the runs that it was fitted to; None where there is no drive.
 
     It has the drives that fill all intervals of depth that the deepest of them fills.
@@ -75,7 +77,7 @@ def within(found: ErrorMap, most: float) -> list[Within]:
     return stretches
 
 
-def sinkage_range(fitted: LawFit, found: ErrorMap, most: float) -> tuple[float, float] | None:
+def sinkage_range(fitted: LawFit[Candidate], found: ErrorMap, most: float) -> tuple[float, float] | None:
     """Loads [N] between which the depth at which the law bears the load is within `most` of that of the beds.
 
     The depth of the beds is where the mean force of the slowest drive first reaches the load, and the law is taken at
@@ -104,11 +106,12 @@ def _longest(good: Iterable[bool]) -> tuple[int, int]:
     return best
 
 
-def held_out(fitted: LawFit) -> Json:
+def held_out(fitted: LawFit[Law]) -> Json:
     """Rms error of the force over the rms force, of runs that the law was not fitted to [1].
 
     "beds": each bed by the fit to all others. "of_beds": the same of each bed alone, in the order of `Data.beds`.
-    "beds_std": the scatter of those. "speeds": each speed by the fit to all others; None below three speeds.
+    "beds_std": the scatter of those. "interval": 90 % of "beds", by leaving out one bed more. "speeds": each speed by
+    the fit to all others; None below three speeds.
     """
     data = fitted.data
     beds = [
@@ -124,11 +127,60 @@ def held_out(fitted: LawFit) -> Json:
 
             theta = fit_law(fitted.candidate, data.only(other), jackknife=False).theta
             speeds.append((data.only(lambda run, speed=speed: run.speed == speed), theta))  # type: ignore[misc]
-    of_beds = [_rms(fitted, [bed]) for bed in beds]
+    of_beds, whole = [_rms(fitted, [bed]) for bed in beds], _rms(fitted, beds)
+    others = [[bed for bed in beds if bed is not out] for out in beds]
+    sure = interval(whole, np.array([_rms(fitted, rest) for rest in others]))
     return {
-        "beds": _rms(fitted, beds), "of_beds": of_beds, "beds_std": float(np.std(of_beds, ddof=1)),
-        "speeds": _rms(fitted, speeds) if speeds else None,
+        "beds": whole, "of_beds": of_beds, "beds_std": float(np.std(of_beds, ddof=1)),
+        "interval": [max(0.0, sure.low), sure.high], "speeds": _rms(fitted, speeds) if speeds else None,
     }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """Error of a law beyond the runs that it was fitted to: the outermost of them were left out."""
+
+    left_out: float  # Speed of the runs [m/s] or largest depth of the rows [m] that were left out
+    fitted_to: float  # The largest that is left
+    rms: float  # Rms error of the force there over the rms force [1]
+    error: float  # Mean force of the law there over that of the runs, less 1 [1]
+    interval: tuple[float, float] | None  # 90 % of `error`, over beds; None of one bed
+
+
+DEEPEST = 2 / 3
+"""Share of the depth below which rows are left out, to see how wrong a law is beyond its depth [1]."""
+
+
+def beyond(fitted: LawFit[Law]) -> dict[str, Beyond]:
+    """ "speed": without the fastest runs, where two other speeds are left. "depth": without the deepest third.
+
+    A law is fitted to the rest and compared with what was left out. An entry is missing where the rest cannot be
+    fitted: fewer than two speeds, or fewer rows than parameters.
+    """
+    data, found = fitted.data, {}
+    speeds, deepest = data.speeds, float(data.depth.max())
+    if len(speeds) > 2:
+        rest, out = data.only(lambda run: run.speed < speeds[-1]), data.only(lambda run: run.speed == speeds[-1])
+        found["speed"] = _beyond(fitted, rest, out, left_out=speeds[-1], fitted_to=speeds[-2])
+    shallow = data.rows(lambda run: run.depth <= DEEPEST * deepest)
+    deep = data.rows(lambda run: run.depth > DEEPEST * deepest)
+    if shallow.runs and len(shallow.depth) > 2 * len(fitted.theta):
+        found["depth"] = _beyond(fitted, shallow, deep, left_out=deepest, fitted_to=DEEPEST * deepest)
+    return found
+
+
+def _beyond(fitted: LawFit[Law], rest: Data, out: Data, *, left_out: float, fitted_to: float) -> Beyond:
+    theta = fit_law(fitted.candidate, rest, jackknife=False).theta
+    law, beds = fitted.candidate.predict(theta, out), out.force
+    sums = np.array([[law[out.bed_of_row == k].sum(), beds[out.bed_of_row == k].sum()] for k in range(len(out.beds))])
+    error, ends = float(law.sum() / beds.sum() - 1), None
+    if len(sums) > 1:
+        sure = interval(
+            error, np.array([np.divide(*np.delete(sums, k, axis=0).sum(axis=0)) - 1 for k in range(len(sums))])
+        )
+        ends = (sure.low, sure.high)
+    rms = math.sqrt(float(np.sum((law - beds) ** 2) / np.sum(beds**2)))
+    return Beyond(left_out, fitted_to, rms, error, ends)
 
 
 def paired(one: Sequence[float], other: Sequence[float]) -> Estimated:
@@ -139,10 +191,10 @@ def paired(one: Sequence[float], other: Sequence[float]) -> Estimated:
     return mean_of(np.asarray(one, dtype=float) - np.asarray(other, dtype=float))
 
 
-def _rms(fitted: LawFit, parts: Sequence[tuple[Data, Array]]) -> float:
+def _rms(fitted: LawFit[Law], parts: Sequence[tuple[Data, Array]]) -> float:
     square = drag = 0.0
     for data, theta in parts:
-        force = fitted.candidate.force(theta, data.depth, data.rate, data.acceleration)
+        force = fitted.candidate.predict(theta, data)
         square += float(np.sum((force - data.force) ** 2))
         drag += float(np.sum(data.force**2))
     return math.sqrt(square / drag)
@@ -160,9 +212,11 @@ class SinkageCheck:
     error: float  # law / beds - 1 [1]
     error_std: float | None  # Scatter over beds of the same of each bed [1]; None of one
     rms: float  # Rms over beds of the same of each bed [1]
+    interval: tuple[float, float] | None = None  # 90 % of `error`, by leaving out one bed; None of one
+    rms_interval: tuple[float, float] | None = None  # The same of `rms`
 
 
-def sinkage_check(fitted: LawFit) -> list[SinkageCheck]:
+def sinkage_check(fitted: LawFit[Candidate]) -> list[SinkageCheck]:
     """The check at every load of which there are placements; a bed is predicted by the fit to the other beds.
 
     Several placements in one bed count as their mean.
@@ -183,5 +237,20 @@ def sinkage_check(fitted: LawFit) -> list[SinkageCheck]:
         each, mean, law = known / beds - 1, float(beds.mean()), float(known.mean())
         stds = [float(values.std(ddof=1)) if len(own) > 1 else None for values in (beds, each)]
         rms = math.sqrt(float(np.mean(each**2)))
-        found.append(SinkageCheck(load, len(own), mean, stds[0], law, law / mean - 1, stds[1], rms))
+        ends = (_ends(known, beds), _ends_of_rms(each)) if len(own) > 1 else (None, None)
+        found.append(SinkageCheck(load, len(own), mean, stds[0], law, law / mean - 1, stds[1], rms, *ends))
     return found
+
+
+def _ends(laws: Array, beds: Array) -> tuple[float, float]:
+    """90 % interval of mean(laws) / mean(beds) - 1, shapes [bed_count >= 2]."""
+    without = [np.delete(laws, k).mean() / np.delete(beds, k).mean() - 1 for k in range(len(beds))]
+    found = interval(float(laws.mean() / beds.mean() - 1), np.array(without))
+    return found.low, found.high
+
+
+def _ends_of_rms(errors: Array) -> tuple[float, float]:
+    """90 % interval of the rms of `errors`, shape [bed_count >= 2]."""
+    without = [math.sqrt(float(np.mean(np.delete(errors, k) ** 2))) for k in range(len(errors))]
+    found = interval(math.sqrt(float(np.mean(errors**2))), np.array(without))
+    return max(0.0, found.low), found.high

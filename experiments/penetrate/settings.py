@@ -72,7 +72,11 @@ class PenetrateSettings(StrictSettings):
 
     # The spike
     tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip.")
-    tip_diameter: Positive = Field(0.012, description="Diameter of the tip [m].")
+    tip_diameter: Positive = Field(
+        0.012,
+        description="Diameter of the tip [m]; --spike-diameter is the same.",
+        json_schema_extra={"option_alias": "--spike-diameter"},
+    )
     shaft_diameter: Positive | None = None
     """Diameter of the shaft [m], from one grain to tip_diameter; a flat tip needs tip_diameter itself, which is the
     default."""

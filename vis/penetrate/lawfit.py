@@ -26,10 +26,10 @@ def write_lawfit_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a calibration, and return the report."""
     result = report.result
     laws: list[Result] = result["laws"]
-    (ranked,) = tables(result)
+    found = tables(result)
     drawn = [block for block in (_laws(report, laws), _trust(report, laws)) if block is not None]
     sections = [
-        Section("", [listing(result["departures"]["sentences"]), ranked, *drawn]),
+        Section("", [listing(result["departures"]["sentences"]), *found, *drawn]),
         Section("Parameters", [_parameters(laws)]),
         Section("The spring-damper that is right at a load and a speed", [_tangents(result)]),
         Section("What each run contributed", [*_design(result), _contributions(result)]),

@@ -5,8 +5,9 @@ import pytest
 from fake_bed import FakeBed
 
 from experiments import lawfit
+from experiments.lawfit.cells import cells_of
 from experiments.lawfit.data import Data, PushRun
-from experiments.lawfit.design import _base, how_sure
+from experiments.lawfit.design import how_sure
 from experiments.lawfit.fit import fit_law
 from experiments.lawfit.laws import CANDIDATES
 from experiments.lawfit.synthetic import BINS, DEPTH, FOUNDATION, stopping_coverage
@@ -103,7 +104,7 @@ def test_all_beds_have_one_modulus_with_room_for_the_faster_drive(monkeypatch):
     real = beds.choose_softness
     monkeypatch.setattr(beds, "choose_softness", lambda s: chosen.append(max(s.speeds)) or real(s))
     settings = lawfit.Settings(**(QUICK | {"young": None, "max_overlap": 0.04}))
-    base = _base(settings)
+    (base,) = (cell.base for cell in cells_of(settings))
     assert chosen == [1.6]
     assert base.young == real(settings.model_copy(update={"speeds": (0.2, 1.6)})).young
     assert base.max_overlap == 0.08

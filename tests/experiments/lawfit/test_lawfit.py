@@ -16,7 +16,7 @@ from experiments.lawfit.data import Data, Placement, PushRun
 from experiments.lawfit.fit import fit_law
 from experiments.lawfit.identify import identified
 from experiments.lawfit.laws import ADDED_MASS, CANDIDATES, candidates_for
-from experiments.lawfit.reading import read_data
+from experiments.lawfit.reading import read_cells
 from experiments.lawfit.settings import LAWS, say
 from experiments.lawfit.synthetic import DESIGNS, FOUNDATION, TRUTHS, coverage, synthetic_data
 from experiments.lawfit.trust import ErrorMap, error_map, held_out, paired, sinkage_check, within
@@ -37,6 +37,12 @@ TRIALS = {
     "load": 0.2,
 }
 SPRING = {"stiffness": K, "damping": C}
+
+
+def read_data(settings):
+    """The runs of the one tip and gravity that there is."""
+    (data,) = read_cells(settings).values()
+    return data
 
 
 def made_up_run(path, *, law="spring-damper", parameters=SPRING, strong=("stiffness", "damping"), **changed):
@@ -301,7 +307,8 @@ def test_runs_that_cannot_be_fitted_together_are_refused_by_name(of_three_beds, 
     weak = made_up_run(tmp_path / "weak", seeds=(4,), material="sand-weak")
     assert "sand-weak" in refused(of_three_beds, weak)
     thick = made_up_run(tmp_path / "thick", seeds=(4,), tip_diameter=0.013)
-    assert "tip_diameter" in refused(of_three_beds, thick)
+    assert "sphere-13mm" in refused(of_three_beds, thick)  # one bed of this tip
+    assert "spike_friction" in refused(of_three_beds, made_up_run(tmp_path / "rough", seeds=(4,), spike_friction=0.6))
     assert "one bed" in refused(made_up_run(tmp_path / "one", seeds=(1,)))
     assert "C cannot" in refused(made_up_run(tmp_path / "s", seeds=(1, 2), speeds=(0.2,), other_speeds=(0.2,)))
     copy = shutil.copytree(of_three_beds, tmp_path / "copy")

@@ -92,7 +92,7 @@ def test_a_series_knows_its_units_and_reads_back(tmp_path):
 def test_frames_of_pandas(monkeypatch):
     pandas = pytest.importorskip("pandas")
     frame = made().to_dataframe()
-    assert frame.loc["speed", "value"] == 0.5 and list(frame) == ["value", "std", "unit", "note"]
+    assert frame.loc["speed", "value"] == 0.5 and list(frame) == ["value", "std", "unit", "note", "interval"]
     assert isinstance(Series({"t_s": np.arange(3.0)}).to_dataframe(), pandas.DataFrame)
 
 
