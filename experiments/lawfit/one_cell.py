@@ -90,6 +90,7 @@ def fit_cell(settings: LawFitSettings, name: str, data: Data, progress: Progress
     entries[PAIR]["holds"] = holds
     warnings = [*told, *data.notes, *(say(why, name=law, f=data.foundation) for law, why in left.items())]
     warnings += [say("few_beds", beds=len(data.beds))] if len(data.beds) < 3 else []
+    warnings += [] if "speed" in entries[PAIR]["beyond"] else [say("two_speeds")]
     if (shown := entries[PAIR]["map"]) is not None and shown["left"]:
         warnings.append(say("not_in_map", mm=1e3 * shown["depth"][-1], runs=", ".join(shown["left"])))
     warnings += [f"{law['name']}: {text}" for law in laws for text in law["notes"]]
