@@ -50,7 +50,7 @@ def write_folder(folder, *, trials: dict[str, float], scatter: float | None = No
 def test_the_report_of_an_unknown_has_every_part_and_names_columns_in_words(tmp_path):
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0})
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
-    for part in ("Measured and modelled", "What is left, by phase and channel", "layering:slope", "Repeat the trial.",
+    for part in ("Recorded and modelled", "What is left, by phase and channel", "layering:slope", "Repeat the trial.",
                  "What no effect explains", "speed 0.01 m/s", "trial a: gaps", "held-out trials"):  # fmt: skip
         assert part in page
     figures = {path.stem for path in (tmp_path / "figures").iterdir()}

@@ -114,7 +114,7 @@ def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
 
 
 def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple[str, str]) -> Figure | None:
-    """A row a channel: measured and both models on the left, residuals over the noise on the right.
+    """A row a channel: recorded and both models on the left, residuals over the noise on the right.
 
     `labels`: what the models before and after are called; an empty one is not drawn.
     """
@@ -145,7 +145,7 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
         left.set_title(f"trial {c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
         left.set_ylabel(f"{what.split(',')[0]} [{unit}]", fontsize=8.5)
         right.set_ylabel("left over [std]", fontsize=8.5)
-    handles: list[Any] = [handle("measured", INK, ls="", marker=".")]
+    handles: list[Any] = [handle("recorded", INK, ls="", marker=".")]
     handles += [handle(label, colour, ls=dash) for _, colour, dash, label in models]
     handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
     if any(c.scatter is not None for c in channels):

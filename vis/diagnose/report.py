@@ -131,7 +131,7 @@ def _in_units(diagnosis: Result) -> list[Block]:
             for name, unit in names
         ]
         head = ("channel", "unit", "fitted: before", "after", "held out: before", "after")
-        blocks.append(table(head, rows, title="Measured less modelled, root mean square, the sensors' noise included"))
+        blocks.append(table(head, rows, title="Recorded less modelled, root mean square, the sensors' noise included"))
     conditions = diagnosis.get("by_condition", [])
     if len(conditions) > 1:
         common = _common([row["settings"] for row in conditions])

@@ -70,14 +70,9 @@ class _Plane(Camera):
         return np.column_stack([centres[:, 0], centres[0, 1] - 0.06 * stage.height + risen])
 
     def dress(self, axis: Any, reel: Reel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
-        for spine in axis.spines.values():
-            spine.set(visible=True, color="#bbbbbb")
+        _frame_and_ruler(axis, stage)
         level = stage.place(np.array([[focus[0], reel.cut, reel.surface]]), focus)[0, 1]
         axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
-        step, right = nice_below(0.2 * stage.width), 0.97
-        axis.plot([right - step / stage.width, right], [0.035, 0.035], color=INK, lw=2.5, solid_capstyle="butt")
-        middle = right - 0.5 * step / stage.width
-        axis.text(middle, 0.05, f"{1e3 * step:g} mm", ha="center", va="bottom", fontsize=10, bbox=HALO)
         self.mark(axis, stage, frame, focus, level)
 
     def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
@@ -90,6 +85,12 @@ class _Plane(Camera):
         axis.plot([0.02, 0.06], [0.96, 0.96], color=INK, lw=1.6)
         axis.plot([0.02], [0.96], "o", color=INK, ms=4)
         axis.text(0.075, 0.96, "from the centre to row 0", fontsize=9, va="center", color=INK, bbox=HALO)
+        if radius := frame.values.get("hull_radius"):
+            turn = np.linspace(0.0, 2 * np.pi, 181)
+            circle = ring.mean(axis=0) + radius * np.column_stack([np.cos(turn), 0.0 * turn, np.sin(turn)])
+            axis.plot(*stage.place(circle, focus).T, color=INK, lw=1.0, ls=(0, (4, 3)))
+            axis.plot([0.02, 0.06], [0.915, 0.915], color=INK, lw=1.0, ls=(0, (4, 3)))
+            axis.text(0.075, 0.915, "the cylinder that grains touch", fontsize=9, va="center", color=INK, bbox=HALO)
 
 
 class _Near(_Plane):
@@ -121,6 +122,21 @@ class _Space(Camera):
         stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
         level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(stage.pitch)
         return stage, _steady(np.column_stack([centres[:, 0], level - 0.12 * stage.height]))
+
+    def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
+        _frame_and_ruler(axis, stage)
+
+
+def _frame_and_ruler(axis: Any, stage: Stage | FlatStage) -> None:
+    """A thin frame around the picture, and a length in its lower right corner: the same everywhere on the picture."""
+    for spine in axis.spines.values():
+        spine.set(visible=True, color="#bbbbbb")
+    step, right = nice_below(0.2 * stage.width), 0.97
+    for colour, thick in (("white", 5.0), (INK, 2.5)):
+        ends = [right - step / stage.width, right]
+        axis.plot(ends, [0.035, 0.035], color=colour, lw=thick, solid_capstyle="butt")
+    middle = right - 0.5 * step / stage.width
+    axis.text(middle, 0.05, f"{1e3 * step:g} mm", ha="center", va="bottom", fontsize=10, bbox=HALO)
 
 
 def layout(reels: Sequence[AnyReel]) -> list[Panel]:

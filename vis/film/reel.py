@@ -252,8 +252,14 @@ class Reel(_Filmed):
             for name, (points, faces) in self._meshes.items()
         }
         if self.frames is not None:  # grains touch a cylinder inside the hull: shown is the octagon
-            found = self.frames[index]
-            return replace(found, grains=self.grains(found), bodies=found.bodies | {"hull": bodies["hull"]})
+            found, values = self.frames[index], {}
+            if "hull" in found.bodies:
+                across = found.bodies["hull"][0][:, [0, 2]] - bodies["hull"][0][:, [0, 2]].mean(axis=0)
+                values["hull_radius"] = float(np.hypot(*across.T).max())
+            return replace(
+                found, grains=self.grains(found), bodies=found.bodies | {"hull": bodies["hull"]},
+                values=found.values | values,
+            )  # fmt: skip
         grains: dict[str, NDArray[Any]] = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
         return Frame(float(self.times[index]), grains, bodies, {}, {"row_forces": self._loads(row, x, y, theta)})
 

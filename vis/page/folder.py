@@ -95,6 +95,12 @@ class RunFolder:
     status: str = "unknown"
     reason: str = ""
 
+    @property
+    def on_surface(self) -> str:
+        """What the title of a picture ends with: ", " and the material of the bed; empty where result.json has none."""
+        bed = self.result.get("bed")
+        return f", {bed['material']}" if isinstance(bed, dict) and isinstance(bed.get("material"), str) else ""
+
     def of_kind(self, kind: str) -> list[Run]:
         """The runs of a kind, by speed and seed."""
         chosen = [run for run in self.runs if run.kind == kind]

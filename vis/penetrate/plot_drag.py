@@ -110,7 +110,7 @@ def drag_plot(run: RunFolder) -> Plot | None:
     for axis, speed in zip(axes, speeds, strict=True):
         here = [r for r in driven if r.speed == speed]
         seeds = len(here)
-        axis.set_title(f"{speed:.3g} m/s   ({seeds} bed{'s' if seeds > 1 else ''})")
+        axis.set_title(f"{speed:.3g} m/s{run.on_surface}   ({seeds} bed{'s' if seeds > 1 else ''})")
         for way, shade in (("in", 1.0), ("out", 0.45)):
             _band(axis, _parts([r.bed for r in here], way), BED, alpha=shade, solid=way == "in")
             if models := _parts([r.model for r in here], way):

@@ -54,7 +54,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
                     1e3 * (series.time[peak] - start), series.force[peak], "o" if colour == BED else "D",
                     color=colour, ms=5, mec="white", mew=0.8, zorder=5,
                 )  # fmt: skip
-        above.set_title(f"dropped at {speed:.3g} m/s")
+        above.set_title(f"dropped at {speed:.3g} m/s{run.on_surface}")
         above.axhline(0.0, color=GREY, lw=0.8)
         if early:
             for axis in (above, below):

@@ -363,7 +363,7 @@ def _view(
     high[2] = max(min(high[2], surface + 0.25 * (surface - low[2])), surface)  # a grain that flies does not count
     count = f"{len(position):,}".replace(",", "\N{NO-BREAK SPACE}")
     return {
-        "name": story.name, "frames": frames, "by": by, "top": top, "title": story.title,
+        "name": story.name, "frames": frames, "by": by, "top": top, "title": story.title + run.on_surface,
         "lines": [story.line(index) for index in frames], "note": f"{count} grains; {CUT}", "low": low.tolist(),
         "high": high.tolist(), "cut": cut, "radius": float(first.grains["radius"].mean()), "surface": surface,
         "file": str(file), "size": list(size),

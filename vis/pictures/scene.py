@@ -2,9 +2,9 @@
 
 Grains are exact spheres by ray casting in the shader (a quad per grain, not a mesh): software OpenGL draws 20,000 of
 them in about a second. `Scene` is the bed cut open in front of a camera that stands still; `Stage` is a platform on its
-ground through a camera that can be moved. The latter's projection is parallel, so that a length is the same all over
-the picture: the view goes along +y, from a little above, onto the plane of the cut. `place` says where points lie on
-the picture, for what is drawn over it.
+ground through a camera that can be moved. The projection is parallel: a length is the same all over the picture, and
+scales are square to its edges. The view goes along +y, from a little above, onto the plane of the cut. `place` says
+where points lie on the picture, for what is drawn over it.
 """
 
 from __future__ import annotations
@@ -131,15 +131,16 @@ class Scene(Rendered):
         centre = np.array([0.5 * (low[0] + high[0]), cut, 0.5 * (low[2] + high[2])])
         super().__init__(size, centre=centre, reach=reach)
         self.cut = cut
-        self.add_block((low[0], high[0], cut, high[1], low[2] - 0.03 * height, low[2] - 1e-6), FLOOR, 0.25, 0.8)
+        floor = (low[0], high[0], cut, cut + 4.0 * radius, low[2] - 0.03 * height, low[2] - 1e-6)
+        self.add_block(floor, FLOOR, 0.25, 0.8)
         self._plotter.enable_ssao(radius=3.0 * radius, bias=0.12 * radius, kernel_size=48, blur=True)
+        self._plotter.enable_parallel_projection()
         camera = self._plotter.camera
         view = np.array([0.0, -1.0, 0.40])  # from straight ahead: a depth on the ruler is the same all across the cut
         camera.focal_point = tuple(centre)
         camera.position = tuple(centre + view / np.linalg.norm(view) * 5.0 * reach)
         camera.up = (0.0, 0.0, 1.0)
-        camera.view_angle = 21.0
-        camera.clipping_range = (0.5 * reach, 12.0 * reach)
+        camera.clipping_range = (2.5 * reach, 7.5 * reach)
         corners = [(x, y, z) for x in (low[0], high[0]) for y in (cut, high[1]) for z in (low[2], high[2])]
         self._fit(np.array([*corners, (centre[0], cut, high[2] + 0.55 * height)]))
 
@@ -176,7 +177,7 @@ class Scene(Rendered):
         camera = self._plotter.camera
         low, high = (edge(self.place(points), axis=0) for edge in (np.min, np.max))
         zoom = min((right - left) / (high[0] - low[0]), (head - foot) / (high[1] - low[1]))
-        camera.view_angle = np.degrees(2.0 * np.arctan(np.tan(np.radians(0.5 * camera.view_angle)) / zoom))
+        camera.parallel_scale /= zoom
         low, high = (edge(self.place(points), axis=0) for edge in (np.min, np.max))
         shift = 0.5 * (low + high) - 0.5 * np.array([left + right, foot + head])
         camera.SetWindowCenter(*(2.0 * shift))

@@ -243,7 +243,7 @@ def _in_units(diagnosis: Row) -> list[dict[str, Any]]:
     tables = []
     if channels := diagnosis.get("by_channel", []):
         tables.append({
-            "title": "measured less modelled, root mean square (after: with the sensors' noise)",
+            "title": "recorded less modelled, root mean square (after: with the sensors' noise)",
             "head": ["channel", "unit", *_STAGES],
             "rows": _by_stage(channels, ("channel", "unit"), "rms_", "{:.3g}".format),
         })  # fmt: skip
