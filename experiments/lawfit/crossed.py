@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.runs.progress import Progress
 from experiments.runs.types import Json
@@ -39,6 +41,18 @@ class Crossed:
     tables: list[Json]
     sentences: list[str]
     warnings: list[str]
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The rows that were fitted, without dimensions, and the force of each law there."""
+        data = self.best.data
+        assert isinstance(data, CrossedData)
+        cells = list(dict.fromkeys(data.cell_of_row.tolist()))
+        columns: dict[str, NDArray[Any]] = {
+            "cell": np.array([cells.index(cell) for cell in data.cell_of_row]), "bed": data.bed_of_row,
+            "depth": data.depth, "froude": data.rate, "inertial": data.inertial * data.rate,
+            "force": data.force / data.weight,
+        }  # fmt: skip
+        return columns | {name: fit.predicted / data.weight for name, fit in self.fits.items()}
 
     @property
     def best(self) -> LawFit[CrossedLaw]:
@@ -149,7 +163,7 @@ def _sentences(laws: Sequence[Json]) -> list[str]:
     alike = [law["name"] for law in laws[1:] if law["above_best"]["low"] <= 0]
     if alike:
         said.append(say("crossed_alike", laws="; ".join(alike)))
-    additive = [next((law for law in laws if law["name"] == f"power, {rate}"), None) for rate in ("square", "early")]
+    additive = [next((law for law in laws if law["name"] == f"power-{rate}"), None) for rate in ("square", "early")]
     if all(additive):
         square, early = (100 * law["held_out"]["beds"] for law in additive if law is not None)
         said.append(say("crossed_roth", square=square, early=early))

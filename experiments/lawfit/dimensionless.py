@@ -35,9 +35,9 @@ __all__ = ["CROSSED", "CrossedData", "CrossedLaw", "Tangent", "cross", "crossed_
 _EXPONENT, _SETTLING = (0.3, 3.9), (1e-2, 50.0)
 """Bounds of exponents and of T [1]."""
 CROSSED = {
-    "spring-damper, scaled": ("linear", "damper"), "katsuragi-durian, scaled": ("linear", "square"),
-    "power, damper": ("power", "damper"), "power, square": ("power", "square"), "power, early": ("power", "early"),
-    "power, inertial": ("power", "inertial"), "area, square": ("area", "square"), "area, early": ("area", "early"),
+    "scaled-spring-damper": ("linear", "damper"), "scaled-katsuragi-durian": ("linear", "square"),
+    "power-damper": ("power", "damper"), "power-square": ("power", "square"), "power-early": ("power", "early"),
+    "power-inertial": ("power", "inertial"), "area-square": ("area", "square"), "area-early": ("area", "early"),
     "one-pair": ("si", "si"),
 }  # fmt: skip
 """Name -> static part, part of the rate."""

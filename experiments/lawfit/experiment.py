@@ -6,6 +6,7 @@ and cells/NAME has the same of each.
 """
 
 from dataclasses import asdict
+from pathlib import Path
 
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.platform.surfaces import surface_of_grains
@@ -17,6 +18,7 @@ from experiments.runs.whole_runs import publish, whole_run
 
 from .crossed import crossed_result
 from .design import check_design, compute_runs
+from .export import export_cell, export_crossed
 from .further import further_rows
 from .one_cell import OneCell, fit_cell
 from .reading import read_cells
@@ -46,6 +48,12 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
         folder.write_series(f"bins-{cell.name}", cell.columns())
     crossed = crossed_result(runs, progress) if several else None
     laws = {cell.name: cell.laws for cell in cells}
+    target = Path(settings.export) if settings.export else folder.path / "export"
+    if crossed is None:
+        export_cell(first.exported, first.laws, target)
+    else:
+        export_crossed(crossed.best, crossed.laws, runs, target)
+        folder.write_series("crossed", crossed.columns())
     tables = [{"title": say("table_laws"), **law_rows(first.laws)}, *_more_tables(cells)]
     warnings = [*(designed.notes if designed else []), *_named(cells, "warnings")]
     sentences = _named(cells, "sentences")

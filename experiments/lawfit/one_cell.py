@@ -63,6 +63,12 @@ class OneCell:
         pair = ground_file(self.fits[PAIR], self.data, [*self.told, *self.entries[PAIR]["holds"]])
         pair.write(folder / "ground.toml")
 
+    @property
+    def exported(self) -> Fitted:
+        """The best law that can be a ground."""
+        good = (law["name"] for law in self.laws if law["name"] != ADDED_MASS)
+        return next((self.fits[name] for name in good if not _beyond_the_law(self.fits[name])), self.fits[PAIR])
+
     def columns(self) -> dict[str, NDArray[Any]]:
         """The rows that were fitted, and each law's force there."""
         return _columns(self.data, self.fits)

@@ -85,6 +85,10 @@ class LawFitSettings(PenetrateSettings):
     """Not used: every bed has all drops of drop_speeds [m/s]."""
     frame_count: int = Field(0, ge=0, le=2000, description="Frames of each shown run [1]; 0 for none.")
 
+    export: str | None = Field(None, min_length=1)
+    """Folder for law.json and law.py, the best law for use without hedgebed; 'export' in the run's folder if not
+    given."""
+
     # The fit
     laws: tuple[str, ...] = Field(LAWS, min_length=1)
     """Laws to compare beside the spring-damper: spring-damper, hunt-crossley, power-irreversible, katsuragi-durian,

@@ -9,9 +9,11 @@ so many beds, and of the whole procedure of `design`, which adds beds until the 
 """
 
 import json
+import math
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +23,11 @@ from experiments.runs.types import Json
 
 from .data import Data, Foundation, PushRun
 from .design import LEAST_BEDS, how_sure, middle_force, sure_enough
+from .dimensionless import CrossedLaw
 from .fit import fit_law
 from .laws import CANDIDATES
 
-__all__ = ["DESIGNS", "FOUNDATION", "coverage", "stopping_coverage", "synthetic_data"]
+__all__ = ["DESIGNS", "FOUNDATION", "coverage", "scaled_cells", "stopping_coverage", "synthetic_data"]
 
 FOUNDATION = Foundation(
     material="sand", tip="sphere", diameter=0.012, tip_height=0.006, cone_angle=60.0, gravity=9.80665, grain=0.001,
@@ -89,6 +92,38 @@ def synthetic_data(
                 PushRun(f"{bed}-{speed:g}", str(bed), "driven", speed, means[0], still + speed, still, means[1])
             )
     return Data(FOUNDATION, tuple(runs))
+
+
+def scaled_cells(
+    law: CrossedLaw,
+    theta: Sequence[float],
+    *,
+    shapes: Sequence[str] = ("sphere", "flat"),
+    gravities: Sequence[float] = (9.80665, 0.980665),
+    beds: int = 3,
+    noise: float = 0.02,
+    seed: int = 1,
+) -> dict[str, Data]:
+    """Made-up runs of a law without dimensions at three Froude numbers, in `beds` beds of every shape and gravity.
+
+    Beds differ by 5 %; the force of each interval of depth fluctuates by `noise` times the mean of its run.
+    """
+    random, cells = np.random.default_rng(seed), {}
+    factors = 1 + 0.05 * random.standard_normal(beds)
+    x, still = (np.arange(BINS) + 0.5) / BINS * 0.9, np.zeros(BINS)
+    for gravity in gravities:
+        for shape, diameter in zip(shapes, (0.012, 0.016), strict=False):
+            of, runs = replace(FOUNDATION, tip=shape, diameter=diameter, gravity=gravity, grain=0.0024), []
+            depth = x * diameter
+            for bed, factor in enumerate(factors):
+                for number in (0.2, 0.4, 0.8):
+                    speed = number * math.sqrt(gravity * diameter)
+                    force = factor * np.array([law.force(np.array(theta), of, z, speed) for z in depth.tolist()])
+                    force += noise * force.mean() * random.standard_normal(BINS)
+                    name = f"{bed}-{number}"
+                    runs.append(PushRun(name, f"seed {bed}", "driven", speed, depth, still + speed, still, force))
+            cells[f"{shape}-{gravity:.3g}"] = Data(of, tuple(runs))
+    return cells
 
 
 def coverage(

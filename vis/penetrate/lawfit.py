@@ -10,7 +10,7 @@ from matplotlib.colors import TwoSlopeNorm
 
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, listing, table
-from vis.page.plots import BED, GREY, INK, handle, legend_above, line_styles, new_panels, sheet
+from vis.page.plots import BED, GREY, INK, handle, legend_above, line_styles, new_panels, shades, sheet
 from vis.page.report import Report, Result, report_of, tables
 
 __all__ = ["write_lawfit_report"]
@@ -27,7 +27,7 @@ def write_lawfit_report(report: Report) -> Path:
     result = report.result
     laws: list[Result] = result["laws"]
     found = tables(result)
-    drawn = [block for block in (_laws(report, laws), _trust(report, laws)) if block is not None]
+    drawn = [block for block in (_crossed(report), _laws(report, laws), _trust(report, laws)) if block is not None]
     sections = [
         Section("", [listing(result["departures"]["sentences"]), *found, *drawn]),
         Section("Parameters", [_parameters(laws)]),
@@ -75,6 +75,38 @@ def _laws(report: Report, laws: list[Result]) -> Block | None:
     lines = [handle(law["name"], lw=1.5, **styles[law["name"]]) for law in laws]
     legend_above(drawing, [*marks, *lines], 3)
     return report.draw("laws", drawing)
+
+
+def _crossed(report: Report) -> Block | None:
+    """Force over rho g D^3 of all cells, and the best law at the slowest and the fastest Froude number of each tip."""
+    if "crossed" not in report.result:
+        return None
+    columns, best = report.columns("series/crossed.csv"), report.result["crossed"][0]["name"]
+    cells = [cell["foundation"] for cell in report.result["cells"]]
+    tips = list(dict.fromkeys((cell["tip"], cell["diameter"], cell["cone_angle"]) for cell in cells))
+    gravities = sorted({cell["gravity"] for cell in cells}, reverse=True)
+    looks = [{"marker": mark, "color": colour} for mark, colour in zip("ox+sd^v", shades(len(gravities)), strict=False)]
+    drawing, axes = new_panels(len(tips), height=3.4)
+    lines = {}
+    for axis, tip in zip(axes, tips, strict=True):
+        own = [k for k, cell in enumerate(cells) if (cell["tip"], cell["diameter"], cell["cone_angle"]) == tip]
+        for k in own:
+            rows, look = columns["cell"] == k, looks[gravities.index(cells[k]["gravity"]) % len(looks)]
+            axis.plot(columns["depth"][rows], columns["force"][rows], ls="", ms=4, alpha=0.6, **look)
+        rows = np.isin(columns["cell"], own)
+        for end, style in (("slowest", "-"), ("fastest", "--")):
+            froude = columns["froude"][rows].min() if end == "slowest" else columns["froude"][rows].max()
+            on = rows & np.isclose(columns["froude"], froude, rtol=0.02)
+            depth, place = np.unique(columns["depth"][on], return_index=True)
+            axis.plot(depth, columns[best][on][place], style, color=INK, lw=1.5)
+            lines[style] = handle(f"{best}, {end} drive", INK, ls=style)
+        axis.set(title=f"{tip[0]}, {1e3 * tip[1]:g} mm", xlabel="depth over diameter")
+    axes[0].set_ylabel("force over rho g D^3")
+    marks = [
+        handle(f"{gravity:.4g} m/s2", ls="", ms=4, **look) for gravity, look in zip(gravities, looks, strict=False)
+    ]
+    legend_above(drawing, [*marks, *lines.values()], 4)
+    return report.draw("crossed", drawing)
 
 
 def _trust(report: Report, laws: list[Result]) -> Block | None:

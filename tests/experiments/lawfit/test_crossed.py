@@ -10,11 +10,11 @@ from fake_bed import FakeBed
 from experiments import lawfit
 from experiments.lawfit.cells import cells_of
 from experiments.lawfit.crossed import crossed_result
-from experiments.lawfit.data import Data, Foundation, PushRun
+from experiments.lawfit.data import Data, PushRun
 from experiments.lawfit.dimensionless import CrossedLaw, cross, tangent_at
 from experiments.lawfit.fit import fit_law
 from experiments.lawfit.laws import CANDIDATES
-from experiments.lawfit.synthetic import FOUNDATION
+from experiments.lawfit.synthetic import FOUNDATION, scaled_cells
 from experiments.lawfit.trust import beyond
 from experiments.penetrate import beds
 from experiments.runs.progress import Progress
@@ -136,49 +136,28 @@ def test_what_cannot_be_crossed_is_refused_by_name():
         lawfit.check(lawfit.Settings(**(TWO | {"budget": 1.0})))
 
 
-def scaled_cells(law, theta, *, shapes=("sphere", "flat"), gravities=(9.80665, 0.980665), noise=0.02, seed=1):
-    """Made-up runs of a law without dimensions, in three beds of every shape and gravity."""
-    random, cells = np.random.default_rng(seed), {}
-    factors = 1 + 0.05 * random.standard_normal(3)
-    x = (np.arange(12) + 0.5) / 12 * 0.9
-    for gravity in gravities:
-        for shape, diameter in zip(shapes, (0.012, 0.016), strict=False):
-            of: Foundation = replace(FOUNDATION, tip=shape, diameter=diameter, gravity=gravity, grain=0.0024)
-            runs = []
-            for bed in range(3):
-                for number in (0.2, 0.4, 0.8):
-                    speed = number * math.sqrt(gravity * diameter)
-                    force = np.array([law.force(theta, of, float(z), speed) for z in x * diameter])
-                    force = factors[bed] * force + noise * force.mean() * random.standard_normal(12)
-                    still = np.zeros(12)
-                    runs.append(PushRun(f"{bed}-{number}", f"seed {bed}", "driven", speed, x * diameter,
-                                        still + speed, still, force))  # fmt: skip
-            cells[f"{shape}-{gravity:.3g}"] = Data(of, tuple(runs))
-    return cells
-
-
-EARLY = CrossedLaw("power, early", ("sphere", "flat"))
+EARLY = CrossedLaw("power-early", ("sphere", "flat"))
 TRUTH = np.array([6.0, 9.0, 1.3, 0.9, 3.0, 0.5])  # k and n of both shapes, b, T
 
 
 def test_runs_of_a_law_without_dimensions_give_it_back_and_rank_it_first():
     found = crossed_result(scaled_cells(EARLY, TRUTH), Progress())
-    assert found.laws[0]["name"] == "power, early"
+    assert found.laws[0]["name"] == "power-early"
     assert found.best.candidate.free == ("k_sphere", "k_flat", "n_sphere", "n_flat", "b", "T")
     np.testing.assert_allclose(found.best.theta, TRUTH, rtol=0.1)
     laws = {law["name"]: law for law in found.laws}
-    assert laws["power, early"]["above_best"]["value"] == 0
-    assert laws["power, square"]["above_best"]["low"] > 0  # inertia at every depth is clearly worse
-    assert laws["one-pair"]["held_out"]["beds"] > 5 * laws["power, early"]["held_out"]["beds"]
+    assert laws["power-early"]["above_best"]["value"] == 0
+    assert laws["power-square"]["above_best"]["low"] > 0  # inertia at every depth is clearly worse
+    assert laws["one-pair"]["held_out"]["beds"] > 5 * laws["power-early"]["held_out"]["beds"]
     # A gravity that it was not fitted to is predicted as well as the beds are.
-    assert laws["power, early"]["gravity_out"]["rms"] < 0.1 < laws["one-pair"]["gravity_out"]["rms"]
-    assert laws["power, early"]["tip_out"] is None  # each shape has a strength of its own
+    assert laws["power-early"]["gravity_out"]["rms"] < 0.1 < laws["one-pair"]["gravity_out"]["rms"]
+    assert laws["power-early"]["tip_out"] is None  # each shape has a strength of its own
 
 
 def test_the_area_of_the_tip_predicts_a_shape_that_was_left_out():
-    law = CrossedLaw("area, square", ("sphere", "flat"))
+    law = CrossedLaw("area-square", ("sphere", "flat"))
     found = crossed_result(scaled_cells(law, np.array([10.0, 0.6, 1.0])), Progress())
-    out = next(one for one in found.laws if one["name"] == "area, square")
+    out = next(one for one in found.laws if one["name"] == "area-square")
     assert out["tip_out"]["groups"] == ["sphere 0.012", "flat 0.016"] and out["tip_out"]["rms"] < 0.1
 
 

@@ -343,3 +343,35 @@ def test_a_bed_whose_grains_carry_the_spike_above_the_surface_is_named(of_three_
     monkeypatch.setattr("coupling.trajectory.Penetration.resting_depth", property(lambda run: next(depths)))
     data = read_data(lawfit.Settings(runs=(of_three_beds,)))
     assert len(data.placements) == 2 and any("seed 2" in note and "above" in note for note in data.notes)
+
+
+@pytest.mark.long
+def test_runs_of_two_tips_and_gravities_have_a_ground_each_and_laws_of_all(tmp_path):
+    for name, changed in {
+        "a": {}, "b": {"tip": "flat"}, "c": {"gravity": 0.980665}, "d": {"tip": "flat", "gravity": 0.980665}
+    }.items():  # fmt: skip
+        share = changed.get("gravity", 9.80665) / 9.80665
+        speeds = tuple(speed * np.sqrt(share) for speed in (0.1, 0.2, 0.4))
+        # Of one Froude number: K goes with g, and C with its root.
+        parameters = {"stiffness": K * share, "damping": C * np.sqrt(share)}
+        changed |= {"speeds": speeds, "other_speeds": speeds, "load": 0.2 * share, "seeds": (1, 2, 3)}
+        made_up_run(tmp_path / "runs" / name, parameters=parameters, **changed)
+    settings = lawfit.Settings(runs=(str(tmp_path / "runs"),), laws=("spring-damper",))
+    result = lawfit.run(settings, tmp_path / "out")
+    assert [cell["foundation"]["tip"] for cell in result["cells"]] == ["sphere", "flat", "sphere", "flat"]
+    for cell in result["cells"]:
+        pair = read_ground(tmp_path / "out" / "cells" / cell["name"] / "ground.toml")
+        share = cell["foundation"]["gravity"] / 9.80665
+        assert pair.values["stiffness"] == pytest.approx(K * share, rel=0.02)
+        assert pair.range["gravity"][0] == cell["foundation"]["gravity"]
+    laws = {law["name"]: law for law in result["crossed"]}
+    # The beds differ by 5 %, which is all that the law of the right form leaves.
+    assert laws["scaled-spring-damper"]["held_out"]["beds"] < 0.07 < 0.5 < laws["one-pair"]["held_out"]["beds"]
+    assert laws["scaled-spring-damper"]["gravity_out"]["rms"] < 0.07
+    for row in result["crossed_tangents"]:
+        share = row["gravity"] / 9.80665
+        assert row["stiffness"]["value"] == pytest.approx(K * share, rel=0.05)
+        assert row["stiffness"]["low"] < row["stiffness"]["value"] < row["stiffness"]["high"]
+    names = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
+    assert any(name.startswith("crossed") for name in names)
+    assert {path.name for path in (tmp_path / "out" / "export").iterdir()} >= {"law.json", "law.py"}
