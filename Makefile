@@ -6,6 +6,7 @@ BIN := $(VENV)/bin
 ARGS ?=
 WHAT ?= bed
 WORKERS ?= 2
+FUZZED ?= fuzzed.jsonl
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -35,8 +36,8 @@ long: $(VENV)/.installed-test  ## the tests of some 10 s and more, which CI runs
 slow: $(VENV)/.installed-test  ## the tests that take minutes: physics against closed forms, kill and resume
 	$(PYTEST) -m slow $(ARGS)
 
-fuzz: $(VENV)/.installed-test  ## settings and campaigns drawn at random, 10,000 and 500: exit 0, or 2 with a sentence
-	HEDGEBED_FUZZ=10000 $(PYTEST) tests/faults/test_fuzz.py $(ARGS)
+fuzz: $(VENV)/.installed-test  ## settings and campaigns drawn at random, 10,000 and 500, what FUZZED=fuzzed.jsonl has left out
+	HEDGEBED_FUZZ=10000 HEDGEBED_FUZZ_KEPT=$(FUZZED) $(PYTEST) tests/faults/test_fuzz.py $(ARGS)
 
 torture: $(VENV)/.installed-test  ## files damaged, 1,000 in all, and experiments killed, 25 times each, resumed to the same bits
 	HEDGEBED_DAMAGES=200 $(PYTEST) tests/faults/test_damage.py $(ARGS)

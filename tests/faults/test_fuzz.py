@@ -1,19 +1,22 @@
 """Settings and campaigns drawn at random: exit 0, or exit 2 with a sentence that names what is wrong, before any work.
 
-`make fuzz` draws as many as HEDGEBED_FUZZ says; the suite a few. The work itself is replaced: what is tried is all that
-comes before it.
+`make fuzz` draws as many as HEDGEBED_FUZZ says, in parts that each have a seed of their own; the suite a few. The work
+itself is replaced: what is tried is all that comes before it. HEDGEBED_FUZZ_KEPT names a file to which each part that
+passes adds a line; parts that it has are not done again.
 """
 
+import json
 import os
 import random
 import shutil
-from contextlib import redirect_stderr, redirect_stdout
+from collections import Counter
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from typing import get_args
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
 from experiments.campaign.files import new_campaign
@@ -23,10 +26,14 @@ from experiments.runs.registry import EXPERIMENTS
 from rigid.result import toml_value
 
 CASES = int(os.environ.get("HEDGEBED_FUZZ", "24"))
+KEPT = os.environ.get("HEDGEBED_FUZZ_KEPT")
+PART, CAMPAIGNS = 250, 25
+"""Cases of settings and campaigns of a part, at most."""
+PARTS = range(-(-CASES // PART))
+ALL = CASES > 60
 SLOW_TO_CHECK = {"hop", "paper", "validate", "converge", "sweep"}
 """Their checks compute for seconds where a setting is at its limit: `make fuzz` draws them too."""
-DRAWN = [one for one in EXPERIMENTS.values() if CASES > 60 or one.name not in SLOW_TO_CHECK]
-some = settings(max_examples=CASES, deadline=None, suppress_health_check=list(HealthCheck), derandomize=CASES <= 60)
+DRAWN = [one for one in EXPERIMENTS.values() if ALL or one.name not in SLOW_TO_CHECK]
 
 numbers = st.one_of(
     st.sampled_from([0, 1, -1, 2, 3, 0.5, 1e-3, 1e-6, 1e6, 1e300, -1e-300, 2**31, float("nan"), float("inf")]),
@@ -86,20 +93,39 @@ def no_work(monkeypatch, tmp_path):
     monkeypatch.setattr(registry.Experiment, "headline_of", lambda self, result: None)
 
 
-@some
-@given(case=cases())
-def fuzz_settings(case):
-    name, given = case
-    lines = [f"{key} = {toml_value(value)}\n" for key, value in given.items()]
-    Path("case.toml").write_text("".join(lines), encoding="utf-8")
-    shutil.rmtree("out", ignore_errors=True)
-    status, said = outcome(*name.split(" "), "case.toml", "--out", "out", "--quiet")
-    assert status in (0, 2) and in_words(said), (name, given, status, said)
-    assert status == 0 or said.strip(), (name, given)
+@contextmanager
+def kept(name):
+    """Skips a part that the file has already; a part that passes adds its line, with how often each status came."""
+    path = Path(KEPT).resolve() if KEPT else None
+    lines = path.read_text(encoding="utf-8").splitlines() if path is not None and path.exists() else []
+    if any(json.loads(line)["part"] == name for line in lines):
+        pytest.skip(f"{path} has {name}")
+    counts = Counter()
+    yield counts
+    if path is not None:
+        line = {"part": name} | {f"exit {status}": count for status, count in sorted(counts.items())}
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
 
 
-def test_settings_of_any_kind_are_run_or_refused_in_words(no_work):
-    fuzz_settings()
+@pytest.mark.parametrize("part", PARTS)
+def test_settings_of_any_kind_are_run_or_refused_in_words(part, no_work):
+    with kept(f"settings {part}") as counts:
+
+        @seed(part)
+        @settings(max_examples=min(CASES, PART), deadline=None, suppress_health_check=list(HealthCheck), database=None)
+        @given(case=cases())
+        def fuzz(case):
+            name, given = case
+            lines = [f"{key} = {toml_value(value)}\n" for key, value in given.items()]
+            Path("case.toml").write_text("".join(lines), encoding="utf-8")
+            shutil.rmtree("out", ignore_errors=True)
+            status, said = outcome(*name.split(" "), "case.toml", "--out", "out", "--quiet")
+            assert status in (0, 2) and in_words(said), (name, given, status, said)
+            assert status == 0 or said.strip(), (name, given)
+            counts[status] += 1
+
+        fuzz()
 
 
 def mangled(text, chance):
@@ -121,21 +147,25 @@ def mangled(text, chance):
     return "".join(lines)
 
 
+@pytest.mark.parametrize("part", range(-(-CASES // (20 * 2 * CAMPAIGNS)) if ALL else 1))
 @pytest.mark.parametrize("kind", ["tumble", "penetration"])
-def test_campaigns_with_something_wrong_are_checked_or_refused_in_words(kind, tmp_path, monkeypatch):
+def test_campaigns_with_something_wrong_are_checked_or_refused_in_words(kind, part, tmp_path, monkeypatch):
     """No markup of a campaign gets into the page as such."""
-    monkeypatch.chdir(tmp_path)
-    new_campaign(tmp_path / "new", kind=kind)
-    reports = CASES > 60
-    if not reports:
-        monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
-    for seed in range(max(4, CASES // 20)):
-        chance = random.Random(seed)
-        shutil.rmtree("one", ignore_errors=True), shutil.rmtree("out", ignore_errors=True)
-        shutil.copytree("new", "one")
-        path = chance.choice(sorted(path for path in (tmp_path / "one").rglob("*") if path.is_file()))
-        path.write_text(mangled(path.read_text(encoding="utf-8"), chance), encoding="utf-8")
-        status, said = outcome("campaign", "check", "one", "--out", "out", "--quiet")
-        assert status in (0, 2) and in_words(said), (seed, path, said)
-        if reports and status == 0:
-            assert "<script>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8"), seed
+    source = tmp_path / "new"
+    with kept(f"campaigns {kind} {part}") as counts:
+        monkeypatch.chdir(tmp_path)
+        new_campaign(source, kind=kind)
+        if not ALL:
+            monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
+        count = CAMPAIGNS if ALL else 4
+        for number in range(part * count, (part + 1) * count):
+            chance = random.Random(number)
+            shutil.rmtree("one", ignore_errors=True), shutil.rmtree("out", ignore_errors=True)
+            shutil.copytree("new", "one")
+            path = chance.choice(sorted(path for path in (tmp_path / "one").rglob("*") if path.is_file()))
+            path.write_text(mangled(path.read_text(encoding="utf-8"), chance), encoding="utf-8")
+            status, said = outcome("campaign", "check", "one", "--out", "out", "--quiet")
+            assert status in (0, 2) and in_words(said), (number, path, said)
+            if ALL and status == 0:
+                assert "<script>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8"), number
+            counts[status] += 1
