@@ -290,7 +290,7 @@ _NAMES = {
     "experiments.penetrate.recorded": {"experiments.campaign.files": "place_campaign"},
     "experiments.penetrate.settings": {"experiments.grains.sizes": "expected_grain_count"},
     "experiments.platform.numbers": {"experiments.tumble.trial": "Spikes spikes_of"},
-    "experiments.suite": {"experiments.suite.cases": "Case EXPERIMENTS KEPT LONGEST do_case estimate keep standing"},
+    "experiments.suite": {"experiments.suite.cases": "Case EXPERIMENTS KEPT LONGEST estimate keep standing"},
     "experiments.tumble": {"experiments.tumble.result": "motion_columns quantities_of result_of trajectory_columns"},
     "experiments.tumble.campaign_settings": {"experiments.diagnose.settings": "CheckSettings"},
     "experiments.tumble.coupled": {"experiments.tumble.steppers": "law_feet=row_feet"},

@@ -10,12 +10,11 @@ the rate v / D of shear under a tip of diameter D, times d sqrt(rho / P) (GDR Mi
 tip deep, P = phi rho g D with phi = 0.6 (`experiments.grains.similarity`).
 """
 
-import hashlib
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -23,6 +22,9 @@ from pydantic import ValidationError
 from experiments.grains import similarity
 from experiments.penetrate import beds
 from experiments.penetrate.settings import PenetrateSettings
+from experiments.pool.tasks import name_of, task_of
+from experiments.pool.together import Planned
+from experiments.runs.registry import find_experiment
 
 from .costs import core_hours
 from .settings import FEWEST_ACROSS, LEAST_WIDTH, ConvergeSettings, say
@@ -37,9 +39,9 @@ ROOM = 2.0
 beforehand."""
 MOST_OVERLAP = 0.1
 """That `penetrate` takes [of a diameter]."""
-_NOT_OF_THE_BED = ("seeds", "arch", "threads", "checkpoint_interval", "frame_count", "cache", "allow_coarse")
-"""Settings that say how a member is computed, not which it is, and its seed, which stands beside them. `arch` changes
-its bits, not what they are drawn from: a sweep may be made in parts, some of them on a GPU."""
+_NOT_OF_THE_BED = ("arch", "frame_count", "allow_coarse")
+"""Settings that say how a member is computed, not which it is. `arch` changes its bits, not what they are drawn from: a
+sweep may be made in parts, some of them on a GPU."""
 
 
 def inertial_number(settings: PenetrateSettings, speed: float) -> float:
@@ -91,12 +93,14 @@ class Member:
     def folder(self) -> str:
         """The name of its run folder: the same for the same settings and code, whatever the sweep calls it."""
         settings = self.settings
-        kept = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _NOT_OF_THE_BED}
-        kept["material"] = repr(beds.find_material(settings))
-        text = json.dumps([kept, self.seed, beds.fingerprint()], sort_keys=True)
         width, deep = 1e3 * settings.bed_size[0], 1e3 * settings.bed_size[2]
-        digest = hashlib.sha256(text.encode()).hexdigest()[:12]
-        return f"{1e3 * settings.grain:.3g}mm-in-{width:.3g}x{deep:.3g}mm-seed{self.seed}-{digest}"
+        label = f"{1e3 * settings.grain:.3g}mm-in-{width:.3g}x{deep:.3g}mm-seed{self.seed}"
+        return name_of(find_experiment("penetrate"), settings, label=label, beside=_NOT_OF_THE_BED)
+
+    def planned(self, home: Path) -> Planned:
+        """The run as one of a list, in a folder below `home`."""
+        task = task_of(find_experiment("penetrate"), self.settings, home, name=self.folder)
+        return Planned(task, self.id, 3600 * self.core_hours)
 
     @property
     def tells(self) -> float:

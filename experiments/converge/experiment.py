@@ -1,10 +1,11 @@
 """`hedgebed converge`: a penetration case on finer grains, in wider and deeper beds, stiffer, at other speeds.
 
-Every member is an ordinary `penetrate` run in a folder of its own, found again by its settings. After each the result
-is written anew from those that are there, so that a sweep that is stopped has one. A member that fails is told, and
-the others are made; `hedgebed resume` tries it again.
+Every member is an ordinary `penetrate` run in a folder of its own, found again by its settings and code. After each the
+result is written anew from those that are there, so that a sweep that is stopped has one. A member that fails is told,
+and the others are made; `hedgebed resume` tries it again.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,8 @@ from typing import Any
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
+from experiments.pool.tasks import Outcome
+from experiments.pool.together import Where, run_all
 from experiments.runs.folder import RunFolder, write_json
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -20,11 +23,12 @@ from experiments.runs.whole_runs import draw_report, whole_run
 
 from .analysis import numbers_of
 from .design import Member, affordable, members_of, variants_of
-from .members import finished_member, make_member
 from .result import conclude, doubts, plan_told
 from .settings import ConvergeSettings, say
 
 __all__ = ["check", "fingerprint", "resume", "run"]
+
+_REPORT = 10.0  # What the report takes [s]
 
 
 def fingerprint() -> str:
@@ -34,6 +38,7 @@ def fingerprint() -> str:
 
 def check(settings: ConvergeSettings) -> None:
     """Raise ValueError, naming list and value, for a member that machine or material cannot serve."""
+    Where.of(settings).check()
     variants = variants_of(settings)
     for variant in variants:
         try:
@@ -59,31 +64,20 @@ class _Work:
     failed: dict[str, str] = field(default_factory=dict)
     spent: dict[str, float] = field(default_factory=dict)
     """Processor time of the members that are done [s]."""
+    result: Result | None = None
 
-    @property
-    def home(self) -> Path:
-        """Where the members' run folders are."""
-        return Path(self.settings.members) if self.settings.members else self.folder.path / "members"
-
-    def make(self, member: Member) -> None:
-        """Carry out a member, or go on with it."""
-        path = self.home / member.folder
-        self.progress.stage(member.id, total=1.0)
-        failed = make_member(member.settings, path, self.progress)
-        if failed is not None:
-            self.failed[member.id] = failed
-            self.progress.message(f"{member.id}: {failed}")
-            return
-        self.read(member)
-
-    def read(self, member: Member) -> bool:
-        """Take the numbers of a member that is done, and say whether it is."""
-        own = finished_member(self.home / member.folder)
-        if own is None:
-            return False
-        self.numbers[member.id] = numbers_of(own.read_result())
-        self.spent[member.id] = own.processor_time
-        return True
+    def take(self, outcomes: Sequence[Outcome]) -> None:
+        """Take the numbers of members that are over, or why they have none, and write the result of what is done."""
+        over = {outcome.name: outcome for outcome in outcomes}
+        for member in self.members:
+            outcome = over.get(member.folder)
+            if outcome is not None and outcome.fault:
+                self.failed[member.id] = outcome.fault
+            elif outcome is not None:
+                self.numbers[member.id] = numbers_of(json.loads(outcome.result))
+                self.spent[member.id] = outcome.processor_time
+        if self.numbers:
+            self.result = self.keep()
 
     def keep(self) -> Result:
         """Write the result of what is done so far, and what it cost; return it."""
@@ -103,17 +97,14 @@ def _carry_out(settings: ConvergeSettings, folder: RunFolder, progress: Progress
         work = _Work(settings, folder, progress, members, every[len(members) :])
         for line in (*plan_told(settings, members, work.left_out), *doubts(settings)):
             progress.message(line)
-        todo = [member for member in members if not work.read(member)]
-        progress.plan({member.id: 3600 * member.core_hours for member in todo}, seconds={"report": 10.0}, unit=1.0)
-        result = work.keep() if work.numbers else None
-        for member in todo:
-            work.make(member)
-            if work.numbers:
-                result = work.keep()
-        if result is None:
+        home = Path(settings.members) if settings.members else folder.path / "members"
+        planned = [member.planned(home) for member in members]
+        where = Where.of(settings)
+        run_all(planned, where=where, progress=progress, on_outcomes=work.take, report=_REPORT, unit=1.0)
+        if work.result is None:
             raise RuntimeError(next(iter(work.failed.values())))
         draw_report(folder, progress)
-    return result
+    return work.result
 
 
 run, resume = whole_run(

@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from experiments.penetrate.settings import MaxOverlap, PenetrateSettings, Seeds
-from experiments.runs.strict import Positive
+from experiments.runs.strict import Positive, Scheduler, Workers
 from vis.page.sentences import Sentences
 
 __all__ = ["FEWEST_ACROSS", "LEAST_WIDTH", "ConvergeSettings", "say"]
@@ -63,6 +63,8 @@ class ConvergeSettings(PenetrateSettings):
     members: str | None = Field(None, min_length=1)
     """Folder of the single runs. Sweeps share it and find runs by their settings. 'members' in the folder of the run if
     not given."""
+    workers: Workers = None
+    scheduler: Scheduler = None
 
     @model_validator(mode="after")
     def _varied(self) -> Self:

@@ -4,7 +4,7 @@
 bed calibrate`, which fits the grains, is `experiments.calibrate`.)
 
 Imports `coupling`, `dem`, `experiments.converge`, `experiments.grains`, `experiments.penetrate`,
-`experiments.platform`, `experiments.runs`, `rigid`, `vis.page`.
+`experiments.platform`, `experiments.pool`, `experiments.runs`, `rigid`, `vis.page`.
 """
 
 from experiments.runs.registry import face

@@ -19,8 +19,8 @@ import numpy as np
 
 from experiments.converge.costs import core_hours
 from experiments.converge.design import BASE, Member, Variant
-from experiments.converge.members import finished_member, make_member
 from experiments.penetrate import experiment as penetrate
+from experiments.pool.together import Where, run_all, whole_folder
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.types import Json
@@ -107,6 +107,7 @@ def _seeds(settings: LawFitSettings) -> list[int]:
 
 def check_design(settings: LawFitSettings) -> None:
     """Raise ValueError for runs that cannot be computed, and a budget below what the first two beds cost."""
+    Where.of(settings).check()
     cells, seeds = cells_of(settings), _seeds(settings)[:2]
     for cell in cells:
         for load in (cell.base.weight, *cell.loads):
@@ -130,11 +131,13 @@ def _cost(cell: Cell, members: Sequence[Member]) -> float:
 def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress) -> Designed:
     """Compute runs, or find them done, until the force is sure in every cell or the budget is used up.
 
-    Raises RuntimeError where a run fails: what was computed is kept, and resuming goes on with it.
+    Beds that come whatever is found are computed together with the first two. Raises RuntimeError where a run fails:
+    what was computed is kept, and resuming goes on with it.
     """
     home = Path(settings.members) if settings.members else folder.path / "members"
     growing = [_Growing(cell, _seeds(settings)) for cell in cells_of(settings)]
     budget, spent, designed = settings.budget or 0.0, 0.0, Designed()
+    certain = _certain([one.cell for one in growing], _seeds(settings), budget)
     while going := [one for one in growing if not one.ended]:
         one = max(going, key=lambda one: one.sure)  # the first of those that are alike
         why, todo = one.next_step(settings.tolerance)
@@ -145,8 +148,8 @@ def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress
             designed.notes.append(_of_cell(one, growing, say("spent", **numbers)))
             break
         progress.message(_of_cell(one, growing, why))
+        _make(todo, certain, home, Where.of(settings), progress)
         for member in todo:
-            _make(member, home / member.folder, progress)
             if member.variant.what == BASE:
                 _make_further(one.cell, member, home / member.folder, progress)
         spent += cost
@@ -182,12 +185,30 @@ def _make_further(cell: Cell, member: Member, path: Path, progress: Progress) ->
         raise RuntimeError(say("member_failed", name=path.name, reason=error)) from error
 
 
-def _make(member: Member, path: Path, progress: Progress) -> None:
-    if finished_member(path) is not None:
-        return
-    progress.stage(path.name, total=1.0)
-    if (failed := make_member(member.settings, path, progress)) is not None:
-        raise RuntimeError(say("member_failed", name=path.name, reason=failed))
+def _certain(cells: Sequence[Cell], seeds: Sequence[int], budget: float) -> list[Member]:
+    """Beds that come whatever is found: the first two of each cell, and up to `LEAST_BEDS` where the budget reaches
+    those in all cells, even where each of them gets the faster drive, which is decided later.
+    """
+    first = seeds[:LEAST_BEDS]
+    most = [_cost(cell, [_member(cell, seed, faster=faster) for seed in first for faster in (False, True)])
+            for cell in cells]  # fmt: skip
+    return [_member(cell, seed) for cell in cells for seed in (first if sum(most) <= budget else seeds[:2])]
+
+
+def _make(todo: Sequence[Member], certain: Sequence[Member], home: Path, where: Where, progress: Progress) -> None:
+    """Compute the runs `todo` that are not done, and those that are `certain` where others can be computed beside them.
+
+    Raises RuntimeError, naming the run, for the first of `todo` that fails, after the others.
+    """
+    planned = [member.planned(home) for member in todo]
+    more = [member.planned(home) for member in certain]
+    if where.scheduler is None and where.processes([one.cost for one in (*planned, *more)]) == 1:
+        more = []
+    outcomes = run_all([*planned, *more], where=where, progress=progress)
+    for one in planned:
+        if fault := outcomes[one.task.name].fault:
+            raise RuntimeError(say("member_failed", name=one.task.name, reason=fault))
+        whole_folder(one.task, "series")
 
 
 def sure_enough(sure: float, beds: int, tolerance: float) -> bool:

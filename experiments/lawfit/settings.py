@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.reading import nearest
-from experiments.runs.strict import Positive
+from experiments.runs.strict import Positive, Scheduler, Workers
 from experiments.runs.units import find_unit
 from vis.page.sentences import Sentences
 
@@ -63,6 +63,8 @@ class LawFitSettings(PenetrateSettings):
     members: str | None = Field(None, min_length=1)
     """Folder where the computed runs are kept, each found again by its settings; 'members' in the run's folder if not
     given."""
+    workers: Workers = None
+    scheduler: Scheduler = None
     tips: tuple[str, ...] = ()
     """Tips of a crossed design, such as ball:12mm, flat:16mm, cone:12mm or cone:12mm:90 (full angle in degrees). The
     settings of the runs are those of the first tip; the others have similar runs (docs/calibrate.md)."""
@@ -156,6 +158,6 @@ class LawFitSettings(PenetrateSettings):
     def _refuse_settings_of_runs(self) -> None:
         """Raise ValueError for a setting that the finished runs have decided already."""
         fields = type(self).model_fields
-        for name in (*PenetrateSettings.model_fields, "members", *_OF_DESIGN):
+        for name in (*PenetrateSettings.model_fields, "members", "workers", "scheduler", *_OF_DESIGN):
             if getattr(self, name) != fields[name].default:
                 raise ValueError(say("of_computed_runs", key=name, value=getattr(self, name)))

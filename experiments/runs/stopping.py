@@ -2,19 +2,32 @@
 
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-__all__ = ["held_back"]
+__all__ = ["held_back", "request_stop", "stop_requested"]
+
+_STOP = threading.Event()
+
+
+def request_stop() -> None:
+    """Ask all work of this process to stop, as the first Ctrl-C does: also outside the main thread."""
+    _STOP.set()
+
+
+def stop_requested() -> bool:
+    """Whether `request_stop` was called."""
+    return _STOP.is_set()
 
 
 @contextmanager
 def held_back() -> Iterator[Callable[[], bool]]:
-    """Within, the first Ctrl-C or SIGTERM raises nothing: the function given says whether it came.
+    """Within, the first Ctrl-C or SIGTERM raises nothing: the function given says whether it or `request_stop` came.
 
     Whoever works asks it where it can stop, keeps what there is and raises KeyboardInterrupt. A second signal is not
-    held back. Outside the main thread, where Python delivers no signals, nothing is changed.
+    held back. Outside the main thread, where Python delivers no signals, only `request_stop` counts.
     """
     asked = False
     before: dict[int, Any] = {}
@@ -36,6 +49,6 @@ def held_back() -> Iterator[Callable[[], bool]]:
     except ValueError:  # not in the main thread
         release()
     try:
-        yield lambda: asked
+        yield lambda: asked or stop_requested()
     finally:
         release()

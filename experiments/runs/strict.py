@@ -9,12 +9,39 @@ from pydantic.fields import FieldInfo
 
 from .units import find_unit
 
-__all__ = ["NotNegative", "Positive", "SeedNumber", "StrictSettings", "Threads", "may_be_empty", "plain_kinds"]
+__all__ = [
+    "MOST_WORKERS", "NotNegative", "Positive", "Scheduler", "SeedNumber", "StrictSettings", "Threads", "Workers",
+    "described", "may_be_empty", "plain_kinds",
+]  # fmt: skip
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
 Threads = Annotated[int | None, Field(ge=1, le=1024, description="CPU threads; all cores if not given.")]
+
+MOST_WORKERS = 1024
+Workers = Annotated[
+    int | None,
+    Field(
+        ge=1,
+        le=MOST_WORKERS,
+        description="Processes here that compute a run each; 1 takes this process alone, and needs no dask. If not "
+        "given: as many as there are cores, but 1 for less than a minute of work or where dask is not installed.",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    Field(
+        min_length=1,
+        description="Cluster of dask.distributed in place of `workers`: tcp://host:port, or a scheduler file. The "
+        "variable HEDGEBED_SCHEDULER replaces it, also when the run is resumed.",
+    ),
+]
+
+
+def described(kind: Any) -> str:
+    """The description that a kind of setting, such as `Workers`, brings along."""
+    return next(str(item.description) for item in get_args(kind) if isinstance(item, FieldInfo))
 
 
 class StrictSettings(BaseModel):

@@ -1,30 +1,30 @@
 """The platform's experiments on grains: which cases there are, what each costs, which have a result; doing the rest.
 
 A case is a TOML file in experiments/cases/grains, named after the experiment that it belongs to. Its result is done
-once docs/results/<case>/ holds result.json; what is under way is a run folder below `work`, which is gone on with. Each
-is a process of its own, so that one that fails or is stopped leaves the others alone.
+once docs/results/<case>/ holds result.json; what is under way is a run folder below `work`, which is gone on with. One
+that fails leaves the others alone.
 """
 
 import functools
 import math
 import re
 import shutil
-import subprocess
-import sys
 import tempfile
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from experiments.pool.tasks import task_of
+from experiments.pool.together import Planned
 from experiments.runs.folder import read_json, write_json
 from experiments.runs.reading import read_case, settings_from
-from experiments.runs.registry import CASES
+from experiments.runs.registry import CASES, find_experiment
 from experiments.tumble.settings import TumbleSettings
 
-__all__ = ["EXPERIMENTS", "KEPT", "LONGEST", "Case", "Cost", "cases", "cost_of_tumble", "do_case", "estimate", "keep"]
+__all__ = ["EXPERIMENTS", "KEPT", "LONGEST", "Case", "Cost", "cases", "cost_of_tumble", "estimate", "keep", "planned"]
 
 RATES = ((2.8e3, 3.8e6), (2e4, 9.52e6), (1e5, 7.09e6))
 """(grains computed, grain-steps a second with rolling friction): `hedgebed bench bed` of 2026-11-21 on a quiet Xeon
@@ -234,20 +234,11 @@ def standing(case: Case, results: Path, work: Path) -> tuple[str, str]:
     return str(kept.get("status", "stopped")), str(kept.get("reason") or "")
 
 
-def do_case(case: Case, results: Path, work: Path, *, say: Callable[[str], None]) -> int:
-    """Run it, or go on with it, and keep its result; the exit status of the run."""
-    folder = work / case.name
-    begun = (folder / "run.toml").exists()
-    arguments = ["resume", str(folder)] if begun else ["tumble", str(case.path), "--out", str(folder)]
-    say(f"{case.name}: hedgebed {' '.join(arguments)}")
-    work.mkdir(parents=True, exist_ok=True)
-    status = subprocess.run(
-        [sys.executable, "-m", "hedgebed", *arguments, "--json"], stdout=subprocess.DEVNULL, check=False
-    ).returncode
-    if status == 0:
-        keep(folder, results / case.name)
-        say(f"{case.name}: kept in {results / case.name}")
-    return status
+def planned(case: Case, results: Path, work: Path) -> Planned:
+    """The run of a case as one of a list, in a folder below `work`; its cost is the estimate [s of two cores]."""
+    task = task_of(find_experiment("tumble"), case.settings, work, name=case.name, reports=True)
+    cost = estimate(case, results)
+    return Planned(task, case.path.stem, 0.0 if isinstance(cost, str) else cost.seconds)
 
 
 def keep(folder: Path, target: Path) -> None:

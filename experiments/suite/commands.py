@@ -2,6 +2,7 @@
 
 import json as json_module
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -9,11 +10,14 @@ from cyclopts import App, Parameter
 from rich.console import Console
 from rich.table import Table
 
+from experiments.pool.tasks import Outcome
+from experiments.pool.together import Planned, Where, run_all, whole_folder
 from experiments.runs.folder import read_json
-from experiments.runs.progress import duration
+from experiments.runs.progress import duration, make_progress
 from experiments.runs.streams import refusing, say, stdout_to_stderr
+from experiments.runs.strict import Scheduler, Workers, described
 from experiments.runs.types import Json
-from experiments.suite.cases import EXPERIMENTS, LONGEST, Case, cases, do_case, estimate, standing
+from experiments.suite.cases import EXPERIMENTS, KEPT, LONGEST, Case, cases, estimate, keep, planned, standing
 from experiments.tumble.footfalls import Footfall, sinking_over
 
 __all__ = ["add_suite_commands"]
@@ -79,28 +83,52 @@ def _row(case: Case, results: Path, work: Path) -> Json:
     return row | numbers | {"words": words}
 
 
-def _run(names: _Names = (), /, *, results: _Results = RESULTS, work: _Work = WORK) -> int:
-    """Do the cases that have no result yet, one by one; a stopped one is gone on with, beds come from the cache.
+def _run(
+    names: _Names = (),
+    /,
+    *,
+    results: _Results = RESULTS,
+    work: _Work = WORK,
+    workers: Annotated[int | None, Parameter(help=described(Workers), negative="")] = None,
+    scheduler: Annotated[str | None, Parameter(help=described(Scheduler), negative="")] = None,
+    quiet: Annotated[bool, Parameter(help="Show no progress.", negative="")] = False,
+) -> int:
+    """Do the cases that have no result yet; a stopped one is gone on with, beds come from the cache.
 
     What would take more than an hour by its estimate, or cannot be run yet, is left out unless it is named in full.
     """
+    where = Where.of(Where(scheduler, workers))
     with refusing(), stdout_to_stderr():
+        where.check()
         chosen = [(case, _row(case, results, work)) for case in cases(names)]
-    failed = []
+    failed: list[str] = []
+    todo: dict[str, Planned] = {}
     for case, row in chosen:
         if row["standing"] in ("done", "not yet") or (row["standing"] == "too long" and case.name not in names):
             say(f"{case.name}: {row['standing']}{': ' + row['why'] if row['standing'] == 'not yet' else ''}")
-            continue
-        if row["standing"] == "failed" and case.name not in names:
+        elif row["standing"] == "failed" and case.name not in names:
             say(f"{case.name}: failed before ({row['why']}); named in full it is gone on with")
             failed.append(case.name)
-            continue
-        status = do_case(case, results, work, say=say)
-        if status == 3:
+        else:
+            todo[case.name] = planned(case, results, work)
+
+    def take(outcomes: Sequence[Outcome]) -> None:
+        for outcome in outcomes:
+            if outcome.fault:
+                failed.append(f"{outcome.name} ({outcome.fault})")
+            else:
+                keep(whole_folder(todo[outcome.name].task, *KEPT), results / outcome.name)
+                say(f"{outcome.name}: kept in {results / outcome.name}")
+
+    with refusing(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:
+        try:
+            run_all(list(todo.values()), where=where, progress=progress, on_outcomes=take, report=0.0)
+        except KeyboardInterrupt:
             say("stopped; the same command goes on")
             return 3
-        if status:
-            failed.append(case.name)
+        except (OSError, RuntimeError) as error:
+            say(f"failed: {error}; the same command goes on")
+            return 1
     if failed:
         say(f"without a result: {', '.join(failed)}")
     return 1 if failed else 0

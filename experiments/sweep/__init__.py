@@ -2,7 +2,7 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed sweep`; calling one imports what computes.
 
-Imports `dem.prepare`, `experiments.converge`, `experiments.penetrate`, `experiments.runs`, `experiments.suite`,
+Imports `experiments.converge`, `experiments.penetrate`, `experiments.pool`, `experiments.runs`, `experiments.suite`,
 `experiments.tumble`, `rigid`.
 """
 

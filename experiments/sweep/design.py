@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 from scipy.stats import qmc
 
+from experiments.pool.tools import required
 from experiments.runs.reading import Layer, find_case, read_case, settings_from
 from experiments.runs.registry import CASES, Experiment, find_experiment
 
 from .factors import Factor, parse_fixed, parse_over, read_table
 from .settings import SweepSettings
-from .tools import required
 
 __all__ = ["Design", "Point", "design_of", "problem_of"]
 

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.pool.tasks import Outcome, Task
+from experiments.pool.tools import required
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.result import Result, Table, quantity
 from rigid.series import replacing
@@ -21,8 +23,6 @@ from rigid.series import replacing
 from .design import Design, problem_of
 from .factors import unit_of
 from .settings import SweepSettings
-from .tasks import Outcome, Task
-from .tools import required
 
 __all__ = ["FEWEST_SAMPLES", "conclude"]
 

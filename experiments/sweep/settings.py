@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from experiments.runs.registry import EXPERIMENTS
-from experiments.runs.strict import SeedNumber, StrictSettings, Threads
+from experiments.runs.strict import Scheduler, SeedNumber, StrictSettings, Threads
 from rigid.result import toml_value
 
 __all__ = ["SweepSettings"]
@@ -48,9 +48,7 @@ class SweepSettings(StrictSettings):
     cores if not given."""
     threads: Threads = None
     """CPU threads of each run; the cores here shared out evenly, or 1 on a cluster, if not given."""
-    scheduler: str | None = Field(None, min_length=1)
-    """Cluster of dask.distributed in place of `workers`: tcp://host:port, or a scheduler file. The variable
-    HEDGEBED_SCHEDULER wins over it, also when the sweep is resumed."""
+    scheduler: Scheduler = None
     members: str | None = Field(None, min_length=1)
     """Folder of the runs, each found again by its settings, so that sweeps share them; workers elsewhere must see it
     under the same path; 'members' in the sweep's folder if not given."""

@@ -2,7 +2,7 @@
 
 ``suite.SUITE`` lists them; a family of cases is a module with ``CASES``.
 
-Imports `dem`, `experiments.bed`, `experiments.calibrate`, `experiments.runs`, `rigid`, `vis`.
+Imports `dem`, `experiments.bed`, `experiments.calibrate`, `experiments.pool`, `experiments.runs`, `rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

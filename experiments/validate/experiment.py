@@ -1,5 +1,7 @@
 """`hedgebed validate`: runs the verification suite into a run folder, case by case; finished cases are kept.
 
+Where several processes compute, each case is a run of its own below members/.
+
 The result that docs/validation.md and docs/notes/validation.md are made of is kept in the checkout. Long cases need not
 all be run in one go:
 `hedgebed validate --only sink-from-rest --keep` puts its row into the table with its own date, command and code, and
@@ -15,10 +17,15 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from experiments.pool.tasks import Outcome as TaskOutcome
+from experiments.pool.tasks import task_of
+from experiments.pool.together import Planned, Where, run_all, whole_folder
 from experiments.runs.folder import RunFolder, plain, write_text
 from experiments.runs.progress import Progress
+from experiments.runs.registry import find_experiment
 from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
+from experiments.runs.whole_runs import draw_report
 from experiments.validate.settings import ValidateSettings
 
 from .base.case import Case, Outcome
@@ -28,6 +35,8 @@ from .suite import SUITE, chosen, fingerprint, fingerprint_of
 __all__ = ["check", "fingerprint", "keep", "resume", "run", "run_case"]
 
 _ROOT = Path(__file__).resolve().parents[2]
+_RECORD = ("status", "skipped", "comparisons", "plots", "remarks", "seconds", "date", "code")
+"""What is kept of a case."""
 
 
 def run(settings: ValidateSettings, folder: str | Path, *, progress: Progress | None = None) -> Result:
@@ -46,6 +55,7 @@ def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
 def check(settings: ValidateSettings) -> None:
     """Raise ValueError, naming key, value and what would do, for an unknown case or a file that cannot be written."""
     _wanted(settings)
+    Where.of(settings).check()
     if settings.document is not None and not Path(settings.document).resolve().parent.is_dir():
         raise ValueError(f"document = {settings.document!r} lies in a folder that does not exist: make it first")
     if settings.keep and settings.document is not None:
@@ -76,20 +86,19 @@ def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress
         done = {case: folder.done_data(case.id) for case in wanted if case.compute and folder.is_done(case.id)}
         records = {case.id: record for case, record in done.items() if record["code"] == fingerprint_of(case)}
         left = [case for case in wanted if case.compute and case.id not in records]
+        where = Where.of(settings)
         progress.plan({case.title: case.seconds for case in left})
-        for case in left:
-            progress.stage(case.title, total=1.0)
-            record = _record(folder, case, progress)
-            progress.message(": ".join(filter(None, (f"{record['status']:>7}  {case.id}", _line(record)))))
-            records[case.id] = record
+        if where.scheduler is None and where.processes([case.seconds for case in left]) == 1:
+            for case in left:
+                progress.stage(case.title, total=1.0)
+                records[case.id] = _told(case, _record(folder, case, progress), progress)
+        else:
+            records |= _elsewhere(left, folder, where, progress)
         entire = not (settings.only or settings.quick or settings.measured)
         result = _result([_row(case, records.get(case.id)) for case in SUITE], entire)
         folder.write_result(result)
         write_pages(folder.path / "validation.md", result, command=_command(settings))
-        progress.stage("report", total=1.0)
-        from vis.bed.validation import write_validation_report
-
-        write_validation_report(folder.path, progress=progress.update)
+        draw_report(folder, progress)
         if settings.document is not None:
             write_pages(Path(settings.document), result, command=_command(settings))
         elif entire and _is_checkout():
@@ -100,6 +109,50 @@ def _carry_out(settings: ValidateSettings, folder: RunFolder, progress: Progress
         elif settings.keep:
             keep([_illustrated(row, folder.path) for row in result["cases"]])
         return result
+
+
+def _elsewhere(left: Sequence[Case], folder: RunFolder, where: Where, progress: Progress) -> dict[str, Json]:
+    """The records of cases that are each a run of its own, in members/ of the folder, computed beside one another.
+
+    Raises RuntimeError for a case whose run failed, after the others, which are kept.
+    """
+    experiment, records = find_experiment("validate"), dict[str, Json]()
+    planned = {
+        case: Planned(
+            task_of(experiment, ValidateSettings(only=(case.id,)), folder.path / "members"), case.id, case.seconds
+        )
+        for case in left
+    }
+
+    def take(outcomes: Sequence[TaskOutcome]) -> None:
+        over = {outcome.name: outcome for outcome in outcomes if not outcome.fault}
+        for case, one in planned.items():
+            if one.task.name in over:
+                record = _record_of(case, json.loads(over[one.task.name].result))
+                series = [plot["series"] for plot in record["plots"]]
+                home = whole_folder(one.task, *series)
+                for name in series:
+                    (folder.path / name).parent.mkdir(exist_ok=True)
+                    shutil.copyfile(home / name, folder.path / name)
+                records[case.id] = _told(case, _kept(folder, case, record), progress)
+
+    outcomes = run_all(list(planned.values()), where=where, progress=progress, on_outcomes=take)
+    if faults := [outcome for outcome in outcomes.values() if outcome.fault]:
+        raise RuntimeError(f"{len(faults)} cases have no result, as {faults[0].name}: {faults[0].fault}")
+    return records
+
+
+def _record_of(case: Case, result: Json) -> Json:
+    """The record of a case in the result of a run of it alone."""
+    (row,) = (row for row in result["cases"] if row["id"] == case.id)
+    status = "fail" if row["status"] == "informational" else row["status"]
+    return {key: row[key] for key in _RECORD} | {"status": status}
+
+
+def _told(case: Case, record: Json, progress: Progress) -> Json:
+    """The record, of which the progress tells a line."""
+    progress.message(": ".join(filter(None, (f"{record['status']:>7}  {case.id}", _line(record)))))
+    return record
 
 
 def _illustrated(row: Json, folder: Path) -> Json:
@@ -133,7 +186,12 @@ def _record(folder: RunFolder, case: Case, progress: Progress) -> Json:
         "date": date.today().isoformat(),
         "code": fingerprint_of(case),
     }
-    if found.status != "skipped":
+    return _kept(folder, case, record)
+
+
+def _kept(folder: RunFolder, case: Case, record: Json) -> Json:
+    """The record, kept unless the case was skipped."""
+    if record["status"] != "skipped":
         folder.mark_done(case.id, record)
     return record
 

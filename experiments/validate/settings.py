@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from experiments.runs.strict import StrictSettings
+from experiments.runs.strict import Scheduler, StrictSettings, Workers
 
 __all__ = ["ValidateSettings"]
 
@@ -19,3 +19,5 @@ class ValidateSettings(StrictSettings):
     document: str | None = None
     """Markdown file for the table. If not given and all cases are run in a checkout: docs/validation.md. The folder of
     the run always has a copy."""
+    workers: Workers = None
+    scheduler: Scheduler = None

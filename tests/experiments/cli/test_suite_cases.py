@@ -1,13 +1,12 @@
 """`hedgebed experiments`: the cases that ship are valid, what has a result is left alone, the rest is done and kept."""
 
 import json
-import subprocess
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from experiments.cli.main import main
+from experiments.pool import tasks
 from experiments.runs.reading import find_case
 from experiments.runs.registry import CASES
 from experiments.suite import cases as suite
@@ -97,44 +96,57 @@ def stubbed(monkeypatch, tmp_path):
     monkeypatch.setattr(
         suite_commands, "cases", lambda names=(): [case for case in chosen if not names or case.name in names]
     )
-    monkeypatch.setattr(
-        suite_commands, "estimate", lambda case, _: Cost(8e4, 1e-5, 100.0, seconds[case.name] - 100, 1e10, 1e5, 0)
-    )
+    for module in (suite, suite_commands):
+        monkeypatch.setattr(
+            module, "estimate", lambda case, _: Cost(8e4, 1e-5, 100.0, seconds[case.name] - 100, 1e10, 1e5, 0)
+        )
     calls = []
 
-    def run(command, **_):
-        calls.append(command[3:])
-        name = Path(command[command.index("--out") + 1] if "--out" in command else command[4]).name
-        folder = tmp_path / "work" / name
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "run.toml").write_text("x = 1\n")
-        if len(calls) == 1:  # stopped the first time
-            return SimpleNamespace(returncode=3)
-        (folder / "result.json").write_text("{}")
-        (folder / "status.json").write_text('{"status": "done", "processor_time": 61.5, "updated": "2026-11-23"}')
-        (folder / "trajectory.csv").write_text("t_s\n" + "\n".join(map(str, range(5000))) + "\n")
-        return SimpleNamespace(returncode=0)
+    def run(task, folder, progress):
+        calls.append((task.name, folder.has_work))
+        (folder.path / "checkpoint").mkdir(exist_ok=True)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        if len(calls) == 2:
+            raise RuntimeError("overlap")
+        folder.write_result({"title": "made up"})
+        (folder.path / "trajectory.csv").write_text("t_s\n" + "\n".join(map(str, range(5000))) + "\n")
+        folder.set_status("done")
+        return tasks.done_before(task)
 
-    monkeypatch.setattr(subprocess, "run", run)
-    return calls, ("--results", str(tmp_path / "results"), "--work", str(tmp_path / "work"))
+    monkeypatch.setattr(tasks, "_compute", run)
+    where = ("--results", str(tmp_path / "results"), "--work", str(tmp_path / "work"))
+    return calls, where, ("--workers", "1", "--quiet")
 
 
 def test_what_has_no_result_is_done_gone_on_with_and_kept(stubbed, tmp_path, capsys):
-    calls, where = stubbed
-    assert main(["experiments", "run", *where]) == 3
-    assert calls[0][0] == "tumble" and calls[0][1].endswith("grains1-sand-0.0085-0.22.toml")
-    assert main(["experiments", "run", *where]) == 0
-    assert calls[1][:1] == ["resume"] and len(calls) == 2  # the one of a day is left out
-    kept = tmp_path / "results" / "grains1-sand-0.0085-0.22"
+    """Stopped the first time; fails the second, and is named in full then; the one of a day is left out."""
+    calls, where, alone = stubbed
+    name, long = "grains1-sand-0.0085-0.22", "grains1-sand-0.015-brake"
+    assert main(["experiments", "run", *where, *alone]) == 3
+    assert main(["experiments", "run", *where, *alone]) == 1
+    assert "overlap" in capsys.readouterr().err
+    assert calls == [(name, False), (name, True)]
+    assert main(["experiments", "run", *where, *alone, name]) == 0
+    assert len(calls) == 3
+    kept = tmp_path / "results" / name
     assert sorted(path.name for path in kept.iterdir()) == ["cost.json", "result.json", "run.toml", "trajectory.csv"]
-    assert json.loads((kept / "cost.json").read_text()) == {"processor_time": 61.5, "updated": "2026-11-23"}
+    assert json.loads((kept / "cost.json").read_text())["processor_time"] >= 0
     assert len((kept / "trajectory.csv").read_text().splitlines()) == 1 + 5000 // 3 + 1
-    assert main(["experiments", "run", *where]) == 0 and len(calls) == 2
+    assert main(["experiments", "run", *where, *alone]) == 0 and len(calls) == 3
     capsys.readouterr()
     assert main(["experiments", "list", "--json", *where]) == 0
     rows = {row["case"]: row["standing"] for row in json.loads(capsys.readouterr().out)}
-    assert rows == {"grains1-sand-0.0085-0.22": "done", "grains1-sand-0.015-brake": "too long"}
-    assert main(["experiments", "run", "grains1-sand-0.015-brake", *where]) == 0 and len(calls) == 3
+    assert rows == {name: "done", long: "too long"}
+    assert main(["experiments", "run", long, *where, *alone]) == 0 and len(calls) == 4
+
+
+def test_processes_that_cannot_be_are_refused_before_any_run(stubbed, capsys):
+    calls, where, _ = stubbed
+    for given, word in ((("--workers", "0"), "workers = 0"), (("--workers", "2", "--scheduler", "x"), "workers = 2")):
+        assert main(["experiments", "run", *where, *given]) == 2
+        assert word in capsys.readouterr().err
+    assert calls == []
 
 
 @pytest.fixture

@@ -18,12 +18,12 @@ from experiments.converge import experiment as converge
 from experiments.converge.analysis import numbers_of, two_finest
 from experiments.converge.design import affordable, inertial_number, members_of, variants_of
 from experiments.converge.headline import converge_headline
-from experiments.converge.members import finished_member, make_member
 from experiments.converge.result import doubts, plan_told
 from experiments.converge.settings import ConvergeSettings
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.result import SHIPPED_RESULT
+from experiments.pool.tasks import carry_out, done_before
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
@@ -303,17 +303,16 @@ with FileLock(sys.argv[1]):
 
 
 def test_a_member_that_another_process_has_is_waited_for_and_not_made_twice(swift, tmp_path):
-    member, told = members_of(settings_of(), variants_of(settings_of()))[0], []
-    progress, path = Progress(), tmp_path / "member"
+    task, told = members_of(settings_of(), variants_of(settings_of()))[0].planned(tmp_path).task, []
+    progress = Progress()
     progress.message = told.append
-    path.mkdir()
-    with subprocess.Popen([sys.executable, "-c", HOLD, path / "lock"], stdout=subprocess.PIPE) as other:
+    task.path.mkdir()
+    with subprocess.Popen([sys.executable, "-c", HOLD, task.path / "lock"], stdout=subprocess.PIPE) as other:
         assert other.stdout.readline() == b"held\n"
-        assert make_member(member.settings, path, progress) is None
+        first = carry_out(task, float, progress)
         assert other.wait() == 0
     assert len(told) == 1 and "process 4711" in told[0] and len(swift) == 1
-    assert finished_member(path) is not None
-    assert make_member(member.settings, path, progress) is None and len(swift) == 1
+    assert first == done_before(task) == carry_out(task, float, progress) and len(swift) == 1
 
 
 def finding(fine, coarse):

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from experiments.cli.main import main
+from experiments.pool import tasks
 from experiments.runs.folder import RunFolder
-from experiments.sweep import Settings, design, result, tasks
+from experiments.sweep import Settings, design, result
 from rigid.series import read_series
 from vis.report import write_report
 
@@ -117,7 +118,7 @@ def test_a_folder_is_named_by_what_the_result_hangs_on(tmp_path):
 
     def name(**given):
         point = design.find_experiment("tumble").settings_class()(**given)
-        return tasks.task_of(design.find_experiment("tumble"), point, tmp_path, threads=1, reports=False).name
+        return tasks.task_of(design.find_experiment("tumble"), point, tmp_path).name
 
     first = name(platform=str(mine))
     assert name(platform=str(mine)) == first != name(platform=str(mine), torque=0.1)
@@ -163,7 +164,7 @@ def test_files_in_lists_and_files_that_files_name_are_part_of_a_runs_name(tmp_pa
 
     def task(experiment, **given):
         experiment = design.find_experiment(experiment)
-        return tasks.task_of(experiment, experiment.settings_class()(**given), tmp_path, threads=1, reports=False)
+        return tasks.task_of(experiment, experiment.settings_class()(**given), tmp_path)
 
     def names():
         diagnosed = task("diagnose", campaign="mine", effect_file=("mud.py",))
@@ -188,7 +189,7 @@ def test_files_in_lists_and_files_that_files_name_are_part_of_a_runs_name(tmp_pa
 
 OTHER = """
 import pickle, sys
-from experiments.sweep import tasks
+from experiments.pool import tasks
 todo, done, compute = pickle.load(sys.stdin.buffer), [], tasks._compute
 tasks._compute = lambda task, *rest: done.append(task.name) or compute(task, *rest)
 print("ready", flush=True)
@@ -201,7 +202,7 @@ print(len(done), file=sys.stderr)
 def tumbles(home, torques):
     experiment = design.find_experiment("tumble")
     every = [experiment.settings_class()(duration=0.1, torque=torque) for torque in torques]
-    return [tasks.task_of(experiment, settings, home, threads=1, reports=False) for settings in every]
+    return [tasks.task_of(experiment, settings, home) for settings in every]
 
 
 def test_two_processes_with_the_same_runs_do_each_once(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""One run of a sweep as a task: found by its settings and code, carried out once, taken up where it was left.
+"""One run of a list as a task: found by its settings and code, carried out once, taken up where it was left.
 
 The run folder is named by a digest of the settings, of the files that they name, and of the code that computes. Who
 comes upon it while another process works in it waits for that one; what is done there is read, what was left is gone
@@ -9,9 +9,9 @@ import hashlib
 import json
 import re
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -24,13 +24,13 @@ from experiments.runs.progress import Progress
 from experiments.runs.registry import Experiment, find_experiment
 from experiments.runs.whole_runs import keeping_status, without_reports
 
-__all__ = ["Outcome", "Task", "Tell", "carry_out", "code_of", "done_before", "received", "task_of"]
+__all__ = ["Outcome", "Task", "Tell", "carry_out", "code_of", "done_before", "name_of", "received", "task_of"]
 
 Settings = TypeVar("Settings", bound=BaseModel)
 Tell = Callable[[float], None]
 """Called with the share of a run that is done, 0 to 1."""
 _ROOT = Path(__file__).parents[2]
-_HOW = ("threads", "workers", "checkpoint_interval", "cache", "members")
+_HOW = ("threads", "workers", "scheduler", "checkpoint_interval", "cache", "members")
 """Settings that say how a run is computed and where its parts are kept; its bits do not depend on them."""
 _CODE = ("coupling", "dem", "experiments", "rigid")
 _CODE_FILES = (".py", ".toml", ".csv", ".xml", ".json", ".gz")
@@ -55,6 +55,10 @@ class Task:
         """The run folder."""
         return Path(self.home) / self.name
 
+    def on_threads(self, threads: int) -> "Task":
+        """The same on so many threads, where its settings leave it open and have anything that takes threads."""
+        return replace(self, settings=_with_threads(self.settings, threads))
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -66,15 +70,28 @@ class Outcome:
     processor_time: float = 0.0  # [s]
 
 
-def task_of(experiment: Experiment, settings: BaseModel, home: Path, *, threads: int, reports: bool) -> Task:
-    """The task of these settings; `threads` where they do not say how many. Files that they name are made absolute."""
-    settings = _with_threads(_absolute(settings), threads)
-    values = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _HOW}
-    code = code_of(experiment)
-    contents = {name: _replaced(value, partial(_content, setting=name)) for name, value in values.items()}
-    text = json.dumps([experiment.name, contents, code], sort_keys=True)
-    name = f"{experiment.name.replace(' ', '-')}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
-    return Task(name, experiment.name, settings, str(home.resolve()), code, reports)
+def task_of(
+    experiment: Experiment, settings: BaseModel, home: Path, *, name: str | None = None, reports: bool = False
+) -> Task:
+    """The task of these settings, below `home`; its folder is called as `name_of` says if no `name` is given.
+
+    Files that the settings name are made absolute.
+    """
+    settings = _absolute(settings)
+    name = name or name_of(experiment, settings)
+    return Task(name, experiment.name, settings, str(home.resolve()), code_of(experiment), reports)
+
+
+def name_of(experiment: Experiment, settings: BaseModel, *, label: str = "", beside: Sequence[str] = ()) -> str:
+    """The name of the run folder: `label`, or the experiment, and a digest of settings, files and code.
+
+    `beside`: settings that are not part of the digest, beside those that never change the numbers.
+    """
+    kept = {key: value for key, value in settings.model_dump(mode="json").items() if key not in (*_HOW, *beside)}
+    contents = {key: _replaced(value, partial(_content, setting=key)) for key, value in kept.items()}
+    text = json.dumps([experiment.name, contents, code_of(experiment)], sort_keys=True)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return f"{label or experiment.name.replace(' ', '-')}-{digest}"
 
 
 @cache
@@ -102,19 +119,24 @@ def done_before(task: Task) -> Outcome | None:
     return Outcome(task.name, text, processor_time=folder.processor_time)
 
 
-def carry_out(task: Task, tell: Tell) -> Outcome:
+def carry_out(task: Task, tell: Tell, shown: Progress | None = None) -> Outcome:
     """Do the task, or go on with it; what goes wrong is its outcome. Waits while another process has its folder.
 
-    Raises KeyboardInterrupt, with the run kept to go on from, where the process is told to stop.
+    `shown` shows the grains of the run. Raises KeyboardInterrupt, with the run kept to go on from, where the process is
+    told to stop.
     """
+    waiting = shown.message if shown is not None else _unsaid
     try:
         if code_of(find_experiment(task.experiment)) != task.code:
-            raise ValueError("the code here is not that of the sweep: install the same version of hedgebed everywhere")
-        with holding(task.path, waiting=_unsaid):
-            return done_before(task) or _compute(task, _folder_of(task), tell)
+            raise ValueError(
+                "the code here is not that of the command: install the same version of hedgebed everywhere"
+            )
+        with holding(task.path, waiting=waiting):
+            return done_before(task) or _compute(task, _folder_of(task), _Told(tell, shown))
     except Exception as error:
         if task.path.is_dir():
-            write_text(task.path / "traceback.txt", traceback.format_exc())
+            with suppress(OSError):
+                write_text(task.path / "traceback.txt", traceback.format_exc())
         return Outcome(task.name, fault=" ".join(f"{type(error).__name__}: {error}".split()))
 
 
@@ -127,11 +149,11 @@ def _folder_of(task: Task) -> RunFolder:
 
 
 def _unsaid(_: str) -> None:
-    """The sweep tells of all runs together: a worker that waits says nothing."""
+    """All runs are told of together: a worker that waits says nothing."""
 
 
-def _compute(task: Task, folder: RunFolder, tell: Tell) -> Outcome:
-    experiment, progress = find_experiment(task.experiment), _Told(tell)
+def _compute(task: Task, folder: RunFolder, progress: Progress) -> Outcome:
+    experiment = find_experiment(task.experiment)
     same = type(task.settings)(**folder.settings) == task.settings  # not so where it was begun on other threads
     with without_reports(not task.reports), keeping_status(folder):
         if same and not folder.has_work:
@@ -254,11 +276,15 @@ def _add(digest: "hashlib._Hash", name: str, content: bytes) -> None:
 
 
 class _Told(Progress):
-    """Silent, but for the share of the whole, which it tells."""
+    """Silent, but for the share of the whole, which it tells, and the grains, which `shown` shows."""
 
-    def __init__(self, tell: Tell) -> None:
+    def __init__(self, tell: Tell, shown: Progress | None) -> None:
         super().__init__()
-        self._tell = tell
+        self._tell, self._shown = tell, shown
+
+    def show_grains(self, *, grain_count: int, awake_count: int, grain_steps: int) -> None:
+        if self._shown is not None:
+            self._shown.show_grains(grain_count=grain_count, awake_count=awake_count, grain_steps=grain_steps)
 
     def update(self, done: float) -> None:
         super().update(done)

@@ -1,0 +1,143 @@
+"""Where tasks are carried out: this process, processes here, or a cluster of dask.distributed.
+
+The scheduler of dask gives a task to a worker, and to another where that one dies. A task is known to it by the name of
+its run folder, so that a client that comes back finds what is under way; and it goes on without a client. A client that
+is interrupted takes back what has not begun; processes here keep what they have done before they end.
+"""
+
+import json
+import logging
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from experiments.runs.progress import Progress
+from experiments.runs.stopping import request_stop, stop_requested
+
+from .tasks import Outcome, Task, carry_out
+from .tools import required
+
+__all__ = ["OnOutcome", "OnShare", "carry_out_all"]
+
+OnOutcome = Callable[[Outcome], None]
+OnShare = Callable[[str, float], None]
+"""Called with the name of a task under way and its share that is done, 0 to 1."""
+_TOPIC = "hedgebed-runs"
+_EVERY = 1.0  # Between two shares that a worker tells [s]
+_CONNECT = 30  # [s]
+_STOPPED_WITHIN = 120  # What processes here have to keep what is done [s]
+_ONE = threading.Lock()  # Taichi serves one run of a process at a time
+
+
+def carry_out_all(
+    tasks: Sequence[Task],
+    *,
+    scheduler: str | None,
+    workers: int,
+    cores: int,
+    on_outcome: OnOutcome,
+    on_share: OnShare,
+    progress: Progress,
+) -> None:
+    """Carry out all tasks; `on_outcome` is called in this thread as each ends, in whatever order.
+
+    `cores`: how many a process here takes for a task whose settings do not say how many threads it has. Raises
+    KeyboardInterrupt where this process is told to stop; RuntimeError where the cluster goes away, ValueError where it
+    cannot be reached or dask is not there. What was done is in the run folders.
+    """
+    if scheduler is None and workers == 1:
+        for task in tasks:
+            on_outcome(carry_out(task, lambda share, name=task.name: on_share(name, share), progress))  # type: ignore[misc]
+        return
+    distributed = required("distributed", f"scheduler = {scheduler!r}" if scheduler else f"workers = {workers}")
+    with _client(distributed, scheduler, workers) as client:
+        client.subscribe_topic(_TOPIC, lambda event: on_share(event[1]["run"], event[1]["share"]))
+        if not client.scheduler_info()["workers"]:
+            progress.message(f"no worker is at {scheduler} yet: the runs wait for the first")
+        futures = [
+            client.submit(_on_worker, task, None if scheduler else cores, key=task.name, pure=False, priority=-place)
+            for place, task in enumerate(tasks)
+        ]
+        if scheduler is not None:
+            distributed.fire_and_forget(futures)
+        try:
+            for future in distributed.as_completed(futures):
+                on_outcome(_outcome(future, scheduler))
+        except KeyboardInterrupt:
+            if scheduler is not None:
+                client.cancel(futures, force=True)
+            else:
+                progress.message("stopping as soon as what was done is kept; once more to stop at once")
+                client.run(request_stop, on_error="ignore")
+                with suppress(TimeoutError):
+                    distributed.wait(futures, timeout=_STOPPED_WITHIN)
+            raise
+
+
+def _outcome(future: Any, scheduler: str | None) -> Outcome:
+    """What a future that has ended holds, or why it holds nothing."""
+    if future.status == "finished":
+        return future.result()
+    if future.status == "error":  # a task reports its own faults: this is its worker's
+        return Outcome(future.key, fault=f"its worker died: {future.exception()}")
+    where = f"scheduler = {scheduler!r}" if scheduler else "the scheduler here"
+    raise RuntimeError(f"{where} has gone away ({future.status}); what was done is kept")
+
+
+@contextmanager
+def _client(distributed: Any, scheduler: str | None, workers: int) -> Iterator[Any]:
+    """A client of the cluster, or of processes here that end with it."""
+    if scheduler is None:
+        with (
+            distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, memory_limit=0, dashboard_address=None,
+                silence_logs=logging.CRITICAL, preload=[__name__],
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):  # fmt: skip
+            yield client
+        return
+    given = {"scheduler_file": scheduler} if Path(scheduler).is_file() else {"address": scheduler}
+    try:
+        client = distributed.Client(**given, timeout=_CONNECT)
+    except (OSError, ValueError, json.JSONDecodeError) as error:
+        raise ValueError(f"scheduler = {scheduler!r} cannot be reached: {error}") from None
+    with client:
+        yield client
+
+
+def dask_setup(worker: Any) -> None:
+    """Called by dask in each process here as it starts: Ctrl-C is for the command, which asks processes to stop."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _on_worker(task: Task, cores: int | None) -> Outcome:
+    """The task on a worker, which tells its share to whoever listens; on so many `cores`, if given."""
+    worker, told = required("distributed", "a worker").get_worker(), [0.0]
+
+    def tell(share: float) -> None:
+        if time.monotonic() - told[0] >= _EVERY:
+            told[0] = time.monotonic()
+            worker.log_event(_TOPIC, {"run": task.name, "share": share})
+
+    with _ONE:
+        if stop_requested():
+            return Outcome(task.name, fault="stopped before it began")
+        if cores is not None and "threads" not in type(task.settings).model_fields:
+            _keep_to(int(worker.name), cores)
+        try:
+            return carry_out(task, tell)
+        except KeyboardInterrupt:  # raised further, it would end the worker
+            return Outcome(task.name, fault="stopped")
+
+
+def _keep_to(place: int, count: int) -> None:
+    """Give this thread, and those that it starts, `count` cores: others than those of processes at other places."""
+    with suppress(AttributeError, OSError):
+        there = sorted(os.sched_getaffinity(os.getpid()))
+        os.sched_setaffinity(0, {there[(place * count + k) % len(there)] for k in range(count)})

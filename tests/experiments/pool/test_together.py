@@ -1,0 +1,161 @@
+"""Lists of runs: in how many processes, what is done already, who cannot see a folder, Ctrl-C, the same numbers."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from experiments import lawfit
+from experiments.cli.main import main
+from experiments.converge import Settings as ConvergeSettings
+from experiments.converge.design import members_of, variants_of
+from experiments.lawfit.cells import cells_of
+from experiments.lawfit.design import LEAST_BEDS, _certain, _cost, _member
+from experiments.pool import tasks, together
+from experiments.pool.tasks import Outcome, task_of
+from experiments.pool.together import Planned, Where, run_all, whole_folder
+from experiments.runs.progress import Progress
+from experiments.runs.registry import find_experiment
+
+ROOT = Path(__file__).resolve().parents[3]
+pytestmark = pytest.mark.usefixtures("unreported")
+
+
+def tumbles(home, torques, cost=0.5):
+    """Tumbles of 0.1 s on a law, as a list of runs."""
+    tumble = find_experiment("tumble")
+    every = [tumble.settings_class()(duration=0.1, torque=torque) for torque in torques]
+    return [Planned(task_of(tumble, settings, home), f"torque {settings.torque}", cost) for settings in every]
+
+
+@pytest.mark.parametrize(
+    ("where", "costs", "count"),
+    [
+        (Where(), [20.0, 20.0], 1),  # done before processes had started
+        (Where(), [60.0, 60.0, 60.0], 2),  # a core each
+        (Where(), [600.0], 1),
+        (Where(workers=3), [1.0, 1.0], 2),
+        (Where(workers=3), [1.0] * 9, 3),
+        (Where(workers=1), [600.0] * 9, 1),
+        (Where(workers=4), [], 1),
+    ],
+)
+def test_processes_are_started_where_they_are_asked_for_or_worth_it(where, costs, count, monkeypatch):
+    monkeypatch.setattr(together, "cores_there", lambda: 2)
+    assert where.processes(costs) == count
+
+
+def test_without_dask_one_process_computes_unless_more_are_asked_for(monkeypatch):
+    monkeypatch.setattr(together, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert Where().processes([600.0] * 9) == 1
+    Where(workers=1).check()
+    for where, named in ((Where(workers=2), "workers = 2"), (Where("tcp://nowhere:1"), "tcp://nowhere:1")):
+        with pytest.raises(ValueError, match=named):
+            where.check()
+
+
+def test_a_scheduler_beside_workers_is_refused_and_the_variable_replaces_it(monkeypatch):
+    with pytest.raises(ValueError, match="workers = 2"):
+        Where("tcp://here:1", 2).check()
+    monkeypatch.setenv("HEDGEBED_SCHEDULER", "tcp://there:2")
+    assert Where.of(ConvergeSettings(scheduler="tcp://here:1")).scheduler == "tcp://there:2"
+
+
+def test_runs_come_in_their_order_each_once_and_what_is_done_comes_first(tmp_path):
+    first, second, third = tumbles(tmp_path, [0.2, 0.15, 0.18])
+    begun, progress = [], Progress()
+    run_all([second], where=Where(workers=1), progress=progress)
+    planned = [first, second, first, third]
+    outcomes = run_all(planned, where=Where(workers=1), progress=progress, on_outcomes=begun.append)
+    names = [[outcome.name for outcome in some] for some in begun]
+    assert names == [[second.task.name], [first.task.name], [third.task.name]]
+    assert set(outcomes) == {one.task.name for one in planned} and not any(one.fault for one in outcomes.values())
+    assert progress.stage_fraction == 1.0
+    again = run_all(planned, where=Where(workers=1), progress=progress)
+    assert again == outcomes
+
+
+def test_a_file_that_is_only_on_the_disk_of_a_worker_is_named(tmp_path):
+    """The numbers arrive; a series does not."""
+    (one,) = tumbles(tmp_path / "there", [0.2])
+    outcome = tasks.carry_out(one.task, float)
+    (here,) = tumbles(tmp_path / "here", [0.2])
+    tasks.received(here.task, Outcome(here.task.name, outcome.result))
+    assert whole_folder(here.task, "result.json").is_dir() and whole_folder(one.task, "trajectory.csv").is_dir()
+    with pytest.raises(RuntimeError, match=r"trajectory\.csv.*workers must see .*here"):
+        whole_folder(here.task, "trajectory.csv")
+
+
+def test_a_member_of_converge_and_calibrate_is_named_by_all_code_that_computes_it(monkeypatch):
+    """Not only by that of beds: other code of `penetrate` has other members."""
+    settings = ConvergeSettings(seeds=(1,), ratios=(), widths=(), bed_depths=(), overlaps=(), paces=())
+    (cell,) = cells_of(lawfit.Settings(budget=1e9))
+
+    def names():
+        return [members_of(settings, variants_of(settings))[0].folder, _member(cell, 1).folder]
+
+    first = names()
+    assert names() == first
+    monkeypatch.setattr(tasks, "code_of", lambda experiment: "other")
+    assert not set(names()) & set(first)
+
+
+def test_beds_of_calibrate_are_computed_together_only_where_the_budget_reaches_them_in_any_case():
+    """Also where each bed gets the faster drive, which is decided after the first two."""
+    (cell,), seeds = cells_of(lawfit.Settings(budget=1e9)), list(range(1, 8))
+    whole = _cost(cell, [_member(cell, seed, faster=faster) for seed in seeds[:LEAST_BEDS] for faster in (False, True)])
+    for budget, count in ((1.001 * whole, LEAST_BEDS), (0.999 * whole, 2)):
+        assert [member.seed for member in _certain([cell], seeds, budget)] == seeds[:count]
+        assert [member.seed for member in _certain([cell, cell], seeds, 2 * budget)] == 2 * seeds[:count]
+
+
+def command(*tokens, log):
+    """A process of hedgebed with a process group of its own."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    with log.open("w") as file:
+        return subprocess.Popen(
+            [sys.executable, "-m", "hedgebed", *map(str, tokens)], env=environment, stdout=file, stderr=file,
+            start_new_session=True,
+        )  # fmt: skip
+
+
+@pytest.mark.long
+def test_ctrl_c_ends_processes_and_command_in_words_and_resume_makes_the_same_table(tmp_path):
+    """Ctrl-C of a terminal reaches the processes too."""
+    pytest.importorskip("distributed")
+    tokens = ["sweep", "--experiment", "tumble", "--fixed", "duration=6", "--over", "torque=0.14:0.2:0.01"]
+    out, log = tmp_path / "out", tmp_path / "log"
+    process = command(*tokens, "--workers", "2", "--out", out, log=log)
+    until = time.monotonic() + 120
+    while not list(out.glob("members/*/result.json")) and time.monotonic() < until:
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)
+    said = (process.wait(timeout=120), log.read_text())
+    assert said[0] == 3 and "Traceback" not in said[1] and not (out / "result.json").exists(), said
+    assert main([*tokens, "--workers", "1", "--out", str(tmp_path / "one"), "--quiet"]) == 0
+    assert command("resume", out, log=log).wait(timeout=120) == 0, log.read_text()
+    assert (out / "table.csv").read_bytes() == (tmp_path / "one" / "table.csv").read_bytes()
+
+
+@pytest.mark.long
+def test_cases_of_the_verification_suite_come_out_the_same_in_two_processes(tmp_path):
+    """All but the times; with the curves of their plots."""
+    pytest.importorskip("distributed")
+    one, two, log = tmp_path / "one", tmp_path / "two", tmp_path / "log"
+    tokens = ["validate", "--only", "hertz-force", "t1", "--out"]
+    assert main([*tokens, str(one), "--workers", "1", "--quiet"]) == 0
+    assert command(*tokens, two, "--workers", "2", log=log).wait(timeout=300) == 0, log.read_text()
+    assert (two / "report.html").is_file() and len(list(two.glob("members/*"))) == 2
+    found = []
+    for out in (one, two):
+        cases = {row["id"]: row for row in json.loads((out / "result.json").read_text())["cases"]}
+        curves = {path.name: path.read_bytes() for path in out.glob("series/*.csv")}
+        rows = [[cases[name][key] for key in ("status", "comparisons", "plots")] for name in ("hertz-force", "t1")]
+        found.append((rows, curves))
+    assert found[0] == found[1] and found[0][1]
