@@ -312,7 +312,7 @@ def test_a_member_that_another_process_has_is_waited_for_and_not_made_twice(swif
         first = carry_out(task, float, progress)
         assert other.wait() == 0
     assert len(told) == 1 and "process 4711" in told[0] and len(swift) == 1
-    assert first == done_before(task) == carry_out(task, float, progress) and len(swift) == 1
+    assert first.result == done_before(task).result == carry_out(task, float, progress).result and len(swift) == 1
 
 
 def finding(fine, coarse):
