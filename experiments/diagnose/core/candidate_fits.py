@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import groupby
 
 import numpy as np
 
-from experiments.diagnose.fit.evidence import Hypothesis, best_start, excess
-from experiments.diagnose.fit.fitting import Fit, Model, fit
+from experiments.diagnose.fit.evidence import Hypothesis, best_starts, excess
+from experiments.diagnose.fit.fitting import Fit, Model, fit, fit_each
 from experiments.diagnose.fit.gate import Verdict, open_gate
 from experiments.diagnose.fit.problem import Finding, Form, Values
 
@@ -56,25 +57,34 @@ class CandidateFits:
         self.table.append(Hypothesis.of(found))
         return self.table[-1]
 
-    def _try(self, start: Hypothesis, form: Form, *, rounds: int = 6) -> Hypothesis:
-        """`start` with `form` added, all refitted."""
-        model: Model = start.fit.model.with_forms((*start.forms, form))
-        alone = self._alone.get(form.id)
-        if alone is None:
-            found = best_start(model, form, start.fit.values, rounds=rounds)
-        else:  # begin from where it stood alone, and from a small amplitude
-            amplitude = form.amplitude
-            values = {**{p.name: alone.values[p.name] for p in form.parameters}, **start.fit.values}
-            places: list[Values] = [values, {**values, amplitude: _SMALL_PART * values[amplitude]}]
-            if form.effect in start.effects and model.problem.contacts is None:
-                # Another form of the effect explains most already: a little of this one, in all its shapes.
-                for own in form.starts:
-                    places += [{**start.fit.values, **own, amplitude: part * own[amplitude]} for part in _PARTS]
-            first = [fit(model, place, rounds=4) for place in places]
-            found = fit(model, min(first, key=lambda one: one.objective).values)
+    def _try(self, start: Hypothesis, forms: Sequence[Form]) -> list[Hypothesis]:
+        """`start` with each of `forms` added, all refitted."""
+        fresh = [form for form in forms if form.id not in self._alone]
+        found = dict(zip([f.id for f in fresh], best_starts(start.fit.model, fresh, start.fit.values), strict=True))
+        begun: list[tuple[Form, Model, Values]] = []
+        for form in forms:
+            if form not in fresh:
+                model: Model = start.fit.model.with_forms((*start.forms, form))
+                begun += [(form, model, place) for place in self._places(start, form)]
+        short: dict[str, Fit] = {}
+        for (form, _, _), one in zip(begun, fit_each([(m, v) for _, m, v in begun], rounds=4), strict=True):
+            if form.id not in short or one.objective < short[form.id].objective:
+                short[form.id] = one
+        found |= dict(zip(short, fit_each([(one.model, one.values) for one in short.values()]), strict=True))
         if not start.forms:
-            self._alone[form.id] = found
-        return self._kept(found)
+            self._alone |= found
+        return [self._kept(found[form.id]) for form in forms]
+
+    def _places(self, start: Hypothesis, form: Form) -> list[Values]:
+        """Where a form may begin beside others: where it stood alone, and from a small amplitude."""
+        amplitude, alone = form.amplitude, self._alone[form.id]
+        values = {**{p.name: alone.values[p.name] for p in form.parameters}, **start.fit.values}
+        places: list[Values] = [values, {**values, amplitude: _SMALL_PART * values[amplitude]}]
+        if form.effect in start.effects and alone.model.problem.contacts is None:
+            # Another form of the effect explains most already: a little of this one, in all its shapes.
+            for own in form.starts:
+                places += [{**start.fit.values, **own, amplitude: part * own[amplitude]} for part in _PARTS]
+        return places
 
     def _singles(self) -> list[Hypothesis]:
         """The best form of each effect, the likeliest effect first."""
@@ -85,9 +95,13 @@ class CandidateFits:
             self.tell("looking for where the candidates' fits begin", 0.0)
             contacts.guess(model.with_forms(forms[:1]), self.base.fit.values)
         made: list[Hypothesis] = []
-        for k, form in enumerate(forms):
-            self.tell(f"trying {form.effect} ({form.name})", k / max(1, len(forms)))
-            made.append(self._try(self.base, form, rounds=6 if contacts is None else 1))
+        for effect, group in groupby(forms, key=lambda form: form.effect):
+            own = list(group)
+            self.tell(f"trying {effect}", len(made) / max(1, len(forms)))
+            rounds = 6 if contacts is None else 1
+            for form, found in zip(own, best_starts(model, own, self.base.fit.values, rounds=rounds), strict=True):
+                self._alone[form.id] = found
+                made.append(self._kept(found))
         if contacts is not None:
             ranked = sorted((h.score for h in made), reverse=True)
             least = min(ranked[:_FINISHED][-1], ranked[0] - _NEAR_BY)
@@ -153,10 +167,10 @@ class CandidateFits:
         known = {p.name for p in plain.parameters}
         bends = dict.fromkeys(tuple((k, v) for k, v in point.items() if k not in known) for point in finer.starts)
         places: list[Values] = [{**start.values, **dict(bend)} for bend in bends]
-        begun = [fit(model, values, rounds=3) for values in places]
         contacts = model.problem.contacts
         if contacts is not None:  # a bend alone may put trials on other branches: from their beginnings, too
-            begun += [fit(model, values, rounds=3) for values in contacts.refine([model] * len(places), places)]
+            places += contacts.refine([model] * len(places), places)
+        begun = fit_each([(model, values) for values in places], rounds=3)
         return fit(model, min(begun, key=lambda one: one.objective).values)
 
     def _siblings(self, hypothesis: Hypothesis) -> list[Hypothesis]:
@@ -183,10 +197,11 @@ class CandidateFits:
             if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
                 break
             taken = {p.name for form in start.forms for p in form.parameters}
-            for form in start.fit.model.problem.forms:
-                if form.effect not in start.effects or any(p.name in taken for p in form.parameters):
-                    continue
-                made = self._try(start, form)
+            others = [
+                form for form in start.fit.model.problem.forms
+                if form.effect in start.effects and not any(p.name in taken for p in form.parameters)
+            ]  # fmt: skip
+            for made in self._try(start, others):
                 if made.score > best.score + 1.0:
                     best = made
             if best is start:
@@ -213,18 +228,17 @@ class CandidateFits:
         places = [start.values for start in starts]
         models = [model.with_forms((*model.forms, *start.forms)) for start in starts]
         contacts = model.problem.contacts
-        begun: list[Fit] = []
         if contacts is not None and starts:  # a search of its own, after which the better half goes on
             places = list(contacts.refine(models, places))
             left = [float(np.square(one.evaluate([point])[0]).sum()) for one, point in zip(models, places, strict=True)]
             kept = sorted(range(len(left)), key=lambda k: left[k])[: max(FOLLOWED, (len(left) + 1) // 2)]
             models, places = [models[k] for k in kept], [places[k] for k in kept]
-        for longer, values in zip(models, places, strict=True):
-            for share in (0.4, 0.7) if model.problem.rough else ():
-                values = fit(longer.until(share), values, rounds=6).values
-            begun.append(fit(longer, values, rounds=5))
+        for share in (0.4, 0.7) if model.problem.rough else ():
+            part = fit_each([(one.until(share), v) for one, v in zip(models, places, strict=True)], rounds=6)
+            places = [one.values for one in part]
+        begun = fit_each(list(zip(models, places, strict=True)), rounds=5)
         begun.sort(key=lambda found: found.objective)
-        return [self._kept(fit(one.model, one.values)) for one in begun[:FOLLOWED]]
+        return [self._kept(found) for found in fit_each([(one.model, one.values) for one in begun[:FOLLOWED]])]
 
     def _best_forms(self, effect: str) -> list[Form]:
         """Forms of an effect, the one that did best alone first."""

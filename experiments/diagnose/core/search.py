@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.diagnose.fit.bounds import is_strained
 from experiments.diagnose.fit.evidence import SMALL, Hypothesis, excess
-from experiments.diagnose.fit.fitting import Fit, fit
+from experiments.diagnose.fit.fitting import Fit, fit, fit_each
 from experiments.diagnose.fit.gate import Verdict
 from experiments.diagnose.fit.problem import Finding
 
@@ -93,8 +93,7 @@ class Search(CandidateFits):
                 if name in best.effects or name in seen:
                     continue
                 seen.add(name)
-                for form in self._best_forms(name)[:2]:
-                    tried.append(self._try(best, form))
+                tried += self._try(best, self._best_forms(name)[:2])
             tried += self._pairs() if len(best.effects) < 2 else self._next(best.fit, best.effects)
             if not tried:
                 return best
@@ -201,7 +200,7 @@ class Search(CandidateFits):
         """Without what is no longer needed; a further effect stays by the rule that adds one (`_worth`)."""
         while len(best.forms) > 1:
             shorter = [tuple(f for f in best.forms if f is not form) for form in best.forms]
-            fits = [fit(best.fit.model.with_forms(rest), best.fit.values) for rest in shorter]
+            fits = fit_each([(best.fit.model.with_forms(rest), best.fit.values) for rest in shorter])
             kept = max(map(Hypothesis.of, fits), key=lambda h: h.score)
             fewer = len(kept.effects) < len(best.effects)
             if kept.score < best.score - (WORTH if fewer else 0.5) and not (fewer and not self._worth(kept, best)):
@@ -260,6 +259,7 @@ def _ordered(best: Hypothesis) -> Hypothesis:
     if len(best.effects) < 2:
         return best
     model, values = best.fit.model, best.fit.values
-    cost = {effect: fit(model.with_forms(best.without(effect)), values, rounds=8).objective for effect in best.effects}
+    fewer = fit_each([(model.with_forms(best.without(effect)), values) for effect in best.effects], rounds=8)
+    cost = dict(zip(best.effects, (one.objective for one in fewer), strict=True))
     forms = tuple(sorted(best.forms, key=lambda form: -cost[form.effect]))
     return Hypothesis(fit(model.with_forms(forms), values, rounds=3), best.score)

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .fitting import Fit, Model, fit, scanned
+from .fitting import Fit, Model, fit, fit_each, scanned
 from .gate import column_basis, low_modes
 from .problem import Array, Form, Values
 
 __all__ = [
-    "SMALL", "Hypothesis", "best_start", "excess", "held_out_fit", "inflation", "score", "signature_matrix",
+    "SMALL", "Hypothesis", "best_starts", "excess", "held_out_fit", "inflation", "score", "signature_matrix",
     "slow_count", "tempered",
 ]  # fmt: skip
 
@@ -104,19 +104,33 @@ _SIZES = (0.1, 0.4, 1.0, 3.0)
 _FIRST = 0.2
 
 
-def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> Fit:
-    """The best fit of `model` (which holds `form`) over the form's starts, in several sizes of the amplitude.
+def best_starts(model: Model, forms: Sequence[Form], values: Values, *, rounds: int = 6) -> list[Fit]:
+    """The best fit of `model` with each of `forms` added, over the form's starts, in several sizes of the amplitude.
 
     The other values are those given, and those of the priors: a base model from which an effect is missing bends its
     parameters, and what replicates differ by first of all.
     `rounds`: steps, where the problem looks for the best start itself.
     """
+    models = [model.with_forms((*model.forms, form)) for form in forms]
     if model.problem.contacts is not None:
-        return fit(model, values, rounds=rounds)
+        return fit_each([(one, values) for one in models], rounds=rounds)
+    points = [_start_points(one, form, values) for one, form in zip(models, forms, strict=True)]
+    begun = [(k, one, point) for k, one in enumerate(models) for point in _promising(one, *points[k])]
+    short = fit_each([(one, point) for _, one, point in begun], rounds=5)
+    best: dict[int, Fit] = {}
+    for (k, _, _), found in zip(begun, short, strict=True):
+        if k not in best or found.objective < best[k].objective:
+            best[k] = found
+    whole = fit_each([(one, best[k].values) for k, one in enumerate(models)])
+    return _from_beginnings(whole, [own for own, _ in points])
+
+
+def _start_points(model: Model, form: Form, values: Values) -> tuple[list[Values], list[tuple[float, ...]]]:
+    """Points from which a form may be fitted, and of which start each is."""
     starts = form.starts or ({form.amplitude: 1.0},)
     amplitude = next(p for p in form.parameters if p.name == form.amplitude)
     known = {p.name: p.value for p in (*model.problem.base, *model.scatter) if math.isfinite(p.std)}
-    points = []
+    points: list[Values] = []
     places: list[tuple[float, ...]] = []
     for start in starts:
         place = tuple(math.copysign(1.0, v) if name == form.amplitude else v for name, v in start.items())
@@ -125,8 +139,12 @@ def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> 
             for others in (values, {**values, **known}) if known else (values,):
                 points.append({**others, **start, form.amplitude: value})
                 places.append(place)
-    objectives = np.array([float(modes @ modes) for modes in model.evaluate(points)])
-    order = np.argsort(objectives)
+    return points, places
+
+
+def _promising(model: Model, points: Sequence[Values], places: Sequence[tuple[float, ...]]) -> list[Values]:
+    """The points that leave least, of several starts."""
+    order = np.argsort([float(modes @ modes) for modes in model.evaluate(points)])
     chosen: list[int] = []
     for k in order.tolist():  # of each place one: an amplitude hardly goes through zero
         if len(chosen) < _PLACES and all(places[k] != places[c] for c in chosen):
@@ -134,17 +152,26 @@ def best_start(model: Model, form: Form, values: Values, *, rounds: int = 6) -> 
     for k in order.tolist():  # and the next best that is not of the same start
         if len(chosen) < 3 and all(abs(k - c) >= 2 for c in chosen):
             chosen.append(k)
-    fits = [fit(model, points[k], rounds=5) for k in chosen]
-    best = min(fits, key=lambda found: found.objective)
-    best = fit(model, best.values)
-    if model.problem.rough and excess(best) > 6 * math.sqrt(2.0 * best.count):
-        part = model.until(_FIRST)
-        early = [float(modes @ modes) for modes in part.evaluate(points)]
-        begun: Values = points[int(np.argmin(early))]
-        for share in (_FIRST, 0.4, 0.7):
-            begun = fit(model.until(share), begun, rounds=8).values
-        other = fit(model, begun)
-        best = other if other.objective < best.objective else best
+    return [points[k] for k in chosen]
+
+
+def _from_beginnings(found: Sequence[Fit], points: Sequence[Sequence[Values]]) -> list[Fit]:
+    """The better of each fit and one that looks at the beginning of rough trials first, where much is left."""
+    best = list(found)
+    rough = [
+        k for k, one in enumerate(best)
+        if one.model.problem.rough and excess(one) > 6 * math.sqrt(2.0 * one.count)
+    ]  # fmt: skip
+    models = [best[k].model for k in rough]
+    begun: list[Values] = []
+    for k, model in zip(rough, models, strict=True):
+        early = [float(modes @ modes) for modes in model.until(_FIRST).evaluate(points[k])]
+        begun.append(points[k][int(np.argmin(early))])
+    for share in (_FIRST, 0.4, 0.7):
+        part = fit_each([(model.until(share), v) for model, v in zip(models, begun, strict=True)], rounds=8)
+        begun = [one.values for one in part]
+    for k, other in zip(rough, fit_each(list(zip(models, begun, strict=True))), strict=True):
+        best[k] = other if other.objective < best[k].objective else best[k]
     return best
 
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from .problem import Array, Model, Parameter, Values, Whitener, evaluate_all
 
-__all__ = ["SCAN", "SEARCH", "Fit", "Linear", "Model", "Rule", "Whitener", "by_beginnings", "fit", "fits", "scanned",
-           "settled", "settled_slopes"]  # fmt: skip
+__all__ = ["SCAN", "SEARCH", "Fit", "Linear", "Model", "Rule", "Whitener", "by_beginnings", "fit", "fit_each", "fits",
+           "scanned", "settled", "settled_slopes"]  # fmt: skip
 
 _SETTLING = 3  # rounds in which the steps of a settled Jacobian are found
 SCAN = np.linspace(-3.0, 3.0, 25)  # standard deviations of a trial's own number that are looked at for another valley
@@ -118,7 +118,13 @@ class Fit:
 
 def fit(model: Model, start: Values | None = None, *, rounds: int = Rule.rounds) -> Fit:
     """The best values near `start` (the parameters' own values where it names none)."""
-    return fits([(model, _begun(model, start), Rule(rounds=rounds))])[0]
+    return fit_each([(model, start)], rounds=rounds)[0]
+
+
+def fit_each(starts: Sequence[tuple[Model, Values | None]], *, rounds: int = Rule.rounds) -> list[Fit]:
+    """`fit` of each model from its start, carried out together."""
+    rule = Rule(rounds=rounds)
+    return fits([(model, _begun(model, start), rule) for model, start in starts])
 
 
 def fits(starts: Sequence[tuple[Model, Values, Rule]]) -> list[Fit]:

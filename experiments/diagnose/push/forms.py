@@ -72,8 +72,12 @@ def physical(slot: Number, value: float, scales: Scales, *, stiffness: float, si
         return value * stiffness
     if slot.how == "spring force":
         return value * stiffness * scales.depth
-    factor = {"area": size**2, "drag": size**2 / scales.speed**2, "perimeter": size, "viscous": size / scales.speed}
-    return value * scales.force * factor[slot.how]
+    factor = size if slot.how in ("perimeter", "viscous") else size**2
+    if slot.how == "drag":
+        factor /= scales.speed**2
+    elif slot.how == "viscous":
+        factor /= scales.speed
+    return value * scales.force * factor
 
 
 _UNITS = {"depth": "m", "speed": "m/s", "time": "s", "spring": "N/m", "spring force": "N", "area": "N", "drag": "kg/m",

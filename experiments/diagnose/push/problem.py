@@ -111,49 +111,64 @@ class PenetrationProblem(Problem):
         read = finding.channel == "force" and "above the surface" in finding.what
         return read and self._zeros is not None and self._zeros.usual(finding.trial)
 
-    def _numbers(self, values: Values, forms: Sequence[Form], trial: Prepared, into: Array) -> None:
-        """Fill one lane's slots."""
-        bed = 1.0 + values.get(f"bed[{trial.info.id}]", 0.0)
-        stiffness = self._number(values, "stiffness", trial.diameter) * bed
-        into[_SLOT["mass"]] = self.tables.spike.mass or 1.0
-        into[_SLOT["gravity"]] = trial.table.gravity
-        into[_SLOT["stiffness"]] = stiffness
-        damper = 1.0 + values.get(f"bed damping[{trial.info.id}]", 0.0)
-        into[_SLOT["damping"]] = self._number(values, "damping", trial.diameter) * bed * damper
-        into[_SLOT["reference"]] = self._scales.depth
-        into[_SLOT["radius_depth"]] = _tip_depth(self.tables.spike, trial.diameter)
+    def _fill(self, trial: Prepared, points: Sequence[tuple[Values, Sequence[Form]]], into: Array) -> None:
+        """Fill the slots of a trial's lanes, one a point, shape [points, slot_count]."""
+        into[:, _SLOT["mass"]] = self.tables.spike.mass or 1.0
+        into[:, _SLOT["gravity"]] = trial.table.gravity
+        into[:, _SLOT["reference"]] = self._scales.depth
+        into[:, _SLOT["radius_depth"]] = _tip_depth(self.tables.spike, trial.diameter)
         if trial.smooth is not None:
-            into[_SLOT["shift_depth"]] = -values.get(f"depth zero[{trial.info.id}]", 0.0)
             fast = float(np.abs(trial.smooth.speed).max())
-            into[_SLOT["speed_scale"]] = max(0.02 * fast, 2 * float(np.median(trial.smooth.speed_std)), 1e-12)
-        size = trial.diameter / self._middle
-        for form in forms:
-            for parameter in form.parameters:
-                value = values.get(parameter.name, parameter.value)
-                slot = form.slots[parameter.name]
-                into[self._places[slot.name]] = physical(slot, value, self._scales, stiffness=stiffness, size=size)
+            into[:, _SLOT["speed_scale"]] = max(0.02 * fast, 2 * float(np.median(trial.smooth.speed_std)), 1e-12)
+        size, (k, stated_k) = trial.diameter / self._middle, self._stated("stiffness", trial.diameter)
+        c, stated_c = self._stated("damping", trial.diameter)
+        own = [f"{kind}[{trial.info.id}]" for kind in ("bed", "bed damping", "depth zero")]
+        for (values, forms), lane in zip(points, into, strict=True):
+            bed, damper, zero = (values.get(name, 0.0) for name in own)
+            lane[_SLOT["stiffness"]] = stiffness = values.get(k, stated_k) * (1.0 + bed)
+            lane[_SLOT["damping"]] = values.get(c, stated_c) * (1.0 + bed) * (1.0 + damper)
+            if trial.smooth is not None:
+                lane[_SLOT["shift_depth"]] = -zero
+            for form in forms:
+                for parameter in form.parameters:
+                    value = values.get(parameter.name, parameter.value)
+                    slot = form.slots[parameter.name]
+                    lane[self._places[slot.name]] = physical(slot, value, self._scales, stiffness=stiffness, size=size)
 
     def _file(self, form: Form) -> str | None:
         """Name of the file that an effect is from; None for the library's."""
         return next((effect.file.name for effect in self.own if effect.id == form.effect), None)
 
+    def _has_own(self, forms: Sequence[Form]) -> bool:
+        """Whether one of the effects is from a file."""
+        return bool(self.own) and any(self._file(form) for form in forms)
+
     def _number(self, values: Values, which: str, diameter: float) -> float:
         """K or C, ``stiffness`` or ``damping``, of a diameter."""
-        name = named(which, diameter, self._diameters)
-        stated: float = getattr(self.tables.surface, which)
-        return values.get(name, next((parameter.value for parameter in self.base if parameter.name == name), stated))
+        name, stated = self._stated(which, diameter)
+        return values.get(name, stated)
+
+    def _stated(self, which: str, diameter: float) -> tuple[str, float]:
+        """The parameter that is K or C of a diameter, and its value where none is given."""
+        name, surface = named(which, diameter, self._diameters), self.tables.surface
+        stated = surface.stiffness if which == "stiffness" else surface.damping
+        return name, next((parameter.value for parameter in self.base if parameter.name == name), stated)
 
     def _run(self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[Prepared],
              shifts: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Array]:  # fmt: skip
         """Forces [points, n] of driven trials, or motions [points, n, 4] of drops; all trials of one mode."""
+        return self._run_each([(values, forms) for values in points], trials, shifts)
+
+    def _run_each(self, points: Sequence[tuple[Values, Sequence[Form]]], trials: Sequence[Prepared],
+                  shifts: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Array]:  # fmt: skip
+        """The same of points that have forms of their own, all or none of them from files."""
         count = len(points)
         # Effects from files are compiled in where one of them is on: another kernel.
-        own = self.own if any(self._file(form) for form in forms) else ()
+        own = self.own if self._has_own(points[0][1]) else ()
         numbers = slot_table(count * len(trials), own)
         lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
         for place, trial in enumerate(trials):
-            for k, values in enumerate(points):
-                self._numbers(values, forms, trial, numbers[place * count + k])
+            self._fill(trial, points, numbers[place * count : (place + 1) * count])
         numbers[:, _SLOT["shift_depth"]] += shifts[0]
         numbers[:, _SLOT["shift_speed"]], numbers[:, _SLOT["shift_row"]] = shifts[1:]
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
@@ -161,7 +176,7 @@ class PenetrationProblem(Problem):
             depth, speed = (np.concatenate([getattr(t.path, name) for t in trials]) for name in ("depth", "speed"))
             out = push(numbers, lanes, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
             for place, trial in enumerate(trials):
-                zeros = np.array([values.get(f"force zero[{trial.info.id}]", 0.0) for values in points])
+                zeros = np.array([values.get(f"force zero[{trial.info.id}]", 0.0) for values, _ in points])
                 if zeros.any():
                     out[place * count : (place + 1) * count] += zeros[:, None]
         else:
@@ -169,17 +184,26 @@ class PenetrationProblem(Problem):
             out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)
         return [out[p * count : (p + 1) * count, : len(trial.time)] for p, trial in enumerate(trials)]
 
-    def evaluate(
-        self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[str], share: float = 1.0
-    ) -> list[dict[str, Array]]:
+    def evaluate_together(
+        self, asked: Sequence[tuple[Sequence[Values], Sequence[Form]]], trials: Sequence[str], share: float = 1.0
+    ) -> list[list[dict[str, Array]]]:
         """Whitened residuals, of all of their time."""
-        models: dict[str, Array] = {}
-        for driven in (True, False):
-            chosen = [id for id in trials if self._trials[id].driven == driven]
-            if chosen:
-                out = self._run(points, forms, [self._trials[id] for id in chosen])
-                models |= dict(zip(chosen, out, strict=True))
-        return [{id: self._residuals(self._trials[id], models[id][k]) for id in trials} for k in range(len(points))]
+        found: list[list[dict[str, Array]]] = [[] for _ in asked]
+        for own in (False, True):
+            mine = [k for k, (_, forms) in enumerate(asked) if self._has_own(forms) == own]
+            points = [(values, asked[k][1]) for k in mine for values in asked[k][0]]
+            models: dict[str, Array] = {}
+            for driven in (True, False):
+                chosen = [id for id in trials if self._trials[id].driven == driven]
+                if chosen and points:
+                    out = self._run_each(points, [self._trials[id] for id in chosen])
+                    models |= dict(zip(chosen, out, strict=True))
+            rest = iter(
+                {id: self._residuals(self._trials[id], models[id][k]) for id in trials} for k in range(len(points))
+            )
+            for k in mine:
+                found[k] = [next(rest) for _ in asked[k][0]]
+        return found
 
     def _residuals(self, trial: Prepared, model: Array) -> Array:
         if not trial.driven:
@@ -428,4 +452,5 @@ def _of_drop(trial: Prepared, depth: Array, acceleration: Array, tables: Penetra
 
 
 def _bounded(rest: Array) -> Array:
-    return np.where(np.isfinite(rest), np.clip(rest, -1e5, 1e5), _FAILED)
+    near = np.clip(rest, -1e5, 1e5)
+    return near if math.isfinite(float(rest.sum())) else np.where(np.isfinite(rest), near, _FAILED)

@@ -19,7 +19,7 @@ from penetration_campaigns import (
 from experiments.campaign import Recording
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.core.renoised import whitened_fit
-from experiments.diagnose.fit.evidence import best_start
+from experiments.diagnose.fit.evidence import best_starts
 from experiments.diagnose.fit.fitting import Model, Whitener
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.noise.replicates import split_trials
@@ -203,7 +203,10 @@ def test_a_small_step_is_found_from_the_side_on_which_it_lies():
     problem = make_problem(campaign_of(trials))
     base = whitened_fit(Model(problem, Whitener.white(problem), tuple(t.id for t in problem.trials)))
     form = next(form for form in problem.forms if form.id == "layering:step")
-    found = best_start(base.model.with_forms([form]), form, base.values)
+    (found,) = best_starts(base.model, [form], base.values)
     assert problem.reported(found.values, form)["layer_step"][0] == pytest.approx(0.5, rel=0.1)
     assert problem.reported(found.values, form)["layer_depth"][0] == pytest.approx(0.01, rel=0.03)
     assert found.chi_square / found.count < 1.1
+    other = next(form for form in problem.forms if form.effect == "depth-hardening")
+    _, again = best_starts(base.model, [other, form], base.values)  # the same bits beside another one's fits
+    assert (again.values, again.chi_square) == (found.values, found.chi_square)
