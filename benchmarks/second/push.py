@@ -20,10 +20,12 @@ __all__ = ["EFFECTS", "OUTSIDE", "Law", "fall", "make_push"]
 Array = NDArray[np.float64]
 Random = np.random.Generator
 Columns = list[dict[str, Array]]
-EFFECTS = ("inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering")
-OUTSIDE = ("relaxation", "jamming", "cell-drift", "ringing")
-"""What no library has: a force that fades at a stop, one that goes up and down with depth, a cell that warms up, a
-frame that rings after each change of speed."""
+EFFECTS = (
+    "inertial-drag", "depth-hardening", "plastic-sinkage", "adhesion", "shaft-friction", "layering", "relaxation",
+)  # fmt: skip
+OUTSIDE = ("jamming", "cell-drift", "ringing")
+"""What no library has: a force that goes up and down with depth, a cell that warms up, a frame that rings after each
+change of speed."""
 _G = 9.80665
 _FINE = 3000  # points of a path
 _STEP = 1e-4  # of a drop [s]

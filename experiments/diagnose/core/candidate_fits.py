@@ -1,6 +1,6 @@
 """Fits of candidate effects: alone, with another shape, beside other effects, from the most promising starts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 
@@ -28,14 +28,17 @@ class CandidateFits:
     """Fits of candidates on one set of trials: each effect alone, bent, beside others; `table` keeps all of them.
 
     `recoloured`: a fit with the noise as that fit leaves it. `find_diverging`: trials whose divergence is all that
-    contradicts the base model or the best single effect; asked before a second effect is searched.
+    contradicts the base model or the best single effect; asked before a second effect is searched. `known`: where each
+    form by its id ended in an earlier search of the same trials, by other weights, from which it is fitted then.
     """
 
     def __init__(
         self, base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None,
         find_diverging: Callable[[Fit, Fit], tuple[Finding, ...]] | None = None,
+        known: Mapping[str, Values] | None = None,
     ) -> None:  # fmt: skip
         self.base = Hypothesis.of(base)
+        self._known = known or {}
         self._find_diverging = find_diverging
         self.tell = tell
         self.seed = seed
@@ -98,10 +101,8 @@ class CandidateFits:
         for effect, group in groupby(forms, key=lambda form: form.effect):
             own = list(group)
             self.tell(f"trying {effect}", len(made) / max(1, len(forms)))
-            rounds = 6 if contacts is None else 1
-            for form, found in zip(own, best_starts(model, own, self.base.fit.values, rounds=rounds), strict=True):
-                self._alone[form.id] = found
-                made.append(self._kept(found))
+            self._fit_alone(own)
+            made += [self._kept(self._alone[form.id]) for form in own]
         if contacts is not None:
             ranked = sorted((h.score for h in made), reverse=True)
             least = min(ranked[:_FINISHED][-1], ranked[0] - _NEAR_BY)
@@ -117,6 +118,22 @@ class CandidateFits:
         if contacts is None:
             best = {effect: self._from_its_like(one) for effect, one in best.items()}
         return sorted(best.values(), key=lambda h: -h.score)
+
+    def _fit_alone(self, forms: Sequence[Form]) -> None:
+        """Fit each of `forms` alone beside the base model."""
+        base, found = self.base.fit, self._alone
+        again = [form for form in forms if form.id in self._known and base.model.problem.contacts is None]
+        fresh = [form for form in forms if form not in again]
+        rounds = 6 if base.model.problem.contacts is None else 1
+        begun = [(base.model.with_forms([form]), {**base.values, **self._known[form.id]}) for form in again]
+        found |= dict(zip([form.id for form in again], fit_each(begun), strict=True))
+        starts = best_starts(base.model, fresh, base.values, rounds=rounds)
+        found |= dict(zip([form.id for form in fresh], starts, strict=True))
+
+    @property
+    def alone(self) -> dict[str, Values]:
+        """Where each form ended alone, by its id."""
+        return {id: found.values for id, found in self._alone.items()}
 
     def _base_again(self, first: Sequence[Hypothesis]) -> None:
         """Fit the base model again from where the best effects ended, which may be on another branch of a trial."""

@@ -11,7 +11,7 @@ from experiments.diagnose.fit.bounds import is_strained
 from experiments.diagnose.fit.evidence import Hypothesis, excess, held_out_fit, signature_matrix
 from experiments.diagnose.fit.fitting import Fit, Model, Whitener, by_beginnings, fit, settled
 from experiments.diagnose.fit.gate import Verdict, held_out_gate, open_gate
-from experiments.diagnose.fit.problem import Array, Finding, Problem
+from experiments.diagnose.fit.problem import Array, Finding, Problem, Values
 from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.diverging import diverging_trials, most_diverging
 from experiments.diagnose.noise.jitter import Jitter
@@ -83,6 +83,7 @@ class _Course:
         self.wander = Wander({})
         self.model_std: Mapping[str, float] = {}
         self.alone: Fit | None = None  # the base model's fit as its own weights have it
+        self.known: dict[str, Values] = {}  # where forms ended alone in the searches so far
 
     def run(self) -> Diagnosis:
         """All steps; some findings begin the course anew."""
@@ -174,8 +175,7 @@ class _Course:
             self.first = self._gate_of_base()
 
     def _gate_of_base(self) -> Verdict:
-        columns, _ = signature_matrix(self.base, self.problem.forms)
-        return self._gate(self.base, "making the gate's null", columns)
+        return self._gate(self.base, "making the gate's null", signature_matrix(self.base, self.problem.forms)[0])
 
     def _gate(self, found: Fit, what: str, signatures: Array | None = None) -> Verdict:
         """The gate on a fit, by full refits where these were asked for."""
@@ -199,10 +199,10 @@ class _Course:
         def diverging(base: Fit, best: Fit) -> tuple[Finding, ...]:
             return self._diverging(base) or (self._diverging(best) if best.model.forms else ())
 
-        choice = Search(
-            self.base, tell=self.tell, seed=self.asked.seed, recoloured=self._recoloured,
-            find_diverging=diverging if may_diverge else None,
-        ).choose()  # fmt: skip
+        search = Search(self.base, tell=self.tell, seed=self.asked.seed, recoloured=self._recoloured, known=self.known,
+                        find_diverging=diverging if may_diverge else None)  # fmt: skip
+        choice = search.choose()
+        self.known |= search.alone
         if not choice.diverging:
             self.base = choice.base.fit
         return choice

@@ -27,6 +27,7 @@ _WORTH_ALONE = 16.0  # nats from which a further effect counts where one conditi
 _WORTH_BOTH, _SHARE_BOTH = 5.0, 0.75
 """Nats, and share of what is left, from which a smaller second effect counts if the cross-validation supports it."""
 _LEADS = 2.0  # nats of evidence and cross-validation together by which another close effect takes the lead
+_BESIDE = 20.0  # nats behind the best within which a rival is compared with it beside a further effect
 _UNEXPLAINED, _HOPELESS = 1.3, 0.1
 """Reduced chi-square, and share of the base model's excess, beyond both of which no effect can be named."""
 _SHOWN = 3  # rivals that are compared
@@ -251,7 +252,52 @@ class Search(CandidateFits):
         if close and len(best.effects) == 1:
             best = min(close, key=lambda rival: rival.total).hypothesis
             mine, rivals = self._predicted(best, self._rivals(best, first))
-        return best, mine, rivals
+        return self._beside_structure(best, first) or (best, mine, rivals)
+
+    def _lead_beside(self, one: Hypothesis, other: Hypothesis) -> float:
+        """Nats by which one single effect leads another where each stands alone or beside the same further effects."""
+        both = (*one.effects, *other.effects)
+        self.tell(f"{' and '.join(both)}, each beside a small further effect", 0.5)
+        found = {h.effects[0]: self._next(h.fit, both, most=FOLLOWED) for h in (one, other)}
+        for name, own in found.items():
+            own += [h for h in self.table if len(h.effects) == 2 and set(h.effects) & set(both) == {name}]
+        best = [max(own, key=lambda h: h.score) for own in found.values() if own]
+        seconds = {form.id: form for h in best for form in h.forms if form.effect not in both}
+        scores = []
+        for h in (one, other):  # with what did best beside either
+            tried = (*found[h.effects[0]], *self._try(h, list(seconds.values())))
+            scores.append(max([h.score, *(n.score for n in tried)]))
+        return scores[0] - scores[1]
+
+    def _beside_structure(
+        self, best: Hypothesis, first: Sequence[Hypothesis]
+    ) -> tuple[Hypothesis, Predicted | None, tuple[Rival, ...]] | None:
+        """A rival in the lead that explains the trials better than `best` where each stands beside one more effect.
+
+        No measurement has exactly the model's structure. Where two single effects both leave too little to matter, what
+        chooses between them is how well each imitates that structure too: a form with many numbers does it best. Beside
+        any small further effect, which stands for the structure, the right one leaves less. None where no rival leads.
+        """
+        if len(best.effects) != 1 or not _leaves_little(best):
+            return None
+        mine: dict[str, float] = {}
+        for rival in self._rivals(best, first):
+            if 0.0 <= rival.behind < _BESIDE and _leaves_little(rival.hypothesis):
+                mine[rival.effect] = self._lead_beside(rival.hypothesis, best)
+        ahead = max(mine, key=lambda effect: mine[effect], default="")
+        if not ahead or mine[ahead] < _LEADS:
+            return None
+        lead = next(h for h in first if h.effects == (ahead,))
+        rivals = [
+            replace(rival, behind=mine[ahead]) if rival.effect == best.effects[0] else rival
+            for rival in self._rivals(lead, first)
+        ]
+        return lead, *self._predicted(lead, rivals)
+
+
+def _leaves_little(found: Hypothesis) -> bool:
+    """Whether what is left is too small to matter."""
+    return found.fit.chi_square <= SMALL * found.fit.count
 
 
 def _ordered(best: Hypothesis) -> Hypothesis:
