@@ -13,25 +13,24 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from experiments.runs.types import Json
-from rigid.ground.rft import tractions
-from rigid.ground.rft_table import Pieces
+from rigid.ground.rft_table import Pieces, law_tractions
 
 __all__ = ["Fit", "fit_of", "measured_force", "predicted_force"]
 
-Gradients = tuple[float, float, float]
+Factors = tuple[float, float, float, float]
 START = 1e5  # [N/m3], from which the search starts
 
 
 @dataclass(frozen=True)
 class Fit:
-    """xi_1, xi_2, xi_3 [N/m3] of all runs and of those without each bed; errors over the force of the plate [1].
+    """xi_1, xi_2, xi_3 [N/m3] and b [1] of all runs and of those without each bed; errors over the force [1].
 
     unseen: rms over plates of the mean over beds, each predicted by a fit without that plate. seen: of the fit itself.
     """
 
-    gradients: Gradients
-    left_out: tuple[Gradients, ...]
-    stds: Gradients
+    factors: Factors
+    left_out: tuple[Factors, ...]
+    stds: Factors
     seen: float
     unseen: float
 
@@ -41,10 +40,10 @@ def measured_force(run: Json) -> np.ndarray:
     return np.asarray(run["samples"], dtype=float)[:, 1:4].mean(axis=0)
 
 
-def predicted_force(gradients: ArrayLike, friction: float, run: Json, pieces: Pieces) -> np.ndarray:
+def predicted_force(factors: ArrayLike, friction: float, run: Json, pieces: Pieces) -> np.ndarray:
     """Mean force on the body of a run at the same depths [N], shape [3]."""
     normals, weights = _faces(run, pieces)
-    return np.asarray(weights @ _tractions(gradients, friction, run, normals))
+    return np.asarray(weights @ _tractions(factors, friction, run, normals))
 
 
 def _faces(run: Json, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
@@ -54,15 +53,15 @@ def _faces(run: Json, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
     return normals, np.bincount(which.ravel(), weights=deep * pieces.areas, minlength=len(normals))
 
 
-def _tractions(gradients: ArrayLike, friction: float, run: Json, normals: np.ndarray) -> np.ndarray:
+def _tractions(factors: ArrayLike, friction: float, run: Json, normals: np.ndarray) -> np.ndarray:
     angle = math.radians(run["gamma"])
     way = (math.cos(angle), 0.0, -math.sin(angle))
-    return tractions(normals, way, surface_friction=friction, factors=gradients)
+    return law_tractions(factors, friction, normals, way)
 
 
 def _solved(
     runs: Sequence[Json], surfaces: Mapping[str, Pieces], friction: float, terms: int, start: Sequence[float]
-) -> Gradients:
+) -> Factors:
     measured = [measured_force(run) for run in runs]
     alike: dict[tuple[str, float], list[np.ndarray]] = {}
     for run, force in zip(runs, measured, strict=True):
@@ -71,7 +70,8 @@ def _solved(
     faces = [_faces(run, surfaces[run["body"]]) for run in runs]
 
     def full(x: np.ndarray) -> np.ndarray:
-        return START * (np.repeat(x, 3) if terms == 1 else x)
+        gradients, downward = (x, 0.0) if terms == 3 else (np.repeat(x[:1], 3), x[1] if terms == 2 else 0.0)
+        return np.array([*(START * gradients), downward])
 
     def off(x: np.ndarray) -> np.ndarray:
         each = zip(runs, faces, measured, sizes, strict=True)
@@ -81,25 +81,26 @@ def _solved(
         ]
         return np.concatenate(parts)
 
-    found = full(least_squares(off, np.asarray(start[:terms]) / START, x_scale=1.0).x)
-    return (float(found[0]), float(found[1]), float(found[2]))
+    first = np.asarray(start[:3]) / START
+    found = full(least_squares(off, {1: first[:1], 2: np.array([first[0], start[3]]), 3: first}[terms]).x)
+    return (float(found[0]), float(found[1]), float(found[2]), float(found[3]))
 
 
 def fit_of(runs: Sequence[Json], surfaces: Mapping[str, Pieces], friction: float, *, terms: int) -> Fit:
-    """The fit with one factor for all three functions (`terms` = 1) or one for each (3).
+    """The fit of xi (`terms` = 1), of xi and b (2), or of xi_1, xi_2 and xi_3 (3).
 
     `runs`: those of plates. `surfaces`: the pieces of each body, by `body` of a run. `friction`: of grains and body.
     """
-    one = _solved(runs, surfaces, friction, terms, (START, START, START))
+    one = _solved(runs, surfaces, friction, terms, (START, START, START, 0.0))
     beds = list(dict.fromkeys(run["bed"] for run in runs))
     without = []
     if len(beds) > 1:
         without = [_solved([run for run in runs if run["bed"] != bed], surfaces, friction, terms, one) for bed in beds]
-    stds = (0.0, 0.0, 0.0)
+    stds = (0.0, 0.0, 0.0, 0.0)
     if len(without) > 1:
         spread = np.array(without) - np.mean(without, axis=0)
         s = np.sqrt((len(beds) - 1) / len(beds) * (spread**2).sum(axis=0))
-        stds = (float(s[0]), float(s[1]), float(s[2]))
+        stds = (float(s[0]), float(s[1]), float(s[2]), float(s[3]))
     plates = list(dict.fromkeys((run["body"], run["gamma"]) for run in runs))
     seen, unseen = [], []
     for plate in plates:
@@ -110,9 +111,9 @@ def fit_of(runs: Sequence[Json], surfaces: Mapping[str, Pieces], friction: float
     return Fit(one, tuple(without), stds, _rms(seen), _rms(unseen))
 
 
-def _error(gradients: Gradients, friction: float, own: Sequence[Json], surfaces: Mapping[str, Pieces]) -> float:
+def _error(factors: Factors, friction: float, own: Sequence[Json], surfaces: Mapping[str, Pieces]) -> float:
     measured = np.mean([measured_force(run) for run in own], axis=0)
-    law = np.mean([predicted_force(gradients, friction, run, surfaces[run["body"]]) for run in own], axis=0)
+    law = np.mean([predicted_force(factors, friction, run, surfaces[run["body"]]) for run in own], axis=0)
     return float(np.linalg.norm(law - measured) / np.linalg.norm(measured))
 
 

@@ -18,6 +18,7 @@ from .tests import of_beds, quantity, table
 __all__ = ["FUNCTION_FILE", "TABLE_FILE", "result_of"]
 
 TABLE_FILE, FUNCTION_FILE = "rft.json", "rft_force.py"
+TERMS = (1, 2, 3)  # fitted numbers: xi; xi and b; xi_1, xi_2 and xi_3
 GOAL = 0.15  # error of a shape that was not seen [1], above which a warning says so
 FINE = 10.0  # grains across a plate from which its size hardly counts
 
@@ -29,7 +30,7 @@ def result_of(settings: BedPlatesSettings, runs: list[Json], surfaces: Mapping[s
     """
     runs = [run | {"bed": run["id"].rpartition("-")[0]} for run in runs]
     plates = [run for run in runs if run["beta"] is not None]
-    fits = {terms: fit_of(plates, surfaces, friction, terms=terms) for terms in (1, 3)}
+    fits = {terms: fit_of(plates, surfaces, friction, terms=terms) for terms in TERMS}
     terms = min(fits, key=lambda count: (fits[count].unseen, count))
     fit = fits[terms]
     kept = _table(settings, plates, surfaces, fit, friction)
@@ -37,15 +38,15 @@ def result_of(settings: BedPlatesSettings, runs: list[Json], surfaces: Mapping[s
     others = [_row(own, surfaces, fit, friction) for own in _alike([run for run in runs if run["beta"] is None])]
     of = partial(quantity, runs)
     law = {
-        f"gradient_{k + 1}": {"value": fit.gradients[k], "std": fit.stds[k] or None, "unit": "N/m3", "note": note}
+        f"gradient_{k + 1}": {"value": fit.factors[k], "std": fit.stds[k] or None, "unit": "N/m3", "note": note}
         for k, note in enumerate(say(f"gradient_{k}") for k in (1, 2, 3))
     }
     quantities = law | {
+        "downward": {"value": fit.factors[3], "std": fit.stds[3] or None, "unit": "1", "note": say("downward")},
         "terms": _number(terms, say("terms")),
         "seen_error": _number(fit.seen, say("seen_error")),
         "unseen_error": _number(fit.unseen, say("unseen_error")),
-        "unseen_error_one": _number(fits[1].unseen, say("unseen_error_n", terms=1)),
-        "unseen_error_three": _number(fits[3].unseen, say("unseen_error_n", terms=3)),
+        **{f"unseen_error_{n}": _number(fits[n].unseen, say("unseen_error_n", terms=n)) for n in TERMS},
     }  # fmt: skip
     if others:
         worst = max(others, key=lambda row: row["error"])
@@ -65,7 +66,7 @@ def result_of(settings: BedPlatesSettings, runs: list[Json], surfaces: Mapping[s
         "plates": rows,
         "shapes": others,
         "warnings": _warnings(settings, runs, fit, others),
-        "files": {TABLE_FILE: kept.to_json(), FUNCTION_FILE: function_of(kept.gradients, friction, kept.material)},
+        "files": {TABLE_FILE: kept.to_json(), FUNCTION_FILE: function_of(kept.factors, friction, kept.material)},
     }
 
 
@@ -86,7 +87,7 @@ def _row(own: list[Json], surfaces: Mapping[str, Pieces], fit: Fit, friction: fl
     measured = np.array([measured_force(run) for run in own])
     mean = measured.mean(axis=0)
     pieces = surfaces[own[0]["body"]]
-    law = np.mean([predicted_force(fit.gradients, friction, run, pieces) for run in own], axis=0)
+    law = np.mean([predicted_force(fit.factors, friction, run, pieces) for run in own], axis=0)
     depths = [float(np.mean([row[0] for row in run["samples"]])) for run in own]
     between = [spread(measured[:, k].tolist()) for k in (0, 2)]
     return {
@@ -118,7 +119,7 @@ def _table(
     return RftTable(
         format=RFT_FORMAT, material=one["material"], source="hedgebed bed test plates", gravity=one["gravity"],
         grain=one["grain"], bulk_density=float(np.mean([run["packing_fraction"] for run in plates])) * one["density"],
-        surface_friction=friction, gradients=fit.gradients, stds=fit.stds, left_out=fit.left_out, unseen=fit.unseen,
+        surface_friction=friction, factors=fit.factors, stds=fit.stds, left_out=fit.left_out, unseen=fit.unseen,
         depth=(settings.shallow * settings.depth, settings.depth), side=settings.side, speed=one["speed"],
         plates=tuple(entries), notes=(say("no_history"),),
     )  # fmt: skip

@@ -1,6 +1,10 @@
-"""`hedgebed bed list`, `bed show`, `bed share`: the beds there are, what one of them is, and one as a file to send."""
+"""`hedgebed bed list`, `bed show`, `bed share`: the beds there are, what one of them is, and one as a file to send.
+
+`hedgebed bed foot`: the force on a shape by the table that `bed test plates` measured.
+"""
 
 import json as json_module
+import math
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -23,6 +27,7 @@ def add_bed_commands(home: App) -> None:
     home.command(_list, name="list")
     home.command(_show, name="show")
     home.command(_share, name="share")
+    home.command(_foot, name="foot")
 
 
 def _list(
@@ -108,4 +113,49 @@ def _share(bed: _Bed, to: Annotated[Path, Parameter(help="The file to write; mus
         file = share_bed(find_bed(bed), to)
     print(f"bed: {file}")
     say(f"`hedgebed bed show {file}` says what it is, `dem.Bed.load({str(file)!r})` reads it")
+    return 0
+
+
+def _foot(
+    table: Annotated[Path, Parameter(help="rft.json of a run of bed test plates.")],
+    shape: Annotated[str, Parameter(help="ball, cone, cylinder, or a file of a closed surface (STL, OBJ).")],
+    /,
+    *,
+    depth: Annotated[float, Parameter(help="Depth of the origin of the shape [m]; a built-in one stands on it.")],
+    gamma: Annotated[float, Parameter(help="Direction of motion below the horizontal [degrees].")] = 90.0,
+    size: Annotated[float, Parameter(help="Diameter of a ball, cone or cylinder [m].")] = 0.024,
+    scale: Annotated[float, Parameter(help="Unit of the file [m].")] = 1.0,
+    gravity: Annotated[float | None, Parameter(help="Gravity [m/s2]; that of the table if not given.")] = None,
+    json: _Json = False,
+) -> int:
+    """Predict the slow force of a bed on a shape of your own."""
+    import numpy as np
+
+    from experiments.bed.plates import direction_of, shaped
+    from experiments.bed.test_settings import SHAPES
+    from rigid.ground.rft_table import read_rft
+
+    with refusing():
+        found = read_rft(table)
+        for name, value in (("depth", depth), ("size", size), ("scale", scale), ("gravity", gravity)):
+            if value is not None and not 0 < value < math.inf:
+                raise ValueError(f"{name} = {value:g} must be positive and finite")
+        if not -90 <= gamma <= 90:
+            raise ValueError(f"gamma = {gamma:g} degrees: -90 (up) to 90 (down) would do")
+        if shape not in SHAPES and not Path(shape).is_file():
+            raise ValueError(f"shape = {shape!r} is no file, and no built-in shape: {', '.join(SHAPES)}")
+        body = shaped(shape, size, scale)
+    force, std = found.force(body.pieces, depth=depth, direction=direction_of(gamma), gravity=gravity)
+    size_of_law = found.unseen * float(np.linalg.norm(force))
+    if json:
+        numbers = {"force": force.tolist(), "std": [None if math.isnan(s) else s for s in std.tolist()]}
+        print(json_module.dumps(numbers | {"law_error": size_of_law, "unit": "N"}, indent=2))
+        return 0
+    for axis, value, spread in zip("xyz", force, std, strict=True):
+        print(f"force {axis} = {value:.4g}" + ("" if math.isnan(spread) else f" ± {spread:.2g}") + " N")
+    print(f"± is one standard deviation between beds; the law missed unseen plates by {100 * found.unseen:.0f} % (rms)")
+    if depth > 1.5 * found.depth[1]:
+        say(f"warning: depth = {depth:g} m is beyond that of the plates, {found.depth[1]:g} m: extrapolated")
+    if gamma < 0:
+        say("warning: gamma is below 0, and no plate was pushed upwards: extrapolated")
     return 0

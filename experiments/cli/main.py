@@ -338,7 +338,9 @@ def build_app() -> App:
         about = "Prepare, list, show, share, refine, test and calibrate beds of grains."
         app.command(App(name="bed", help=about, group=GROUPS["prepare"]))
         add_bed_commands(app["bed"])
-        app["bed"].command(App(name="test", help="Test beds as in a laboratory: shear, repose, cone, vertical cut."))
+        app["bed"].command(
+            App(name="test", help="Test beds as in a laboratory: shear, repose, cone, vertical cut, plates.")
+        )
     for place, experiment in enumerate(registry.EXPERIMENTS.values()):
         *above, name = experiment.name.split(" ")
         home = app

@@ -70,7 +70,7 @@ def tractions(
 _FUNCTION = '''"""Slow push into {material}: force on a body by 3D-RFT (`hedgebed bed test plates`). Needs numpy."""
 import numpy as np
 
-XI = np.array({factors})  # of f1, f2, f3 [N/m3]
+XI, B = np.array({gradients}), {downward}  # of f1, f2, f3 [N/m3]; of surfaces that face down and move down [1]
 FRICTION = {friction}  # of grains and body [1]
 TABLE = np.array({table})
 
@@ -81,7 +81,7 @@ def force(points, normals, areas, direction):
     a, b, c = np.full(len(n), -v[2]), -n[:, 2], n @ v
     powers = np.stack([a**0, a, b, c, a*a, b*b, c*c, a*b, b*c, c*a, a**3, b**3, c**3,
                        a*b*b, b*a*a, b*c*c, c*b*b, c*a*a, a*c*c, a*b*c], axis=1)
-    f1, f2, f3 = (powers @ TABLE * XI).T[:, :, None]
+    f1, f2, f3 = ((1 + B * np.maximum(a, 0) * np.maximum(b, 0)) * (powers @ TABLE * XI).T)[:, :, None]
     t = f1 * n + f2 * v - f3 * np.array([0, 0, 1.0])
     normal = -np.sum(t * n, axis=1, keepdims=True)
     along, normal = t + normal * n, np.maximum(normal, 0)
@@ -92,10 +92,11 @@ def force(points, normals, areas, direction):
 
 
 def function_of(factors: ArrayLike, surface_friction: float, material: str) -> str:
-    """A Python file with a function `force` that is the law with `factors` [N/m3], for use without this package."""
+    """A Python file with a function `force`, for use without this package; `factors` as in `rigid.ground.rft_table`."""
+    *gradients, downward = [float(f"{f:.6g}") for f in np.asarray(factors)]
     table = np.array2string(_COEFFICIENTS, separator=", ", threshold=1000)
     return _FUNCTION.format(
-        material=material, factors=[float(f"{f:.6g}") for f in np.asarray(factors)], friction=surface_friction,
+        material=material, gradients=gradients, downward=downward, friction=surface_friction,
         table=table.replace("\n", "\n                  "),
     )  # fmt: skip
 

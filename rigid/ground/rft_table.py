@@ -3,10 +3,11 @@
 `hedgebed bed test plates` writes them to `rft.json`. The traction on a piece of surface at depth d below the surface,
 with outward normal n and unit direction of motion v, is
 
-    d (xi_1 f1 n + xi_2 f2 v - xi_3 f3 z),  bounded by friction along the surface,
+    d (1 + b max(x1, 0) max(x2, 0)) (xi_1 f1 n + xi_2 f2 v - xi_3 f3 z),  bounded by friction along the surface,
 
-with the functions f1, f2, f3 of Agarwal, Goldman and Kamrin (`rigid.ground.rft`). There xi_1 = xi_2 = xi_3 = xi_n, the
-one number of the grains. Here each may have its own value [N/m3].
+with the functions f1, f2, f3 of Agarwal, Goldman and Kamrin (`rigid.ground.rft`), x1 = -v_z and x2 = -n_z. There b = 0
+and xi_1 = xi_2 = xi_3 = xi_n, the one number of the grains. Here each may have its own value [N/m3]. b is ours: in beds
+of coarse grains a surface that faces down and moves down bears more than 3D-RFT says, beside one that faces forward.
 """
 
 import json
@@ -28,6 +29,7 @@ __all__ = ["RFT_FORMAT", "Pieces", "RftTable", "box_pieces", "mesh_pieces", "rea
 RFT_FORMAT = "hedgebed-rft/1"
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Factors = tuple[Finite, Finite, Finite, Finite]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -123,9 +125,9 @@ class RftTable(BaseModel):
     grain: Positive  # mean diameter [m]
     bulk_density: Positive  # [kg/m3]
     surface_friction: Annotated[float, Field(ge=0, allow_inf_nan=False)]  # of grains and body [1]
-    gradients: tuple[Finite, Finite, Finite]  # xi_1, xi_2, xi_3 [N/m3]
-    stds: tuple[Finite, Finite, Finite]  # standard deviation of each between fits that leave out one bed
-    left_out: tuple[tuple[Finite, Finite, Finite], ...]  # The gradients of those fits
+    factors: Factors  # xi_1, xi_2, xi_3 [N/m3], b [1]
+    stds: Factors  # standard deviation of each between fits that leave out one bed
+    left_out: tuple[Factors, ...]  # The factors of those fits
     unseen: Annotated[float, Field(ge=0)]  # rms of the error of plates that were not fitted, over their force [1]
     depth: tuple[Finite, Finite]  # of the measured plates' middles [m]
     side: Positive  # of the plates [m]
@@ -135,8 +137,8 @@ class RftTable(BaseModel):
 
     @model_validator(mode="after")
     def _positive(self) -> Self:
-        if not self.gradients[0] or not any(self.gradients):
-            raise ValueError(f"gradients = {list(self.gradients)}: the first must not be 0")
+        if not any(self.factors[:3]):
+            raise ValueError(f"factors = {list(self.factors)}: one of the first three must differ from 0")
         return self
 
     def force(
@@ -146,12 +148,12 @@ class RftTable(BaseModel):
 
         `depth`: of the origin of the body below the undisturbed surface [m]. `direction`: of its motion, any length,
         shape [3]. `gravity` [m/s2]: that of the table if not given; the force is in proportion to it. The deviation is
-        that of the gradients between beds. It does not contain the error of the law itself, `unseen`. Raises
+        that of the factors between beds. It does not contain the error of the law itself, `unseen`. Raises
         ValueError for a direction without length.
         """
         scale = 1.0 if gravity is None else gravity / self.gravity
-        best = scale * law_force(self.gradients, self.surface_friction, pieces, depth, direction)
-        others = [scale * law_force(g, self.surface_friction, pieces, depth, direction) for g in self.left_out]
+        best = scale * law_force(self.factors, self.surface_friction, pieces, depth, direction)
+        others = [scale * law_force(f, self.surface_friction, pieces, depth, direction) for f in self.left_out]
         count = len(others)
         if count < 2:
             return best, np.full(3, np.nan)
@@ -162,18 +164,22 @@ class RftTable(BaseModel):
         return self.model_dump_json(indent=1) + "\n"
 
 
-def law_force(
-    gradients: ArrayLike, surface_friction: float, pieces: Pieces, depth: float, direction: ArrayLike
-) -> Array:
-    """Force on a body [N], shape [3]; `gradients` xi_1, xi_2, xi_3 [N/m3], the others as of `RftTable.force`."""
+def law_force(factors: ArrayLike, surface_friction: float, pieces: Pieces, depth: float, direction: ArrayLike) -> Array:
+    """Force on a body [N], shape [3]; `factors` xi_1, xi_2, xi_3 [N/m3], b [1]; the others as in `RftTable.force`."""
     way = np.asarray(direction, dtype=float)
     if not 0 < float(np.linalg.norm(way)) < math.inf:
         raise ValueError(f"direction = {way.tolist()} must be three finite numbers, not all 0")
     deep = np.maximum(depth - pieces.points[:, 2], 0.0)
-    alpha = tractions(
-        pieces.normals, way / np.linalg.norm(way), surface_friction=surface_friction, factors=gradients
-    )  # fmt: skip
+    alpha = law_tractions(factors, surface_friction, pieces.normals, way / np.linalg.norm(way))
     return np.asarray((deep * pieces.areas) @ alpha, dtype=np.float64)
+
+
+def law_tractions(factors: ArrayLike, surface_friction: float, normals: ArrayLike, direction: ArrayLike) -> Array:
+    """Tractions per depth [N/m3], shape [n, 3], of pieces with these outward unit normals; `direction` of length 1."""
+    *gradients, downward = np.asarray(factors, dtype=float)
+    facing = np.maximum(-np.asarray(normals)[:, 2], 0.0) * max(-float(np.asarray(direction)[2]), 0.0)
+    bare = tractions(normals, direction, surface_friction=surface_friction, factors=gradients)
+    return np.asarray((1.0 + downward * facing)[:, None] * bare)
 
 
 def read_rft(path: str | Path) -> RftTable:

@@ -10,7 +10,8 @@ from experiments.bed import plates
 from experiments.bed.plates_fit import fit_of, predicted_force
 from experiments.bed.test_settings import BedPlatesSettings
 from experiments.cli.main import BAD_INPUT, DONE, main
-from rigid.ground.rft_table import read_rft
+from rigid.ground.rft import tractions
+from rigid.ground.rft_table import RftTable, read_rft
 
 SMALL = [
     "--size", "0.036", "0.036", "0.03", "--grain", "0.004", "--side", "0.012", "--depth", "0.006", "--travel", "0.004",
@@ -19,18 +20,18 @@ SMALL = [
 ]  # fmt: skip
 
 
-def made_up(gradients, *, scatter=0.0, beds=3):
+def made_up(factors, *, scatter=0.0, beds=3):
     """Runs of the default plates with forces of 3D-RFT, each bed's times its own factor; and their surfaces."""
     settings = BedPlatesSettings(shapes=())
     asked = plates.pushes(settings)
     surfaces = {push.name: plates.plate_of(push.beta, settings.side, settings.thickness).pieces for push in asked}
-    factors = 1 + scatter * np.random.default_rng(3).standard_normal(beds)
+    shares = 1 + scatter * np.random.default_rng(3).standard_normal(beds)
     runs = []
-    for bed, factor in enumerate(factors):
+    for bed, share in enumerate(shares):
         for push in asked:
             run = {"bed": f"seed{bed}", "gamma": push.gamma, "beta": push.beta, "body": push.name}
             run["samples"] = [[depth, 0, 0, 0] for depth in (0.012, 0.016, 0.02)]
-            force = factor * predicted_force(gradients, 0.5, run, surfaces[push.name])
+            force = share * predicted_force(factors, 0.5, run, surfaces[push.name])
             run["samples"] = [[row[0], *force] for row in run["samples"]]
             runs.append(run)
     return runs, surfaces
@@ -51,20 +52,22 @@ def test_a_plate_is_turned_as_its_angle_says():
         assert shape.pieces.points[:, 2].min() == pytest.approx(shape.low, abs=0.002)
 
 
-@pytest.mark.parametrize("gradients", [(3e5, 3e5, 3e5), (3e5, 2.4e5, 3.9e5)])
-def test_made_up_forces_give_their_factors_back(gradients):
-    runs, surfaces = made_up(gradients)
-    fit = fit_of(runs, surfaces, 0.5, terms=3)
-    assert fit.gradients == pytest.approx(gradients, rel=1e-4)
-    assert fit.unseen < 1e-3 and max(fit.stds) < 1e-3 * gradients[0]
+@pytest.mark.parametrize(
+    ("factors", "terms"), [((3e5,) * 3 + (0.0,), 1), ((3e5,) * 3 + (1.7,), 2), ((3e5, 2.4e5, 3.9e5, 0.0), 3)]
+)
+def test_made_up_forces_give_their_factors_back(factors, terms):
+    runs, surfaces = made_up(factors)
+    fit = fit_of(runs, surfaces, 0.5, terms=terms)
+    assert fit.factors == pytest.approx(factors, rel=1e-4)
+    assert fit.unseen < 1e-3 and max(fit.stds) < 1e-3 * factors[0]
 
 
 def test_beds_that_differ_as_a_whole_give_the_standard_error_of_their_mean():
     """All forces of a bed times one factor: the scale's std is that of the mean of the factors, s / sqrt(n)."""
-    runs, surfaces = made_up((3e5, 3e5, 3e5), scatter=0.1, beds=5)
+    runs, surfaces = made_up((3e5, 3e5, 3e5, 0.0), scatter=0.1, beds=5)
     factors = 1 + 0.1 * np.random.default_rng(3).standard_normal(5)
     fit = fit_of(runs, surfaces, 0.5, terms=1)
-    assert fit.gradients[0] == pytest.approx(3e5 * factors.mean(), rel=1e-6)
+    assert fit.factors[0] == pytest.approx(3e5 * factors.mean(), rel=1e-6)
     assert fit.stds[0] == pytest.approx(3e5 * factors.std(ddof=1) / math.sqrt(5), rel=1e-6)
 
 
@@ -85,6 +88,32 @@ def test_what_cannot_be_is_refused_before_any_bed_is_made(options, named, tmp_pa
     assert main(["bed", "test", "plates", *options, "--out", str(tmp_path / "run"), "--quiet"]) == BAD_INPUT
     assert named in capsys.readouterr().err
     assert not (tmp_path / "run" / "checkpoint").exists()
+
+
+def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by_name(tmp_path, capsys):
+    """A cone of 60 degrees, tip first, by its closed form: xi alpha_z pi tan(b) / (3 cos(b)) z^3."""
+    table = RftTable(
+        format="hedgebed-rft/1", material="sand", source="made up", gravity=9.8, grain=0.004, bulk_density=1450.0,
+        surface_friction=0.4, factors=(2e5, 2e5, 2e5, 0.0), stds=(1e4, 1e4, 1e4, 0.0),
+        left_out=((1.9e5, 1.9e5, 1.9e5, 0.0), (2.1e5, 2.1e5, 2.1e5, 0.0)), unseen=0.1,
+        depth=(0.01, 0.02), side=0.024, speed=0.1, plates=(),
+    )  # fmt: skip
+    path = tmp_path / "rft.json"
+    path.write_text(table.to_json(), encoding="utf-8")
+    assert main(["bed", "foot", str(path), "cone", "--depth", "0.015", "--json"]) == DONE
+    found = json.loads(capsys.readouterr().out)
+    half = math.radians(30.0)
+    alpha = tractions([[math.cos(half), 0.0, -math.sin(half)]], [0.0, 0.0, -1.0], surface_friction=0.4)[0, 2]
+    closed = 2e5 * alpha * math.pi * math.tan(half) / (3 * math.cos(half)) * 0.015**3
+    assert found["force"][2] == pytest.approx(closed, rel=0.02)
+    assert found["std"][2] == pytest.approx(0.05 * found["force"][2], rel=0.01)
+    for wrong, named in (
+        (["cone", "--depth", "-1"], "depth"), (["mud.stl", "--depth", "0.01"], "mud.stl"),
+        (["cone", "--depth", "0.01", "--gamma", "100"], "gamma"),
+    ):  # fmt: skip
+        assert main(["bed", "foot", str(path), *wrong]) == BAD_INPUT
+        assert named in capsys.readouterr().err
+    assert main(["bed", "foot", str(tmp_path / "none.json"), "cone", "--depth", "0.01"]) == BAD_INPUT
 
 
 @pytest.mark.long

@@ -12,8 +12,8 @@ from rigid.ground.rft_table import RftTable, box_pieces, law_force, mesh_pieces,
 DOWN = (0.0, 0.0, -1.0)
 TABLE = {
     "format": "hedgebed-rft/1", "material": "sand", "source": "made up", "gravity": 9.8, "grain": 0.004,
-    "bulk_density": 1450.0, "surface_friction": 0.4, "gradients": (2e5, 2e5, 2e5), "stds": (1e4, 1e4, 1e4),
-    "left_out": [(1.9e5,) * 3, (2e5,) * 3, (2.1e5,) * 3], "unseen": 0.1, "depth": (0.01, 0.02), "side": 0.024,
+    "bulk_density": 1450.0, "surface_friction": 0.4, "factors": (2e5, 2e5, 2e5, 0.5), "stds": (1e4, 1e4, 1e4, 0.0),
+    "left_out": [(xi, xi, xi, 0.5) for xi in (1.9e5, 2e5, 2.1e5)], "unseen": 0.1, "depth": (0.01, 0.02), "side": 0.024,
     "speed": 0.1, "plates": [],
 }  # fmt: skip
 
@@ -39,10 +39,18 @@ def test_pieces_of_a_box_a_ball_and_a_mesh_have_their_areas_and_close():
 def test_a_level_plate_bears_its_closed_form():
     """F = 0.876 xi z A of the face below; the four thin sides add friction, the face above nothing."""
     side, thick, xi, depth = 0.05, 1e-5, 3e5, 0.02
-    force = law_force((xi,) * 3, 0.4, box_pieces((side, side, thick), 0.0), depth, DOWN)
+    force = law_force((xi, xi, xi, 0.0), 0.4, box_pieces((side, side, thick), 0.0), depth, DOWN)
     assert force[2] == pytest.approx(flat_plate() * xi * depth * side**2, rel=2e-3)
     assert np.abs(force[:2]).max() < 1e-12
     assert flat_plate() == pytest.approx(0.876, abs=5e-4)
+
+
+def test_the_term_of_surfaces_that_face_and_move_down_doubles_a_level_plate_and_spares_an_upright_one():
+    """1 + b x1 x2 is 2 for b = 1 and n = v = -z, 1 where n or v is level, and 1 for what is pulled up."""
+    level, upright = box_pieces((0.02, 0.02, 1e-6), 0.0), box_pieces((0.02, 0.02, 1e-6), 90.0)
+    for pieces, way, times in ((level, DOWN, 2.0), (upright, (1.0, 0.0, 0.0), 1.0), (level, (0.0, 0.0, 1.0), 1.0)):
+        with_b, without = (law_force((1e5, 1e5, 1e5, b), 0.0, pieces, 0.02, way) for b in (1.0, 0.0))
+        assert with_b == pytest.approx(times * without, rel=1e-3, abs=1e-9)
 
 
 def test_a_cone_bears_xi_z_cubed_times_the_traction_of_its_side():
@@ -52,7 +60,7 @@ def test_a_cone_bears_xi_z_cubed_times_the_traction_of_its_side():
     pieces = round_pieces([(0.0, 0.0), (radius, radius / math.tan(half))], along=400)
     alpha = tractions([[math.cos(half), 0.0, -math.sin(half)]], DOWN, surface_friction=0.4)[0, 2]
     wanted = xi * alpha * math.pi * math.tan(half) / (3 * math.cos(half)) * depth**3
-    assert law_force((xi,) * 3, 0.4, pieces, depth, DOWN)[2] == pytest.approx(wanted, rel=2e-3)
+    assert law_force((xi, xi, xi, 0.0), 0.4, pieces, depth, DOWN)[2] == pytest.approx(wanted, rel=2e-3)
 
 
 def test_the_deviation_is_that_of_fits_without_one_bed_and_gravity_scales_the_force():
@@ -70,11 +78,11 @@ def test_the_deviation_is_that_of_fits_without_one_bed_and_gravity_scales_the_fo
 def test_the_function_without_the_package_gives_the_same_forces():
     """Three different factors, a ball that goes down at an angle and a plate: equal to 1e-5, the digits written."""
     made = {}
-    exec(function_of((2.1e5, 1.7e5, 2.6e5), 0.35, "sand"), made)
+    exec(function_of((2.1e5, 1.7e5, 2.6e5, 1.4), 0.35, "sand"), made)
     for pieces in (box_pieces((0.02, 0.03, 0.002), 60.0), round_pieces([(0.0, 0.0), (0.01, 0.02)])):
         for way in ((1.0, 0.0, -0.5), (0.3, 0.2, -1.0), (1.0, 0.0, 0.0)):
             points = pieces.points - (0.0, 0.0, 0.015)
-            own = law_force((2.1e5, 1.7e5, 2.6e5), 0.35, pieces, 0.015, way)
+            own = law_force((2.1e5, 1.7e5, 2.6e5, 1.4), 0.35, pieces, 0.015, way)
             assert made["force"](points, pieces.normals, pieces.areas, way) == pytest.approx(own, rel=1e-5, abs=1e-9)
 
 
@@ -82,7 +90,7 @@ def test_a_table_reads_back_and_a_wrong_one_names_file_and_key(tmp_path):
     path = tmp_path / "rft.json"
     path.write_text(RftTable(**TABLE).to_json(), encoding="utf-8")
     assert read_rft(path) == RftTable(**TABLE)
-    for change, named in (({"gravity": -1}, "gravity"), ({"gradients": [0, 1, 1]}, "gradients"), ({"new": 1}, "new")):
+    for change, named in (({"gravity": -1}, "gravity"), ({"factors": [0, 0, 0, 1]}, "factors"), ({"new": 1}, "new")):
         path.write_text(json.dumps(json.loads(RftTable(**TABLE).to_json()) | change), encoding="utf-8")
         with pytest.raises(ValueError, match=f"rft.json.*{named}"):
             read_rft(path)
@@ -92,6 +100,6 @@ def test_a_table_reads_back_and_a_wrong_one_names_file_and_key(tmp_path):
     with pytest.raises(ValueError, match=r"none\.json"):
         read_rft(tmp_path / "none.json")
     with pytest.raises(ValueError, match="direction"):
-        law_force((1, 1, 1), 0.4, box_pieces((1, 1, 1), 0.0), 0.0, (0, 0, 0))
+        law_force((1, 1, 1, 0), 0.4, box_pieces((1, 1, 1), 0.0), 0.0, (0, 0, 0))
     with pytest.raises(ValueError, match="corners"):
         mesh_pieces(np.zeros((2, 3)))
