@@ -9,10 +9,10 @@ each tip shape s, and k (A / D^2) x^n ("area"), with the area A in the plane of 
 Parts of the rate: c Fr ("damper"), b Fr^2 ("square"), b Fr^2 exp(-x / (T Fr)) ("early"), and the static part times a I
 ("inertial", I the inertial number of `experiments.grains.similarity`). With "area", b Fr^2 is times A / D^2.
 
-"early" is what Roth, Han and Jaeger (arXiv 1910.10358) found of a rod: inertia adds to the force only after the impact,
-until the grains that welled up have settled. The time z / v is compared with that of a fall, T sqrt(D / g). So the
-force is not a sum of a part of the depth and a part of the rate. "one-pair" is the rival without scaling: one K and C
-in N/m and N s/m for all tips and gravities.
+"early" follows what Roth, Han and Jaeger (arXiv 1910.10358) report: the dependence on speed crosses over to one on
+depth at a characteristic time after the impact, so the force is not a sum of a part of the depth and a part of the
+rate. The form is ours, the simplest that does so: the time since the impact, z / v, is compared with T sqrt(D / g).
+"one-pair" is the rival without scaling: one K and C in N/m and N s/m for all tips and gravities.
 
 Each cell is weighted by its rms force, so that all count the same.
 """

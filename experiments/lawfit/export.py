@@ -24,6 +24,7 @@ from .settings import say
 __all__ = ["export_cell", "export_crossed"]
 
 _HEAD = '''"""{title}
+{about}
 
 Made by hedgebed calibrate; needs Python alone. SI units. The force is that on the tip while it goes in. A call outside
 RANGE, that of the fitted runs, warns.
@@ -32,8 +33,10 @@ RANGE, that of the fitted runs, warns.
 import math
 import warnings
 
-NUMBERS = {numbers}
-LEFT_OUT = {left_out}  # The same by fits without one bed each
+NUMBERS = {numbers}{names}
+LEFT_OUT = [  # The same by fits without one bed each
+    {left_out},
+]
 STUDENT_T = {t:.6g}  # 90 %, of as many beds
 RANGE = {range}
 '''
@@ -132,7 +135,15 @@ def export_cell(fitted: LawFit[Candidate], laws: Sequence[Json], folder: Path) -
     sets = [tuple(map(float, candidate.numbers(theta))) for theta in (fitted.theta, *fitted.left_out)]
     title = say("export_title", law=candidate.name, summary=law.summary, f=of, mm=1e3 * of.diameter)
     ranges = {"depth": _ends(data, "depth"), "speed": (0.0, max(data.speeds))}
-    text = _python(title, sets, ranges, extra, parameters=(), deepest=10 * float(data.depth.max()))
+    text = _python(
+        title,
+        sets,
+        ranges,
+        extra,
+        parameters=(),
+        deepest=10 * float(data.depth.max()),
+        names=f"  # {', '.join(law.slots)}",
+    )
     about = {"law": candidate.name, "parameters": candidate.values(fitted.theta), "tip": of.tip, "laws": list(laws)}
     _write(folder, text, about | _of_foundation(of), ranges)
 
@@ -169,18 +180,27 @@ def export_crossed(fitted: LawFit[CrossedLaw], laws: Sequence[Json], cells: Mapp
 
 
 def _python(
-    title: str, sets: Sequence[Any], ranges: Mapping[str, Any], extra: str, *, parameters: Sequence[str], deepest: float
+    title: str,
+    sets: Sequence[Any],
+    ranges: Mapping[str, Any],
+    extra: str,
+    *,
+    parameters: Sequence[str],
+    deepest: float,
+    names: str = "",
 ) -> str:
-    """The text of law.py; `sets`: the numbers of the law, and those without each bed."""
+    """The text of law.py; `sets`: the numbers of the law, and those without each bed; `names`: what the numbers are."""
     passed = "".join(f", {name}" for name in parameters)
 
     def call(depth: str, speed: str, numbers: str = "numbers") -> str:
         return f"_force({depth}, {speed}, {numbers}{passed})"
 
     t = float(student_t.ppf(0.5 + 0.5 * CONFIDENCE, len(sets) - 2))
+    first, _, about = title.partition("\n")
     head = _HEAD.format(
-        title=title, numbers=repr(sets[0]), left_out=repr(list(sets[1:])), t=t, range=repr(dict(ranges))
-    )
+        title=first, about=about, numbers=repr(sets[0]), names=names, left_out=",\n    ".join(map(repr, sets[1:])), t=t,
+        range=repr(dict(ranges)),
+    )  # fmt: skip
     tail = _TAIL.format(
         arguments=f"depth, speed=0.0{passed}", arguments_of_load=f"load, speed=0.0{passed}",
         checked="".join(f", {name}={name}" for name in parameters if name in ranges), passed=passed,

@@ -14,7 +14,7 @@ from experiments.runs.types import Json
 from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
 
 from .data import Data
-from .fit import Estimated, LawFit, fit_law, fit_usable, interval
+from .fit import Estimated, LawFit, fit_law, fit_usable, interval, mean_of
 from .identify import identified, influences
 from .laws import ADDED_MASS, RATES, Candidate, candidates_for
 from .settings import LawFitSettings, say
@@ -178,8 +178,10 @@ def ground_file(fitted: Fitted, data: Data, told: Sequence[str]) -> GroundFile:
     parameters, estimates = {}, _fitted_parameters(fitted)
     for name, parameter in known.items():
         if name not in estimates:
-            note = say("unloading") if name == "rebound" else say("fixed")
-            parameters[name] = Estimate(value=candidate.fixed[name], std=0.0, note=note)
+            own = candidate.fixed[name]
+            parameters[name] = (
+                _rebound(data, own) if name == "rebound" else Estimate(value=own, std=0.0, note=say("fixed"))
+            )
             continue
         found = estimates[name]
         low, high = parameter.lowest, parameter.highest
@@ -204,6 +206,21 @@ def ground_file(fitted: Fitted, data: Data, told: Sequence[str]) -> GroundFile:
             "diameter": (foundation.diameter, foundation.diameter),
         },
     )  # fmt: skip
+
+
+def _rebound(data: Data, stiffest: float) -> Estimate:
+    """Share of the deepest depth that springs back: that of the unloadings, or `stiffest` where there is none.
+
+    A smaller one than `stiffest` is not taken, as a step of 1 ms does not follow it.
+    """
+    found = [one.force / (one.stiffness * one.depth) for one in data.unloadings if one.stiffness > 0]
+    if len(found) < 2:
+        return Estimate(value=stiffest, std=0.0, note=say("unloading"))
+    measured = mean_of(np.array(found))
+    if measured.value < stiffest:
+        return Estimate(value=stiffest, std=0.0, note=say("stiffer_unloading", measured=measured))
+    ends = (max(0.0, measured.low), measured.high)
+    return Estimate(value=measured.value, std=measured.std, interval=ends, note=say("measured_unloading"))
 
 
 def _columns(data: Data, fits: dict[str, Fitted]) -> dict[str, NDArray[Any]]:

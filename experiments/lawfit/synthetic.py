@@ -21,13 +21,21 @@ import numpy as np
 from experiments.runs.folder import write_json
 from experiments.runs.types import Json
 
-from .data import Data, Foundation, PushRun
+from .data import Array, Data, Foundation, PushRun
 from .design import LEAST_BEDS, how_sure, middle_force, sure_enough
-from .dimensionless import CrossedLaw
+from .dimensionless import CrossedLaw, cross, tangent_at
 from .fit import fit_law
 from .laws import CANDIDATES
 
-__all__ = ["DESIGNS", "FOUNDATION", "coverage", "scaled_cells", "stopping_coverage", "synthetic_data"]
+__all__ = [
+    "DESIGNS",
+    "FOUNDATION",
+    "coverage",
+    "crossed_coverage",
+    "scaled_cells",
+    "stopping_coverage",
+    "synthetic_data",
+]
 
 FOUNDATION = Foundation(
     material="sand", tip="sphere", diameter=0.012, tip_height=0.006, cone_angle=60.0, gravity=9.80665, grain=0.001,
@@ -81,17 +89,22 @@ def synthetic_data(
         factor = 1 + bed_spread * random.standard_normal()
         for speed in speeds:
             force = candidate.force(theta, depth, np.full(rows, speed))
-            waves = np.empty(rows)
-            waves[0] = random.standard_normal()
-            for k, kick in enumerate(random.standard_normal(rows - 1)):
-                waves[k + 1] = kept * waves[k] + np.sqrt(1 - kept**2) * kick
-            seen = factor * force + noise * force.mean() * waves
+            seen = factor * force + noise * force.mean() * _waves(random, rows, kept)
             means = [values.reshape(bins, -1).mean(axis=1) for values in (depth, seen)]
             still = np.zeros(bins)
             runs.append(
                 PushRun(f"{bed}-{speed:g}", str(bed), "driven", speed, means[0], still + speed, still, means[1])
             )
     return Data(FOUNDATION, tuple(runs))
+
+
+def _waves(random: np.random.Generator, count: int, kept: float) -> Array:
+    """Normal numbers of variance 1, neighbours correlated by `kept`, shape [count]."""
+    waves = np.empty(count)
+    waves[0] = random.standard_normal()
+    for k, kick in enumerate(random.standard_normal(count - 1)):
+        waves[k + 1] = kept * waves[k] + np.sqrt(1 - kept**2) * kick
+    return waves
 
 
 def scaled_cells(
@@ -106,7 +119,8 @@ def scaled_cells(
 ) -> dict[str, Data]:
     """Made-up runs of a law without dimensions at three Froude numbers, in `beds` beds of every shape and gravity.
 
-    Beds differ by 5 %; the force of each interval of depth fluctuates by `noise` times the mean of its run.
+    Beds differ by 5 %; the force of each interval of depth fluctuates by `noise` times the mean of its run, correlated
+    over a grain.
     """
     random, cells = np.random.default_rng(seed), {}
     factors = 1 + 0.05 * random.standard_normal(beds)
@@ -119,7 +133,7 @@ def scaled_cells(
                 for number in (0.2, 0.4, 0.8):
                     speed = number * math.sqrt(gravity * diameter)
                     force = factor * np.array([law.force(np.array(theta), of, z, speed) for z in depth.tolist()])
-                    force += noise * force.mean() * random.standard_normal(BINS)
+                    force += noise * force.mean() * _waves(random, BINS, math.exp(-(depth[1] - depth[0]) / of.grain))
                     name = f"{bed}-{number}"
                     runs.append(PushRun(name, f"seed {bed}", "driven", speed, depth, still + speed, still, force))
             cells[f"{shape}-{gravity:.3g}"] = Data(of, tuple(runs))
@@ -147,6 +161,36 @@ def coverage(
         }
         for name, value in truth.items()
     }  # fmt: skip
+
+
+CROSSED_TRUTHS: dict[str, tuple[float, ...]] = {
+    "scaled-spring-damper": (20.0, 30.0, 1.0),
+    "power-square": (6.0, 9.0, 1.3, 0.9, 2.0),
+    "power-early": (6.0, 9.0, 1.3, 0.9, 3.0, 0.5),
+}
+"""Law of all tips and gravities -> its free parameters in the runs that are made up, of a ball and a flat tip."""
+
+
+def crossed_coverage(law: str, *, count: int, beds: int = 4, first_seed: int = 0) -> dict[str, float]:
+    """How often the 90 % intervals of `count` fits to all cells hold the truth [1], by parameter.
+
+    "stiffness": of the local K of the ball under the second gravity, at half the depth and the middle speed.
+    """
+    candidate, truth = CrossedLaw(law, ("sphere", "flat")), CROSSED_TRUTHS[law]
+    inside = dict.fromkeys((*candidate.free, "stiffness"), 0)
+    for seed in range(first_seed, first_seed + count):
+        cells = scaled_cells(candidate, truth, beds=beds, noise=0.05, seed=seed)
+        fitted, of = fit_law(candidate, cross(cells)), cells["sphere-0.981"].foundation
+        for name, value in zip(candidate.free, truth, strict=True):
+            found = fitted.parameter(name)
+            inside[name] += found.low <= value <= found.high
+        speed = 0.4 * math.sqrt(of.gravity * of.diameter)
+        load = candidate.force(np.array(truth), of, 0.45 * of.diameter, speed)
+        exact = tangent_at(replace(fitted, theta=np.array(truth)), of, load, speed)
+        own = tangent_at(fitted, of, load, speed)
+        assert exact is not None and own is not None
+        inside["stiffness"] += own.stiffness.low <= exact.stiffness.value <= own.stiffness.high
+    return {name: number / count for name, number in inside.items()}
 
 
 def stopping_coverage(
@@ -190,6 +234,12 @@ def _measure(path: Path, count: int = 400) -> None:
             write_json(path, found)
             print(key, {name: one["covered"] for name, one in found[key]["parameters"].items()}, flush=True)
             print(f"{time.process_time() - began:.0f} s", file=sys.stderr)
+    for law in CROSSED_TRUTHS:
+        key = f"{law}: two tips, two gravities, four beds"
+        if key not in found:
+            found[key] = {"fits": count, "parameters": crossed_coverage(law, count=count)}
+            write_json(path, found)
+            print(key, found[key]["parameters"], flush=True)
     for spread in SPREADS:
         key = f"beds added until sure, spread {spread:g}"
         if key not in found:

@@ -18,6 +18,7 @@ from experiments.lawfit.synthetic import FOUNDATION, scaled_cells
 from experiments.lawfit.trust import beyond
 from experiments.penetrate import beds
 from experiments.runs.progress import Progress
+from rigid.ground_file import read_ground
 
 STEP, UNLOAD = 5e-5, 5000.0
 TWO = {
@@ -98,7 +99,9 @@ def test_beds_are_added_to_the_tip_and_gravity_whose_force_is_least_sure(made, t
 @pytest.mark.long
 def test_further_runs_are_made_in_each_bed_and_found_again(made, tmp_path):
     more = {"tips": (), "gravities": (), "tip_diameter": 0.012, "loads": (0.2, 0.6), "unload_depths": (0.005,)}
-    settings = lawfit.Settings(**(TWO | more | {"drag_depths": (0.006,), "members": str(tmp_path / "kept")}))
+    settings = lawfit.Settings(
+        **(TWO | more | {"laws": ("power-irreversible",), "drag_depths": (0.006,), "members": str(tmp_path / "kept")})
+    )
     result = lawfit.run(settings, tmp_path / "a")
     pair = next(law for law in result["laws"] if law["name"] == "spring-damper")
     assert [one["load"] for one in pair["sinkage"]] == [0.2, 0.4, 0.6]
@@ -112,6 +115,9 @@ def test_further_runs_are_made_in_each_bed_and_found_again(made, tmp_path):
         # A spring K and an unloading spring U: work out over work in is K / U.
         assert one["returned"] == pytest.approx(100.0 / UNLOAD, rel=0.15)
     assert len(result["drags"]) == 2 and all(one["side"] == 0 for one in result["drags"])
+    # The force falls to 0 over K / U = 0.02 of the depth; the file keeps what a step of 1 ms follows.
+    kept = read_ground(tmp_path / "a" / "laws" / "power-irreversible.toml").parameters["rebound"]
+    assert kept.value == 0.05 and "0.0" in kept.note
     made.clear()
     again = lawfit.run(settings, tmp_path / "b")
     assert made == [] and again["unloadings"] == result["unloadings"]
