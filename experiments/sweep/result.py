@@ -28,6 +28,8 @@ __all__ = ["FEWEST_SAMPLES", "conclude"]
 
 FEWEST_SAMPLES = 64
 """Of a Latin hypercube, below which RBD-FAST has no confidence interval [1]."""
+FEW = 8
+"""Runs up to which each has a column in the table that is shown [1]."""
 _INDICES = {"first": "S1", "first_conf": "S1_conf", "total": "ST", "total_conf": "ST_conf"}
 """Names in result.json -> those of SALib."""
 Array = NDArray[np.float64]
@@ -75,12 +77,11 @@ def conclude(
     failed = sum(bool(fault) for fault in faults)
     if failed:
         warnings.append(f"{failed} of {len(tasks)} runs failed: table.csv says why, and plots leave them out")
-    rows = [_spread(column) for column in columns]
     title = f"{len(tasks)} runs of {settings.experiment} over {', '.join(design.keys)}"
     return Result.make(
         "sweep", title=title,
         quantities={"runs": quantity(len(tasks), "1"), "failed": quantity(failed, "1")},
-        tables=[Table(title="Over all runs", head=["quantity", "unit", "least", "median", "largest"], rows=rows),
+        tables=[_each_run(design, columns) if len(tasks) <= FEW else _spreads(columns),
                 *([_sensitivity_table(sensitive)] if sensitive else [])],
         of=settings.experiment, factors=[
             {"key": key, "unit": unit_of(key, design.experiment.settings_class())} for key in design.keys
@@ -151,10 +152,34 @@ def _write_netcdf(design: Design, tasks: Sequence[Task], columns: Sequence[_Colu
         xarray.Dataset(data, coords, attributes).to_netcdf(temporary, engine="netcdf4")
 
 
-def _spread(column: _Column) -> list[str]:
-    there = column.values[np.isfinite(column.values)]
-    three = (np.min(there), np.median(there), np.max(there)) if there.size else (math.nan,) * 3
-    return [column.name, column.unit, *(f"{number:.4g}" if math.isfinite(number) else "-" for number in three)]
+def _each_run(design: Design, columns: Sequence[_Column]) -> Table:
+    """A column for each run: what is varied, then what came out."""
+    settings_class = design.experiment.settings_class()
+    varied = [
+        [key, unit_of(key, settings_class), *(str(point.values.get(key, "")) for point in design.points)]
+        for key in design.keys
+    ]
+    rows = [[column.name, *_cells(column.unit, column.values)] for column in columns]
+    numbers = [str(place + 1) for place in range(len(design.points))]
+    return Table(
+        title="Each run, in the order of table.csv", head=["quantity", "unit", *numbers], rows=[*varied, *rows]
+    )
+
+
+def _spreads(columns: Sequence[_Column]) -> Table:
+    """Least, median and largest of each quantity over all runs."""
+    rows = []
+    for column in columns:
+        there = column.values[np.isfinite(column.values)]
+        three = np.array([np.min(there), np.median(there), np.max(there)] if there.size else [math.nan] * 3)
+        rows.append([column.name, *_cells(column.unit, three)])
+    return Table(title="Over all runs", head=["quantity", "unit", "least", "median", "largest"], rows=rows)
+
+
+def _cells(unit: str, values: Array) -> list[str]:
+    """The unit and numbers of a table for reading: angles in degrees, "-" where there is none."""
+    shown, values = ("degrees", np.degrees(values)) if unit == "rad" else (unit, values)
+    return ["" if shown == "1" else shown, *(f"{number:.4g}" if math.isfinite(number) else "-" for number in values)]
 
 
 def _sensitivities(

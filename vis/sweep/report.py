@@ -42,7 +42,9 @@ def write_sweep_report(report: Report) -> Path:
 
 def _over(report: Report, table: Mapping[str, NDArray], column: Result) -> Block:
     """One quantity over each factor, coloured by the factor of fewest values."""
-    factors, values = report.result["factors"], table[column["head"]]
+    factors, values, unit = report.result["factors"], table[column["head"]], unit_text(column["unit"])
+    if column["unit"] == "rad":
+        values, unit = np.degrees(values), "degrees"
     counts = {factor["key"]: len(np.unique(table[factor["key"]])) for factor in factors}
     by = min(counts, key=lambda key: counts[key]) if len(factors) > 1 else ""
     if by and counts[by] > _MOST_COLOURS:
@@ -58,7 +60,6 @@ def _over(report: Report, table: Mapping[str, NDArray], column: Result) -> Block
         axis.set_xlabel(f"{factor['key']} [{factor['unit']}]" if factor["unit"] else factor["key"])
         if x.dtype.kind not in "fiu":
             axis.tick_params(axis="x", labelrotation=30)
-    unit = unit_text(column["unit"])
     axes[0].set_ylabel(f"{column['name'].replace('_', ' ')}{f' [{unit}]' if unit else ''}")
     if by:
         marks = [handle(f"{group}", colour, marker="o", ls="") for group, colour in zip(groups, colours, strict=True)]

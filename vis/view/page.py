@@ -47,7 +47,7 @@ def write_view(
     home = Path(folder)
     sources = sources_of(home)
     if not sources:
-        raise ValueError(say("nothing", folder=home))
+        raise ValueError(_nothing(home))
     scenes = _pack(sources, Limits(size, frames), progress)
     title, lead = _title(home)
     block = scene_block(_head(scenes, title, live), [scene.data for scene in scenes], whole=True)
@@ -67,6 +67,20 @@ def report_scene(folder: str | Path, progress: Progress | None = None) -> list[B
     except (ValueError, OSError) as error:
         return [text(say("failed", reason=str(error).rstrip(".")), small=True)]
     return [scene_block(_head(scenes, _title(home)[0]), [scene.data for scene in scenes])]
+
+
+def _nothing(home: Path) -> str:
+    """Why a folder has nothing to show, and what would do: one of the runs in it, frames, or nothing."""
+    run = read_folder(home)
+    settings = {setting.key: setting.value.strip("\"'") for setting in run.settings}
+    homes = [home, home / settings.get("members", "none")]
+    inside = sorted(
+        {path.parent for place in homes for path in (*place.glob("*/run.toml"), *place.glob("*/*/run.toml"))}
+    )
+    kind = str(run.result.get("experiment") or "unknown kind")
+    if inside:
+        return say("of_several", folder=home, kind=kind, count=len(inside), first=inside[0])
+    return say("nothing" if "frame_count" in settings else "no_picture", folder=home, kind=kind)
 
 
 def _pack(sources: Sequence[Source], limits: Limits, progress: Progress | None) -> list[Packed]:

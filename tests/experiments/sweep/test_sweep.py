@@ -41,6 +41,28 @@ def test_the_table_has_what_the_runs_alone_have_to_the_bit(tmp_path):
     assert (member / "result.json").read_bytes() == (tmp_path / "alone" / "result.json").read_bytes()
 
 
+def test_few_runs_are_listed_one_by_one_and_many_by_their_spread_with_angles_in_degrees(tmp_path):
+    assert sweep("few", "--over", "torque=[0.15, 0.6]", "mu_s=[0.4, 0.5]") == 0
+    assert sweep("many", "--over", "torque=0.14:0.3:0.02") == 0
+    few, many = (json.loads((tmp_path / name / "result.json").read_text())["tables"][0] for name in ("few", "many"))
+    rows = {row[0]: row[1:] for row in few["rows"]}
+    assert rows["torque"] == ["N m", "0.15", "0.15", "0.6", "0.6"] and rows["mu_s"] == ["", "0.4", "0.5", "0.4", "0.5"]
+    assert rows["max_speed"][1:] == [f"{value:.4g}" for value in table(tmp_path / "few")["max_speed_m_s"]]
+    angles = np.degrees(table(tmp_path / "few")["transition_angle_hop_rad"])
+    assert np.nanmax(angles) > 1
+    found = rows["transition_angle_hop"]
+    assert found == ["degrees", *("-" if np.isnan(angle) else f"{angle:.4g}" for angle in angles)]
+    assert len(many["head"]) == 5 and len(many["rows"]) < len(few["rows"])
+
+
+def test_a_sweep_has_no_picture_and_view_names_one_of_its_runs(tmp_path, capsys):
+    assert sweep("swept", "--over", "torque=[0.15, 0.2]") == 0
+    capsys.readouterr()
+    assert main(["view", "swept", "--no-open", "--quiet"]) == 2
+    run = capsys.readouterr().err.split("hedgebed view ")[1].strip()
+    assert main(["view", run, "--no-open", "--quiet"]) == 0
+
+
 def test_a_grid_is_a_netcdf_with_an_axis_for_each_setting(tmp_path):
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("netCDF4")
