@@ -42,8 +42,9 @@ def test_the_table_has_what_the_runs_alone_have_to_the_bit(tmp_path):
 
 
 def test_few_runs_are_listed_one_by_one_and_many_by_their_spread_with_angles_in_degrees(tmp_path):
-    assert sweep("few", "--over", "torque=[0.15, 0.6]", "mu_s=[0.4, 0.5]", "--fixed", "max_motor_torque=1") == 0
-    assert sweep("many", "--over", "torque=0.14:0.3:0.02") == 0
+    whole = ["--experiment", "tumble", "--fixed", "duration=0.9", "max_motor_torque=1", "--workers", "1", "--quiet"]
+    assert main(["sweep", *whole, "--over", "torque=[0.15, 0.6]", "mu_s=[0.4, 0.5]", "--out", "few"]) == 0
+    assert sweep("many", "--over", "torque=0.06:0.22:0.02") == 0
     few, many = (json.loads((tmp_path / name / "result.json").read_text())["tables"][0] for name in ("few", "many"))
     rows = {row[0]: row[1:] for row in few["rows"]}
     assert rows["torque"] == ["N m", "0.15", "0.15", "0.6", "0.6"] and rows["mu_s"] == ["", "0.4", "0.5", "0.4", "0.5"]
