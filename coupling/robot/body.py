@@ -27,7 +27,7 @@ import numpy as np
 
 from coupling.poses import Pose, Twist, Vector, Wrench
 from rigid.ground.reaction import Reaction, State
-from rigid.spatial.quaternions import multiply, to_matrix
+from rigid.spatial.quaternions import multiply
 
 from .feet import Foot, find_feet, mesh_of, refuse_missing
 from .friction import FeetFriction
@@ -146,12 +146,15 @@ class MujocoRobot:
     @property
     def clearance(self) -> float:
         """Height of its lowest foot over the surface [m]."""
-        turns = self.data.xquat[self._bodies]
-        heights = [
-            float(at[2]) + foot.bottom(to_matrix(turn))
-            for foot, at, turn in zip(self.feet, self.data.xipos[self._bodies], turns, strict=True)
-        ]
-        return min(heights)
+        return min(self._foot_heights().values())
+
+    def _foot_heights(self) -> dict[int, float]:
+        """Height of the lowest point of each foot [m], by its body."""
+        data = self.data
+        return {
+            foot.body: float(data.xipos[foot.body, 2]) + foot.bottom(data.xmat[foot.body].reshape(3, 3))
+            for foot in self.feet
+        }
 
     @cached_property
     def other_geoms(self) -> list[int]:
@@ -165,14 +168,19 @@ class MujocoRobot:
         ]
 
     def lowest_other(self) -> tuple[float, str]:
-        """Height of the lowest point of what is no foot [m], infinite where that is above the surface, and its geom."""
-        worst, data = (math.inf, ""), self.data
+        """Height of the lowest point of what is no foot [m], infinite where that is above the surface, and its geom.
+
+        What is fixed to a foot counts from the foot's own lowest point, where that is below the surface: a spike goes
+        into the ground with the point at its end that is its foot.
+        """
+        worst, data, feet = (math.inf, ""), self.data, self._foot_heights()
         for k in self.other_geoms:
             if float(data.geom_xpos[k, 2]) - float(self.model.geom_rbound[k]) < min(worst[0], 0.0):
                 if k not in self._surfaces:
                     self._surfaces[k] = mesh_of(self.model, k)[0]
                 up = data.geom_xmat[k].reshape(3, 3)[2]
                 low = float(data.geom_xpos[k, 2]) + float((self._surfaces[k] @ up).min())
+                low -= min(0.0, feet.get(int(self.model.geom_bodyid[k]), 0.0))
                 name = self._mujoco.mj_id2name(self.model, self._mujoco.mjtObj.mjOBJ_GEOM, k) or f"geom {k}"
                 worst = min(worst, (low, name))
         return worst

@@ -9,7 +9,7 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_origin
 
@@ -105,6 +105,8 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
                 case, given[experiment.subject] = None, named
             elif experiment.subject and case is not None and (not case.is_file() or case.suffix in _SUBJECTS):
                 case, given[experiment.subject] = None, str(case)
+            if experiment.subject and case is None and fields[experiment.subject].is_required():
+                _refuse_swallowed(experiment, given)
             if case is not None and is_number(str(case)):
                 # As the second of ``--mu-s 0.4 0.5``.
                 several = "; to try several values, --sweep KEY=FROM:TO:STEP" if "sweep" in fields else ""
@@ -150,6 +152,19 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
     parameters += [reserved_option("verbose")] if experiment.headline else []
     command.__name__ = experiment.name.replace(" ", "_")
     return with_parameters(command, parameters)
+
+
+def _refuse_swallowed(experiment: Experiment, given: Mapping[str, Any]) -> None:
+    """Raise ValueError where an option of several words may have taken the first argument as one of its words."""
+    words = {name: value for name, value in given.items() if isinstance(value, tuple) and len(value) > 0}
+    if experiment.subject in given or not words:
+        return
+    name, value = max(words.items(), key=lambda item: len(item[1]))
+    raise ValueError(
+        f"{experiment.subject} is missing: it must stand before the options, as in hedgebed {experiment.name} "
+        f"{value[-1]} {option(name)} ...; here {option(name)} took all words up to the next option "
+        f"({' '.join(map(str, value))})"
+    )
 
 
 def _damage(run: RunFolder) -> str:

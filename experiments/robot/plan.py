@@ -15,6 +15,7 @@ import numpy as np
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
 from coupling.robot.stability import plan_area
+from dem.grains.materials import material
 from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import Surface, find_surface
@@ -135,27 +136,54 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
             tip = fitted.foot.diameter if fitted is not None else tip
             scales[part.name] = _scale(part, to_matrix(turn), tip)
     largest = max(scales.values())
-    if fitted is not None and largest != 1.0:
-        warnings.append(say("fitted", file=fitted, most=largest))
-    for key in ("stiffness", "damping"):
-        given = getattr(settings, key)
-        unit = "N/m" if key == "stiffness" else "N s/m"
-        own = getattr(surface, key) / SPIKES_PER_ROW
-        times = f"; {largest:.3g} times under a foot" if largest > 1 else ""
-        origin = f"surface {surface.name}, of one spike{times}"
-        numbers[key] = Number(own, unit, origin) if given is None else Number(given, unit, "given")
-    if settings.ground not in ("spring-damper", "bed"):
-        del numbers["stiffness"], numbers["damping"]
+    if fitted is not None:
+        warnings += [say("fitted", file=fitted, most=largest)] if largest != 1.0 else []
+        warnings += [say("beyond_range", sentence=said, file=fitted) for said in _beyond_gravity(fitted, robot.gravity)]
+    if settings.ground in ("spring-damper", "bed"):
+        warnings += _settle_law(settings, surface, robot.gravity, largest, numbers)
     _settle_friction(settings, surface, numbers)
     if surface.guess:
         warnings.append(say("guess", surface=surface))
-    if settings.ground == "spring-damper" and surface.granular and robot.gravity < 0.5 * STANDARD_GRAVITY:
-        warnings.append(say("of_earth", gravity=robot.gravity, less=STANDARD_GRAVITY / max(robot.gravity, 1e-9)))
     numbers["weight"] = Number(max(robot.mass * robot.gravity, 1e-9), "N", "mass times gravity")
     return RobotPlan(
         settings=settings, model=model, controller=_controller(settings, folder), surface=surface, numbers=numbers,
         scales=scales, fitted=fitted, warnings=tuple(warnings),
     )  # fmt: skip
+
+
+def _beyond_gravity(fitted: GroundFile, gravity: float) -> list[str]:
+    """Whether gravity [m/s2] is outside the range of the law of a file, in words."""
+    low, high = fitted.range["gravity"]
+    near = min(max(gravity, low), high)  # MuJoCo's own 9.81 m/s2 are as good as 9.80665
+    return fitted.beyond(gravity=near if abs(near - gravity) < 0.01 * near else gravity)
+
+
+def _settle_law(
+    settings: RobotSettings, surface: Surface, gravity: float, largest: float, numbers: dict[str, Number]
+) -> list[str]:
+    """Settle K and C of one spike, and warn where they are those of another gravity [m/s2].
+
+    Without cohesion the forces among grains in slow motion go with their weight. So K goes with gravity g, and C,
+    a force over a speed, with sqrt(g), as speeds do in motions that are similar (docs/coupling.md).
+    """
+    share = gravity / STANDARD_GRAVITY
+    times = f"; {largest:.3g} times under a foot" if largest > 1 else ""
+    loose = surface.grains is not None and material(surface.grains).cohesion == "none"
+    if settings.scale_with_gravity and not loose:
+        what = "made of grains with cohesion" if surface.granular else "hard ground"
+        raise ValueError(say("scaled_surface", surface=surface.name, what=what))
+    for key, unit, power in (("stiffness", "N/m", 1.0), ("damping", "N s/m", 0.5)):
+        given, own = getattr(settings, key), getattr(surface, key) / SPIKES_PER_ROW
+        scaled = f" times (g / {STANDARD_GRAVITY:g} m/s2)^{power:g}" if settings.scale_with_gravity else ""
+        own *= share**power if settings.scale_with_gravity else 1.0
+        origin = f"surface {surface.name}{scaled}, of one spike{times}"
+        numbers[key] = Number(own, unit, origin) if given is None else Number(given, unit, "given")
+    fits = settings.scale_with_gravity or settings.stiffness is not None or not surface.granular
+    if fits or share >= 0.5:
+        return []
+    stiffness = largest * numbers["stiffness"].value
+    key = "of_earth" if loose else "of_earth_cohesive"
+    return [say(key, stiffness=stiffness, scaled=share * stiffness, gravity=gravity, surface=surface.name)]
 
 
 def _settle_friction(settings: RobotSettings, surface: Surface, numbers: dict[str, Number]) -> None:

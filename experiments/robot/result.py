@@ -178,16 +178,13 @@ def conclude(
 
 
 def _beyond(plan: RobotPlan, run: RobotRun) -> list[str]:
-    """A sentence for each number that is outside the range of the law of a file: load of a tip, depth, gravity."""
+    """A sentence for load of a tip and depth where they are outside the range of the law of a file."""
     assert plan.fitted is not None
     feet, fitted = run.feet, plan.fitted
     shares = [sum(plan.scales[part.name] for part in foot.parts) for foot in run.robot.feet]
     load = float((feet[:, :, 9].max(axis=0) / shares).max())
     found = {"load": load, "depth": float(feet[:, :, -1].max())}
-    most = {name: max(value, fitted.range[name][0]) for name, value in found.items()}
-    low, high = fitted.range["gravity"]
-    near = min(max(run.robot.gravity, low), high)  # MuJoCo's own 9.81 m/s2 are as good as 9.80665
-    return fitted.beyond(**most, gravity=near if abs(near - run.robot.gravity) < 0.01 * near else run.robot.gravity)
+    return fitted.beyond(**{name: max(value, fitted.range[name][0]) for name, value in found.items()})
 
 
 def quantities_of(run: RobotRun) -> dict[str, Json]:

@@ -50,6 +50,9 @@ class RobotSettings(GrainsSettings):
     spike's."""
     damping: NotNegative | None = None
     """C of one foot, while going in [N s/m]; likewise."""
+    scale_with_gravity: bool = False
+    """Whether K and C of the surface, which are those of 1 g, follow gravity: K in proportion, C with its square root.
+    So do those of grains without cohesion."""
     mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (sand: 0.6).")
     mu_d: NotNegative | None = None
     """Sliding friction [1]; the surface's if not given (sand: 0.3), half of mu_s where that is."""
@@ -60,7 +63,7 @@ class RobotSettings(GrainsSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        for finding in (self._of_ground(), self._friction(), self._of_grains()):
+        for finding in (self._of_ground(), self._scaled(), self._friction(), self._of_grains()):
             if finding:
                 raise ValueError(finding)
         return self
@@ -76,6 +79,13 @@ class RobotSettings(GrainsSettings):
             return say("no_parameters", s=self, given=" ".join(self.ground_parameters))
         of_spring = self.stiffness is not None or self.damping is not None
         return say("of_the_spring", s=self) if of_spring and self.ground not in ("bed", "spring-damper") else None
+
+    def _scaled(self) -> str | None:
+        if not self.scale_with_gravity:
+            return None
+        if self.ground not in ("bed", "spring-damper"):
+            return say("scaled_law", s=self)
+        return say("scaled_given") if self.stiffness is not None and self.damping is not None else None
 
     def _friction(self) -> str | None:
         above = self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s

@@ -14,6 +14,7 @@ from experiments.robot.plan import keep_files, plan_robot
 from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
 from experiments.runs.folder import RunFolder, read_series
+from rigid.ground_file import GroundFile
 from vis.page.folder import read_columns
 from vis.view.page import report_scene
 from vis.view.sources import sources_of
@@ -35,6 +36,8 @@ ON_BED = HOPPER | {"ground": "bed", "height": 0.012, "grain": 0.012, "bed_size":
         ({"lowering_speed": 0.1}, "lowering_speed = 0.1 is for platforms"),
         ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
         ({"feet": ()}, "feet"),
+        ({"ground": "power", "scale_with_gravity": True}, "scale_with_gravity.*'power'"),
+        ({"stiffness": 1.0, "damping": 1.0, "scale_with_gravity": True}, "scale_with_gravity"),
     ],
 )
 def test_what_does_not_go_together_is_refused_by_name(given, said):
@@ -74,6 +77,65 @@ def test_what_there_is_not_and_what_would_be_unstable_is_refused_before_any_work
 def test_a_bed_that_does_not_suit_the_robot_is_refused_before_any_work(given, said):
     with pytest.raises(ValueError, match=said):
         robot.check(RobotSettings(**ON_BED | given))
+
+
+def test_k_of_sand_goes_with_gravity_and_c_with_its_root_where_that_is_asked_for_and_a_warning_names_it():
+    """Forces among grains without cohesion go with their weight, speeds of similar motions with the root of gravity."""
+    low = HOPPER | {"gravity": 9.80665e-3}
+    kept, scaled = (plan_robot(RobotSettings(**low, scale_with_gravity=asked)) for asked in (False, True))
+    assert scaled.numbers["stiffness"].value == pytest.approx(1e-3 * kept.numbers["stiffness"].value)
+    assert scaled.numbers["damping"].value == pytest.approx(1e-3**0.5 * kept.numbers["damping"].value)
+    (of_one_g,) = [said for said in kept.warnings if "--scale-with-gravity" in said]
+    foot = scaled.numbers["stiffness"].value * scaled.scales["foot"]
+    assert f"{foot:.3g} N/m" in of_one_g and f"{1e3 * foot:.3g} N/m" in of_one_g
+    assert not [said for said in scaled.warnings if "gravity" in said]
+    given = plan_robot(RobotSettings(**low, stiffness=2.0))
+    assert given.numbers["stiffness"].value == 2.0 and not [said for said in given.warnings if "gravity" in said]
+    sticky = plan_robot(RobotSettings(**low, surface="jsc1a"))
+    assert [said for said in sticky.warnings if "cohesion of jsc1a" in said]
+    for surface in ("jsc1a", "brick"):
+        with pytest.raises(ValueError, match=f"scale_with_gravity.*{surface}"):
+            plan_robot(RobotSettings(**low, surface=surface, scale_with_gravity=True))
+
+
+def test_a_gravity_beyond_the_range_of_a_ground_file_is_told_before_the_run(tmp_path):
+    law = GroundFile(
+        format="hedgebed-ground/1", law="spring-damper", material="sand", source="a test",
+        foot={"tip": "sphere", "diameter": 0.012},
+        range={"load": (0, 50), "depth": (0, 0.1), "speed": (0, 5), "gravity": (9.8, 9.8), "diameter": (0.012, 0.012)},
+        parameters={name: {"value": value, "std": 0.1} for name, value in (("stiffness", 62.0), ("damping", 0.5))},
+    ).write(tmp_path / "ground.toml")  # fmt: skip
+    told = [
+        [
+            said
+            for said in plan_robot(RobotSettings(**HOPPER, ground=str(law), gravity=gravity)).warnings
+            if "9.8" in said
+        ]
+        for gravity in (9.81, 9.81e-3)
+    ]
+    assert not told[0] and "gravity = 0.00981" in told[1][0]
+
+
+def test_a_model_that_an_option_took_as_one_of_its_words_is_found(capsys):
+    assert main(["mujoco", "--surface", "sand", "--feet", "foot", "hopper"]) == 2
+    said = capsys.readouterr().err
+    assert "hopper --feet" in said and "foot hopper" in said
+
+
+@pytest.mark.long
+def test_the_hedgehog_turns_onto_its_next_face_and_lies_still_and_its_spikes_are_no_surprise_in_the_ground(tmp_path):
+    turn = f"{EXAMPLES / 'mujoco-hedgehog' / 'turn.py'}:control"
+    settings = RobotSettings(
+        model="hedgehog", feet=("tip_*",), surface="brick", controller=turn, duration=15, substeps=40, frame_count=0
+    )
+    plan = plan_robot(settings)
+    run = RobotFollowed(settings, plan).run_on_law()
+    run.run()
+    quaternion, speeds = run.joints["qpos"][-1][3:7], run.joints["qvel"][-1][:6]
+    turned = 2 * np.degrees(np.arctan2(quaternion[2], quaternion[0]))
+    assert turned == pytest.approx(45, abs=0.1) and np.abs(speeds).max() < 2e-3
+    told = conclude(settings, plan, run, tmp_path).warnings
+    assert not [said for said in told if "below the surface" in said]
 
 
 def test_a_controller_that_fails_is_refused_with_its_file_and_line_and_finds_what_lies_beside_it(tmp_path):
