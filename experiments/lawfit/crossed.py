@@ -76,7 +76,15 @@ def crossed_result(cells: Mapping[str, Data], progress: Progress) -> Crossed:
     tables = [{"title": say("table_crossed"), **_law_rows(laws)}]
     tables.append({"title": say("table_tangents", law=best.candidate.name), **_tangent_rows(tangents)})
     bounds = [say("crossed_bound", law=law["name"], keys=", ".join(law["at_bound"])) for law in laws if law["at_bound"]]
-    return Crossed(fits, laws, tangents, tables, _sentences(laws), bounds)
+    return Crossed(fits, laws, tangents, tables, _sentences(laws), [*_unlike_beds(cells), *bounds])
+
+
+def _unlike_beds(cells: Mapping[str, Data]) -> list[str]:
+    """A warning where cells have different beds: an interval takes all beds for beds of each cell."""
+    beds = {name: set(data.beds) for name, data in cells.items()}
+    fewest = min(beds, key=lambda name: len(beds[name]))
+    every = set.union(*beds.values())
+    return [say("unlike_beds", cell=fewest, own=len(beds[fewest]), all=len(every))] if beds[fewest] != every else []
 
 
 def _entry(fitted: LawFit[CrossedLaw], data: CrossedData) -> Json:

@@ -66,7 +66,7 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
     return Result.make(
         "calibrate",
         title=_title(cells),
-        quantities=first.quantities,
+        quantities=_quantities(cells),
         departures={"sentences": sentences},
         **_entries(first),
         **entries,
@@ -76,6 +76,14 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
         surface=surface_of_grains(first.data.foundation.material),
         warnings=list(dict.fromkeys(warnings)),
     )  # fmt: skip
+
+
+def _quantities(cells: list[OneCell]) -> dict[str, Json]:
+    """The numbers that a person would quote: of one cell all of them, of several K, C and the error of each."""
+    if len(cells) == 1:
+        return cells[0].quantities
+    names = ("stiffness", "damping", "held_out_error")
+    return {f"{name}@{cell.name}": cell.quantities[name] for name in names for cell in cells}
 
 
 def _entries(cell: OneCell) -> Json:

@@ -217,6 +217,8 @@ def solve_law(candidate: Fittable, data: Data, theta: Array, share: float | None
     low, high = candidate.bounds()
     theta = np.clip(theta, low + 1e-9 * size, high - 1e-9 * size)
     beds, count = data.bed_of_row, len(data.beds)
+    # In forces of their own size: a solver stops at an absolute slope, which tiny forces have everywhere.
+    unit = float(np.sqrt(np.mean(data.force**2))) or 1.0
     force = candidate.predict(theta, data)
     kept = 0.0 if share is None else share
     for turn in range(_ROUNDS):
@@ -227,7 +229,7 @@ def solve_law(candidate: Fittable, data: Data, theta: Array, share: float | None
         def whitened(x: Array, frozen: Array = force, pull: Array = pull) -> Array:
             left = data.force - candidate.predict(x * size, data)
             cross = np.bincount(beds, weights=frozen * left, minlength=count)
-            return left - (pull * cross)[beds] * frozen
+            return np.asarray((left - (pull * cross)[beds] * frozen) / unit)
 
         found = least_squares(
             whitened, theta / size, bounds=(low / size, high / size), x_scale="jac", xtol=1e-10, ftol=1e-12

@@ -25,29 +25,38 @@ _FULL = 0.5
 def write_lawfit_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a calibration, and return the report."""
     result = report.result
-    laws: list[Result] = result["laws"]
-    found = tables(result)
-    drawn = [block for block in (_crossed(report), _laws(report, laws), _trust(report, laws)) if block is not None]
-    sections = [
-        Section("", [listing(result["departures"]["sentences"]), *found, *drawn]),
-        Section("Parameters", [_parameters(laws)]),
-        Section("The spring-damper that is right at a load and a speed", [_tangents(result)]),
-        Section("What each run contributed", [*_design(result), _contributions(result)]),
+    cells: list[Result] = result.get("cells", [result])
+    blocks = [listing(result["departures"]["sentences"]), *tables(result), *_crossed(report)]
+    sections = [Section("", [*blocks, *([] if len(cells) > 1 else _of_cell(report, result, ""))])]
+    for cell in cells if len(cells) > 1 else ():
+        sections.append(Section(cell["name"], [*_of_cell(report, cell, cell["name"]), _parameters(cell["laws"])]))
+    sections += [
+        Section("Parameters", [_parameters(result.get("crossed", result["laws"]))]),
+        Section("The spring-damper that is right at a load and a speed", [_tangents(cells)]),
+        Section("What each run contributed", [*_design(result), _contributions(cells)]),
         report.numbers(std=True),
         report.again("hedgebed calibrate run.toml", "numbers"),
     ]
-    numbers = result["quantities"]
-    tiles = [
-        Tile(name, quote(numbers[key]["value"], numbers[key]["std"], numbers[key]["unit"]), "one standard deviation")
-        for name, key in (("K", "stiffness"), ("C", "damping"))
-    ]
-    own, std = (100 * numbers["held_out_error"][key] for key in ("value", "std"))
-    tiles.append(Tile("Force in other beds", f"{own:.2g} ± {std:.1g} %", "rms of the spring-damper, std over beds"))
-    counted = f"{len(result['contributions'])} runs in {len({one['bed'] for one in result['contributions']})} beds"
+    tiles, numbers = [], result["quantities"]
+    for name, key, factor, unit in (("K", "stiffness", 1, None), ("C", "damping", 1, None),
+                                    ("Force in other beds", "held_out_error", 100, "%")):  # fmt: skip
+        own = numbers[key] if key in numbers else numbers[f"{key}@{cells[0]['name']}"]
+        words = "one standard deviation" if unit is None else "rms of the spring-damper, std over beds"
+        words += f", {cells[0]['name']}" if len(cells) > 1 else ""
+        shown = quote(factor * own["value"], factor * own["std"], unit or own["unit"])
+        tiles.append(Tile(name, shown, words))
+    runs = [one for cell in cells for one in cell["contributions"]]
+    counted = f"{len(runs)} runs in beds of {len({one['bed'] for one in runs})} seeds"
     return report.write(sections, lead=["calibrate", counted], tiles=tiles)
 
 
-def _laws(report: Report, laws: list[Result]) -> Block | None:
+def _of_cell(report: Report, cell: Result, name: str) -> list[Block]:
+    """The figures of one tip and gravity; `name`: of the cell where there are several."""
+    drawn = (_laws(report, cell["laws"], name), _trust(report, cell["laws"], name))
+    return [block for block in drawn if block is not None]
+
+
+def _laws(report: Report, laws: list[Result], cell: str) -> Block | None:
     """Mean force over beds of each speed's drives, with every law."""
     first = next((law["map"] for law in laws if law["map"] is not None), None)
     if first is None:
@@ -56,7 +65,7 @@ def _laws(report: Report, laws: list[Result]) -> Block | None:
     places = np.unique(np.linspace(0, len(speeds) - 1, min(_MOST, len(speeds))).round().astype(int))
     drawing, axes = new_panels(len(places), height=3.4, sharey=True)
     styles = line_styles([law["name"] for law in laws])
-    columns = report.columns("series/bins.csv")
+    columns = report.columns(f"series/bins-{cell}.csv" if cell else "series/bins.csv")
     for axis, place in zip(axes, places, strict=True):
         rows = np.isclose(columns["rate_m_s"], speeds[place], rtol=1e-3)
         axis.plot(1e3 * columns["depth_m"][rows], columns["force_N"][rows], ".", color=BED, ms=3, alpha=0.4)
@@ -74,13 +83,13 @@ def _laws(report: Report, laws: list[Result]) -> Block | None:
     ]
     lines = [handle(law["name"], lw=1.5, **styles[law["name"]]) for law in laws]
     legend_above(drawing, [*marks, *lines], 3)
-    return report.draw("laws", drawing)
+    return report.draw("laws", drawing, name=f"laws-{cell}" if cell else "")
 
 
-def _crossed(report: Report) -> Block | None:
+def _crossed(report: Report) -> list[Block]:
     """Force over rho g D^3 of all cells, and the best law at the slowest and the fastest Froude number of each tip."""
     if "crossed" not in report.result:
-        return None
+        return []
     columns, best = report.columns("series/crossed.csv"), report.result["crossed"][0]["name"]
     cells = [cell["foundation"] for cell in report.result["cells"]]
     tips = list(dict.fromkeys((cell["tip"], cell["diameter"], cell["cone_angle"]) for cell in cells))
@@ -106,10 +115,10 @@ def _crossed(report: Report) -> Block | None:
         handle(f"{gravity:.4g} m/s2", ls="", ms=4, **look) for gravity, look in zip(gravities, looks, strict=False)
     ]
     legend_above(drawing, [*marks, *lines.values()], 4)
-    return report.draw("crossed", drawing)
+    return [report.draw("crossed", drawing)]
 
 
-def _trust(report: Report, laws: list[Result]) -> Block | None:
+def _trust(report: Report, laws: list[Result], cell: str) -> Block | None:
     """Error of the spring-damper and of the best other law over depth and speed."""
     pair = next(law for law in laws if law["name"] == "spring-damper")
     other = next((law for law in laws if law is not pair), None)
@@ -136,31 +145,33 @@ def _trust(report: Report, laws: list[Result]) -> Block | None:
         axis.grid(visible=False)
     grid[0][0].set_ylabel("speed [m/s]")
     drawing.colorbar(image, ax=grid[0].tolist(), label="law less grains, fitted runs [%]", extend="both", shrink=0.9)
-    return report.draw("trust", drawing)
+    return report.draw("trust", drawing, name=f"trust-{cell}" if cell else "")
 
 
 def _parameters(laws: list[Result]) -> Block:
     rows = [
         (law["name"], name, f"{one['value']:.4g}", f"{one['std']:.2g}", f"{one['low']:.4g} to {one['high']:.4g}",
-         one["unit"].removesuffix("1") or "")
+         one.get("unit", "").removesuffix("1"))
         for law in laws for name, one in law["parameters"].items()
     ]  # fmt: skip
     rows += [
         (law["name"], name, f"{value:.4g}", "-", "not fitted", "")
         for law in laws
-        for name, value in law["fixed"].items()
+        for name, value in law.get("fixed", {}).items()
     ]
     return table(("law", "parameter", "value", "std", "90 %", "unit"), rows)
 
 
-def _tangents(result: Result) -> Block:
+def _tangents(cells: list[Result]) -> Block:
     rows = [
-        (row["law"], f"{row['load']:.3g} N", f"{row['speed']:.3g} m/s", f"{1e3 * row['depth']['value']:.3g} mm",
-         *(f"{row[key]['value']:.3g} ± {row[key]['std']:.2g}" for key in ("stiffness", "damping")))
-        for row in result["tangents"]
+        (*([cell["name"]] if len(cells) > 1 else []), row["law"], f"{row['load']:.3g} N", f"{row['speed']:.3g} m/s",
+         f"{1e3 * row['depth']['value']:.3g} mm",
+         *(f"{row[key]['value']:.3g} ({row[key]['low']:.3g} to {row[key]['high']:.3g})"
+           for key in ("stiffness", "damping")))
+        for cell in cells for row in cell["tangents"]
     ]  # fmt: skip
-    head = ("law", "load", "speed", "depth", "K = dF/dz [N/m]", "C = dF/d(dz/dt) [N s/m]")
-    return table(head, rows)
+    head = ("law", "load", "speed", "depth", "K = dF/dz [N/m] (90 %)", "C = dF/d(dz/dt) [N s/m] (90 %)")
+    return table(("tip and gravity", *head) if len(cells) > 1 else head, rows)
 
 
 def _design(result: Result) -> list[Block]:
@@ -173,9 +184,10 @@ def _design(result: Result) -> list[Block]:
     return [table(head, rows, words=True)] if rows else []
 
 
-def _contributions(result: Result) -> Block:
+def _contributions(cells: list[Result]) -> Block:
     rows = [
         (one["run"], f"{100 * one['misfit']:.3g} %", f"{one['stiffness']:.4g}", f"{one['damping']:.3g}")
-        for one in result["contributions"]
+        for cell in cells
+        for one in cell["contributions"]
     ]
     return table(("run", "rms error", "K without it [N/m]", "C without it [N s/m]"), rows)

@@ -129,6 +129,19 @@ def test_the_bed_s_factor_is_found_beside_the_noise():
     assert fit_law(CANDIDATES["spring-damper"](FOUNDATION), data).bed_spread == pytest.approx(0.2, rel=0.4)
 
 
+@pytest.mark.parametrize("law", TRUTHS)
+def test_tiny_forces_of_low_gravity_are_fitted_as_well_as_others(law):
+    # A million times less force: strengths and their standard deviations are a million times less.
+    data = synthetic_data(law, TRUTHS[law], DESIGNS["three beds, two speeds"], seed=8)
+    tiny = replace(data, runs=tuple(replace(run, force=1e-6 * run.force) for run in data.runs))
+    one, other = (fit_law(CANDIDATES[law](FOUNDATION), runs) for runs in (data, tiny))
+    for name in one.candidate.free:
+        factor = 1.0 if name == "exponent" else 1e-6
+        full, small = one.parameter(name), other.parameter(name)
+        assert (small.value, small.std) == pytest.approx((factor * full.value, factor * full.std), rel=1e-3)
+    assert other.bed_spread == pytest.approx(one.bed_spread, rel=1e-2)
+
+
 def test_drops_tell_the_added_mass_of_the_grains_and_drives_do_not():
     candidate, truth = CANDIDATES[ADDED_MASS](FOUNDATION), np.array([50.0, 2.0])
     runs = []
@@ -373,5 +386,8 @@ def test_runs_of_two_tips_and_gravities_have_a_ground_each_and_laws_of_all(tmp_p
         assert row["stiffness"]["value"] == pytest.approx(K * share, rel=0.05)
         assert row["stiffness"]["low"] < row["stiffness"]["value"] < row["stiffness"]["high"]
     names = {path.name for path in (tmp_path / "out" / "figures").iterdir()}
-    assert any(name.startswith("crossed") for name in names)
+    assert {"crossed.png", *(f"trust-{cell['name']}.png" for cell in result["cells"])} <= names
+    for cell in result["cells"]:
+        own = result["quantities"][f"stiffness@{cell['name']}"]
+        assert own["interval"][0] < own["value"] < own["interval"][1]
     assert {path.name for path in (tmp_path / "out" / "export").iterdir()} >= {"law.json", "law.py"}
