@@ -67,12 +67,9 @@ def table() -> str:
 
 
 def effects() -> str:
-    """The list of effects in Markdown, short: what each is, and its parameters with unit and default."""
-    lines = ["| effect | what it is | parameters |", "|---|---|---|"]
-    for term in EFFECTS.values():
-        own = ", ".join(f"`{p.name}` [{p.unit}] = {p.default:g}" for p in term.parameters)
-        lines.append(f"| `{term.id}` | {term.summary} | {own} |")
-    return "\n".join(lines)
+    """The list of effects in Markdown, short: what each is."""
+    lines = ["| effect | what it is |", "|---|---|"]
+    return "\n".join([*lines, *(f"| `{term.id}` | {term.summary} |" for term in EFFECTS.values())])
 
 
 def details() -> str:

@@ -57,7 +57,7 @@ def _result(settings: BedCutSettings, runs: list[Json]) -> Json:
     quantities = {
         "critical_height": of("critical_height", "m", stands, error=half),
         "stands_to": of("low", "m", "largest height that stood, at the bed's own gravity"),
-        "falls_from": of("high", "m", "least height that fell, likewise"),
+        "falls_from": of("high", "m", "smallest height that fell, in the same way"),
         "cohesion": of(lambda run: None if friction_angle is None else cohesion(run, friction_angle), "Pa", told),
         "slumped_to": of("slumped_to", "degrees", "slope of a fallen face, fitted as the angle of repose is"),
         "unit_weight": of("unit_weight", "N/m3", "bulk density times the bed's own gravity"),
@@ -86,7 +86,7 @@ def _result(settings: BedCutSettings, runs: list[Json]) -> Json:
         what = f"its cohesion is less than {bound:.2g} Pa, or none"
         warnings.append(f"no face stood at {LEAST:g} of the bed's gravity: {what}")
     elif any(run["fell"] is None for run in runs):
-        what = "more ('most') or a deeper bed would tell"
+        what = "more ('most') or a deeper bed would show it"
         warnings.append(f"not every face fell at {most:g} times the bed's gravity: {what}")
     title = f"Vertical cut in {runs[0]['material']}"
     return {"title": title, "quantities": quantities, "tables": tables, "warnings": warnings}

@@ -39,7 +39,7 @@ def refined_options(settings: BedRefineSettings) -> tuple[Json, Prepared]:
     sizes = _sizes(recipe["sizes"])
     grain = 0.5 * sizes.mean if settings.grain is None else settings.grain
     if not grain < sizes.mean:
-        raise ValueError(f"grain = {grain:g} m is not smaller than the bed's own, {sizes.mean:.6g} m: less would do")
+        raise ValueError(f"grain = {grain:g} m is not smaller than the bed's, {sizes.mean:.6g} m: use a smaller one")
     share = grain / sizes.mean
     stuff = of_before(Material(**recipe["material"]))
     if stuff.cohesion != "none":
@@ -117,7 +117,7 @@ def _carry_out(settings: BedRefineSettings, folder: RunFolder, progress: Progres
                 ("surface [mm]", 1e3 * old.surface, 1e3 * new.surface),
             )
         ]
-        table = {"title": "Beside the bed it was made from", "head": ["", "before", "now", "change"], "rows": rows}
+        table = {"title": "Compared with the original bed", "head": ["", "before", "now", "change"], "rows": rows}
         stuff, (kept, _) = options["material"], KEPT[settings.keep]
         said = [f"the grains' {kept} is kept: surface_energy = {stuff.surface_energy:.4g} J/m2"]
         told = grading_told(prepared) if isinstance(options["grain"], Graded) else {}

@@ -27,7 +27,7 @@ def check(settings: BedReposeSettings) -> None:
 def _test(settings: BedReposeSettings, bed: Any, about: Json, _: int, tell: Callable[[float], None]) -> Tested:
     found = angle_of_repose(bed, slot=settings.slot, tell=tell)
     short = min(flank.end - flank.start for flank in found.flanks) < _SHORT * about["grain"]
-    said = f"a slope was fitted over less than {_SHORT:g} diameters: a wider or a deeper bed tells it better"
+    said = f"a slope was fitted over less than {_SHORT:g} diameters: a wider or a deeper bed is more accurate"
     numbers = picked(found, "angle", "error", "flanks", "drained", "crest", "slot", "plate")
     return Tested(found.bed, {"x_m": found.distance, "thickness_m": found.thickness}, numbers, [said] if short else [])
 

@@ -92,7 +92,7 @@ def check(settings: BedShearSettings) -> None:
     """Raise ValueError for what is no bed, or one that does not lie level."""
     stored, _, _ = read_file(find_bed(settings.bed))
     if stored.gravity[0] or stored.gravity[1]:
-        raise ValueError(f"bed = {settings.bed!r} is tilted: a level one would do")
+        raise ValueError(f"bed = {settings.bed!r} is tilted: a level one is accepted")
 
 
 def _compute(settings: BedShearSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -158,7 +158,7 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
         long, wide, deep = (side / grain for side in (*bed.size[:2], bed.surface))
         warnings.append(say("small_shear", long=long, wide=wide, deep=deep))
     if len(runs) < 3:
-        warnings.append("fewer than three pressures: the line through them has no error that could be told")
+        warnings.append("fewer than three pressures: the line through them has no error that could be stated")
     if doubt := caveat(bed.material):
         warnings.append(doubt)
     return Result.make(

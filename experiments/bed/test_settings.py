@@ -39,7 +39,7 @@ class BedTestSettings(StrictSettings):
     @model_validator(mode="after")
     def _one_or_the_other(self) -> Self:
         if len(set(self.seeds)) < len(self.seeds):
-            raise ValueError("seeds holds a seed twice: each once would do")
+            raise ValueError("seeds holds a seed twice: give each once")
         for key in _OF_BED if self.bed is not None else ():
             value = getattr(self, key)
             if value != type(self).model_fields[key].default:
@@ -110,7 +110,7 @@ class BedPlatesSettings(BedTestSettings):
                 raise ValueError(say("flat_gamma", key=key, gamma=flat[0]))
         for key in ("betas", "gammas", "shape_gammas", "shapes"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):
-                raise ValueError(f"{key} holds a value twice: each once would do")
+                raise ValueError(f"{key} holds a value twice: give each once")
         for shape in self.shapes:
             if shape not in SHAPES and not Path(shape).is_file():
                 raise ValueError(say("no_shape", shape=shape, known=", ".join(SHAPES)))
@@ -148,5 +148,5 @@ class BedShearSettings(StrictSettings):
             given = " ".join(f"{p:g}" for p in self.pressures)
             raise ValueError(say("pressures", pressures=given, most=max(self.pressures)))
         if len(set(self.pressures)) < len(self.pressures):
-            raise ValueError("pressures holds a value twice: each once would do")
+            raise ValueError("pressures holds a value twice: give each once")
         return self

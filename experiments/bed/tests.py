@@ -55,7 +55,7 @@ def check_bed(settings: BedTestSettings) -> Extent:
     reports = read_preparation(path).reports
     stages = [report.stage for report in reports]
     if stored.gravity[0] or stored.gravity[1] or any(stage.startswith("cut") for stage in stages):
-        raise ValueError(f"bed = {settings.bed!r} was cut or tilted: a level one would do")
+        raise ValueError(f"bed = {settings.bed!r} was cut or tilted: a level one is accepted")
     position = state["position"].astype(float)
     surface = reports[-1].surface if reports else float(np.quantile(position[:, 2] + position[:, 3], 0.9))
     return Extent(stored.size, surface, 2 * float(position[:, 3].mean()))

@@ -45,7 +45,7 @@ class Response:
         x, y, error = (np.asarray(a, dtype=float) for a in (x, y, error))
         count, width = x.shape
         if count < width + 2:
-            raise ValueError(f"{count} points are too few for {width} parameters: at least {width + 2} would do")
+            raise ValueError(f"{count} points are too few for {width} parameters: at least {width + 2} are needed")
         self._unit = max(float(np.std(y)), float(error.max()), 1e-300)
         self._x, self._y, self._error = x, y / self._unit, error / self._unit
         self._trend = np.column_stack([np.ones(count), x])

@@ -163,7 +163,7 @@ class CalibrateSettings(StrictSettings):
             names, free = ", ".join(fitted) or "none", ", ".join(self.free)
             raise ValueError(say("few_figures", count=len(fitted), fitted=names, wanted=len(self.free), free=free))
         if base.cohesion != "none" and len(self.pressures) < 2:
-            raise ValueError("pressures holds one value: with cohesion at least two would do, for a line through them")
+            raise ValueError("pressures holds one value: with cohesion at least two are needed, for a line")
         if base.cohesion == "none" and (lost := [n for n in fitted if _sticks(wanted[n].figure)]):
             raise ValueError(say("not_sticking", lost=lost[0]))
         if len(set(self.pressures)) < len(self.pressures) or len(set(self.check_seeds)) < len(self.check_seeds):
@@ -213,7 +213,7 @@ def _target(name: str, given: Json) -> Target:
     if kind not in FIGURES:
         raise ValueError(f"{called}{'.figure' if 'figure' in given else ''} is no figure: {nearest(kind, FIGURES)}")
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
-        raise ValueError(f"{called}: small letters, digits and '_' would do as its name")
+        raise ValueError(f"{called}: small letters, digits and '_' are accepted as its name")
     keys = [f.name for f in fields(Target) if f.name != "name"]
     for key in given:
         if key not in keys:
@@ -243,7 +243,7 @@ def _target(name: str, given: Json) -> Target:
     if not isinstance(fit, bool):
         raise ValueError(f"{called}.fit = {fit!r} must be true or false")
     if fit and not figure.state:
-        raise ValueError(f"{called}.fit = true: {figure.words} takes minutes and is compared only; false would do")
+        raise ValueError(f"{called}.fit = true: {figure.words} takes minutes and is compared only; false is accepted")
     unit, bounds = figure.unit, _BOUNDS.get(figure.unit, (0.0, math.inf))
     if not bounds[0] <= given["value"] < bounds[1]:
         most = f" and below {bounds[1]:g}" if math.isfinite(bounds[1]) else ""
@@ -266,11 +266,11 @@ def _check_free(free: dict[str, tuple[float, float]], base: Material, fixed: Jso
     if len(sticks) == 2:
         raise ValueError("free holds surface_energy and bond_number, which are one and the same: leave one out")
     if sticks and base.cohesion == "none":
-        raise ValueError(f"free.{sticks[0]} needs a law: fixed.cohesion = 'dmt' or 'jkr' would do")
+        raise ValueError(f"free.{sticks[0]} needs a law: fixed.cohesion = 'dmt' or 'jkr' is accepted")
     if sticks and free[sticks[0]][0] <= 0:
-        raise ValueError(f"free.{sticks[0]} begins at {free[sticks[0]][0]:g}: above 0 would do")
+        raise ValueError(f"free.{sticks[0]} begins at {free[sticks[0]][0]:g}: above 0 is accepted")
     if fixed.get("cohesion", "none") != "none" and not sticks and "surface_energy" not in fixed:
-        what = "fixed.surface_energy or free.surface_energy would do"
+        what = "fixed.surface_energy or free.surface_energy is accepted"
         raise ValueError(f"fixed.cohesion without a surface energy: {what}")
 
 

@@ -148,11 +148,11 @@ def check_target(target: str | Path, *, keep_out: Path | None = None) -> Path:
     """The folder to write a campaign into. Raises ValueError where it is in use, or is, or lies around, `keep_out`."""
     path = Path(target)
     if _used(path):
-        raise ValueError(f"campaign = {str(path)!r} is in use: a folder that is empty or does not exist yet would do")
+        raise ValueError(f"campaign = {str(path)!r} is in use: an empty or new folder is accepted")
     if keep_out is not None and keep_out.resolve().is_relative_to(path.resolve()):
         raise ValueError(
             f"campaign = {str(path)!r} holds the run's own folder {str(keep_out)!r}, where the truth is kept: another "
-            f"folder would do"
+            f"folder is accepted"
         )
     return path
 

@@ -118,7 +118,7 @@ def loud_sensors(campaign: Campaign) -> list[Finding]:
         ratio = float(np.median(own))
         if ratio > _NOISY:
             words = f"{column} scatters from row to row by {ratio * stated[name, column]:.2g}, {times(ratio)} what "
-            cause = f"[sensors.{name}] states: a louder sensor, or something that moves as fast as it is read"
+            cause = f"[sensors.{name}] states: a noisier sensor, or a motion as fast as the sampling"
             found.append(Finding(trial="", channel=_channel(column), what=words + cause))
         elif ratio < _QUIET and name != "depth":  # a driven depth is smooth, and only its smoothing needs its noise
             unit = unit_words(1 / ratio) if ratio > 0 else None

@@ -312,7 +312,7 @@ def force_units(campaign: Campaign) -> Iterator[str]:
     near = [unit for unit in sorted(off, key=lambda unit: off[unit]) if off[unit] < max(_NEAR, _NEAR_SIGMAS * doubt)]
     if not near:
         return
-    whose = "stiffness and damping, as stated, give" if stated else "the drops of the same diameter say of the spring"
+    whose = "stiffness and damping, as stated, give" if stated else "the drops of the same diameter show for the spring"
     ratio, several = math.exp(middle), len(pushes) > 1
     size = times(ratio) if ratio > 1 else f"{ratio:.2g} of"
     words = say("force_units", size=size, whose=whose, all="all " if several else "", count=len(pushes),

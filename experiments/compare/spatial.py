@@ -113,7 +113,7 @@ def gaps(columns: Mapping[str, Any]) -> dict[str, Json]:
     for name, (values, unit, note) in apart.items():
         at = int(np.argmax(values))
         found[f"gap_{name}"] = (float(values[at]), unit, f"{note}, largest over time, at {time[at]:.4g} s")
-        found[f"gap_{name}_end"] = (float(values[-1]), unit, f"likewise at {time[-1]:.4g} s")
+        found[f"gap_{name}_end"] = (float(values[-1]), unit, f"the same at {time[-1]:.4g} s")
     return all_gaps(columns, found, say("spike_gap"))
 
 

@@ -117,7 +117,7 @@ def variants_of(settings: ConvergeSettings) -> list[Variant]:
     """The base, and what differs from it in one thing: finer or coarser grains, other widths, depths, ...
 
     A value that is the base's own is not made again. Raises ValueError, naming the list and the value, for one that
-    `penetrate` refuses, with what would do and what that costs.
+    `penetrate` refuses, with what is sufficient and what that costs.
     """
     base = _base(settings)
     found = [Variant(BASE, 1.0, base)]
@@ -233,7 +233,7 @@ def _varied(settings: ConvergeSettings, base: PenetrateSettings, what: str, valu
 
 
 def _cost(settings: ConvergeSettings, base: PenetrateSettings, what: str, value: float) -> str:
-    """What the least value that would do costs, over all seeds; empty where `value` is not too small."""
+    """What the least sufficient value costs, over all seeds; empty where `value` is not too small."""
     tip = settings.tip_diameter
     least = {"grain": FEWEST_ACROSS, "width": LEAST_WIDTH, "depth": settings.depth / tip + 1}.get(what, 0.0)
     if value >= least:

@@ -40,7 +40,7 @@ def plan_told(settings: ConvergeSettings, members: Sequence[Member], left_out: S
 
 
 def doubts(settings: ConvergeSettings) -> Iterator[str]:
-    """What the sweep as it is set will leave open, with what would do and what that costs."""
+    """What the sweep as it is set will leave open, with what is sufficient and what that costs."""
     finest, seeds = max(settings.ratio, *settings.ratios), len(settings.seeds)
     sizes = {round(settings.ratio, 6), *(round(ratio, 6) for ratio in settings.ratios)}
 

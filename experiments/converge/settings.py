@@ -70,12 +70,12 @@ class ConvergeSettings(PenetrateSettings):
     def _varied(self) -> Self:
         for key in ("ratios", "widths", "bed_depths", "overlaps", "paces"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):
-                raise ValueError(f"{key} = {list(getattr(self, key))} holds a value twice: each once would do")
+                raise ValueError(f"{key} = {list(getattr(self, key))} holds a value twice: give each once")
         for key in _NOT_HERE:
             if getattr(self, key) is not None:
                 raise ValueError(say("not_here", key=key, value=getattr(self, key)))
         if self.ground != "bed":
-            raise ValueError(f"ground = {self.ground!r} has no grains to be made finer: ground = 'bed' would do")
+            raise ValueError(f"ground = {self.ground!r} has no grains to be made finer: ground = 'bed' is accepted")
         if self.life_grain > self.finest:
             raise ValueError(say("life_grain", s=self, finest=self.finest))
         return self

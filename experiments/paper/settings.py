@@ -66,7 +66,7 @@ class PaperSettings(StrictSettings):
         for key in ("rigs", "motor_torques", "brake_torques", "surfaces"):
             values = getattr(self, key)
             if len(set(values)) < len(values):
-                raise ValueError(f"{key} = {list(values)} holds a value twice: each once would do")
+                raise ValueError(f"{key} = {list(values)} holds a value twice: give each once")
         if set(self.motor_torques) & set(self.brake_torques):
             raise ValueError(f"brake_torques = {list(self.brake_torques)} holds a torque of motor_torques too")
         torques = (*self.motor_torques, *self.brake_torques)

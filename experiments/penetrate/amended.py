@@ -152,7 +152,7 @@ class AmendedLaw:
         if far:
             said.append(say("extrapolated", s=self, far=", ".join(f"{v:g}" for v in far)))
         if drops and not dropped:
-            said.append("the model was fitted to pushes alone: what it says of drops is extrapolated")
+            said.append("the model was fitted to pushes alone: its results for drops are extrapolated")
         return said
 
     @property
@@ -291,7 +291,7 @@ def run_beside(
         "force_gap_spring_damper": (plain, "1", note),
         "force_gap_amended": (amended, "1", f"the same with {law.words}"),
         "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
-        "work_returned_amended": (_returned(units, runs), "1", "work of the way out over work in, driven"),
+        "work_returned_amended": (_returned(units, runs), "1", "work of unloading over work of loading, driven"),
     }
     known = plain is not None and amended is not None
     sentences = [say("off_by", law=law, amended=100 * amended, plain=100 * plain)] if known else []  # type: ignore[operator]

@@ -165,7 +165,7 @@ def sentences(
             for speed, (value, std, count) in exponents.items()
         )
         said.append(
-            f"On the way in the bed's force grows with depth to the power {shown}; the spring's to the power 1."
+            f"During loading the bed's force grows with depth to the power {shown}; the spring's to the power 1."
         )
     if sinkage is not None:
         bed, law = sinkage

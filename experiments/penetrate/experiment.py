@@ -102,7 +102,7 @@ def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) 
         if settings.campaign is not None:
             campaign = campaign_of(settings, result, folder, sensors_of(settings))
             target = place_campaign(settings.campaign, campaign, keep_out=folder.path)
-            progress.message(f"campaign {target}: `hedgebed diagnose {target}` says what the spring-damper lacks")
+            progress.message(f"campaign {target}: `hedgebed diagnose {target}` states what the spring-damper omits")
     return result
 
 

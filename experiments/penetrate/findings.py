@@ -181,7 +181,7 @@ class Findings:
             for fit in self.seed_fits.values()
         ]
         bed, law = (mean_of([returned_work(runs[unit.id]) for unit in driven]) for runs in (self.beds, self.models))
-        note = "work of the way out over work in, driven runs"
+        note = "work of unloading over work of loading, driven runs"
         return {
             "work_returned_dem": _quantity(bed, spread(own) if alike else None, "1", note),
             "work_returned_spring_damper": _quantity(

@@ -43,7 +43,7 @@ def settings_of_bed(given: Json) -> Json:
     if known is None or known.softened(stuff.young) != stuff:
         whose = f"one that ships ({', '.join(sorted(MATERIALS))}): give --material with the file that it was made with"
         if "material" in given:
-            whose = f"material = {given['material']!r}: the file that the bed was made with would do"
+            whose = f"material = {given['material']!r}: use the file that the bed was made with"
         raise ValueError(f"bed = {name!r} is of a material {stuff.name!r} whose numbers are not those of {whose}")
     said = {
         "material": given.get("material", stuff.name),

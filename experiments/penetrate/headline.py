@@ -34,7 +34,7 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     for name, words in (("stiffness", "fitted stiffness K"), ("damping", "fitted damping C")):
         rows.append((words, "", _quoted(numbers[name])))
     if "drag_gap" in numbers:
-        rows.append(("error of its drag (rms, way in)", "", _quoted(numbers["drag_gap"], "%")))
+        rows.append(("error of its force (rms, loading)", "", _quoted(numbers["drag_gap"], "%")))
     warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
     rest = list(result.get("rest", {}).get("sentences", []))
     changes = result.get("reference", {}).get("moved", {})

@@ -71,7 +71,7 @@ def campaign_of_run(run: str | Path, *, sensors: SpikeSensors | None = None) -> 
     """
     folder = RunFolder.open(Path(run))
     if folder.command != "penetrate":
-        remedy = f": `hedgebed tumble {run}/run.toml --campaign DIR` would do" if folder.command == "tumble" else ""
+        remedy = f": use `hedgebed tumble {run}/run.toml --campaign DIR`" if folder.command == "tumble" else ""
         raise ValueError(f"{str(run)!r} is a run of {folder.command!r}, 'penetrate' was expected{remedy}")
     if folder.status != "done" or not (folder.path / "result.json").exists():
         raise ValueError(f"{str(run)!r} is not finished ({folder.status}): `hedgebed resume {run}` first")

@@ -40,7 +40,7 @@ def check(settings: PenetrateSettings) -> None:
         check_bed_stages(settings.bed_stages, stuff, size=size, grain=grain, spread=spread)
     for seeds, speeds in ((settings.seeds[:1], settings.speeds), (settings.seeds[1:], settings.other_speeds)):
         if seeds and not speeds:
-            raise ValueError("other_speeds is empty: at least one speed would do, so that every seed has a fit")
+            raise ValueError("other_speeds is empty: at least one speed is needed, so that every seed has a fit")
     count = settings.grain_count
     check_memory(count, settings.grain, "bed_size")
     if count > MOST_GRAINS:
@@ -53,7 +53,7 @@ def check(settings: PenetrateSettings) -> None:
         most = beds.find_material(settings).young
         if settings.young > most:
             young, whose = settings.young, settings.material
-            raise ValueError(f"young = {young:g} Pa is more than {whose} itself has: at most {most:g} Pa would do")
+            raise ValueError(f"young = {young:g} Pa is more than {whose} itself has: at most {most:g} Pa is accepted")
         chosen = beds.choose_softness(settings.model_copy(update={"young": None})).young
         check_young(settings.young, chosen=chosen, max_overlap=settings.max_overlap)
     _check_reach(settings)

@@ -288,7 +288,7 @@ class PenetrateSettings(StrictSettings):
         for key in ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds", "seeds"):
             values = getattr(self, key)
             if len(set(values)) < len(values):
-                return f"{key} = {_plain(values)} holds a value twice: each once would do"
+                return f"{key} = {_plain(values)} holds a value twice: give each once"
         return None
 
     def _beside(self) -> str | None:

@@ -15,7 +15,7 @@ __all__ = ["check", "resume", "run"]
 
 
 def check(settings: RobotSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
     plan = plan_robot(settings)
     try_controller(plan.robot())
     if settings.ground == "bed":

@@ -126,7 +126,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         return low, high
 
     def check(self) -> None:
-        """Raise ValueError, naming key, value and what would do, for a bed that does not suit this robot."""
+        """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this robot."""
         s = self.settings
         for foot in self._robot.feet:
             if not foot.shapes:

@@ -17,7 +17,7 @@ __all__ = ["check", "resume", "run"]
 
 
 def check(settings: SpatialSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
     plan = plan_spatial(settings)
     if settings.ground == "bed":
         SpatialOnBed(settings, plan).check()

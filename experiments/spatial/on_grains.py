@@ -126,7 +126,7 @@ class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, S
         )  # fmt: skip
 
     def check(self) -> None:
-        """Raise ValueError, naming key, value and what would do, for a bed that does not suit this trial."""
+        """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this trial."""
         check_lengths(self.settings, self.platform.stance().spike_length)
         try:
             super().check()

@@ -178,7 +178,7 @@ def quantities_of(run: SpatialRun) -> dict[str, Json]:
     found: dict[str, tuple[float | None, str, str]] = {
         "displacement_x": (float(way[0]), "m", say("displacement")),
         "displacement_y": (float(way[1]), "m", "likewise"),
-        "displacement_z": (float(way[2]), "m", "likewise, upwards"),
+        "displacement_z": (float(way[2]), "m", "the same, upwards"),
         "max_speed": (float(speed.max()), "m/s", "of the centre of mass"),
         "max_angular_velocity": (float(spin.max()), "rad/s", ""),
         "largest_turn": (float(run.turned.max()), "rad", say("largest_turn")),

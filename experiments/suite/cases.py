@@ -172,7 +172,7 @@ class Case:
         """Its number in EXPERIMENTS."""
         match = re.match(r"grains(\d+)-", self.name)
         if match is None:
-            raise ValueError(f"case {self.name!r} is not named after its experiment: grains1-... would do")
+            raise ValueError(f"case {self.name!r} is not named after its experiment: grains1-... is accepted")
         return int(match.group(1))
 
 

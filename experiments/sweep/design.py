@@ -87,7 +87,7 @@ def design_of(settings: SweepSettings, *, check: bool = False) -> Design:
     listed = [factor for factor in factors if not factor.sampled]
     count = len(table) * len(shares) * math.prod(len(factor.values) for factor in listed)
     if count > MOST_RUNS:
-        raise ValueError(f"over makes {count:,} runs: at most {MOST_RUNS:,} would do")
+        raise ValueError(f"over makes {count:,} runs: at most {MOST_RUNS:,} is accepted")
     cells = product(*(factor.values for factor in listed))
     layers, points = [*base, Layer("fixed", fixed)], []
     faults: dict[str, list[int]] = {}  # sentence -> the runs that it is of
@@ -137,7 +137,7 @@ def _check_apart(
         ("over", f"table = {settings.table!r}", tabled & varied),
     ):
         if both:
-            raise ValueError(f"{min(both)} is in {first} and in {second}: one of them would do")
+            raise ValueError(f"{min(both)} is in {first} and in {second}: one of them is accepted")
 
 
 def _shares(settings: SweepSettings, sampled: Sequence[Factor]) -> Array:

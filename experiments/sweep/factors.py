@@ -16,7 +16,7 @@ from experiments.runs.units import find_unit, has_unit
 __all__ = ["Factor", "parse_fixed", "parse_over", "read_table", "unit_of"]
 
 MOST_VALUES = 100_000
-_WOULD_DO = "[VALUE, VALUE], FROM:TO:STEP, FROM:TO or FROM:TO:log would do"
+_ACCEPTED = "[VALUE, VALUE], FROM:TO:STEP, FROM:TO or FROM:TO:log are accepted"
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def parse_fixed(texts: Sequence[str], settings_class: type[BaseModel]) -> Mappin
     for text in texts:
         key, value = _pair("fixed", text, settings_class)
         if key in found:
-            raise ValueError(f"fixed has {key} twice: each key once would do")
+            raise ValueError(f"fixed has {key} twice: give each key once")
         found[key] = value
     return found
 
@@ -58,7 +58,7 @@ def parse_over(texts: Sequence[str], settings_class: type[BaseModel]) -> tuple[F
     for text in texts:
         key, value = _pair("over", text, settings_class)
         if key in {factor.key for factor in factors}:
-            raise ValueError(f"over has {key} twice: each key once would do")
+            raise ValueError(f"over has {key} twice: give each key once")
         factors.append(_factor(text, key, value, settings_class))
     return tuple(factors)
 
@@ -76,12 +76,12 @@ def read_table(path: str, settings_class: type[BaseModel]) -> Sequence[Mapping[s
     except (UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"table = {path!r} is no CSV file: {error}") from None
     if len(numbered) < 2:
-        raise ValueError(f"table = {path!r} has no rows: a head that names settings, and a row for each run, would do")
+        raise ValueError(f"table = {path!r} has no rows: expected a head that names settings, and a row for each run")
     head = [cell.strip() for cell in numbered[0][1]]
     for key in head:
         _check_key(f"table = {path!r}", key, settings_class)
     if len(set(head)) < len(head):
-        raise ValueError(f"table = {path!r} names a setting twice in its head: each once would do")
+        raise ValueError(f"table = {path!r} names a setting twice in its head: give each once")
     rows = []
     for number, cells in numbered[1:]:
         if len(cells) != len(head):
@@ -100,7 +100,7 @@ def unit_of(key: str, settings_class: type[BaseModel]) -> str:
 def _pair(where: str, text: str, settings_class: type[BaseModel]) -> tuple[str, object]:
     key, equals, value = text.partition("=")
     if not equals or not value.strip():
-        raise ValueError(f"{where} = {text!r} gives no value: KEY=VALUE would do")
+        raise ValueError(f"{where} = {text!r} gives no value: KEY=VALUE is accepted")
     name = key.strip().replace("-", "_")
     _check_key(f"{where} = {text!r}", name, settings_class)
     return name, _value(value.strip())
@@ -123,21 +123,21 @@ def _factor(text: str, key: str, value: object, settings_class: type[BaseModel])
     where = f"over = {text!r}"
     if isinstance(value, list):
         if not value:
-            raise ValueError(f"{where} is an empty list: {_WOULD_DO}")
+            raise ValueError(f"{where} is an empty list: {_ACCEPTED}")
         if any(value.count(item) > 1 for item in value):
-            raise ValueError(f"{where} has a value twice: each once would do")
+            raise ValueError(f"{where} has a value twice: give each once")
         return Factor(key, tuple(value))
     words = value.split(":") if isinstance(value, str) else []
     log = words[2:] == ["log"]
     numbers = [_number(where, key, word, settings_class) for word in (words[:2] if log else words)]
     if len(numbers) not in (2, 3):
-        raise ValueError(f"{where} is neither a list nor a range: {_WOULD_DO}; one value belongs to fixed")
+        raise ValueError(f"{where} is neither a list nor a range: {_ACCEPTED}; one value belongs to fixed")
     if not numbers[0] < numbers[1] or (log and numbers[0] <= 0):
-        raise ValueError(f"{where} goes nowhere: FROM below TO{', and above 0,' if log else ''} would do")
+        raise ValueError(f"{where} goes nowhere: FROM below TO{', and above 0,' if log else ''} are accepted")
     whole = int in (kinds := plain_kinds(settings_class.model_fields[key].annotation)) and float not in kinds
     if len(numbers) == 2:
         if whole:
-            raise ValueError(f"{where}: {key} is a whole number, which is not sampled: FROM:TO:STEP would do")
+            raise ValueError(f"{where}: {key} is a whole number, which is not sampled: FROM:TO:STEP is accepted")
         return Factor(key, (), numbers[0], numbers[1], log)
     low, high, step = numbers
     if step <= 0 or (high - low) / step > MOST_VALUES:
@@ -154,7 +154,7 @@ def _number(where: str, key: str, word: str, settings_class: type[BaseModel]) ->
     try:
         number = unit.value_of(word) if unit is not None and has_unit(word) else float(word)
     except ValueError:
-        raise ValueError(f"{where}: {word!r} is no number of a range: {_WOULD_DO}") from None
+        raise ValueError(f"{where}: {word!r} is no number of a range: {_ACCEPTED}") from None
     if not math.isfinite(number):
         raise ValueError(f"{where}: {word!r} is no finite number")
     return number

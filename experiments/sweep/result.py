@@ -191,7 +191,7 @@ def _sensitivities(
     if design.rows > 1:
         return [], ["sensitivities are not computed beside a table of several rows"]
     if settings.sampling == "latin" and settings.samples < FEWEST_SAMPLES:
-        return [], [f"samples = {settings.samples} are too few for sensitivities: {FEWEST_SAMPLES} or more would do"]
+        return [], [f"samples = {settings.samples} are too few for sensitivities: {FEWEST_SAMPLES} are needed"]
     found: list[Mapping[str, object]] = []
     warnings, problem = [], problem_of(design.sampled)
     for column in columns:

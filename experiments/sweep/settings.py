@@ -67,11 +67,11 @@ class SweepSettings(StrictSettings):
         if not self.experiment:
             raise ValueError(f"experiment must be given, {_EXAMPLE}: one of {', '.join(known)}")
         if self.experiment not in known:
-            raise ValueError(f"experiment = {self.experiment!r} cannot be swept: one of {', '.join(known)} would do")
+            raise ValueError(f"experiment = {self.experiment!r} cannot be swept: one of {', '.join(known)} is accepted")
         if not self.over and self.table is None:
             raise ValueError("nothing is varied: give over, as over = ['torque=[0.2, 0.25]'], or table")
         if self.scheduler is not None and self.workers is not None:
             raise ValueError(f"workers = {self.workers} are processes here: leave it out beside scheduler")
         if self.sampling == "sobol" and self.samples & (self.samples - 1):
-            raise ValueError(f"samples = {self.samples} is no power of two, as sampling = 'sobol' needs: 64 would do")
+            raise ValueError(f"samples = {self.samples} is not a power of two, as sampling = 'sobol' needs, such as 64")
         return self

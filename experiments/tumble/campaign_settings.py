@@ -63,9 +63,9 @@ class CampaignSettings(TrialSettings):
     @model_validator(mode="after")
     def _conditions_fit_together(self) -> Self:
         if not self.motor_torques and not self.brake_torques:
-            raise ValueError("motor_torques and brake_torques are both empty: at least one torque would do")
+            raise ValueError("motor_torques and brake_torques are both empty: at least one torque is needed")
         if not self.rig and not self.gravity:
-            raise ValueError("rig and gravity are both empty: at least one gravity would do")
+            raise ValueError("rig and gravity are both empty: at least one gravity is needed")
         if self.gravity and self.counterweight is not None:
             raise ValueError(say("counterweight_of_a_rig", s=self))
         if self.ground != "spring-damper":

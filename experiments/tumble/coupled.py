@@ -28,7 +28,7 @@ by twice of that after 0.9 s, as the torque ends with the step in which the last
 
 
 def check_coupled(settings: TumbleSettings, plan: TumblePlan) -> None:
-    """Raise ValueError, naming key, value and what would do, for a trial that the master cannot step."""
+    """Raise ValueError, naming key, value and what is accepted, for a trial that the master cannot step."""
     if plan.trial.ground is not None:
         raise ValueError(say("master_takes", s=settings))
     if other := [effect.id for effect in plan.trial.effects if not effect.term.on_torque_alone]:

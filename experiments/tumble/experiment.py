@@ -34,7 +34,7 @@ __all__ = ["check", "resume", "run"]
 
 
 def check(settings: TumbleSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
     if settings.ground == "bed":
         from .on_grains import PlanarOnBed  # loads Taichi
 
@@ -66,7 +66,7 @@ def _check_planar(settings: TumbleSettings, plan: TumblePlan) -> None:
         try:
             check_step(plan.trial, PAPER_STEP)
         except ValueError as error:
-            raise ValueError(f"method = 'paper': {error}; method = 'located' would do") from None
+            raise ValueError(f"method = 'paper': {error}; method = 'located' is accepted") from None
     _integrate(settings, plan, duration=1e-3)
 
 

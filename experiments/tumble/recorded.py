@@ -62,7 +62,7 @@ def write_tumbles_campaign(
 def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = None, seed: int = 1) -> Campaign:
     """The finished tumble in the folder `run`, with those of ``recording.also``, as a campaign; `seed` fixes the noise.
 
-    Raises ValueError, naming the folder and what would do, for runs that are not finished, of something else, too
+    Raises ValueError, naming the folder and what is accepted, for runs that are not finished, of something else, too
     short, or of another platform, rig or surface than the first.
     """
     recording = recording if recording is not None else TumbleRecording()

@@ -54,7 +54,7 @@ class Sweep:
     ) -> None:
         if settings.method != "located":
             method = settings.method
-            raise ValueError(f"method = {method!r} with a sweep, which the batched model does: 'located' would do")
+            raise ValueError(f"method = {method!r} with a sweep, which the batched model does: 'located' is accepted")
         self.settings, self.ranges = settings, parse_sweep(settings.sweep)
         self.counts = [len(each.values) for each in self.ranges]
         self.values = list(itertools.product(*(each.values for each in self.ranges)))

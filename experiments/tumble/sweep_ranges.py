@@ -42,12 +42,12 @@ def parse_sweep(texts: tuple[str, ...]) -> tuple[SweepRange, ...]:
     ranges = tuple(_one(text) for text in texts)
     keys = [each.key for each in ranges]
     if len(set(keys)) < len(keys):
-        raise ValueError(f"sweep = {' '.join(texts)} has {keys[0]} twice: each key once would do")
+        raise ValueError(f"sweep = {' '.join(texts)} has {keys[0]} twice: give each key once")
     if len(ranges) > 2:
-        raise ValueError(f"sweep = {' '.join(texts)} has {len(ranges)} keys: one or two would do")
+        raise ValueError(f"sweep = {' '.join(texts)} has {len(ranges)} keys: one or two are accepted")
     count = math.prod(len(each.values) for each in ranges)
     if count > MOST_TRIALS:
-        raise ValueError(f"sweep = {' '.join(texts)} makes {count} trials: at most {MOST_TRIALS} would do")
+        raise ValueError(f"sweep = {' '.join(texts)} makes {count} trials: at most {MOST_TRIALS} is accepted")
     return ranges
 
 
@@ -71,14 +71,14 @@ def _one(text: str) -> SweepRange:
     key = key.strip().replace("-", "_") if "." not in key else key.strip()
     words = span.split(":")
     if not (equals and len(words) == 3 and all(has_unit(word) or _is_finite(word) for word in words)):
-        raise ValueError(f"sweep = {text!r} is no range: {_TYPED} would do")
+        raise ValueError(f"sweep = {text!r} is no range: {_TYPED} is accepted")
     _check_key(key, text)
     low, high, step = _numbers(key, words, text)
     if step <= 0 or high < low:
-        raise ValueError(f"sweep = {text!r} goes nowhere: FROM below TO and a STEP above 0 would do")
+        raise ValueError(f"sweep = {text!r} goes nowhere: FROM below TO and a STEP above 0 are accepted")
     count = math.floor((high - low) / step * (1 + 1e-12) + 1e-9) + 1
     if count > MOST_TRIALS:
-        raise ValueError(f"sweep = {text!r} makes {count} trials: at most {MOST_TRIALS} would do")
+        raise ValueError(f"sweep = {text!r} makes {count} trials: at most {MOST_TRIALS} is accepted")
     return SweepRange(key, tuple(float(f"{low + k * step:.12g}") for k in range(count)))
 
 
@@ -98,9 +98,9 @@ def _numbers(key: str, words: list[str], text: str) -> list[float]:
     unit = find_unit(f"[{stated}]")
     if unit is None:
         which = "has no unit" if stated == "1" else f"is in {stated}"
-        raise ValueError(f"sweep = {text!r}: {key} {which}: numbers without one would do")
+        raise ValueError(f"sweep = {text!r}: {key} {which}: numbers without one are accepted")
     if len(with_unit) < len(words):
-        raise ValueError(f"sweep = {text!r} has a unit behind some of FROM, TO and STEP: behind all or none would do")
+        raise ValueError(f"sweep = {text!r} has a unit behind some of FROM, TO and STEP: give it behind all or none")
     try:
         return [unit.value_of(word) for word in words]
     except ValueError as error:

@@ -104,7 +104,7 @@ def sensor_set(settings: CampaignSettings, *, noise: float = 1.0) -> SensorSet:
 
 
 def check(settings: CampaignSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for what the settings class cannot see."""
+    """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
     made = _MadeUp(settings, _plans(settings))
     for number, plan in enumerate(made.plans.values(), 1):
         for trial in (plan.trial, made.true_trial(number, plan)):
@@ -295,7 +295,7 @@ def _result(made: _MadeUp, folder: Path) -> Result:
     plan, rows = made.first, made.rows
     return Result.make(
         "campaign",
-        title=f"A made-up campaign on {plan.surface}: {len(rows)} trials",
+        title=f"A simulated campaign on {plan.surface}: {len(rows)} trials",
         quantities={
             "trial_count": quantity(len(rows), "1"),
             "row_count": quantity(count, "1", "of all recordings together"),

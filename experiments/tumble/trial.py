@@ -155,7 +155,7 @@ def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) 
 def _read(path: Path) -> TumbleModel:
     model = read_model(path)
     if not isinstance(model, TumbleModel):
-        raise ValueError(f"model = {str(path)!r} is of kind {model.kind!r}: one of kind 'tumble' would do")
+        raise ValueError(f"model = {str(path)!r} is of kind {model.kind!r}: one of kind 'tumble' is accepted")
     return model
 
 
@@ -216,7 +216,7 @@ def _assignment(key: str, text: str) -> tuple[str, float]:
         return name.strip(), float(value)
     except ValueError:
         found = "has no number" if equals else "has no ="
-        raise ValueError(f"{key} = {text!r} {found}: name=value would do, such as exponent=1.5") from None
+        raise ValueError(f"{key} = {text!r} {found}: name=value is accepted, such as exponent=1.5") from None
 
 
 def _model_effects(model: TumbleModel | None, path: Path | None) -> tuple[Effect, ...]:

@@ -58,7 +58,7 @@ def _page(result: Mapping[str, Any], command: str, details: str) -> Iterator[str
     numbers = [one for row in ran for one in row["comparisons"]]
     yield from ("# Verification of the bed", "")
     yield "This page compares the bed of grains with closed forms, published results, other codes and measurements."
-    yield f"It shows how far the bed can be trusted. [{details}]({details}) has all numbers, formulas and remarks."
+    yield f"It shows how far the bed can be trusted. [{details}]({details}) has all numbers, formulas and sources."
     yield "The page is made by code; do not edit it."
     yield ""
     met = sum(one["passes"] for one in numbers)
@@ -75,8 +75,8 @@ def _page(result: Mapping[str, Any], command: str, details: str) -> Iterator[str
     yield from _failing(cases, details)
     for family, rows in groupby(cases, key=lambda row: row["family"]):
         yield from ("", f"## {family}", "")
-        yield "| case | compared with | difference | band | |"
-        yield "|---|---|---|---|---|"
+        yield "| case | difference | band | |"
+        yield "|---|---|---|---|"
         for row in rows:
             yield _overview(row, details)
 
@@ -93,7 +93,7 @@ def _overview(row: Mapping[str, Any], details: str) -> str:
     why = "" if row.get("worst") else row.get("waits_for") or row.get("skipped") or ""
     mark = ": ".join(filter(None, (_MARKS.get(row["status"], row["status"]), why)))
     name = f"[{row['id']}]({details}#{row['id']})" if row["status"] in RAN else row["id"]
-    return f"| {name}: {row['title']} | {row['source'].partition(';')[0]} | {cells} | {mark} |"
+    return f"| {name}: {row['title']} | {cells} | {mark} |"
 
 
 def _failing(cases: Sequence[Json], details: str) -> Iterator[str]:

@@ -175,7 +175,7 @@ class Trial(Coulomb):
             raise ValueError(
                 f"com-offset.x = {offset['x']:g} m, com-offset.y = {offset['y']:g} m are too far off the shaft for "
                 f"inertia = {self.inertia:g} kg m2 about it: less than sqrt(J / m) = "
-                f"{math.sqrt(self.inertia / self.mass):.4g} m together would do"
+                f"{math.sqrt(self.inertia / self.mass):.4g} m together is accepted"
             )
 
     def __repr__(self) -> str:

@@ -101,8 +101,8 @@ def leaning(system: System, lean: float) -> tuple[list[float], Modes]:
     if not (lean > 0 and max(depths) < 0):
         deeper = max(depths) * 1e6
         raise ValueError(
-            f"lean = {lean:g} rad does not lift the other rows: one would be {deeper:.3g} um deep; more would do, up "
-            f"to pi / {system.trial.spike_count}"
+            f"lean = {lean:g} rad does not lift the other rows: one would be {deeper:.3g} um deep; use more, at "
+            f"most pi / {system.trial.spike_count}"
         )
     modes.touching = [front]
     modes.top = [*([0.0] * front), system.depth(front, z)]
@@ -134,9 +134,7 @@ def _why_not(system: System, what: str) -> str:
 def _offset_that_tips(trial: Trial) -> str:
     """How far the centre of mass may be ahead of the shaft or behind it: m g x = W l sin(pi / n) empties a row."""
     limit = trial.tipping_torque / (trial.mass * trial.pull_at_mass)
-    return (
-        f"on level ground com-offset.x up to {1e3 * limit:.3g} mm would do, W l sin(pi / {trial.spike_count}) / (m g)"
-    )
+    return f"on level ground com-offset.x may be up to {1e3 * limit:.3g} mm, W l sin(pi / {trial.spike_count}) / (m g)"
 
 
 def _sinkage(system: System, load: float) -> float:

@@ -50,8 +50,9 @@ def write_folder(folder, *, trials: dict[str, float], scatter: float | None = No
 def test_the_report_of_an_unknown_has_every_part_and_names_columns_in_words(tmp_path):
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0})
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
-    for part in ("Recorded and modelled", "What is left, by phase and channel", "layering:slope", "Repeat the trial.",
-                 "What no effect explains", "speed 0.01 m/s", "trial a: gaps", "held-out trials"):  # fmt: skip
+    for part in ("Recorded and modelled", "Remaining misfit by phase and channel", "layering:slope",
+                 "Repeat the trial.", "The unexplained force", "speed 0.01 m/s", "trial a: gaps",
+                 "held-out trials"):  # fmt: skip
         assert part in page
     figures = {path.stem for path in (tmp_path / "figures").iterdir()}
     assert figures == {"trajectories", "residuals", "evidence", "latent"}
@@ -60,7 +61,7 @@ def test_the_report_of_an_unknown_has_every_part_and_names_columns_in_words(tmp_
 def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left(tmp_path):
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
-    for part in ("1.5 beside what replicates differ by", "replicates&#39; scatter added", "Certain: nothing."):
+    for part in ("1.5 with the scatter of replicates", "replicates&#39; scatter added", "Certain: nothing."):
         assert part in page or part.replace("&#39;", "'") in page
     channel = read_channel(tmp_path / "series" / "a.force.csv")
     assert channel.scatter is not None and set(channel.scatter) == {0.2}

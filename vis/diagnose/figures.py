@@ -262,7 +262,7 @@ def draw_evidence(diagnosis: Result) -> Figure | None:
     return drawing
 
 
-_KINDS = {"named": BED, "certain": BED, "likeliest, not certain": "#7fb8d9", "cannot be told from it": MODEL,
+_KINDS = {"named": BED, "certain": BED, "likeliest, not certain": "#7fb8d9", "cannot be distinguished from it": MODEL,
           "other": "#b5b5b5"}  # fmt: skip
 """What a candidate is -> its colour."""
 
@@ -320,7 +320,7 @@ def _kind(name: tuple[str, ...], leading: tuple[str, ...], diagnosis: Result) ->
     if name == leading:
         return "named"
     swapped = [(other, *leading[1:]) for other in diagnosis["alternatives"]]
-    return "cannot be told from it" if set(name) in [set(s) for s in swapped] else "other"
+    return "cannot be distinguished from it" if set(name) in [set(s) for s in swapped] else "other"
 
 
 # What no effect explains ----------------------------------------------------------------------------------------------

@@ -43,7 +43,7 @@ def write_diagnosis_report(report: Report) -> Path:
         Section("What is left", [*left, *drawn["latent"]]),
         Section("Where the base model fails", [*([listing(departures)] if departures else []), *_where(diagnosis)]),
         Section("Candidates", [*drawn["evidence"], *_evidence(diagnosis)]),
-        Section("What these trials can tell apart", _distinguished(diagnosis)),
+        Section("What these trials can distinguish", _distinguished(diagnosis)),
         Section("The next experiment", [text(following)] if following else []),
         Section("Numbers", _numbers(diagnosis)),
         Section("What was found in the recordings", _findings(diagnosis)),
@@ -83,7 +83,7 @@ def _labels(diagnosis: Result) -> tuple[str, str]:
 def _weighed(diagnosis: Result, stage: str) -> str:
     """The same weighed against what replicates differ by, where that is more than the sensors."""
     weighed = diagnosis.get("gap_with_scatter")
-    return "" if weighed is None else f"; {_gap(weighed[stage])} beside what replicates differ by"
+    return "" if weighed is None else f"; {_gap(weighed[stage])} with the scatter of replicates"
 
 
 def _gap(gap: Result) -> str:

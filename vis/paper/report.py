@@ -48,12 +48,12 @@ def write_paper_report(report: Report) -> Path:
     small = "In brackets: friction at both ends of its band; after the semicolon: the paper's 1 ms step."
     sections = [
         Section("", [text(say("about"))]),
-        Section("What the text states, and what comes out", [_claims_table(result)]),
+        Section("Statements of the text and results", [_claims_table(result)]),
         *_evidence_section(result, blocks.pop("evidence", None)),
         Section("The figures", list(blocks.values())),
-        Section("What the paper does not give", [*swept, *_sliding_blocks(paper), *_grains_blocks(paper)]),
+        Section("Numbers that the paper does not state", [*swept, *_sliding_blocks(paper), *_grains_blocks(paper)]),
         Section("Every case", [table(_CASES, numbers), text(small, small=True)]),
-        Section("What stands behind it", [text(f"{_platform(result)} {_ours(result)}"), given]),
+        Section("Inputs", [text(f"{_platform(result)} {_ours(result)}"), given]),
         again("hedgebed paper run.toml", ""),
     ]
     count = result.get("integrations", len(paper.cases) + len(paper.sweep))
@@ -113,7 +113,7 @@ def _evidence_section(result: Result, drawn: Block | None) -> list[Section]:
         )  # fmt: skip
     told = table(head, rows, words=True)
     note = text(say("evidence", error=weighed["error"], wrong=weighed["wrong"]), small=True)
-    return [Section("What the model lacks on hard ground", [*([drawn] if drawn else []), told, note])]
+    return [Section("What the model omits on hard ground", [*([drawn] if drawn else []), told, note])]
 
 
 def _platform(result: Result) -> str:
@@ -166,9 +166,9 @@ def _sliding_blocks(paper: PaperRun) -> list[Block]:
         cells += [_angle(varied[surface, rig, torque, ratio]) for ratio in ratios]
         as_is = f"{numbers['mu_d'] / numbers['mu_s']:g}" if numbers["mu_s"] else "none"
         rows.append((surface, f"{rig:g}", f"{torque:g}", f"{numbers['mu_s']:g}", as_is, *cells))
-    head = ("surface", "g", "torque [N m]", "mu_s", "mu_d / mu_s as it is", "angle", *(f"at {r:g}" for r in ratios))
+    head = ("surface", "g", "torque [N m]", "mu_s", "mu_d / mu_s, default", "angle", *(f"at {r:g}" for r in ratios))
     note = (
-        "Trajectory angles in degrees. The paper fixed mu_d / mu_s to a half; sliding all the way, a platform leaves "
+        "Trajectory angles in degrees. The paper fixed mu_d / mu_s to a half; with pure sliding a platform leaves "
         "at tan = m / ((m + m_b) mu_d)."
     )
     return [table(head, rows, title="Sliding friction"), text(note, small=True)]
@@ -194,11 +194,11 @@ def _grains_blocks(paper: PaperRun) -> list[Block]:
         for law, stiffness, rebound in kinds
     ]
     nominal = [_angle(paper.case(*place)) for place in columns]
-    rows.insert(0, ("as it is", "the surface's", "1, and C", *nominal))
-    head = ("ground", "K of a row [N/m]", "gives back", *(f"{s}, {g:g} g, {t:g} N m" for s, g, t in columns))
+    rows.insert(0, ("default", "the surface's", "1, and C", *nominal))
+    head = ("ground", "K of a row [N/m]", "rebound", *(f"{s}, {g:g} g, {t:g} N m" for s, g, t in columns))
     note = (
-        "Trajectory angles in degrees. Gives back: the share of the deepest depth that is undone as the load goes; the "
-        "spring-dampers of this table have no damper. A softer ground lets the platform sink, and turn, further."
+        "Trajectory angles in degrees. Rebound: share of the deepest depth that is recovered during unloading; the "
+        "spring-dampers of this table have no damper. On softer ground the platform sinks and turns further."
     )
     return [table(head, rows, title="Brake trials on grains"), text(note, small=True)]
 

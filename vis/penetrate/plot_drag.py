@@ -127,9 +127,9 @@ def drag_plot(run: RunFolder) -> Plot | None:
         axis.set_xlim(left=1e3 * min((float(part.depth.min()) for part in above), default=0.0))
         axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     _label(axes, "depth of the tip [mm]", "force on the spike [N]")
-    handles = [handle("bed, way in", BED, lw=2.2)]
+    handles = [handle("bed, loading", BED, lw=2.2)]
     out = any(((r.bed.phase == "out") & (r.bed.depth >= 0.0)).any() for r in driven if r.bed is not None)
-    handles += [handle("bed, way out", BED, lw=2.2, alpha=0.45)] if out else []
+    handles += [handle("bed, unloading", BED, lw=2.2, alpha=0.45)] if out else []
     handles += [handle("bed, as recorded", BED, lw=0.7, alpha=0.55)]
     law = has_model(driven)
     handles += [handle("spring-damper, in", MODEL, ls=DASHED)] if law else []
@@ -202,7 +202,7 @@ def work_plot(run: RunFolder) -> Plot | None:
     figure, axes = new_panels(2, height=2.7, sharey=True)
     law = any(value_of(r.quantities, "model_work_in") is not None for r in driven)
     sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
-    titles = {"work_in": "put in, way in", "work_out": "got back, way out"}
+    titles = {"work_in": "work in", "work_out": "work recovered"}
     for axis, (key, title) in zip(axes, titles.items(), strict=True):
         for shift, prefix, colour in sides:
             mean, spread = by_speed(driven, speeds, prefix + key, 1e3)

@@ -55,7 +55,7 @@ def write_penetration_report(folder: str | Path, *, pictures: bool = True, progr
         return _write_law_report(folder, progress=progress)
     plots, undrawn = make_plots(run)
     tell(0.1)
-    drawn = Pictures(notes=["Pictures were not asked for."])
+    drawn = Pictures(notes=["No pictures were requested."])
     if pictures:
         try:
             drawn = make_pictures(run.path, progress=lambda done: tell(0.1 + 0.85 * done))

@@ -104,7 +104,7 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
     if push := _push(run):
         tiles.append(("Largest force of the sand", *push))
     if words.value_of(quantities, "drag_gap") is not None:
-        note = "rms difference over rms drag, way in, all pushes"
+        note = "rms difference over rms force, loading, all pushes"
         tiles.append(("Error of the spring-damper", quantity(quantities["drag_gap"], unit="%"), note))
     if words.value_of(quantities, "stiffness") is not None:
         tiles.append(("Fitted stiffness K", words.fitted(quantities, "stiffness"), _fitted_note(run, quantities)))
@@ -183,7 +183,7 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
     if words.value_of(quantities, "drag_gap") is not None:
         text = (
             f"With K = {words.fitted(quantities, 'stiffness')} and C = {words.fitted(quantities, 'damping')} its "
-            f"error on the way in is {quantity(quantities['drag_gap'], unit='%')} of the bed's drag (rms difference "
+            f"error during loading is {quantity(quantities['drag_gap'], unit='%')} of the bed's drag (rms difference "
             "over rms drag)."
         )
         if worst := _worst(run.result):

@@ -324,7 +324,7 @@ def _plan(
     half = _half_way(main)
     fast = _high(main.frames[half], "speed")
     if fast > 0.0:
-        still(main, half, "speed", nice_above(fast), "speed", "the grains' speed half way in")
+        still(main, half, "speed", nice_above(fast), "speed", "the speed of the grains at half the depth")
     last = len(main.frames) - 1
     if last != main.deepest and main.run.kind == "driven":
         inside = main.depth[last] > 0.0

@@ -33,7 +33,7 @@ def write_sweep_report(report: Report) -> Path:
     listed = text("table.csv has every run; table.nc the same for xarray. Each run's folder is under members/.")
     sections = [
         *([Section("", [_sensitivities(report, result["sensitivities"])])] if result["sensitivities"] else []),
-        Section("What came out", figures),
+        Section("Results", figures),
         Section("Numbers", [*tables(result), listed]),
         again("hedgebed sweep run.toml"),
     ]

@@ -37,7 +37,7 @@ def grains_section(report: Report) -> Section:
         f"E = {short(grains['young'] / 1e6, 3)} MPa ({short(grains['softer_than_real'], 2)} times softer than real), "
         f"step {short(1e6 * grains['time_step'], 3)} µs, {round(grains['macro_step'] / grains['time_step'])} of them "
         f"in one of the platform; largest overlap {short(100 * grains['max_overlap'], 2)} %. "
-        f"One spike stands for its row of two."
+        f"One spike represents its row of two."
     )
     if (repeats := grains.get("repeats", 1)) > 1:
         facts += (
@@ -48,7 +48,7 @@ def grains_section(report: Report) -> Section:
     words = [] if result.get("quantities", {}).get("impact_speed") else [text(beside_words(*both))]
     numbers = table(HEAD, beside_rows(*both))
     blocks = [drawn[0], *words, numbers, drawn[1], text(facts, small=True), *drawn[2:]]
-    return Section("On grains, beside the spring-damper", blocks)
+    return Section("On grains and on the spring-damper", blocks)
 
 
 def _balance(motion: Columns, feet: Columns, bed: Columns) -> Columns:

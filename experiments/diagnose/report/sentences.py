@@ -59,7 +59,7 @@ def sure_sentences(diagnosis: Row) -> list[str]:
     sure = f"How sure: {'; '.join(parts)}" if parts else ""
     if rivals := diagnosis["equivalence"][1:]:
         near = min(rivals, key=lambda row: row["evidence_behind"])
-        apart = "these trials tell the two apart" if near["told_apart"] else "these trials do not tell the two apart"
+        apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         if sure:
             sure += f"; the nearest other name, {near['effect']}, is {near['evidence_behind']:.0f} nats behind, "
         sure += f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
@@ -357,7 +357,7 @@ def _note(diagnosis: Row, names: frozenset[str], best: Mapping[frozenset[str], R
         return ""
     rest = _named(diagnosis)[1:]
     if diagnosis["verdict"] == "ambiguous" and any(names == {other, *rest} for other in diagnosis["alternatives"]):
-        return "cannot be told from it"
+        return "cannot be distinguished from it"
     own, row = best[named], best[names]
     more = row["score"] - own["score"]
     if more <= 0:

@@ -58,7 +58,7 @@ def title_words(diagnosis: Mapping[str, Any]) -> str:
     if names:
         return f"Unknown: {names} for certain, and something beside it that no effect of the library explains"
     likeliest = _likeliest(diagnosis)
-    also = f"; the likeliest is {likeliest}, not for certain" if likeliest else ""
+    also = f"; the most likely is {likeliest}, not with confidence" if likeliest else ""
     return f"Unknown: something is missing that no effect of the library explains{also}"
 
 
@@ -163,7 +163,7 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
     first = f"{parts}{nats}: it takes the gap {_closes(diagnosis['gap'])}"
     near = leading["nearest"]
     if near is not None:
-        apart = "these trials tell the two apart" if near["told_apart"] else "these trials do not tell the two apart"
+        apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         first += say("nearest", near=near, apart=apart)
     sentences.append(f"{first}.")
     sentences += [*_numbers(leading), *size_sentences(diagnosis), *remark_sentences(diagnosis)]
@@ -247,6 +247,6 @@ def _left(diagnosis: Mapping[str, Any]) -> list[str]:
         phase, channel = (shares_words(places, key) for key in ("phase", "channel"))
         sentences.append(say("left", beyond=beyond, phase=phase, channel=channel, first=places[0]))
     if "latent" in diagnosis:
-        sentences.append(f"The force that is missing goes with {diagnosis['latent']['depends_on']}.")
+        sentences.append(f"The missing force correlates with {diagnosis['latent']['depends_on']}.")
         sentences += [line_sentence(row) for row in diagnosis["latent"].get("lines", [])]
     return sentences

@@ -94,7 +94,7 @@ def test_refining_keeps_the_recipe_and_asks_for_the_packing_that_was_there(shelf
     assert options["stages"] == ["rain", f"packing:{coarse.reports[-1].packing_fraction:.4f}"]
     assert options["size"] == (0.024, 0.024, 0.02) and options["seed"] == 1
     bed_refine.check(BedRefineSettings(bed="rained"))
-    with pytest.raises(ValueError, match=r"grain = 0.004 m is not smaller than the bed's own, 0.004 m"):
+    with pytest.raises(ValueError, match=r"grain = 0.004 m is not smaller than the bed's, 0.004 m"):
         bed_refine.check(BedRefineSettings(bed="rained", grain=0.004))
     recipe = coarse.recipe
     recipe["material"] |= {"cohesion": "dmt", "surface_energy": 0.8}
@@ -109,7 +109,7 @@ def test_refining_keeps_the_recipe_and_asks_for_the_packing_that_was_there(shelf
 
 def test_a_bed_that_does_not_say_how_it_was_made_is_not_refined(shelf, tmp_path):
     Bed.load(shelf / "rained.npz", threads=1).save(tmp_path / "plain.npz")
-    with pytest.raises(ValueError, match="does not say how it was prepared"):
+    with pytest.raises(ValueError, match="does not state how it was prepared"):
         bed_refine.check(BedRefineSettings(bed=str(tmp_path / "plain.npz")))
 
 

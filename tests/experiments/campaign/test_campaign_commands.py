@@ -159,7 +159,7 @@ def test_in_good_tumbles_nothing_is_found(tumbles):
         (("001", "pose"), lost_marker, "jump that no motion makes (the camera lost its marker)"),
         (("002", "pose"), late_clock, "the clock of the camera jumps forward by 0.4 s"),
         (("003", "imu"), silence, "gyro has no valid row for 0.31 s"),
-        (("004", "pose"), other_way, "at odds with its 4 replicates, which agree with one another: in x"),
+        (("004", "pose"), other_way, "disagrees with its 4 replicates, which agree with one another: in x"),
     ],
 )
 def test_what_is_odd_in_a_tumble_is_found_where_it_is_and_nowhere_else(tumbles, key, change, said):

@@ -143,10 +143,9 @@ def test_the_loads_on_the_rows_are_the_force_that_lifts_the_platform(runs):
         (("begun",), "has no result yet"),
         (
             ("hop",),
-            "is of hop, of which there is nothing to compare over time: runs of tumble, tumble spatial or penetrate "
-            "would do",
+            "is of hop, which has nothing to compare over time; expected: runs of tumble, tumble spatial or penetrate",
         ),
-        (("spike",), "is of tumble and .* of penetrate: two of one kind would do"),
+        (("spike",), "is of tumble and .* of penetrate: expected two runs of one kind"),
     ],
 )
 def test_what_cannot_be_compared_is_refused_by_name(runs, tmp_path, others, said, capsys):

@@ -118,7 +118,7 @@ def test_grains_and_spring_damper_stand_side_by_side_in_curves_and_flat_pictures
         energy = columns[f"energy_J_{number}"] + columns[f"dissipated_J_{number}"] - columns[f"torque_work_J_{number}"]
         assert np.ptp(energy) < 5e-3 * 0.1 * 0.15**2
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png") >= 8 and "no OpenGL" in page and "Turn and states" in page
+    assert page.count("data:image/png") >= 8 and "no OpenGL" in page and "Rotation and states" in page
     assert (out / "film.gif").exists()
     seen = {path.name for path in (out / "figures").glob("seen-*.png")}
     assert seen == {f"seen-{name}.png" for name in ("start", "middle", "end")}
@@ -139,7 +139,7 @@ def test_a_run_without_frames_has_its_curves_compared_and_says_why_there_is_no_p
     [
         ("planar", r"is of tumble spatial and .*planar' of tumble: in the plane a platform has one angle"),
         ("footless", r"has no series/feet.csv: run it again, `hedgebed tumble spatial .*run.toml`"),
-        ("older", r"trajectory.csv of .*older' has no state .*an older hedgebed wrote it.*: run it again"),
+        ("older", r"trajectory.csv of .*older' has no state .*written by an older hedgebed.*: run it again"),
     ],
 )
 def test_what_cannot_be_compared_is_refused_by_name(runs, tmp_path, capsys, other, said):
@@ -184,8 +184,8 @@ def test_numbers_of_a_run_in_space_until_a_time_within_it_are_those_of_its_serie
 def test_that_one_of_two_never_touches_is_said_and_of_both_or_none_nothing():
     hit, none = np.array([0.0, 0.2, 0.0]), np.zeros(3)
     for lifts, said in (
-        ((none, hit), "On law it never"),
-        ((hit, none), "On bed it never"),
+        ((none, hit), "On law the platform touches nothing"),
+        ((hit, none), "On bed the platform touches nothing"),
         ((hit, hit), ""),
         ((none, none), ""),
     ):

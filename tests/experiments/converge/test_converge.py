@@ -367,8 +367,8 @@ def test_the_report_of_a_first_bed_alone_is_drawn(swift, tmp_path):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"ratios": (4.0,)}, "ratios has 4.*5 would do.*h of one core"),
-        ({"widths": (3.0,)}, "widths has 3.*4 would do.*h of one core"),
+        ({"ratios": (4.0,)}, "ratios has 4.*5 is sufficient.*h of one core"),
+        ({"widths": (3.0,)}, "widths has 3.*4 is sufficient.*h of one core"),
         ({"bed_depths": (1.5,)}, "bed_depths has 1.5.*h of one core"),
         ({"budget": 1e-9}, "budget = 1e-09 h.*at least"),
     ],

@@ -65,8 +65,8 @@ def test_what_there_is_not_and_what_would_be_unstable_is_refused_before_any_work
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"grain": 0.015}, r"grain = 0.015 m: foot 'foot' is 0.06 m wide, 4 grains; .* at most 0.012 m would do"),
-        ({"height": 0.002}, "starts 0.002 m over the surface.* height = 0.012 m would do"),
+        ({"grain": 0.015}, r"grain = 0.015 m: foot 'foot' is 0.06 m wide, 4 grains; .* at most 0.012 m are accepted"),
+        ({"height": 0.002}, "starts 0.002 m over the surface.* height = 0.012 m is accepted"),
         ({"bed_size": (0.2, 0.2, 0.1)}, r"bed_size = 0.1 m deep is too shallow: .* a foot goes"),
         ({"bed_size": (0.04, 0.2, 0.16)}, r"bed_size = 0.04 m along x is too short"),
         ({"surface": "steel"}, "surface = 'steel' has no grains"),

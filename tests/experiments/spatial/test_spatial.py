@@ -62,7 +62,7 @@ def test_what_does_not_go_together_is_refused_by_name(given, said):
         ({"surface": "steel", "ground": "bed"}, "surface = 'steel' has no grains .* use sand, .*, jsc1a"),
         (
             {"bed_size": (0.07, 0.2, 0.05)},
-            r"bed_size = 0.07 m along x is too short: .* 0.\d+ m or a shorter one would do",
+            r"bed_size = 0.07 m along x is too short: .* 0.\d+ m or a shorter one is accepted",
         ),
         ({"bed_size": (0.2, 0.2, 0.02)}, r"bed_size = 0.02 m deep is too shallow: .* use"),
         ({"bed_size": (0.2, 0.2, 0.05), "grain": 0.009}, "grain = 0.009 m is larger than the spike"),
@@ -105,7 +105,7 @@ def test_set_down_by_the_hand_on_the_spring_damper_it_stands_as_deep_as_its_load
     out = tmp_path / "run"
     given = ("--surface", "sand", "--torque", "0.05", "0.06", "0", "--duration", "0.1", "--frame-count", "3")
     assert main(["tumble", "spatial", *given, "--quiet", "--out", str(out)]) == 0
-    assert "set it down" in capsys.readouterr().out
+    assert "was set down" in capsys.readouterr().out
     result = json.loads((out / "result.json").read_text())
     weight, quantities = result["trial"]["weight"]["value"], result["quantities"]
     assert quantities["sinkage_start"]["value"] == pytest.approx(weight / (4 * 70.0), rel=0.01)

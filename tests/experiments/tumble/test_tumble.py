@@ -472,7 +472,7 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--mass", "nan"], ["--mass", "finite"]),
         (["--torque", "-0.1"], ["--torque = -0.1", "greater than or equal to 0"]),
         (["--mu-s", "0.4", "0.5"], ["0.5 belongs to no option", "--sweep KEY=FROM:TO:STEP"]),
-        (["--effects", "com-offset.x=0.01"], ["tips over", "com-offset.x up to 1.29 mm would do"]),
+        (["--effects", "com-offset.x=0.01"], ["tips over", "com-offset.x may be up to 1.29 mm"]),
         (["--mu-d", "0.6"], ["mu_d = 0.6 is above mu_s = 0.5 (surface brick)"]),
         (["--mu-s", "0.2", "--mu-d", "0.3"], ["mu_d = 0.3", "mu_s = 0.2"]),
         (["--surface", "snow"], ["surface = 'snow'", "steel, brick, sand, sand-weak, jsc1a"]),

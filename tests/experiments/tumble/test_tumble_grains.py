@@ -277,7 +277,7 @@ def plan_of(duration):
         ({"spike_clear": 40}, r"spike_clear = 40 m, .* expected: 0.04\?"),
         ({"grain": 3}, r"grain = 3 m, .* expected: 0.003\?"),
         ({"coarse": 6}, r"coarse = 6 m, .* expected: 0.006\?"),
-        ({"bed_size": (0.5, 60, 0.046)}, r"bed_size\[1\] = 60 m, .* at most 20 m would do; .* expected: 0.06\?"),
+        ({"bed_size": (0.5, 60, 0.046)}, r"bed_size\[1\] = 60 m, .* at most 20 m is accepted; .* expected: 0.06\?"),
         ({"rig": 3}, r"rig = 3 g is not below the local gravity, 1 g .* \(3 m/s2 are 0.306 g\), or gravity"),
     ],
 )
