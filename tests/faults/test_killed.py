@@ -1,8 +1,10 @@
 """Long experiments killed (kill -9) at random moments and resumed: the same bits as of a run left alone.
 
-Slow: `make torture` kills each experiment as often as HEDGEBED_KILLS says.
+Each experiment is killed once, `make torture` kills as often as HEDGEBED_KILLS says, in all. HEDGEBED_KILLED_KEPT names
+a file to which every run adds a line as it ends; kills that it has are not done again.
 """
 
+import json
 import os
 import random
 import subprocess
@@ -12,28 +14,124 @@ from pathlib import Path
 
 import pytest
 
+from experiments.campaign.files import new_campaign
+
 ROOT = Path(__file__).resolve().parents[2]
-KILLS = int(os.environ.get("HEDGEBED_KILLS", "3"))
-GRAINS = ["--grain", "0.0024", "--checkpoint-interval", "0.5", "--frame-count", "0", "--threads", "1"]
-EXPERIMENTS = {
-    "penetrate": [
-        "penetrate", *GRAINS, "--bed-size", "0.03", "0.03", "0.0254", "--tip-diameter", "0.0075", "--allow-coarse",
-        "--shaft-length", "0.03", "--seeds", "1", "--speeds", "0.2", "--depth", "0.006", "--hold", "0.005", "--load",
-        "0.1", "--mass", "0.05", "--drop-speeds", "0.1", "--after-stop", "0.01", "--rest-time", "0.01",
-    ],
-    "sweep": [
-        "sweep", "--experiment", "tumble", "--fixed", "duration=4", "--over", "torque=0.14:0.2:0.02", "mu_s=[0.4, 0.6]",
-        "--workers", "2",
-    ],
+KEPT = os.environ.get("HEDGEBED_KILLED_KEPT")
+GRAINS = """
+bed_size = [0.03, 0.03, 0.0254]
+tip_diameter = 0.0075
+shaft_length = 0.03
+allow_coarse = true
+depth = 0.006
+load = 0.1
+rest_time = 0.01
+checkpoint_interval = 0.5
+frame_count = 0
+threads = 1
+"""
+CASES = {
+    "penetrate": GRAINS + """
+grain = 0.0024
+seeds = [1]
+speeds = [0.2]
+hold = 0.005
+mass = 0.05
+drop_speeds = [0.1]
+after_stop = 0.01
+""",
+    "calibrate": GRAINS + """
+budget = 3600.0
+grain = 0.004
+seeds = [1, 2]
+most_beds = 2
+speeds = [0.2, 0.4]
+hold = 0.0
+drop_speeds = []
+young = 2e7
+laws = ["spring-damper"]
+workers = 1
+""",
+    "tumble": """
+surface = "sand-weak"
+ground = "bed"
+mass = 0.3
+inertia = 2e-4
+spike_length = 0.04
+spike_diameter = 0.008
+spike_clear = 0.015
+wheel_inertia = 1e-5
+rig = 0.03
+torque = 0.01
+duration = 0.06
+lowering_speed = 0.04
+stiffness = 500.0
+damping = 2.0
+bed_size = [0.2, 0.036, 0.03]
+grain = 0.006
+young = 1e7
+max_overlap = 0.1
+substeps = 8
+frame_count = 0
+checkpoint_interval = 0.5
+threads = 1
+""",
+    "sweep": """
+experiment = "tumble"
+workers = 2
+[fixed]
+duration = 4.0
+[over]
+torque = "0.14:0.2:0.02"
+mu_s = [0.4, 0.6]
+""",
+    "diagnose": "campaign = 'dig'\n",
+    "bed calibrate": """
+name = "mine"
+size = [6.0, 6.0, 6.0]
+strain = 0.2
+inertial_number = 0.05
+points = 3
+most_points = 3
+checks = 1
+check_seeds = [2]
+threads = 1
+[free]
+rolling_friction = [0.0, 0.8]
+[targets.critical_friction_angle]
+value = 31.0
+tolerance = 1.0
+source = "made up"
+""",
 }  # fmt: skip
+OF_CASES = """
+import sys
+from pathlib import Path
+import experiments.suite.cases
+from experiments.cli.main import main
+experiments.suite.cases.CASES = Path("cases")
+sys.exit(main(sys.argv[1:]))
+"""
+"""`hedgebed experiments run` with cases of the test, which are much smaller than those that ship."""
+NAMES = (*CASES, "experiments run")
+ALL = int(os.environ.get("HEDGEBED_KILLS", str(len(NAMES))))
+KILLS = {name: ALL // len(NAMES) + (place < ALL % len(NAMES)) for place, name in enumerate(NAMES)}
 
 
-def begun(tokens, cache, log):
-    """The command in a process of its own; what it says goes to the file `log`."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "HEDGEBED_CACHE": str(cache)}
-    command = [sys.executable, "-m", "hedgebed", *map(str, tokens), "--quiet"]
-    with log.open("w") as file:
-        return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=file)
+def begun(name, out, home):
+    """The command, or its resumption, in a process of its own; what it says goes to `home`/log."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "HEDGEBED_CACHE": str(out) + "-cache"}
+    if name == "experiments run":
+        work = ["--work", f"{out}/work", "--results", f"{out}/results", "--workers", "1"]
+        command = ["-c", OF_CASES, "experiments", "run", *work, "--quiet"]
+    elif (out / "run.toml").exists():
+        command = ["-m", "hedgebed", "resume", str(out), "--quiet"]
+    else:
+        command = ["-m", "hedgebed", *name.split(), "case.toml", "--out", str(out), "--quiet"]
+    with (home / "log").open("w") as log:
+        return subprocess.Popen(
+            [sys.executable, *command], env=environment, cwd=home, stdout=subprocess.DEVNULL, stderr=log
+        )
 
 
 def files(folder):
@@ -42,28 +140,69 @@ def files(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", EXPERIMENTS)
+def where(folder):
+    """The part of the work that was kept last when a run was killed."""
+    paths = [path for path in folder.rglob("*") if path.is_file() and path.name not in ("lock", "log")]
+    last = max(paths, key=lambda path: path.stat().st_mtime_ns, default=None)
+    return "nothing yet" if last is None else str(last.relative_to(folder))
+
+
+def kept_of(name):
+    """Lines of runs of the experiment in the file, if there is one."""
+    lines = Path(KEPT).read_text().splitlines() if KEPT and Path(KEPT).exists() else []
+    return [line for line in map(json.loads, lines) if line["experiment"] == name]
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=pytest.mark.long if one == "bed calibrate" else pytest.mark.slow) for one in NAMES]
+)
 def test_an_experiment_killed_at_random_moments_ends_in_the_same_bits(name, tmp_path):
     """A run that comes to its end between two kills is compared, and the next begins."""
-    chance, tokens, log = random.Random(name), EXPERIMENTS[name], tmp_path / "log"
+    before = kept_of(name)
+    killed, runs = sum(len(line["killed"]) for line in before), len(before)
+    assert all(line["same"] for line in before), before
+    if killed >= KILLS[name] and before:
+        pytest.skip(f"{KEPT} has {killed} kills of it")
+    prepared(name, tmp_path)
     started = time.monotonic()
-    assert begun([*tokens, "--out", tmp_path / "whole"], tmp_path / "cache", log).wait() == 0, log.read_text()
-    lasts, whole, killed, turn = time.monotonic() - started, files(tmp_path / "whole"), 0, 0
-    assert "result.json" in whole
-    ended = True
-    while killed < KILLS or not ended:
-        if ended:
-            turn += 1
-            out, cache = tmp_path / f"broken{turn}", tmp_path / f"cache{turn}"
-        process = begun(["resume", out] if (out / "run.toml").exists() else [*tokens, "--out", out], cache, log)
-        try:
-            status = process.wait(timeout=chance.uniform(0.0, lasts) if killed < KILLS else None)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-            killed, ended = killed + 1, False
-        else:
-            ended = True
-            assert status == 0, log.read_text()
-            assert files(out) == whole
+    assert begun(name, tmp_path / "whole", tmp_path).wait() == 0, (tmp_path / "log").read_text()
+    lasts, whole = time.monotonic() - started, files(tmp_path / "whole")
+    assert any(path.endswith("result.json") for path in whole)
+    while killed < KILLS[name]:
+        chance, out, moments = random.Random(f"{name} {runs}"), tmp_path / f"broken{runs}", []
+        while True:
+            process, began = begun(name, out, tmp_path), time.monotonic()
+            try:
+                status = process.wait(timeout=chance.uniform(0.0, lasts) if killed < KILLS[name] else None)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+                killed += 1
+                moments.append({"after_s": round(time.monotonic() - began, 2), "last_kept": where(out)})
+            else:
+                break
+        assert status == 0, (tmp_path / "log").read_text()
+        runs += 1
+        same = files(out) == whole
+        if KEPT:
+            line = {
+                "experiment": name,
+                "lasts_s": round(lasts, 1),
+                "killed": moments,
+                "files": len(whole),
+                "same": same,
+            }
+            with Path(KEPT).open("a") as file:
+                file.write(json.dumps(line) + "\n")
+        assert same
+
+
+def prepared(name, home):
+    """What the experiment reads: its case, its campaign."""
+    if name == "diagnose":
+        new_campaign(home / "dig", kind="penetration")
+    if name == "experiments run":
+        (home / "cases" / "grains").mkdir(parents=True)
+        (home / "cases" / "grains" / "grains1-small.toml").write_text(CASES["tumble"].replace("0.06", "0.03"))
+    else:
+        (home / "case.toml").write_text(CASES[name])
