@@ -27,6 +27,7 @@ from experiments.runs.result import Result
 from experiments.runs.streams import (
     RefusedError,
     fault_words,
+    file_words,
     is_number,
     refusing,
     say,
@@ -72,6 +73,9 @@ def main(tokens: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of stdout has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
+    except OSError as error:
+        say(f"failed: {file_words(error, 'a file')}")
+        return FAILED
 
 
 _SUBJECTS = (".npz", ".xml", ".urdf", ".mjb")

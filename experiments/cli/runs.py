@@ -6,6 +6,7 @@ import sys
 import textwrap
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from rich.console import Console
@@ -18,7 +19,7 @@ from experiments.runs.kernel_cache import free_kernel_cache
 from experiments.runs.progress import Progress, make_progress
 from experiments.runs.registry import Headline
 from experiments.runs.result import Result
-from experiments.runs.streams import RefusedError, say, stdout_to_stderr
+from experiments.runs.streams import RefusedError, file_words, say, stdout_to_stderr
 from experiments.runs.whole_runs import draw_report, keeping_status
 from vis.page.numbers import digits_for
 
@@ -54,9 +55,16 @@ def carry_out(
                 if {item.name for item in folder.path.iterdir()} <= {"run.toml", "status.json", "lock"}:
                     shutil.rmtree(folder.path)
                 raise RefusedError(str(error)) from error
-            write_text(folder.path / "traceback.txt", traceback.format_exc())
+            with suppress(OSError):
+                write_text(folder.path / "traceback.txt", traceback.format_exc())
             say(f"failed: {error}")
             say(f"what was finished is kept in {folder.path}, and where it failed in traceback.txt there")
+            return FAILED
+        except OSError as error:
+            from dem.prepare.specification import cache_folder
+
+            say(f"failed: {file_words(error, f'a file below {folder.path} or {cache_folder()}')}")
+            say(f"what was finished is kept; when the fault is mended, `hedgebed resume {folder.path}` goes on")
             return FAILED
         except Exception:
             traceback.print_exc()

@@ -21,7 +21,7 @@ import tomllib
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -167,13 +167,19 @@ def holding(path: Path, *, waiting: Callable[[str], None] | None = None) -> Iter
             raise BusyError(f"{said}wait for it or stop it first") from None
         waiting(f"{said}this one waits for it")
         lock.acquire(timeout=-1, poll_interval=_POLL)
-    file.write_text(f"{os.getpid()}\n", encoding="utf-8")
+    _write_owner(file, f"{os.getpid()}\n")
     try:
         yield
     finally:
         if lock.lock_counter == 1:
-            file.write_text("", encoding="utf-8")
+            _write_owner(file, "")
         lock.release()
+
+
+def _write_owner(file: Path, text: str) -> None:
+    """Who has the lock, for the message to another; without it, as on a full disk, the lock holds all the same."""
+    with suppress(OSError):
+        file.write_text(text, encoding="utf-8")
 
 
 class RunFolder:

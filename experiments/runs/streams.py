@@ -11,7 +11,10 @@ from types import FrameType
 from cyclopts import CoercionError, MissingArgumentError
 from cyclopts.exceptions import UnusedCliTokensError
 
-__all__ = ["RefusedError", "fault_words", "is_number", "refusing", "say", "stdout_to_stderr", "terminate_like_ctrl_c"]
+__all__ = [
+    "RefusedError", "fault_words", "file_words", "is_number", "refusing", "say", "stdout_to_stderr",
+    "terminate_like_ctrl_c",
+]  # fmt: skip
 
 
 class RefusedError(ValueError):
@@ -40,6 +43,11 @@ def fault_words(error: Exception) -> str:
         if unit and unit[0] != "1":
             text = f"{text.rstrip('.')}: give a number in {unit[0]}"
     return text
+
+
+def file_words(error: OSError, place: str) -> str:
+    """Which file could not be read or written, and why; `place` where the system does not name the file."""
+    return f"{error.filename or place}: {error.strerror or error}"
 
 
 def is_number(word: str) -> bool:

@@ -1,7 +1,7 @@
 """The skeleton of an experiment: `run` and `resume`, and how its result and its report come into the folder."""
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from itertools import pairwise
@@ -53,11 +53,12 @@ def keeping_status(folder: RunFolder) -> Iterator[None]:
         folder.set_status("running")
         try:
             yield
-        except KeyboardInterrupt:
-            folder.set_status("stopped", "interrupted")
-            raise
         except BaseException as error:
-            folder.set_status("failed", f"{type(error).__name__}: {error}")
+            with suppress(OSError):  # a full disk may be why
+                if isinstance(error, KeyboardInterrupt):
+                    folder.set_status("stopped", "interrupted")
+                else:
+                    folder.set_status("failed", f"{type(error).__name__}: {error}")
             raise
         folder.set_status("done")
 

@@ -149,7 +149,10 @@ def _write_netcdf(design: Design, tasks: Sequence[Task], columns: Sequence[_Colu
         )  # fmt: skip
     attributes = {"title": f"hedgebed sweep of {design.experiment.name}"}
     with replacing(folder.path / "table.nc") as temporary:
-        xarray.Dataset(data, coords, attributes).to_netcdf(temporary, engine="netcdf4")
+        try:
+            xarray.Dataset(data, coords, attributes).to_netcdf(temporary, engine="netcdf4")
+        except RuntimeError as error:  # of HDF5, as on a full disk
+            raise OSError(None, str(error), str(folder.path / "table.nc")) from error
 
 
 def _each_run(design: Design, columns: Sequence[_Column]) -> Table:

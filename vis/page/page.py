@@ -17,6 +17,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from PIL import Image
 
+from rigid.series import replacing
+
 __all__ = [
     "Block", "Columns", "Page", "Section", "Tile", "code", "columns", "figure", "listing", "scene_block", "table",
     "table_of", "text", "write_page", "write_template",
@@ -142,9 +144,9 @@ def write_template(path: Path, name: str, **context: Any) -> Path:
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.globals["columns"] = columns
-    temporary = path.with_name(f"{path.name}.part")
-    temporary.write_text(environment.get_template(name).render(**context), encoding="utf-8")
-    temporary.replace(path)
+    text = environment.get_template(name).render(**context)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
     return path
 
 
