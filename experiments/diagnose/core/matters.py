@@ -16,14 +16,13 @@ from experiments.diagnose.fit.evidence import SMALL, Hypothesis
 from experiments.diagnose.fit.fitting import Fit, fit
 
 from .deciding import Gap, gap_of, values_of_all
-from .rivals import compare
+from .rivals import LEAD, compare
 from .scatter_gap import gap_with_scatter
 from .search import Choice
 
-__all__ = ["MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by", "takes_below"]
+__all__ = ["MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by", "takes_below", "undecided"]
 
 MOST = SMALL  # the gap up to which what is left is too small to matter
-_LEAD = 10.0  # nats by which a name must lead every rival
 _CLOSED = 0.99
 """Share of what the base model leaves beyond the noise, on fitted and held-out trials, that a name must close where
 more than `MOST` is left beside it: 97.6 % of a magnet was closed by a pendulum."""
@@ -73,9 +72,9 @@ def takes_below(before: Gap, best: Fit, held_out: tuple[str, ...], scatter: Scat
 
 
 def explains(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> bool:
-    """Whether the best model's first name leads every rival by `_LEAD`, and what is left of held-out trials is too
+    """Whether the best model's first name leads every rival by `LEAD`, and what is left of held-out trials is too
     small to matter, or nearly all is closed. What is left is then reported as residue."""
-    if not choice.best.effects or any(rival.behind < _LEAD for rival in choice.rivals):
+    if not choice.best.effects or undecided(choice):
         return False
     after, weighed = _gaps(choice.best.fit, held_out, scatter)
     small = after if weighed is None else weighed
@@ -85,6 +84,11 @@ def explains(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> boo
     pairs = ((before.fit, after.fit), (before.held_out, after.held_out))
     shares = [1 - (b - 1) / (a - 1) for a, b in pairs if a is not None and b is not None and a > 1]
     return bool(shares) and min(shares) >= _CLOSED
+
+
+def undecided(choice: Choice) -> tuple[Hypothesis, ...]:
+    """Rivals that the best model's first name does not lead by `LEAD`."""
+    return tuple(rival.hypothesis for rival in choice.rivals if rival.lead < LEAD)
 
 
 def fewest(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> Choice:

@@ -20,6 +20,7 @@ from experiments.diagnose.noise.spectrum import Line, lines_of
 
 from .deciding import Gap, certain, closes, gap_of, smallest, unscattered, values_of_all
 from .effect_texts import confirmation
+from .matters import undecided
 from .next_steps import after_unknown
 from .rivals import Predicted, Rival
 from .scatter_gap import ScatterGap, gap_with_scatter, weighed_residuals
@@ -195,7 +196,9 @@ def finish(
 ) -> Diagnosis:  # fmt: skip
     """The diagnosis that a choice makes. `alone`: the base model's fit with rows weighted as it has them itself, where
     they are weighted otherwise now. `last`, `held`: the gate on the best model, and on trials held out. `sure`: effects
-    that are certain beside something unknown."""
+    that are certain beside something unknown. A name that does not lead its rivals by enough is one of several."""
+    if choice is not None and verdict == "named" and (rivals := undecided(choice)):
+        choice, verdict = replace(choice, alternatives=rivals), "ambiguous"
     base, held_out = settled(base), known.held_out
     best, plain = choice.best.fit if choice is not None else base, base
     if alone is not None:

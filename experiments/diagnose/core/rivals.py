@@ -8,7 +8,10 @@ its square is the evidence that can be expected [nats], less where the misfit of
 In the cross-validation every condition (torque and gravity of a tumble; kind, speed and diameter of a penetration) is
 left out in turn, the model refitted to the others, and the trials left out are predicted with nothing but their own
 nuisances refitted within their priors; a base parameter of which the others say nothing (K of a diameter) stays as all
-trials have it. What a prediction leaves is scored as a fit is (`evidence.tempered`): the form is never nature's.
+trials have it. What a prediction leaves is scored as a fit is (`evidence.tempered`): the form is never nature's. Where
+motions are smooth in the parameters (pushes and drops), what was learned counts with its standard errors, as in any
+predictive likelihood (Gelman et al., Bayesian Data Analysis, 3rd ed., section 7.2, to first order in the errors): a
+drop that is sensitive to a number that the others determine badly tells nothing against a model.
 """
 
 import math
@@ -18,18 +21,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.diagnose.fit.evidence import Hypothesis, held_out_fit, inflation, slow_count, tempered
-from experiments.diagnose.fit.fitting import Fit, fit
+from experiments.diagnose.fit.fitting import Fit, Linear, fit
 from experiments.diagnose.fit.gate import column_basis
-from experiments.diagnose.fit.problem import Array, TrialInfo, Values
+from experiments.diagnose.fit.problem import Array, Model, TrialInfo, Values
 from experiments.diagnose.noise.replicates import groups_of
 
-__all__ = ["CLOSE", "Predicted", "Rival", "compare", "folds_of", "predict"]
+__all__ = ["CLOSE", "LEAD", "Predicted", "Rival", "compare", "folds_of", "predict"]
 
 CLOSE = 4.0  # nats within which two effects cannot be separated
+LEAD = 10.0  # nats by which a name must lead every rival
 _SMALL_ANGLE = 25.0  # degrees below which two signatures count as one: forms of the same effect differ by as much
 _SURE = 2.0  # nats of evidence and prediction together below which effects whose signatures differ are both named
 _MOST_FOLDS = 4
 _ROUNDS = 4
+_WEAKEST = 1e-3  # of what all trials say of a number, what the others are taken to say at least
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,11 @@ class Rival:
         """Evidence and prediction together [nats]."""
         return self.behind + (self.behind_left_out or 0.0)
 
+    @property
+    def lead(self) -> float:
+        """Nats by which the best leads this one, by the evidence or by prediction: both say much the same twice."""
+        return max(self.behind, self.behind_left_out or 0.0)
+
 
 def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Rival:
     """`other`, which has `effect` in the place of the best's first one, against `best`; `rest` has neither."""
@@ -128,7 +138,7 @@ def predict(found: Fit, folds: Sequence[tuple[str, ...]]) -> Predicted | None:
     if not folds:
         return None
     model, base = found.model, {p.name for p in found.model.problem.base}
-    chi_square, count, fits = 0.0, 0, []
+    chi_square, wide, count, fits = 0.0, 0.0, 0, []
     for fold in folds:
         learned = fit(model.on([id for id in model.trials if id not in fold]), found.values, rounds=_ROUNDS)
         # Base parameters of which the other trials say nothing (K of a diameter that is left out) stay.
@@ -136,7 +146,30 @@ def predict(found: Fit, folds: Sequence[tuple[str, ...]]) -> Predicted | None:
         silent = {p.name: found.values[p.name] for p, slope in slopes if p.name in base and not slope.any()}
         values = held_out_fit(model, fold, {**found.values, **learned.values, **silent})
         fits.append(learned.values)
-        (modes,) = model.on(fold).evaluate([values])
-        chi_square += float(modes @ modes)
-        count += len(modes)
-    return Predicted(chi_square, count, tempered(chi_square - count, slow_count(found)), tuple(fits))
+        if model.problem.contacts is None:
+            left, spread, samples = _left_of(model.on(fold), values, learned, found, set(silent))
+        else:
+            (modes,) = model.on(fold).evaluate([values])
+            left, spread, samples = float(modes @ modes), 0.0, len(modes)
+        chi_square, wide, count = chi_square + left, wide + spread, count + samples
+    return Predicted(chi_square, count, tempered(chi_square - count, slow_count(found)) - wide, tuple(fits))
+
+
+def _left_of(part: Model, values: Values, learned: Fit, found: Fit, silent: set[str]) -> tuple[float, float, int]:
+    """What a prediction of the trials of `part` leaves, the errors of what was `learned` counted as noise; half the
+    log of the factor by which these errors widen it; number of samples. `silent`: what the others say nothing of."""
+    there = Linear.of(part, values)
+    full = {p.name: row for p, row in zip(found.model.parameters, np.diag(found.hessian()), strict=True)}
+    names = [p.name for p in learned.model.parameters]
+    weak = np.array([_WEAKEST * full[name] for name in names])
+    covariance = np.linalg.inv(learned.hessian() + np.diag(np.maximum(weak, 1e-300))) * inflation(learned) ** 2
+    shared = [
+        (k, names.index(p.name)) for k, p in enumerate(there.parameters)
+        if p.trial is None and p.name in names and p.name not in silent and learned.free[names.index(p.name)]
+    ]  # fmt: skip
+    mine, own = [k for k, _ in shared], [k for _, k in shared]
+    errors = there.jacobian[:, mine] @ np.linalg.cholesky(covariance[np.ix_(own, own)])
+    inner = np.eye(len(own)) + errors.T @ errors
+    along = errors.T @ there.modes
+    left = float(there.modes @ there.modes - along @ np.linalg.solve(inner, along))
+    return left, 0.5 * float(np.linalg.slogdet(inner)[1]), len(there.modes)

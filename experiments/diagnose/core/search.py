@@ -13,7 +13,7 @@ from experiments.diagnose.fit.problem import Finding
 
 from .candidate_fits import FOLLOWED, WORTH, CandidateFits
 from .pairs import next_starts, pair_starts
-from .rivals import CLOSE, Predicted, Rival, compare, folds_of, predict
+from .rivals import CLOSE, LEAD, Predicted, Rival, compare, folds_of, predict
 
 __all__ = ["Choice", "Search"]
 
@@ -236,7 +236,7 @@ class Search(CandidateFits):
             return None, tuple(rivals)
         compared = []
         for rival in rivals:
-            theirs = predict(rival.hypothesis.fit, folds) if rival.close else None
+            theirs = predict(rival.hypothesis.fit, folds) if rival.behind < LEAD else None
             behind = None if theirs is None else mine.score - theirs.score
             compared.append(replace(rival, predicted=theirs, behind_left_out=behind))
         return mine, tuple(compared)

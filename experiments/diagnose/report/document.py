@@ -92,7 +92,8 @@ def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
     for rival in found.equivalence:
         form = next(f for f in rival.hypothesis.forms if f.effect == rival.effect)
         rows.append({
-            "effect": rival.effect, "told_apart": not rival.same, "evidence_behind": rival.behind,
+            "effect": rival.effect, "told_apart": not rival.same and rival.effect not in found.alternatives,
+            "evidence_behind": rival.behind,
             "left_out_behind": rival.behind_left_out,
             "left_out": None if rival.predicted is None else rival.predicted.per_sample,
             "angle_deg": rival.angle, "distance": rival.distance, "expected": rival.expected,
