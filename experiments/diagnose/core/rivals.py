@@ -162,7 +162,7 @@ def _left_of(part: Model, values: Values, learned: Fit, found: Fit, silent: set[
     full = {p.name: row for p, row in zip(found.model.parameters, np.diag(found.hessian()), strict=True)}
     names = [p.name for p in learned.model.parameters]
     weak = np.array([_WEAKEST * full[name] for name in names])
-    covariance = np.linalg.inv(learned.hessian() + np.diag(np.maximum(weak, 1e-300))) * inflation(learned) ** 2
+    covariance = np.linalg.inv(learned.hessian() + np.diag(np.maximum(weak, 1e-300)))
     shared = [
         (k, names.index(p.name)) for k, p in enumerate(there.parameters)
         if p.trial is None and p.name in names and p.name not in silent and learned.free[names.index(p.name)]
