@@ -1,17 +1,19 @@
 """What a campaign can tell apart: signatures, conditions left out, two effects at once, nulls that are kept."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose.core.diagnosis import diagnose
+from experiments.diagnose.core.matters import undecided
 from experiments.diagnose.core.rivals import CLOSE, compare, folds_of, predict
-from experiments.diagnose.core.search import Search
+from experiments.diagnose.core.search import Choice, Search
 from experiments.diagnose.fit import gate
-from experiments.diagnose.fit.evidence import Hypothesis, excess, score
-from experiments.diagnose.fit.fitting import Model, Whitener, fit
+from experiments.diagnose.fit.evidence import Hypothesis, excess, score, slow_count, tempered
+from experiments.diagnose.fit.fitting import Linear, Model, Whitener, fit
 from experiments.diagnose.fit.gate import open_gate
 from experiments.diagnose.fit.problem import TrialInfo
 from experiments.diagnose.push.problem import make_problem
@@ -56,6 +58,34 @@ def test_what_holds_at_other_speeds_too_predicts_a_speed_left_out():
     assert right.count == wrong.count == friction.fit.count
     assert abs(right.per_sample - 1) < 6 * math.sqrt(2 / right.count)
     assert wrong.per_sample > 2 and right.score > wrong.score + 10
+
+
+def test_a_prediction_counts_the_errors_of_what_was_learned_as_noise():
+    # r is normal with covariance I + J S J^T, S the covariance of what the other trials determine.
+    _, friction, _ = fitted((0.01, 0.03, 0.1))
+    model, fold = friction.fit.model, ("2",)
+    learned = fit(model.on(("0", "1")), friction.fit.values, rounds=4)
+    there = Linear.of(model.on(fold), {**friction.fit.values, **learned.values})
+    names = [p.name for p in learned.model.parameters]
+    slopes = there.jacobian[:, [[p.name for p in there.parameters].index(name) for name in names]]
+    spread = np.eye(len(there.modes)) + slopes @ np.linalg.inv(learned.hessian()) @ slopes.T
+    found = predict(friction.fit, [fold])
+    assert found.chi_square == pytest.approx(there.modes @ np.linalg.solve(spread, there.modes), rel=2e-3)
+    assert found.chi_square < there.modes @ there.modes
+    wide = 0.5 * np.linalg.slogdet(spread)[1]
+    assert wide > 0.1
+    assert found.score == pytest.approx(
+        tempered(found.chi_square - found.count, slow_count(friction.fit)) - wide, abs=0.05
+    )
+
+
+def test_a_name_that_does_not_lead_by_ten_nats_is_one_of_several():
+    base, friction, drag = fitted((0.01, 0.1))
+    choice = Choice(Hypothesis.of(base), friction, (), (), open_gate(base)[1])
+    rival = compare("inertial-drag", friction, drag, base)
+    for behind, left_out, sure in ((6.0, None, False), (6.0, 9.0, False), (12.0, None, True), (6.0, 11.0, True)):
+        near = replace(choice, rivals=(replace(rival, behind=behind, behind_left_out=left_out),))
+        assert (undecided(near) == ()) == sure
 
 
 def test_each_condition_is_left_out_once_and_replicates_together():
