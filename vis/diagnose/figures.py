@@ -262,8 +262,8 @@ def draw_evidence(diagnosis: Result) -> Figure | None:
     return drawing
 
 
-_KINDS = {"named": BED, "certain": BED, "likeliest, not certain": "#7fb8d9", "cannot be distinguished from it": MODEL,
-          "other": "#b5b5b5"}  # fmt: skip
+_KINDS = {"named": BED, "with confidence": BED, "most likely, without confidence": "#7fb8d9",
+          "cannot be distinguished from it": MODEL, "other": "#b5b5b5"}  # fmt: skip
 """What a candidate is -> its colour."""
 
 
@@ -315,8 +315,8 @@ def _kind(name: tuple[str, ...], leading: tuple[str, ...], diagnosis: Result) ->
     if diagnosis["verdict"] == "unknown":
         certain = {effect["id"] for effect in diagnosis["effects"]}
         if certain and set(name) == certain:
-            return "certain"
-        return "likeliest, not certain" if name == leading else "other"
+            return "with confidence"
+        return "most likely, without confidence" if name == leading else "other"
     if name == leading:
         return "named"
     swapped = [(other, *leading[1:]) for other in diagnosis["alternatives"]]

@@ -74,7 +74,10 @@ def _labels(diagnosis: Result) -> tuple[str, str]:
     if diagnosis["verdict"] == "none" or diagnosis["gap"]["after"] == diagnosis["gap"]["before"]:
         return before, ""
     likeliest = " + ".join(diagnosis.get("leading", {}).get("effects", []))
-    return before, f"with {names}" if names else f"with {likeliest}, not certain" if likeliest else "best model found"
+    return (
+        before,
+        f"with {names}" if names else f"with {likeliest}, without confidence" if likeliest else "best model found",
+    )
 
 
 # Its parts ------------------------------------------------------------------------------------------------------------
@@ -111,7 +114,7 @@ def _gap_table(diagnosis: Result) -> Block:
         head += ("base model, replicates' scatter added", "best model, replicates' scatter added")
         title += say("with_scatter")
         freedom = weighed.get("freedom")
-        title += f"; their scatter rests on {freedom} degrees of freedom)" if freedom else ")"
+        title += f"; their scatter has {freedom} degrees of freedom)" if freedom else ")"
     return table(head, rows, title=title)
 
 
@@ -220,7 +223,7 @@ def _evidence(diagnosis: Result) -> list[Block]:
     if better:
         head = ("candidate (effect:form)", "evidence over the base model [nats]", "chi-square a sample beyond noise",
                 "of the gap closed", "forms tried", "what became of it")  # fmt: skip
-        title = "A line a set of names, in its best form; the likeliest first"
+        title = "One line for each set of names, in its best form; the most likely first"
         blocks.append(table(head, better, title=title, words=True))
     if worse:
         blocks.append(text(f"No better than the base model with its parameters fitted: {', '.join(worse)}."))

@@ -52,14 +52,14 @@ def find_lone_scatter(found: Fit, kinds: Sequence[str]) -> tuple[Scatter, list[F
         farthest, spread = _without_farthest([[own[id] for id in ids] for ids in same])
         if spread < _WITHOUT:
             odd = next(id for id, value in own.items() if value == farthest)
-            what = f"{kind} is another in trial {odd} than in all others, which agree: it is no scatter of beds"
+            what = f"{kind} differs in trial {odd} from all others, which agree: this is no scatter of beds"
             findings.append(Finding(trial=odd, what=what))
         for name, numbers in settings.items():
             groups = (same,) if name == "kind" else (alike, same)
             explained = max(_explained(own, numbers, compared) for compared in groups) > _EXPLAINED
             if explained or _chance(own, numbers, groups[0]) < _CHANCE:
                 what = (
-                    f"{kind} differs from trial to trial, but not at random: it goes with {_words(name)}, so that it "
+                    f"{kind} differs from trial to trial, but not at random: it correlates with {_words(name)}, so it "
                     f"is no scatter of beds"
                 )
                 findings.append(Finding(trial="", what=what))
@@ -70,10 +70,10 @@ def lone_finding(scatter: Scatter) -> Finding:
     """The finding of such a scatter."""
     sizes = [f"{kind} by {size_words(kind, std)}" for kind, std in scatter.model_std.items()]
     zeros = all(kind.endswith("zero") for kind in scatter.model_std)
-    own = "a zero that is set anew" if zeros else "what a bed has of its own"
+    own = "a zero that is set again" if zeros else "a difference of beds"
     what = (
-        f"trials differ beyond the sensors ({', '.join(sizes)}, standard deviation), although none repeats another: "
-        f"with that each is explained from end to end, and it goes with neither speed nor order, as {own} does; "
+        f"trials differ beyond the sensors ({', '.join(sizes)}, standard deviation), and there are no replicates: "
+        f"this explains each trial whole, and correlates with neither speed nor order, like {own}; "
         f"replicates would show it without a model"
     )
     return Finding(trial="", what=what)

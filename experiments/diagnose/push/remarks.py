@@ -33,10 +33,10 @@ def remarks(pushes: Sequence[Push], added: Sequence[str]) -> list[str]:
     if not unsure:
         return sentences
     sentences.append(
-        "C cannot be told from these pushes: fitted to each alone beside a straight spring it is "
+        "C cannot be determined from these pushes: fitted to each alone with a straight spring it is "
         + _range([c for _, c, _ in straight])
-        + (f", and beside {' and '.join(added)} {_range([c for _, c, _ in bent])}" if bent else "")
-        + ". A drop, or the same push at a tenth and at ten times the speed, would tell."
+        + (f", and with {' and '.join(added)} {_range([c for _, c, _ in bent])}" if bent else "")
+        + ". A drop, or the same push at a tenth and at ten times the speed, would show it."
     )
     return sentences
 
@@ -54,7 +54,7 @@ def _stiffness(pushes: Sequence[Push]) -> list[str]:
     if len(by_size) > 2:
         sizes = np.log(sorted(by_size))
         means = np.log([max(float(np.mean(by_size[size])), 1e-300) for size in sorted(by_size)])
-        sentences.append(f"It goes with the diameter to the power {np.polyfit(sizes, means, 1)[0]:.2f}.")
+        sentences.append(f"It is proportional to the diameter to the power {np.polyfit(sizes, means, 1)[0]:.2f}.")
     return sentences
 
 

@@ -41,7 +41,7 @@ def where_sentences(diagnosis: Row) -> list[str]:
     first = say("fails_most", phase=shares_words(places, "phase"), channel=shares_words(places, "channel"),
                 first=places[0])  # fmt: skip
     settings = _settings(diagnosis)
-    return [first, *([f"Sample for sample most of it is at {settings}."] if settings else []), *_parted(diagnosis)]
+    return [first, *([f"Per sample, most of it is at {settings}."] if settings else []), *_parted(diagnosis)]
 
 
 def sure_sentences(diagnosis: Row) -> list[str]:
@@ -51,18 +51,18 @@ def sure_sentences(diagnosis: Row) -> list[str]:
     names = [effect["id"] for effect in diagnosis["effects"]]
     sentences = [words for name in names if (words := meaning(name))]
     best = next((row for row in diagnosis["evidence"] if set(row["effects"]) == set(names)), None)
-    parts = [] if best is None else [f"{' + '.join(names)} is {best['score']:.0f} nats likelier than the base model"]
+    parts = [] if best is None else [f"{' + '.join(names)} is {best['score']:.0f} nats more likely than the base model"]
     before, after = (diagnosis["gap"][stage]["held_out"] for stage in ("before", "after"))
     if before is not None:
-        parts.append(f"on the trials that took no part it takes the gap from {numeral(before)} to {numeral(after)} "
+        parts.append(f"on held-out trials it changes the gap from {numeral(before)} to {numeral(after)} "
                      "(1 is noise)")  # fmt: skip
-    sure = f"How sure: {'; '.join(parts)}" if parts else ""
+    sure = f"Confidence: {'; '.join(parts)}" if parts else ""
     if rivals := diagnosis["equivalence"][1:]:
         near = min(rivals, key=lambda row: row["evidence_behind"])
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         if sure:
             sure += f"; the nearest other name, {near['effect']}, is {near['evidence_behind']:.0f} nats behind, "
-        sure += f"{near['angle_deg']:.0f} degrees away in what it changes (0: the same): {apart}"
+        sure += f"and its change of the data is {near['angle_deg']:.0f} degrees away (0: the same): {apart}"
     return [*sentences, *size_sentences(diagnosis), *remark_sentences(diagnosis), *([f"{sure}."] if sure else []),
             *unnamed_sentence(diagnosis)]  # fmt: skip
 
@@ -321,7 +321,7 @@ def unnamed_sentence(diagnosis: Row) -> list[str]:
     if own is None or not ahead:
         return []
     row = ahead[0]
-    what = "is not told" if diagnosis["effects"] else "does not lead"
+    what = "is not named" if diagnosis["effects"] else "does not lead"
     names, ours = (" + ".join(one["effects"]) for one in (row, own))
     return [say("most_evidence", names=names, more=row["score"] - own["score"], own=ours, what=what, row=row)]
 
@@ -352,7 +352,7 @@ def _written(row: Row, alone: Mapping[str, float], named: Sequence[str]) -> str:
 def _note(diagnosis: Row, names: frozenset[str], best: Mapping[frozenset[str], Row], named: frozenset[str]) -> str:
     """How a candidate relates to the one that is named; of one that is likelier, why it is not named."""
     if names == named:
-        return {"named": "told", "ambiguous": "told, or another"}.get(diagnosis["verdict"], "leads")
+        return {"named": "named", "ambiguous": "named, or another"}.get(diagnosis["verdict"], "leads")
     if not named or named not in best:
         return ""
     rest = _named(diagnosis)[1:]
@@ -368,12 +368,12 @@ def _note(diagnosis: Row, names: frozenset[str], best: Mapping[frozenset[str], R
             return f"is not needed: {together} leaves no more than noise"
         left, whole = own.get("left") or 0.0, diagnosis.get("evidence_base", {}).get("left") or 0.0
         if left <= 0:
-            return f"takes up noise: what {together} leaves is no more"
+            return f"fits noise: {together} leaves no more than that"
         what = "a further name" if names > named else f"{len(names)} names in the place of {together}"
         share = f"{100 * (left - row['left']) / left:.0f} % of what {together} leaves"
         of_base = f", {100 * (left - row['left']) / whole:.2g} % of what the base model leaves" if whole > 0 else ""
-        return f"gains {more:.1f} nats, {share}{of_base}: less than {what} must"
+        return f"gains {more:.1f} nats, {share}{of_base}: less than {what} must gain"
     other = next((r for r in diagnosis.get("equivalence", [])[1:] if r["effect"] in names - named), None)
     if other is not None and (other.get("left_out_behind") or 0.0) > 0:
-        return f"predicts conditions that were left out worse, by {other['left_out_behind']:.0f} nats"
-    return "does not stand when noise and names are looked at together"
+        return f"predicts left-out conditions worse, by {other['left_out_behind']:.0f} nats"
+    return "is not confirmed when noise and names are fitted together"

@@ -45,7 +45,7 @@ def _only_stated_wrong(diagnosis: Mapping[str, Any]) -> str:
 def title_words(diagnosis: Mapping[str, Any]) -> str:
     """The verdict in one line."""
     if wrong := _only_stated_wrong(diagnosis):
-        return f"Unknown: {wrong} is not what campaign.toml says; with another number the model explains the trials"
+        return f"Unknown: {wrong} is not what campaign.toml states; with another value the model explains the trials"
     small = small_names(diagnosis)
     names = " and ".join([effect["id"] for effect in diagnosis["effects"] if effect["id"] not in small]
                          + [f"{name} (small: {size})" for name, size in small.items()])  # fmt: skip
@@ -54,9 +54,9 @@ def title_words(diagnosis: Mapping[str, Any]) -> str:
     if diagnosis["verdict"] == "named":
         return f"Missing: {names}"
     if diagnosis["verdict"] == "ambiguous":
-        return f"Missing: {names}, or {' or '.join(diagnosis['alternatives'])}: these trials cannot tell"
+        return f"Missing: {names}, or {' or '.join(diagnosis['alternatives'])}: these trials cannot distinguish them"
     if names:
-        return f"Unknown: {names} for certain, and something beside it that no effect of the library explains"
+        return f"Unknown: {names} with confidence, and something else that no effect of the library explains"
     likeliest = _likeliest(diagnosis)
     also = f"; the most likely is {likeliest}, not with confidence" if likeliest else ""
     return f"Unknown: something is missing that no effect of the library explains{also}"
@@ -67,10 +67,8 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     ask = diagnosis["next_experiment"]
     if diagnosis["verdict"] == "none":
         gap = diagnosis["gap"]["after"]
-        out = "" if gap["held_out"] is None else f" and {numeral(gap['held_out'])} of those held out"
-        first = [
-            f"The base model leaves {numeral(gap['fit'])} a sample of the trials that were fitted{out} (1 is noise)."
-        ]
+        out = "" if gap["held_out"] is None else f" and {numeral(gap['held_out'])} on held-out trials"
+        first = [f"The gap of the base model is {numeral(gap['fit'])} on fitted trials{out} (1 is noise)."]
     elif wrong := _only_stated_wrong(diagnosis):
         off = [f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in _strained(diagnosis, "before")]
         first, ask = [say("stated_wrong", said_so="; ".join(off), wrong=wrong)], say("check_units", wrong=wrong)
@@ -101,7 +99,7 @@ def _doubts(diagnosis: Mapping[str, Any]) -> list[str]:
     if not found or (diagnosis["verdict"] == "none" and diagnosis["gap"]["after"]["fit"] <= SMALL):
         return []
     more = f" (and {len(found) - 1} more, see the warnings)" if len(found) > 1 else ""
-    return [f"To be put right first, for it may be all that is behind this: {found[0]}{more}."]
+    return [f"Correct this first, because it may be the whole cause: {found[0]}{more}."]
 
 
 def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -117,7 +115,7 @@ def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
         "weighed_none" if diagnosis["verdict"] == "none" else "weighed_both",
         scatter=f" ({', '.join(kinds)})" if kinds else "", before=_both(weighed["before"], {}),
         after=_both(weighed["after"], weighed.get("after_std", {})),
-        rests_on=f"; what replicates differ by rests on {freedom} degree{s} of freedom" if freedom else "",
+        rests_on=f"; the scatter has {freedom} degree{s} of freedom" if freedom else "",
     )]  # fmt: skip
 
 
@@ -151,16 +149,16 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
         if not rows:
             return ["No effect of the library could be tried."]
         listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_SHOWN])
-        return [f"No effect of the library explains it: of what the base model leaves beyond the noise, {listed}."]
+        return [f"No effect of the library explains the misfit. Of the misfit beyond the noise, {listed}."]
     certain = leading["certain"]
     others = [name for name in leading["effects"] if name not in certain]
     sentences = [words for name in leading["effects"] if (words := meaning(name))]
-    sure = f"Certain: {' and '.join(certain)}" if certain else ""
-    maybe = f"{'likeliest' if certain else 'Likeliest'}, but not certain: {' and '.join(others)}" if others else ""
+    sure = f"With confidence: {' and '.join(certain)}" if certain else ""
+    maybe = f"{'most' if certain else 'Most'} likely, but without confidence: {' and '.join(others)}" if others else ""
     row = next((r for r in diagnosis["evidence"] if sorted(r["effects"]) == sorted(leading["effects"])), None)
-    nats = "" if row is None else f" ({row['score']:.0f} nats over the base model{_weighed(diagnosis)})"
+    nats = "" if row is None else f" ({row['score']:.0f} nats above the base model{_weighed(diagnosis)})"
     parts = "; ".join(part for part in (sure, maybe) if part)
-    first = f"{parts}{nats}: it takes the gap {_closes(diagnosis['gap'])}"
+    first = f"{parts}{nats}: it changes the gap {_closes(diagnosis['gap'])}"
     near = leading["nearest"]
     if near is not None:
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
@@ -170,7 +168,7 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
     sentences += unnamed_sentence(diagnosis)
     rest = [row for row in _singles(diagnosis) if row["effects"][0] not in leading["effects"]][: _SHOWN - 1]
     if rest and not certain:
-        sentences.append(f"Of what the base model leaves beyond the noise{_weighed(diagnosis)}, {_closing(rest)}.")
+        sentences.append(f"Of the misfit of the base model beyond the noise{_weighed(diagnosis)}, {_closing(rest)}.")
     return [*sentences, *_why_unknown(diagnosis)]
 
 
@@ -182,8 +180,8 @@ def _numbers(leading: Mapping[str, Any]) -> list[str]:
             error = f" +- {told['std']:.2g}" if told["std"] > 0 else ""
             lost = told["std"] > _LOST * abs(told["value"]) > 0  # nothing that was seen changes with it there
             value = f"{effect} {name} {told['value']:.4g}{'' if lost else error} {told['unit']}".removesuffix(" 1")
-            parts.append(f"{value} (no standard error: a little more or less of it changes nothing)" if lost else value)
-    return [f"Its numbers, should it be that: {', '.join(parts)}."] if parts else []
+            parts.append(f"{value} (no standard error: small changes of it have no effect)" if lost else value)
+    return [f"Its parameters, if it is the cause: {', '.join(parts)}."] if parts else []
 
 
 def _why_unknown(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -191,11 +189,11 @@ def _why_unknown(diagnosis: Mapping[str, Any]) -> list[str]:
     gate = diagnosis["gate"]
     failed = [
         f"{numeral(score['score'])} on {which} (a right model: {score['threshold']:.3g} at most)"
-        for which, score in (("the fitted trials", gate["after"]), ("those held out", gate.get("held_out")))
+        for which, score in (("the fitted trials", gate["after"]), ("the held-out trials", gate.get("held_out")))
         if score is not None and not score["passed"]
     ]
-    reasons = [f"the gate stands at {' and at '.join(failed)}"] if failed else []
-    reasons += [f"it needs {bound['parameter']} {bound['sigmas']:+.1f} sigma off what was stated"
+    reasons = [f"the gate is {' and '.join(failed)}"] if failed else []
+    reasons += [f"it needs {bound['parameter']} {bound['sigmas']:+.1f} sigma off the stated value"
                 for bound in _strained(diagnosis, "after")]  # fmt: skip
     return [f"It is not the whole answer: {'; '.join(reasons)}."] if reasons else []
 
@@ -203,7 +201,7 @@ def _why_unknown(diagnosis: Mapping[str, Any]) -> list[str]:
 def _weighed(diagnosis: Mapping[str, Any]) -> str:
     """A clause where candidates were compared against more than the sensors' noise."""
     with_scatter = diagnosis.get("evidence_base", {}).get("with_scatter")
-    return ", weighed against what replicates differ by" if with_scatter else ""
+    return ", with the scatter of replicates as noise" if with_scatter else ""
 
 
 def _singles(diagnosis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -216,9 +214,9 @@ def _singles(diagnosis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _closing(rows: Sequence[Mapping[str, Any]]) -> str:
-    """layering would take away 40 %, adhesion 3 %"""
+    """layering would remove 40 %, adhesion 3 %"""
     first, *others = [(row["effects"][0], _share(row.get("closes"))) for row in rows]
-    return f"{first[0]} would take away {first[1]}" + "".join(f", {name} {share}" for name, share in others)
+    return f"{first[0]} would remove {first[1]}" + "".join(f", {name} {share}" for name, share in others)
 
 
 def _share(share: float | None) -> str:
@@ -230,11 +228,13 @@ def _share(share: float | None) -> str:
 def _closes(gap: Mapping[str, Any]) -> str:
     """From what to what, and which share of what is beyond the noise that is, fitted and held out."""
     parts = []
-    for key, words in (("fit", "on the trials that were fitted"), ("held_out", "on those held out")):
+    for key, words in (("fit", "on fitted trials"), ("held_out", "on held-out trials")):
         before, after = gap["before"][key], gap["after"][key]
         if before is None or after is None:
             continue
-        share = f", {_share(1 - max(after - 1, 0.0) / (before - 1))} of what is beyond the noise" if before > 1 else ""
+        share = (
+            f", {_share(1 - max(after - 1, 0.0) / (before - 1))} of the misfit beyond the noise" if before > 1 else ""
+        )
         parts.append(f"from {numeral(before)} to {numeral(after)} {words}{share}")
     return " and ".join(parts)
 
@@ -243,7 +243,7 @@ def _left(diagnosis: Mapping[str, Any]) -> list[str]:
     """Where the best model still fails, and what the missing force correlates with."""
     sentences = []
     if places := diagnosis.get("left", []):
-        beyond = ", beyond what replicates differ by," if "gap_with_scatter" in diagnosis else ""
+        beyond = ", beyond the scatter of replicates," if "gap_with_scatter" in diagnosis else ""
         phase, channel = (shares_words(places, key) for key in ("phase", "channel"))
         sentences.append(say("left", beyond=beyond, phase=phase, channel=channel, first=places[0]))
     if "latent" in diagnosis:

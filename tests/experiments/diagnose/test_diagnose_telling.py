@@ -123,7 +123,7 @@ def test_the_table_of_candidates_has_every_name_once_and_sets_that_beat_their_pa
     assert table["rows"][1][1] == "25.0" and "c)" in table["title"]
     golden("diagnose/telling_table_title", table["title"])
     rows = candidate_rows(said)
-    assert (rows[0]["effects"], rows[0]["tried"], rows[0]["note"]) == (["a", "b"], 2, "told")
+    assert (rows[0]["effects"], rows[0]["tried"], rows[0]["note"]) == (["a", "b"], 2, "named")
 
 
 def test_a_pair_with_more_evidence_than_what_is_told_is_not_passed_over_in_silence():
@@ -215,7 +215,7 @@ def test_the_first_lines_of_an_unknown_name_what_leads_how_far_it_goes_and_what_
     lines = summary_sentences(unknown())
     words = " ".join(lines)
     for said in ("plastic-sinkage (102 nats", "52 to 23", "57 %",  # (51 - 22) / 51
-                 "65 to 62", "5 %", "41 nats", "at 22", "rest (100 %)", "trial b", "0.4 to 0.9",
+                 "65 to 62", "5 %", "41 nats", "gate is 22", "rest (100 %)", "trial b", "0.4 to 0.9",
                  "Push once more."):  # fmt: skip
         assert said in words, said
     golden("diagnose/telling_unknown", {"title": title_words(unknown()), "summary": lines})
@@ -224,7 +224,7 @@ def test_the_first_lines_of_an_unknown_name_what_leads_how_far_it_goes_and_what_
 def test_where_nothing_is_certain_the_candidates_are_said_with_what_each_would_close():
     leading = {"effects": ["adhesion"], "certain": [], "nearest": None}
     likely = summary_sentences(unknown(effects=[], leading=leading))
-    assert "adhesion (61 nats" in " ".join(likely) and "away 90 %" in " ".join(likely)
+    assert "adhesion (61 nats" in " ".join(likely) and "remove 90 %" in " ".join(likely)
     nothing = unknown(effects=[], leading={"effects": [], "certain": [], "nearest": None})
     none = summary_sentences(nothing)
     assert "90 %, adhesion 50 %" in " ".join(none)
