@@ -27,13 +27,13 @@ def test_each_distribution_has_the_mean_asked_for():
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"distribution": "normal"}, "distribution = 'normal' needs deviation"),
+        ({"distribution": "normal"}, "distribution = 'normal' needs a deviation"),
         ({"distribution": "sieve"}, r"needs openings \[m\] and the share of the mass"),
-        ({"deviation": 0.2}, "deviation = 0.2 beside distribution = 'uniform': it is of 'normal' or 'log-normal'"),
-        (SIEVE | {"cut": 2.0}, "cut = 2.0 beside distribution = 'sieve'"),
+        ({"deviation": 0.2}, "deviation = 0.2 with distribution = 'uniform': it belongs to 'normal' or 'log-normal'"),
+        (SIEVE | {"cut": 2.0}, "cut = 2.0 with distribution = 'sieve'"),
         (SIEVE | {"passing": (0.0, 0.6, 0.2, 1.0)}, "passing = .* rise from 0 to 1"),
-        (SIEVE | {"coarse": 0.008, "footprints": (0.0, 0.02)}, "distribution = 'sieve' beside coarse = 0.008"),
-        ({"distribution": "normal", "deviation": 0.2, "spread": 0.1}, "spread = 0.1 beside distribution = 'normal'"),
+        (SIEVE | {"coarse": 0.008, "footprints": (0.0, 0.02)}, "distribution = 'sieve' with coarse = 0.008"),
+        ({"distribution": "normal", "deviation": 0.2, "spread": 0.1}, "spread = 0.1 with distribution = 'normal'"),
         ({"keep": "bond"}, "keep = 'bond': material 'sand' does not stick"),
     ],
 )
