@@ -13,20 +13,23 @@ from experiments.diagnose.fit.evidence import SMALL, held_out_fit, inflation
 from experiments.diagnose.fit.fitting import Fit, fit, settled
 from experiments.diagnose.fit.gate import Verdict
 from experiments.diagnose.fit.localise import Place, depends_on, latent_table, places
-from experiments.diagnose.fit.problem import Finding, Form, Problem
+from experiments.diagnose.fit.problem import Finding, Form, Planned, Problem
 from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
 from experiments.diagnose.noise.spectrum import Line, lines_of
+from vis.page.sentences import Sentences
 
 from .deciding import Gap, certain, closes, gap_of, smallest, unscattered, values_of_all
 from .effect_texts import confirmation
 from .matters import undecided
 from .next_steps import after_unknown
-from .rivals import Predicted, Rival
+from .rivals import LEAD, Predicted, Rival
 from .scatter_gap import ScatterGap, gap_with_scatter, weighed_residuals
 from .search import Choice
 
 __all__ = ["Diagnosis", "Known", "finish"]
+
+say = Sentences(__package__)
 
 
 @dataclass(frozen=True)
@@ -155,6 +158,13 @@ class Diagnosis(Known):
         return tuple(self.problem.remarks(self.best.values, self.forms))
 
     @cached_property
+    def planned(self) -> Planned | None:
+        """The further trial that would separate the first effect from the likeliest alternative best."""
+        if self.verdict != "ambiguous" or self.choice is None:
+            return None
+        return self.problem.planned(self.best, smallest(self.choice)[0].fit)
+
+    @cached_property
     def next_experiment(self) -> str:
         """The experiment that separates two effects, confirms one, or follows up what is unknown."""
         if self.verdict == "none" or self.choice is None:
@@ -162,7 +172,11 @@ class Diagnosis(Known):
         if self.verdict == "named":
             return confirmation(self.choice.best.effects[0])
         if self.verdict == "ambiguous":
-            return self.problem.next_experiment(self.forms[0], self.rivals[0], self.best.values)
+            told = self.problem.next_experiment(self.forms[0], self.rivals[0], self.best.values)
+            if (plan := self.planned) is None:
+                return told
+            times = math.ceil(LEAD / max(plan.nats, 1e-3))
+            return f"{say('planned', plan=plan, times=f', so {times} of them do' if 1 < times < 100 else '')} {told}"
         weighed = self.gap_with_scatter
         return after_unknown(
             self.problem, self.own_values, self.forms, self.left, self.dependence[1], beside=self.choice.best.effects,

@@ -138,6 +138,35 @@ class Contacts(Protocol):
         """The same for several models of the same trials at once, all of whose values are given."""
 
 
+class Estimate(Protocol):
+    """A fitted model, as a plan of further trials sees it (`fitting.Fit`)."""
+
+    @property
+    def model(self) -> Model:
+        """What was fitted."""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Its numbers."""
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which of them no bound holds, shape [p]."""
+
+    def covariance(self) -> Array:
+        """Of the numbers, in their units, shape [p, p]."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A trial that was not made, and what it would tell between two models."""
+
+    settings: Mapping[str, float]  # name with its unit -> value
+    what: str  # the trial in words
+    nats: float  # evidence to be expected
+    tried: int  # trials of the search
+
+
 class Problem(Protocol):
     """One campaign as the statistics see it."""
 
@@ -267,6 +296,10 @@ class Problem(Protocol):
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """One sentence: the trial or bench measurement that would distinguish the two."""
+
+    def planned(self, one: Estimate, other: Estimate) -> Planned | None:
+        """The further trial that would separate two fitted models best; None where none is searched."""
+        return None
 
 
 @dataclass(frozen=True)

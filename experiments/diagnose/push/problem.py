@@ -22,10 +22,22 @@ from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, Pen
 from experiments.diagnose.core.effect_texts import push_advice
 from experiments.diagnose.fit.forms import PENETRATION_HOOKS, OwnEffect, shapes_of
 from experiments.diagnose.fit.localise import acceleration
-from experiments.diagnose.fit.problem import Array, Finding, Form, Problem, Samples, TrialInfo, Values
+from experiments.diagnose.fit.problem import (
+    Array,
+    Estimate,
+    Finding,
+    Form,
+    Planned,
+    Problem,
+    Samples,
+    TrialInfo,
+    Values,
+)
 from experiments.diagnose.noise.jitter import Shaken
 
 from .data import Prepared, prepare, stds
+from .depth import SmoothDepth
+from .design import best_push
 from .doubt import off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
@@ -434,6 +446,26 @@ class PenetrationProblem(Problem):
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """See `Problem`."""
         return push_advice(first.effect, second.effect)
+
+    def planned(self, one: Estimate, other: Estimate) -> Planned | None:
+        """See `Problem`; None where no push was driven."""
+        driven = [trial for trial in self._trials.values() if trial.driven]
+        if not driven:
+            return None
+
+        def predict(
+            points: Sequence[tuple[Values, Sequence[Form]]], diameter: float, time: Array, z: Array, v: Array
+        ) -> Array:
+            none = np.zeros((len(time), 0))
+            like = next(trial for trial in driven if trial.diameter == diameter)
+            return self._run_each(points, [replace(like, time=time, smooth=SmoothDepth(z, v, none, none))])[0]
+
+        return best_push(
+            one, other, predict, diameters=sorted({trial.diameter for trial in driven}),
+            speeds=[max(float(speeds_of(trial)[1]), 1e-6) for trial in driven], std=stds(self.tables, True)[1],
+            depth=max(float(trial.path.depth.max()) for trial in driven),
+            rows=int(np.median([trial.has_other.sum() for trial in driven])),
+        )  # fmt: skip
 
 
 def _tip_depth(spike: Any, diameter: float) -> float:

@@ -79,6 +79,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
     diagnosis["model_std"] = dict(found.model_std)
     diagnosis["findings"] = [asdict(finding) for finding in found.findings]
     diagnosis["next_experiment"] = found.next_experiment
+    if (plan := found.planned) is not None:
+        diagnosis["planned"] = {**plan.settings, "expected_nats": plan.nats, "tried": plan.tried}
     return diagnosis
 
 

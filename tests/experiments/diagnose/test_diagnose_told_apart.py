@@ -79,6 +79,18 @@ def test_a_prediction_counts_the_errors_of_what_was_learned_as_noise():
     )
 
 
+def test_the_further_push_that_separates_two_effects_is_made_at_another_speed():
+    # f sign(v) and b v^2 are one number f at v_0 = 0.05 m/s. At v they differ by f ((v / v_0)^2 - 1) = 8 N on the way
+    # in. C is stated to 5 %, and C v_0 + f is known: an error c of C changes the predictions by c (v - v_0) and
+    # c v (1 - v / v_0). All rows of a push have these errors in common, so they bound what it tells.
+    base, friction, drag = fitted((0.05, 0.05))
+    plan = base.model.problem.planned(friction.fit, drag.fit)
+    assert plan.settings["speed_m_s"] == pytest.approx(0.15, rel=0.02)
+    errors = 0.05 * DAMPING * np.hypot(0.15 - 0.05, 0.15 * (1 - 0.15 / 0.05))
+    assert plan.nats == pytest.approx(0.5 * (8.0 / errors) ** 2, rel=0.2)
+    assert base.model.problem.planned(friction.fit, friction.fit).nats == 0.0
+
+
 def test_a_name_that_does_not_lead_by_ten_nats_is_one_of_several():
     base, friction, drag = fitted((0.01, 0.1))
     choice = Choice(Hypothesis.of(base), friction, (), (), open_gate(base)[1])
