@@ -29,6 +29,7 @@ _REPORTS = {
     "bed test plates": ("vis.bed.tests", "write_test_report"),
     "bed test cut": ("vis.bed.tests", "write_test_report"),
     "bed calibrate": ("vis.bed.calibrate", "write_calibration_report"),
+    "ground": ("vis.penetrate.groundmap", "write_ground_report"),
     "calibrate": ("vis.penetrate.lawfit", "write_lawfit_report"),
     "converge": ("vis.penetrate.converge", "write_converge_report"),
     "sweep": ("vis.sweep.report", "write_sweep_report"),

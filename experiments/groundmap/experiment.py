@@ -1,0 +1,84 @@
+"""`hedgebed ground`: K, C and sinkage of a spike from the map that ships, as a result and as a ground.toml."""
+
+from experiments.runs.folder import RunFolder
+from experiments.runs.progress import Progress
+from experiments.runs.result import Result, quantity
+from experiments.runs.whole_runs import computed_run
+from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
+
+from .maps import Answer, GroundMap, Number, read_map
+from .settings import GroundSettings, say
+
+__all__ = ["GROUND_FILE", "check", "ground_file", "resume", "run"]
+
+GROUND_FILE = "ground.toml"
+TO_90 = 1.645  # standard deviations of a 90 % interval
+DEPTH = 1.0  # to which the map holds [tip diameters]
+SPEED = 2.0  # to which it holds for 12 mm at 1 g, by the inertial number of the real grains [m/s]
+
+
+def _answer(settings: GroundSettings) -> tuple[GroundMap, Answer]:
+    found = read_map(settings.material)
+    return found, found.answer(
+        gravity=settings.gravity, diameter=settings.tip_diameter, grain=settings.grain, packing=settings.packing,
+        load=settings.load,
+    )  # fmt: skip
+
+
+def check(settings: GroundSettings) -> None:
+    """Raise ValueError for a material without a map and for numbers beyond it."""
+    _answer(settings)
+
+
+def ground_file(settings: GroundSettings, table: GroundMap, answer: Answer) -> GroundFile:
+    """The spring-damper of the answer."""
+    g, size = (settings.gravity / table.reference["gravity"], settings.tip_diameter / table.reference["diameter"])
+
+    def estimate(number: Number) -> Estimate:
+        low, high = (number.value + sign * TO_90 * number.std for sign in (-1, 1))
+        return Estimate(value=number.value, std=number.std, interval=(max(0.0, low), high))
+
+    depth = DEPTH * settings.tip_diameter
+    return GroundFile(
+        format=GROUND_FORMAT, law="spring-damper", material=table.name,
+        source=f"hedgebed ground: {table.source}", notes=(say("of_map", answer=answer),),
+        foot=Foot(tip="sphere", diameter=settings.tip_diameter),
+        parameters={"stiffness": estimate(answer.stiffness), "damping": estimate(answer.damping)},
+        range={
+            "load": (0.0, answer.stiffness.value * depth), "depth": (0.0, depth),
+            "speed": (0.0, SPEED * (g * size) ** 0.5), "gravity": (settings.gravity, settings.gravity),
+            "diameter": (settings.tip_diameter, settings.tip_diameter),
+        },
+    )  # fmt: skip
+
+
+def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) -> Result:
+    progress.stage("look up", total=1.0)
+    table, answer = _answer(settings)
+    ground_file(settings, table, answer).write(folder.path / GROUND_FILE)
+    progress.update(1.0)
+    k, c, sinkage = answer.stiffness, answer.damping, answer.sinkage
+    quantities = {
+        "stiffness": quantity(k.value, "N/m", say("of_stiffness"), std=k.std),
+        "damping": quantity(c.value, "N s/m", say("of_damping"), std=c.std),
+        "sinkage": quantity(sinkage.value, "m", say("of_sinkage", answer=answer), std=sinkage.std),
+        "load": quantity(answer.load, "N", "of the sinkage"),
+        "packing_fraction": quantity(answer.packing, "1", "of the bed"),
+        "grain_ratio": quantity(answer.ratio, "1", "mean grain over tip diameter"),
+    }
+    warnings = [say("of_real_grains")]
+    if answer.ratio < table.lines["stiffness"].finest:
+        warnings.append(say("extrapolated", answer=answer, finest=table.lines["stiffness"].finest))
+    if settings.packing is not None and settings.packing != table.packings[0]:
+        warnings.append(say("damping_of_packing"))
+    return Result.make(
+        "ground",
+        title=say("title", s=settings, mm=1e3 * settings.tip_diameter),
+        quantities=quantities,
+        map={"source": table.source, "reference": dict(table.reference), "ranges": dict(table.ranges)},
+        files={"ground": GROUND_FILE},
+        warnings=warnings,
+    )
+
+
+run, resume = computed_run("ground", GroundSettings, _compute, check=check)

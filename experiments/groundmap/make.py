@@ -1,0 +1,82 @@
+"""Makes maps.toml from kept results: `python -m experiments.groundmap.make` from the root of a checkout.
+
+Reads docs/results/converge-flagship (numbers over grain size) and docs/results/ground-map (packing, and two runs that
+check the scaling). docs/results/README.md has the commands of those runs.
+"""
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rigid.result import write_text
+
+from .maps import DATA, NAMES
+
+__all__ = ["made_map", "main"]
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+PACKED = ("sand-rained", "sand-0.575", "sand-0.60")
+RANGES = {
+    "gravity": (9.80665e-6, 9.80665), "tip_diameter": (0.001, 0.1), "grain": (0.0, 0.2),
+}  # fmt: skip
+"""In m/s2, m, and of the tip's diameter: what scaling covers; the grains of the coarsest bed are a fifth of the tip."""
+QUARTERS = (0.375, 0.625, 0.875)  # middles of the last three quarters of the drive's depth, of which forces are kept
+
+
+def _result(name: str) -> Any:
+    return json.loads((RESULTS / name / "result.json").read_text(encoding="utf-8"))
+
+
+def made_map() -> dict[str, Any]:
+    """The table of sand."""
+    flagship = _result("converge-flagship")
+    lines = {}
+    for name in NAMES:
+        found = flagship["convergence"][name]
+        ratios, values, chance = zip(*found["line"], strict=True)
+        lines[name] = {
+            "ratios": list(ratios), "values": list(values), "chance": list(chance), "grain": found["grain"],
+            "finest": min(size["x"] for size in found["sizes"]), "rest": found["rest"],
+        }  # fmt: skip
+    forces = [flagship["convergence"][f"force_{k}"]["value"] for k in (2, 3, 4)]
+    exponent = math.log(forces[-1] / forces[0]) / math.log(QUARTERS[-1] / QUARTERS[0])
+    packed = [_result(f"ground-map/{name}")["quantities"] for name in PACKED]
+    stiffness = [entry["stiffness"]["value"] for entry in packed]
+    errors = [entry["stiffness"]["std"] / math.sqrt(3) / entry["stiffness"]["value"] for entry in packed]
+    factors = [value / stiffness[0] for value in stiffness]
+    stds = [0.0, *(f * math.hypot(errors[0], error) for f, error in zip(factors[1:], errors[1:], strict=True))]
+    fractions = [entry["packing_fraction"]["value"] for entry in packed]
+    return {
+        "source": "docs/results/converge-flagship over grain size, docs/results/ground-map over packing",
+        "reference": {"diameter": 0.012, "gravity": 9.80665, "load": 0.219, "exponent": exponent},
+        "range": {**RANGES, "packing": (fractions[0], fractions[-1])},
+        "packing": {"fractions": fractions, "factors": factors, "stds": stds},
+        **lines,
+    }  # fmt: skip
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"[{', '.join(map(_written, value))}]"
+    return json.dumps(value) if isinstance(value, str) else f"{value:.6g}"
+
+
+def main() -> None:
+    """Write maps.toml."""
+    table = made_map()
+    lines = [
+        "# Made by `python -m experiments.groundmap.make` from kept results; half-widths are of 95 %.",
+        "",
+        "[sand]",
+    ]
+    lines += [f"source = {_written(table['source'])}"]
+    for name, part in table.items():
+        if isinstance(part, dict):
+            lines += ["", f"[sand.{name}]", *(f"{key} = {_written(value)}" for key, value in part.items())]
+    write_text(DATA, "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

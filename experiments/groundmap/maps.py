@@ -1,0 +1,160 @@
+"""The map of a material: numbers of one spike at one gravity in beds of several grain sizes, scaled to any other spike.
+
+Grains that are rigid and do not stick have no length but their own and no stress but their weight. Slow forces are then
+
+    F = rho g D^3 f(z / D, d / D, packing),
+
+with bulk density rho, tip diameter D, depth z, grain diameter d. K at a given z / D is in proportion to g D^2, C (of
+inertia) to sqrt(g) D^2.5, and the sinkage under the load w rho g D^3 to D. So the map needs runs over d / D and packing
+only; two runs check the scaling (docs/calibrate.md). Over d / D each number is a straight line, fitted by `hedgebed
+converge`; over packing its logarithm is.
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .settings import say
+
+__all__ = ["DATA", "Answer", "GroundMap", "Line", "Number", "map_names", "read_map"]
+
+DATA = Path(__file__).with_name("maps.toml")
+NAMES = ("stiffness", "damping", "sinkage")
+POWERS = {"stiffness": (1.0, 2.0), "damping": (0.5, 2.5), "sinkage": (0.0, 1.0)}
+"""Powers of gravity and of the tip's diameter of each number."""
+TO_STD = 1.96  # of a 95 % half-width
+SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Number:
+    """A value with its standard deviation, SI units."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """A number over d / D at the reference: values on a line with 95 % half-widths of three kinds."""
+
+    ratios: tuple[float, ...]  # d / D, rising
+    values: tuple[float, ...]
+    chance: tuple[float, ...]  # of the beds
+    grain: float  # of the line itself, at the first of ratios; falls to 0 at the finest bed
+    finest: float  # d / D of the finest bed
+    rest: float  # of what else was varied: speed, softness, depth and width of the bed
+
+    def at(self, ratio: float) -> Number:
+        """The number at d / D = ratio. Below the first of `ratios` the line goes on and its errors grow on."""
+        first, second = self.ratios[:2]
+        value, chance = (float(np.interp(ratio, self.ratios, each)) for each in (self.values, self.chance))
+        if ratio < first:
+            share = (ratio - first) / (second - first)
+            value = self.values[0] + share * (self.values[1] - self.values[0])
+            chance = self.chance[0] + share * (self.chance[1] - self.chance[0])
+        grain = self.grain * max(0.0, (self.finest - ratio) / (self.finest - first))
+        return Number(value, (chance + grain + self.rest) / TO_STD)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """K [N/m], C [N s/m] and sinkage [m] under `load` [N] of one spike."""
+
+    stiffness: Number
+    damping: Number
+    sinkage: Number
+    load: float
+    ratio: float  # d / D [1]
+    packing: float
+
+
+@dataclass(frozen=True)
+class GroundMap:
+    """A table of maps.toml."""
+
+    name: str
+    source: str
+    packings: tuple[float, ...]  # rising; the first is that of the reference
+    factors: tuple[float, ...]  # of K, at each of them
+    factor_stds: tuple[float, ...]
+    reference: Mapping[str, float]  # diameter [m], gravity [m/s2], load [N], exponent of force over depth
+    ranges: Mapping[str, tuple[float, float]]
+    lines: Mapping[str, Line]
+
+    def answer(
+        self, *, gravity: float, diameter: float, grain: float, packing: float | None, load: float | None
+    ) -> Answer:
+        """The numbers of a spike; SI units. Raises ValueError for what is beyond the map, naming the key."""
+        packing = self.packings[0] if packing is None else packing
+        ratio = grain / diameter
+        asked = {"gravity": gravity, "tip_diameter": diameter, "packing": packing, "grain": ratio}
+        for key, value in asked.items():
+            low, high = self.ranges[key]
+            if not low * (1 - SLACK) <= value <= high * (1 + SLACK):
+                raise ValueError(say(f"beyond_{key}", map=self, value=value, low=low, high=high, diameter=diameter,
+                                     least=low * diameter, most=high * diameter))  # fmt: skip
+        g, size = gravity / self.reference["gravity"], diameter / self.reference["diameter"]
+        scaled = {}
+        for name in NAMES:
+            power_g, power_d = POWERS[name]
+            found, scale = self.lines[name].at(ratio), g**power_g * size**power_d
+            scaled[name] = Number(scale * found.value, scale * found.std)
+        factor = self._factor(packing)
+        exponent = self.reference["exponent"]
+        own_load = self.reference["load"] * g * size**3
+        load = own_load if load is None else load
+        stiffness = _times(scaled["stiffness"], factor)
+        more = (load / own_load / factor.value) ** (1 / exponent)
+        at_load = Number(more, more * factor.std / factor.value / exponent)
+        sinkage = _times(scaled["sinkage"], at_load)
+        if sinkage.value > diameter:
+            raise ValueError(say("beyond_load", load=load, sinkage=1e3 * sinkage.value, diameter=1e3 * diameter))
+        return Answer(stiffness, scaled["damping"], sinkage, load, ratio, packing)
+
+    def _factor(self, packing: float) -> Number:
+        """K at this packing over that at the first: straight in its logarithm between the measured ones."""
+        value = math.exp(float(np.interp(packing, self.packings, np.log(self.factors))))
+        return Number(value, float(np.interp(packing, self.packings, self.factor_stds)))
+
+
+def _times(number: Number, factor: Number) -> Number:
+    """The product of two numbers that are independent."""
+    value = number.value * factor.value
+    return Number(value, math.hypot(number.std * factor.value, number.value * factor.std))
+
+
+def _line(table: Mapping[str, Any]) -> Line:
+    ratios, values, chance = (tuple(table[key]) for key in ("ratios", "values", "chance"))
+    return Line(ratios, values, chance, table["grain"], table["finest"], table["rest"])
+
+
+def _tables() -> Mapping[str, Any]:
+    found = tomllib.loads(DATA.read_text(encoding="utf-8"))
+    return {name: table for name, table in found.items() if isinstance(table, dict)}
+
+
+def map_names() -> list[str]:
+    """The materials that have a map."""
+    return list(_tables())
+
+
+def read_map(material: str) -> GroundMap:
+    """The map of a material. Raises ValueError for one that has none."""
+    tables = _tables()
+    if material not in tables:
+        why = say("no_map_of_jsc") if material.startswith(("jsc", "JSC")) else ""
+        raise ValueError(say("no_map", material=material, known=", ".join(tables), why=why))
+    table = tables[material]
+    lines = {name: _line(table[name]) for name in NAMES}
+    return GroundMap(
+        name=material, source=table["source"], packings=tuple(table["packing"]["fractions"]),
+        factors=tuple(table["packing"]["factors"]), factor_stds=tuple(table["packing"]["stds"]),
+        reference=table["reference"], ranges={key: (low, high) for key, (low, high) in table["range"].items()},
+        lines=lines,
+    )  # fmt: skip

@@ -1,0 +1,29 @@
+"""Settings of `hedgebed ground`."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from experiments.runs.strict import Positive, StrictSettings
+from rigid.platform.rig import STANDARD_GRAVITY
+from vis.page.sentences import Sentences
+
+__all__ = ["GroundSettings"]
+
+say = Sentences(__package__)
+
+
+class GroundSettings(StrictSettings):
+    """K, C and sinkage of a ball-tipped spike, from the map that ships: no grains are computed."""
+
+    material: str = Field("sand", description="Material of the map: sand.")
+    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
+    tip_diameter: Positive = Field(
+        0.012, description="Diameter of the tip [m].", json_schema_extra={"option_alias": "--spike-diameter"}
+    )
+    packing: Annotated[float, Field(gt=0, lt=1)] | None = None
+    """Packing fraction [1]; that of the rained bed of the map if not given."""
+    grain: Positive = Field(0.0002, description="Mean grain diameter of the soil [m].")
+    load: Positive | None = None
+    """Load under which the sinkage is stated [N]; if not given, 0.219 N for 12 mm at 1 g, and in proportion to gravity
+    and to the cube of the diameter."""

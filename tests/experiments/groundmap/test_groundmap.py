@@ -1,0 +1,103 @@
+"""`hedgebed ground`: the map gives back the runs it is made of, scales as dry grains do, refuses the rest."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from experiments.cli.main import BAD_INPUT, DONE, main
+from experiments.groundmap.make import made_map
+from experiments.groundmap.maps import TO_STD, read_map
+from rigid.ground_file import read_ground
+
+RESULTS = Path(__file__).parents[3] / "docs" / "results"
+POINT = {"gravity": 9.80665, "diameter": 0.012, "grain": 0.0002, "packing": None, "load": None}
+
+
+def kept(name):
+    return json.loads((RESULTS / name / "result.json").read_text(encoding="utf-8"))
+
+
+def test_the_map_that_ships_is_the_one_of_the_kept_results():
+    """maps.toml has six digits of what `make` computes from docs/results."""
+    made, shipped = made_map(), read_map("sand")
+    assert shipped.factors == pytest.approx(made["packing"]["factors"], rel=1e-5)
+    assert shipped.packings == pytest.approx(made["packing"]["fractions"], rel=1e-5)
+    for name, line in shipped.lines.items():
+        assert line.values == pytest.approx(made[name]["values"], rel=1e-4)
+
+
+def test_at_the_reference_it_answers_as_the_flagship_with_all_its_errors():
+    answer = read_map("sand").answer(**POINT)
+    flagship = kept("converge-flagship")["convergence"]
+    for name in ("stiffness", "damping", "sinkage"):
+        number = getattr(answer, name)
+        assert number.value == pytest.approx(flagship[name]["value"], rel=1e-4)
+        assert number.std == pytest.approx(flagship[name]["total"] / TO_STD, rel=1e-4)
+
+
+def test_in_grains_that_were_run_it_is_within_its_error_of_their_mean():
+    """K at d / D of 1/12, 1/8 and 1/5: the means over beds, on a line that misses them by less than one std."""
+    for size in kept("converge-flagship")["convergence"]["stiffness"]["sizes"]:
+        answer = read_map("sand").answer(**POINT | {"grain": 0.012 * size["x"]})
+        assert abs(answer.stiffness.value - size["mean"]) < answer.stiffness.std
+        assert answer.stiffness.std < 0.4 * answer.stiffness.value
+
+
+def test_numbers_scale_as_those_of_grains_without_cohesion():
+    """K as g D^2, C as sqrt(g) D^2.5, sinkage as D under a load as g D^3, all at one d / D; errors alike."""
+    table = read_map("sand")
+    first = table.answer(**POINT)
+    other = table.answer(**POINT | {"gravity": 9.80665e-4, "diameter": 0.03, "grain": 0.0005})
+    assert other.stiffness.value / first.stiffness.value == pytest.approx(1e-4 * 2.5**2)
+    assert other.damping.value / first.damping.value == pytest.approx(1e-2 * 2.5**2.5)
+    assert other.sinkage.value / first.sinkage.value == pytest.approx(2.5)
+    assert other.load / first.load == pytest.approx(1e-4 * 2.5**3)
+    assert other.stiffness.std / other.stiffness.value == pytest.approx(first.stiffness.std / first.stiffness.value)
+
+
+def test_runs_at_another_gravity_and_size_follow_the_scaling_of_the_map():
+    """The same bed at 1e-3 g and at twice the size: K within the deviation of one bed of the scaled one, 8 %."""
+    base = kept("ground-map/sand-rained-seed1")["quantities"]["stiffness"]["value"]
+    for name, scale in (("sand-rained-1e-3g", 1e-3), ("sand-rained-24mm", 4.0)):
+        found = kept(f"ground-map/{name}")["quantities"]["stiffness"]["value"]
+        assert found / scale == pytest.approx(base, rel=0.08)
+
+
+def test_a_denser_bed_is_stiffer_and_sinks_less_and_a_heavier_spike_sinks_more():
+    table = read_map("sand")
+    loose, dense = (table.answer(**POINT | {"packing": table.packings[k]}) for k in (0, -1))
+    assert dense.stiffness.value > loose.stiffness.value and dense.sinkage.value < loose.sinkage.value
+    heavy = table.answer(**POINT | {"load": 2 * loose.load})
+    assert heavy.sinkage.value > 1.5 * loose.sinkage.value
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--gravity", "1e-9"], "gravity"),
+        (["--gravity", "20"], "gravity"),
+        (["--spike-diameter", "0.5"], "tip_diameter"),
+        (["--packing", "0.7"], "packing"),
+        (["--grain", "0.004"], "grain"),
+        (["--load", "5"], "load"),
+        (["--material", "mud"], "material"),
+        (["--material", "jsc-1a-loose"], "calibrate"),
+    ],
+)
+def test_what_is_beyond_the_map_is_refused_by_name(options, named, tmp_path, capsys):
+    assert main(["ground", *options, "--out", str(tmp_path / "run"), "--quiet"]) == BAD_INPUT
+    assert named in capsys.readouterr().err
+
+
+def test_the_command_writes_a_ground_file_that_a_tumble_takes(tmp_path):
+    out = tmp_path / "run"
+    assert main(["ground", "--gravity", "1e-3", "--out", str(out), "--quiet"]) == DONE
+    fitted = read_ground(out / "ground.toml")
+    quantities = json.loads((out / "result.json").read_text(encoding="utf-8"))["quantities"]
+    assert fitted.values["stiffness"] == pytest.approx(quantities["stiffness"]["value"])
+    assert fitted.parameters["damping"].std == pytest.approx(quantities["damping"]["std"])
+    assert fitted.range["gravity"] == (1e-3, 1e-3)
+    assert (out / "report.html").is_file()
+    ground = ["--ground", str(out / "ground.toml"), "--gravity", "1e-3", "--torque", "0.01", "--duration", "0.2"]
+    assert main(["tumble", *ground, "--out", str(tmp_path / "tumble"), "--quiet"]) == DONE
