@@ -55,12 +55,11 @@ class Push:
 
 @dataclass(frozen=True)
 class Shaped:
-    """A body: the shape that grains touch, its surface in pieces, its lowest and highest point [m] from its origin."""
+    """A body: the shape that grains touch, its surface in pieces, height of its lowest point from its origin [m]."""
 
     body: Shape
     pieces: Pieces
     low: float
-    high: float
 
 
 def direction_of(gamma: float) -> np.ndarray:
@@ -89,7 +88,7 @@ def plate_of(beta: float, side: float, thickness: float) -> Shaped:
     turn = (math.cos(0.5 * angle), 0.0, -math.sin(0.5 * angle), 0.0)
     size = (side, side, thickness)
     high = 0.5 * (side * abs(math.sin(angle)) + thickness * abs(math.cos(angle)))
-    return Shaped(Placed(Box(size), turn=turn), box_pieces(size, beta), -high, high)
+    return Shaped(Placed(Box(size), turn=turn), box_pieces(size, beta), -high)
 
 
 def shaped(name: str, size: float, scale: float) -> Shaped:
@@ -101,17 +100,16 @@ def shaped(name: str, size: float, scale: float) -> Shaped:
     if name == "ball":
         angles = np.linspace(0.0, math.pi, 49)
         profile = np.column_stack([radius * np.sin(angles), radius * (1 - np.cos(angles))])
-        return Shaped(Ball((0.0, 0.0, radius), radius), round_pieces(profile), 0.0, size)
+        return Shaped(Ball((0.0, 0.0, radius), radius), round_pieces(profile), 0.0)
     if name == "cone":
         height = radius / math.tan(CONE)
         cone = Cone(bottom=0.0, top=height, bottom_radius=0.0, top_radius=radius)
-        return Shaped(cone, round_pieces([(0.0, 0.0), (radius, height), (0.0, height)]), 0.0, height)
+        return Shaped(cone, round_pieces([(0.0, 0.0), (radius, height), (0.0, height)]), 0.0)
     if name == "cylinder":
         outline = [(0.0, 0.0), (radius, 0.0), (radius, size), (0.0, size)]
-        return Shaped(Cylinder(0.0, size, radius), round_pieces(outline), 0.0, size)
+        return Shaped(Cylinder(0.0, size, radius), round_pieces(outline), 0.0)
     mesh = mesh_from_file(name, scale=scale)
-    low, high = mesh.bounds()
-    return Shaped(mesh, mesh_pieces(mesh.vertices[mesh.triangles]), float(low[2]), float(high[2]))
+    return Shaped(mesh, mesh_pieces(mesh.vertices[mesh.triangles]), float(mesh.bounds()[0][2]))
 
 
 def _body_of(push: Push, settings: BedPlatesSettings) -> Shaped:

@@ -114,6 +114,9 @@ class BedPlatesSettings(BedTestSettings):
         for shape in self.shapes:
             if shape not in SHAPES and not Path(shape).is_file():
                 raise ValueError(say("no_shape", shape=shape, known=", ".join(SHAPES)))
+        names = [Path(shape).name for shape in self.shapes]
+        if len(set(names)) < len(names):
+            raise ValueError(say("same_name", names=" ".join(names)))
         if self.thickness > 0.5 * self.side:
             raise ValueError(say("thick_plate", s=self))
         return self

@@ -42,9 +42,14 @@ def made_map() -> dict[str, Any]:
         }  # fmt: skip
     forces = [flagship["convergence"][f"force_{k}"]["value"] for k in (2, 3, 4)]
     exponent = math.log(forces[-1] / forces[0]) / math.log(QUARTERS[-1] / QUARTERS[0])
-    packed = [_result(f"ground-map/{name}")["quantities"] for name in PACKED]
+    results = [_result(f"ground-map/{name}") for name in PACKED]
+    packed = [result["quantities"] for result in results]
+    beds = [len({run["seed"] for run in result["runs"]}) for result in results]
     stiffness = [entry["stiffness"]["value"] for entry in packed]
-    errors = [entry["stiffness"]["std"] / math.sqrt(3) / entry["stiffness"]["value"] for entry in packed]
+    errors = [
+        entry["stiffness"]["std"] / math.sqrt(count) / entry["stiffness"]["value"]
+        for entry, count in zip(packed, beds, strict=True)
+    ]
     factors = [value / stiffness[0] for value in stiffness]
     stds = [0.0, *(f * math.hypot(errors[0], error) for f, error in zip(factors[1:], errors[1:], strict=True))]
     fractions = [entry["packing_fraction"]["value"] for entry in packed]

@@ -188,7 +188,7 @@ def _forces_of_plates(report: Report) -> list[Block]:
     names = [f"{row['body']}, {row['gamma']:g}°" for row in rows]
     place = np.arange(len(rows))
     drawing, panels = new_panels(2, height=1.2 + 0.24 * len(rows), sharey=True)
-    for axis, key, label in zip(panels, ("x", "z"), ("along the motion, -F_x", "upwards, F_z"), strict=True):
+    for axis, key, label in zip(panels, ("x", "z"), ("backwards, -F_x", "upwards, F_z"), strict=True):
         sign = -1.0 if key == "x" else 1.0
         measured = [sign * row[f"force_{key}"] for row in rows]
         axis.errorbar(
