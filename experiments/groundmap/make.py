@@ -17,7 +17,7 @@ from .maps import DATA, NAMES
 __all__ = ["made_map", "main"]
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
-PACKED = ("sand-rained", "sand-0.575", "sand-0.60")
+PACKED = ("sand-rained", "sand-0.60")
 RANGES = {
     "gravity": (9.80665e-6, 9.80665), "tip_diameter": (0.001, 0.1), "grain": (0.0, 0.2),
 }  # fmt: skip
@@ -56,7 +56,7 @@ def made_map() -> dict[str, Any]:
     return {
         "source": "docs/results/converge-flagship over grain size, docs/results/ground-map over packing",
         "reference": {"diameter": 0.012, "gravity": 9.80665, "load": 0.219, "exponent": exponent},
-        "range": {**RANGES, "packing": (fractions[0], fractions[-1])},
+        "range": {**RANGES, "packing": (math.floor(1e3 * fractions[0]) / 1e3, math.ceil(1e3 * fractions[-1]) / 1e3)},
         "packing": {"fractions": fractions, "factors": factors, "stds": stds},
         **lines,
     }  # fmt: skip
