@@ -11,13 +11,16 @@ KILLED ?= killed.jsonl
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help run test fast long slow fuzz torture tiers cover docs validate experiments bench gpu doctor format clean distclean
+.PHONY: help run flagship test fast long slow fuzz torture tiers cover docs validate experiments bench gpu doctor format clean distclean
 
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
 
-run: $(VENV)/.installed  ## the shipped case of `hedgebed penetrate` into a fresh folder under runs/ (ARGS="--option value ...")
-	$(BIN)/hedgebed penetrate $(ARGS)
+run: $(VENV)/.installed  ## a first answer: a spike in sand, into a fresh folder under runs/ (ARGS="--option value ...")
+	$(BIN)/hedgebed penetrate penetrate-first $(ARGS)
+
+flagship: $(VENV)/.installed  ## the same spike extrapolated to real grains, with three errors; some 3 hours of one core
+	$(BIN)/hedgebed converge docs/results/converge-flagship/run.toml $(ARGS)
 
 # A file of tests stays with one worker: its fixtures and kernels are made once. WORKERS=0 tests in one process.
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile

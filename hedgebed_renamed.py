@@ -318,7 +318,10 @@ _NAMES = {
         "vis.pictures.render": "View",
         "vis.pictures.scene": "Scene",
     },
-    "vis.page": {"vis.page.page": "Block Page Section Tile code figure listing table text write_page"},
+    "vis.page": {
+        "vis.page.page": "Block Page Section Tile code figure listing table text",
+        "vis.page.answer": "write_page",
+    },
     "vis.paper": {"vis.paper.report": "write_paper_report"},
     "vis.page.plots": {"vis.penetrate.plot_drag": "Plot"},
     "vis.page.states": {"vis.page.folder": "read_columns"},

@@ -36,7 +36,7 @@ from rigid.planar.simulate import simulate
 
 from .claims import GRANULAR, Trials, claims, first_lasting
 from .evidence import BRAKE_DURATION, DURATION, evidence, rival_trials
-from .grains import kept_angles
+from .grains import angles_of_beds, kept_angles
 from .settings import PaperSettings
 from .transitions import HARD, say
 
@@ -252,6 +252,10 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
         ],
         evidence=weighed,
         integrations=len(jobs),
+        kept_on_grains={
+            "one_bed": [asdict(angle) for angle in kept_angles()],
+            "beds": [asdict(angle) for angle in angles_of_beds()],
+        },
         cases=cases,
         **{kind: of_kind(kind) for kind in ("sweep", "sliding", "grains")},
         warnings=warnings,

@@ -3,8 +3,9 @@
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-__all__ = ["KeptAngle", "kept_angles"]
+__all__ = ["AngleOfBeds", "KeptAngle", "angles_of_beds", "kept_angles"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +19,26 @@ class KeptAngle:
     angle: float  # Of the first 10 mm [degrees]
 
 
+@dataclass(frozen=True, kw_only=True)
+class AngleOfBeds:
+    """The same tumble on several beds of one grain size (docs/results/tumble-sand)."""
+
+    surface: str
+    rig: float  # g_sim [9.80665 m/s2]
+    torque: float  # [N m]
+    grain: float  # Mean diameter [mm]
+    angles: list[float]  # Of the first 10 mm, one a bed [degrees]
+
+
 def kept_angles() -> tuple[KeptAngle, ...]:
-    """All that are kept."""
-    file = Path(__file__).with_name("grains.toml")
-    return tuple(KeptAngle(**entry) for entry in tomllib.loads(file.read_text(encoding="utf-8"))["case"])
+    """Those of one bed each."""
+    return tuple(KeptAngle(**entry) for entry in _read()["case"])
+
+
+def angles_of_beds() -> tuple[AngleOfBeds, ...]:
+    """Those of several beds each."""
+    return tuple(AngleOfBeds(**entry) for entry in _read()["beds"])
+
+
+def _read() -> dict[str, list[dict[str, Any]]]:
+    return tomllib.loads(Path(__file__).with_name("grains.toml").read_text(encoding="utf-8"))

@@ -7,8 +7,9 @@ import pytest
 from matplotlib import get_data_path
 from PIL import ImageFont
 
+from vis.page.answer import write_page
 from vis.page.folder import read_folder
-from vis.page.page import Page, Section, columns, table, write_page
+from vis.page.page import Page, Section, columns, table
 from vis.penetrate.summary import summarise
 
 SHEET = files("vis").joinpath("templates/style.css").read_text().partition("@media print")[0]
@@ -109,7 +110,7 @@ def test_a_number_of_several_parts_breaks_between_them_only():
 
 def test_a_long_reason_stands_beneath_its_row_under_its_own_heading(tmp_path):
     written = write_page(
-        tmp_path / "page.html", Page(title="", lead=[], sections=[Section("", [table(*CLAIMS, words=True)])])
+        tmp_path / "page.html", Page(title="", lead=[], sections=[Section("", [table(*CLAIMS, words=True)])]), {}
     ).read_text()
     assert '<tr><th class="beneath" colspan="5">judged by, and why</th></tr>' in written
     assert written.count('<td class="beneath" colspan="5">') == 1  # the second row gives no reason

@@ -8,7 +8,8 @@ import pytest
 
 from benchmarks.view import bed_of
 from experiments.cli.main import BAD_INPUT, DONE, main
-from vis.page.page import Page, Section, write_page
+from vis.page.answer import write_page
+from vis.page.page import Page, Section
 from vis.pictures.canvas import colour_values
 from vis.pictures.frames import FrameWriter, read_frames
 from vis.view.packing import Codes, pack, unpack
@@ -160,11 +161,11 @@ def test_frames_with_other_grains_are_refused_by_number(tmp_path):
 
 def test_a_report_holds_the_small_scene_with_its_script_once(make_run, tmp_path):
     blocks = report_scene(make_run(tmp_path, frames=2))
-    page = write_page(tmp_path / "report.html", Page("t", [], [Section("", blocks), Section("", blocks)]))
+    page = write_page(tmp_path / "report.html", Page("t", [], [Section("", blocks), Section("", blocks)]), {})
     text = page.read_text()
     assert text.count("class Viewer") == 1 and len(HEAD.findall(text)) == 2
     assert page.stat().st_size < 15e6
-    empty = write_page(tmp_path / "other.html", Page("t", [], [Section("", [])]))
+    empty = write_page(tmp_path / "other.html", Page("t", [], [Section("", [])]), {})
     assert "class Viewer" not in empty.read_text()
 
 

@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 
 from benchmarks.view import Browser, bed_of, chromium
-from vis.page.page import Page, Section, write_page
+from vis.page.answer import write_page
+from vis.page.page import Page, Section
 from vis.view.page import report_scene, write_view
 
 pytestmark = [
@@ -160,7 +161,7 @@ def test_a_title_that_is_a_script_does_not_run(browser, tmp_path):
 
 
 def test_the_small_scene_of_a_report_is_drawn_when_it_comes_into_sight(browser, page):
-    report = write_page(page.parent / "report.html", Page("t", [], [Section("", report_scene(page.parent))]))
+    report = write_page(page.parent / "report.html", Page("t", [], [Section("", report_scene(page.parent))]), {})
     browser.open(report)
     browser.value("new Promise((done) => (function wait() { const v = document.querySelector('.scene').viewer;"
                   " v ? v.ready.then(done) : setTimeout(wait, 20); })())")  # fmt: skip

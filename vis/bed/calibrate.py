@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from vis.bed.tests import cut_profiles, flank_lines, quoted, thicknesses
+from vis.page.answer import MOST_ROWS
 from vis.page.page import Block, Section, Tile, code, text
 from vis.page.plots import BED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
@@ -31,13 +32,13 @@ def write_calibration_report(report: Report) -> Path:
         *_faces(report),
     ]
 
-    def tile(name: str, note: str, second: bool = False) -> Tile:
+    def tile(name: str, note: str) -> Tile:
         entry = quantities[name]
         unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
-        return Tile(name.replace("_", " ").capitalize(), quoted(entry, 1.0, unit), note, second=second)
+        return Tile(name.replace("_", " ").capitalize(), quoted(entry, 1.0, unit), note)
 
     tiles = [tile(key, quantities[key]["note"]) for key in free]
-    tiles += [tile(one["name"], one["verdict"], second=one["verdict"] != "met") for one in result["figures"]]
+    tiles += [tile(one["name"], one["verdict"]) for one in result["figures"]]
     material = (report.folder / "material.toml").read_text(encoding="utf-8")
     sections = [
         Section("", tables(result) + drawn),
@@ -45,7 +46,7 @@ def write_calibration_report(report: Report) -> Path:
         Section("The material", [text("material.toml, for --material:"), code(material)]),
         again("hedgebed bed calibrate run.toml"),
     ]
-    return report.write(sections, lead=["bed calibrate"], tiles=tiles)
+    return report.write(sections, lead=["bed calibrate"], tiles=tiles[:MOST_ROWS])
 
 
 def _axis_words(entry: Result) -> str:

@@ -95,7 +95,7 @@ def _tiles(cases: Sequence[Result]) -> list[Tile]:
     numbers = [one for case in run for one in case["comparisons"]]
     return [
         Tile("cases that pass", str(many["pass"]), f"of {len(run)} that were run"),
-        Tile("cases that fail", str(many["fail"]), "each with its reason if known", second=True),
+        Tile("cases that fail", str(many["fail"]), "each with its reason if known"),
         Tile("numbers compared", str(len(numbers)), f"{sum(one['passes'] for one in numbers)} within their bands"),
         Tile("not yet", str(many["not yet"]), "cases that the bed cannot compute yet"),
     ]

@@ -106,7 +106,7 @@ def write_inspection_report(report: Report) -> Path:
         Tile("Trials", str(quantities["trial_count"]["value"])),
         Tile("Conditions", str(quantities["condition_count"]["value"])),
         Tile("Rows recorded", str(quantities["row_count"]["value"])),
-        Tile("Found", str(quantities["finding_count"]["value"]), second=bool(found)),
+        Tile("Found", str(quantities["finding_count"]["value"])),
     ]
     return report.write(sections, lead=["campaign check", str(result["kind"])], tiles=tiles, warnings=())
 

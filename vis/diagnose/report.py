@@ -34,7 +34,7 @@ def write_diagnosis_report(report: Report) -> Path:
     tiles = [
         Tile("Verdict", diagnosis["verdict"], " or ".join([named, *diagnosis["alternatives"]])),
         Tile("Gap before", _gap(gap["before"]), which + _weighed(diagnosis, "before")),
-        Tile("Gap after", _gap(gap["after"]), which + _weighed(diagnosis, "after"), second=True),
+        Tile("Gap after", _gap(gap["after"]), which + _weighed(diagnosis, "after")),
     ]
     departures, following = result["departures"]["sentences"], diagnosis.get("next_experiment")
     left = [_gap_table(diagnosis), *_in_units(diagnosis), *drawn["residuals"], *_phase_table(diagnosis)]

@@ -21,7 +21,7 @@ from rigid.series import replacing
 
 __all__ = [
     "Block", "Columns", "Page", "Section", "Tile", "code", "columns", "figure", "listing", "scene_block", "table",
-    "table_of", "text", "write_page", "write_template",
+    "table_of", "text", "write_template",
 ]  # fmt: skip
 
 _KINDS = {".png": "png", ".gif": "gif", ".jpg": "jpeg"}
@@ -56,12 +56,12 @@ class Section:
 
 @dataclass(frozen=True)
 class Tile:
-    """A number that a reader wants first. `second` gives it the other colour."""
+    """A number that a reader wants first: a row of the report's answer."""
 
     label: str
     value: str
     note: str = ""
-    second: bool = False
+    errors: tuple[str, str, str] = ("", "", "")  # Of chance, of grain size, of the rest; "": not known
 
 
 @dataclass(frozen=True)
@@ -127,11 +127,6 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = ""
 def table_of(head: Sequence[str], rows: Sequence[Sequence[str]], **options: Any) -> list[Block]:
     """The table where there are rows, as the only block; options as those of `table`."""
     return [table(head, rows, **options)] if rows else []
-
-
-def write_page(path: Path, page: Page) -> Path:
-    """Write the page to `path`, all of it or nothing, and return it."""
-    return write_template(path, "page.html", page=page)
 
 
 def write_template(path: Path, name: str, **context: Any) -> Path:

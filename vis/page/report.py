@@ -10,9 +10,10 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from rigid.result import read_result
+from vis.page.answer import write_page
 from vis.page.folder import read_columns
 from vis.page.limits import limits_words
-from vis.page.page import Block, Page, Section, Tile, code, figure, table, text, write_page
+from vis.page.page import Block, Page, Section, Tile, code, figure, table, text
 from vis.page.plots import Array, styled
 from vis.page.sentences import Sentences
 
@@ -108,7 +109,7 @@ class Report:
         top = [f"hedgebed {result['version']}", *lead] if version else lead
         words = str(result["title"]) if title is None else title
         page = Page(words, top, sections, tiles, warned, missing, limits_words(result))
-        report = write_page(self.folder / "report.html", page)
+        report = write_page(self.folder / "report.html", page, result)
         self.tell(1.0)
         return report
 

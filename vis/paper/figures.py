@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
+from scipy.special import stdtrit
 
 from vis.page.folder import read_columns
 from vis.page.page import Block
-from vis.page.plots import BED, GREY, INK, STATES, Array, handle, legend_above, sheet
+from vis.page.plots import BED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result
 from vis.page.states import States, state_runs
 
@@ -277,6 +278,62 @@ def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: s
             axis.plot(at, scale * fixed, "o", color=INK, mfc="none", ms=7.5, mew=0.8)
 
 
+def figure_signs(paper: PaperRun) -> Block | None:
+    """Launch angles on sand and JSC-1A: spring-damper, grains, and the signs that the text states."""
+    kept = paper.result.get("kept_on_grains")
+    surfaces = [name for name in ("sand", "jsc1a") if name in paper.surfaces]
+    if not kept or not surfaces:
+        return None
+    drawing, axes = sheet(1, len(paper.rigs), 3.9, sharey=True)
+    places = [(surface, torque) for surface in surfaces for torque in paper.torques]
+    for axis, rig in zip(axes[0], paper.rigs, strict=True):
+        axis.set_title(f"{rig:g} g, {' and '.join(surfaces)}")
+        axis.axhline(0.0, color=INK, lw=0.8)
+        for place, (surface, torque) in enumerate(places):
+            _draw_signs(axis, paper, kept, (surface, rig, torque), place)
+        words = [f"{torque:g} N m\n{paper.label(torque).split('(')[1][:-1]}" for _, torque in places]
+        axis.set_xticks(range(len(places)), words, fontsize=8)
+        axis.tick_params(axis="x", length=0)
+        axis.grid(False, axis="x")
+        for number, surface in enumerate(surfaces):
+            middle = (len(paper.torques) * (number + 0.5) - 0.5 + 0.5) / len(places)
+            axis.text(middle, 0.98, surface, transform=axis.transAxes, ha="center", va="top", fontweight="bold")
+            if number:
+                axis.axvline(len(paper.torques) * number - 0.5, color=GREY, lw=0.8)
+        axis.set_xlim(-0.5, len(places) - 0.5)
+    axes[0, 0].set(ylabel="launch angle [degrees]", ylim=(-45.0, 62.0))
+    legend_above(drawing, [
+        handle("spring-damper", BED, marker="o", ls="", ms=6),
+        handle("grains, one bed each", MODEL, marker="s", mfc="none", ls="", ms=6),
+        handle("grains, mean of three beds and 95 %", MODEL, marker="s", ls="", ms=6),
+        Patch(color=GREY, alpha=0.22, lw=0, label="the paper: motors about +22.5°, brakes below 0"),
+    ], 2)  # fmt: skip
+    return paper.draw("signs", drawing)
+
+
+def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, float, float], place: int) -> None:
+    """One torque on one surface: what the paper's text states as a grey box, our angles as marks."""
+    surface, rig, torque = what
+
+    def of_this(entries: Sequence[Result]) -> list[Result]:
+        return [entry for entry in entries if (entry["surface"], entry["rig"], entry["torque"]) == what]
+
+    motor = paper.case(surface, rig, torque)["actuator"] == "motor"
+    low, high = (17.5, 27.5) if motor else (-45.0, 0.0)
+    axis.fill_between([place - 0.4, place + 0.4], low, high, color=GREY, alpha=0.22, lw=0)
+    band = [value for value in paper.variants(surface, rig, torque, "trajectory_angle")[:3] if value is not None]
+    nominal = paper.case(surface, rig, torque)["trajectory_angle"]
+    if nominal is not None:
+        axis.plot([place - 0.2] * 2, np.degrees([min(band), max(band)]), color=BED, lw=3.0, alpha=0.4)
+        axis.plot(place - 0.2, math.degrees(nominal), "o", color=BED, ms=5.5)
+    for entry in of_this(kept["one_bed"]):
+        axis.plot(place, entry["angle"], "s", color=MODEL, mfc="none", ms=5.5)
+    for entry in of_this(kept["beds"]):
+        angles = np.array(entry["angles"])
+        half = stdtrit(len(angles) - 1, 0.975) * angles.std(ddof=1) / math.sqrt(len(angles))
+        axis.errorbar(place + 0.2, angles.mean(), half, fmt="s", color=MODEL, ms=5.5, capsize=3)
+
+
 def figure_sweep(paper: PaperRun) -> Block | None:
     """What halving and doubling does to the trajectory angle and to the first hop."""
     if not paper.sweep:
@@ -360,6 +417,6 @@ def figure_evidence(paper: PaperRun) -> Block | None:
 
 FIGURES = {
     "evidence": figure_evidence, "figure5": figure_5, "figure6": figure_6, "figure7": figure_7, "figure8": figure_8,
-    "sweep": figure_sweep,
+    "signs": figure_signs, "sweep": figure_sweep,
 }  # fmt: skip
 """Name -> what draws it, in the report's order; None where there is nothing to draw."""

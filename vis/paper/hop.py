@@ -94,10 +94,10 @@ def _tiles(result: Result) -> list[Tile]:
         Tile("Wheel speed", _show(result, "wheel_speed"), result["quantities"]["wheel_speed"]["note"]),
         Tile("Launch, rigid ground", _show(result, "launch_speed"), f"at {at}"),
         Tile("Distance, rigid ground", _show(result, "distance"), f"in {_show(result, 'flight_time')}"),
-        Tile(f"Launch from {ground}", _show(result, "model_launch_speed"), f"at {at_model}, planar model", second=True),
-        Tile(f"Distance from {ground}", _show(result, "model_distance"), "the same wheel", second=True),
+        Tile(f"Launch from {ground}", _show(result, "model_launch_speed"), f"at {at_model}, planar model"),
+        Tile(f"Distance from {ground}", _show(result, "model_distance"), "the same wheel"),
     ]
     if result["quantities"]["model_wheel_speed"]["value"] is not None:  # sought on ground that gives, and found
         speed = _show(result, "model_wheel_speed")
-        tiles.insert(1, Tile(f"Wheel speed, {ground}", speed, "for that distance, planar model", second=True))
+        tiles.insert(1, Tile(f"Wheel speed, {ground}", speed, "for that distance, planar model"))
     return tiles

@@ -47,9 +47,14 @@ def _tiles(result: Result) -> list[Tile]:
     for name in _TILES:
         entry = result["quantities"].get(name)
         if entry is not None:
-            error = entry["total"] or entry["chance"]
-            of = "all errors, 95 %" if entry["total"] else "chance alone, 95 %"
-            tiles.append(Tile(capital(name.replace("_", " ")), quote(entry["value"], error, entry["unit"]), of))
+            unit = entry["unit"]
+            errors = (
+                "" if entry[key] is None else quote(entry[key], None, unit, significant=2)
+                for key in ("chance", "grain_size", "rest")
+            )
+            chance, size, rest = errors
+            value = quote(entry["value"], None, unit, significant=3)
+            tiles.append(Tile(capital(name.replace("_", " ")), value, "95 %", (chance, size, rest)))
     return tiles
 
 

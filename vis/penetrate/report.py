@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vis.page.answer import answer
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
 from vis.page.limits import limits_words
 from vis.page.numbers import quote
@@ -62,6 +63,7 @@ def write_penetration_report(folder: str | Path, *, pictures: bool = True, progr
         except (ValueError, KeyError, IndexError, OSError) as error:
             drawn = Pictures(notes=[f"Pictures could not be drawn ({type(error).__name__}: {error})."])
     context = summarise(run)
+    context["answer"] = answer([Tile(**tile) for tile in context.pop("tiles")], run.result)
     context["missing"] = [*context["missing"], *(text for text in undrawn if _asked_for(run, text))]
     context["plots"] = {plot.name: figure(path, title=plot.title, caption=plot.caption) for plot, path in plots}
     context["scenes"] = report_scene(run.path) if pictures else []
@@ -168,7 +170,7 @@ def _write_law_report(report: Report) -> Path:
     laws = {"spring_damper": "spring-damper", "amended": f"with {words_of_effects(report.result)}"}
     laws = {"law": str(report.result["ground"])} if of_file else laws
     sunk = {law: quote(numbers[f"sinkage_{law}"]["value"], None, "m") for law in laws}
-    tiles = [Tile("Sinks", sunk[law], words, second=law == "amended") for law, words in laws.items()]
+    tiles = [Tile("Sinks", sunk[law], words) for law, words in laws.items()]
     whose = f"no bed: the law of {'a ground file' if of_file else 'the model'} only"
     sections = [
         Section("", blocks),

@@ -63,7 +63,7 @@ def write_robot_report(
         Tile("Highest", quantity(quantities["highest"]), "of the centre of mass over its start"),
         Tile("Deepest", quantity(quantities["sinkage_largest"]), "of any foot"),
         Tile("Largest force", quantity(quantities["largest_force"]), "of the ground"),
-        Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was", second=True),
+        Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was"),
     ]
     return report.write(sections, lead=["mujoco", f"{result['duration']:g} s"], tiles=tiles)
 

@@ -71,7 +71,7 @@ def write_spatial_report(
         Tile("Largest speed", quantity(quantities["max_speed"]), "of the centre of mass"),
         Tile("Largest angular velocity", quantity(quantities["max_angular_velocity"]), ""),
         Tile("Deepest", quantity(quantities["sinkage_largest"]), "of any spike"),
-        Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was", second=True),
+        Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was"),
     ]
     lead = ["tumble spatial", f"{result['duration']:g} s", f"{len(path['t_s'])} rows"]
     return report.write(sections, lead=lead, tiles=tiles)

@@ -100,8 +100,8 @@ def _tiles(result: Result) -> list[Tile]:
         Tile("Trajectory angle", _degrees(result, "trajectory_angle"), "of the first 10 mm"),
         Tile("Largest speed", quantity(quantities["max_speed"]), "of the centre"),
         Tile("Largest angular velocity", quantity(quantities["max_angular_velocity"]), ""),
-        Tile("Slips from", _degrees(result, "transition_angle_slip"), "θ at the first slip", second=True),
-        Tile("Hops from", _degrees(result, "transition_angle_hop"), "θ at the first hop", second=True),
+        Tile("Slips from", _degrees(result, "transition_angle_slip"), "θ at the first slip"),
+        Tile("Hops from", _degrees(result, "transition_angle_hop"), "θ at the first hop"),
     ]
 
 

@@ -1,5 +1,6 @@
 """`hedgebed paper`: which trials it makes, what it claims of the text, and the whole of it within a minute."""
 
+import csv
 import json
 import math
 from dataclasses import replace
@@ -15,7 +16,7 @@ from experiments.cli.main import main
 from experiments.paper.claims import Trials, claims, friction_of_a_rigid_pivot
 from experiments.paper.evidence import RIVALS, evidence, nats, rival_trials
 from experiments.paper.experiment import plan_jobs, run
-from experiments.paper.grains import kept_angles
+from experiments.paper.grains import angles_of_beds, kept_angles
 from experiments.paper.settings import PaperSettings
 from experiments.paper.transitions import slip_before_hop
 from experiments.tumble.settings import TumbleSettings
@@ -157,6 +158,16 @@ def test_angles_on_grains_are_those_of_the_kept_results():
         angle = math.degrees(result["quantities"]["trajectory_angle"]["value"])
         assert angle == pytest.approx(entry.angle, abs=0.05), entry.case
         assert (result["surface"], result["trial"]["torque"]["value"]) == (entry.surface, entry.torque)
+
+
+def test_angles_of_several_beds_are_those_of_the_kept_runs():
+    with (RESULTS / "tumble-sand/runs.csv").open() as file:
+        runs = [row for row in csv.DictReader(file) if float(row["width_mm"]) == 36.0]
+    assert len(angles_of_beds()) == 5
+    for entry in angles_of_beds():
+        case = ("jsc-" if entry.surface == "jsc1a" else "") + ("brake" if entry.torque == 6 else f"{entry.torque:g}")
+        alike = [row for row in runs if row["case"] == case and float(row["grain_mm"]) == entry.grain]
+        assert [float(row["angle_deg"]) for row in alike] == entry.angles, case
 
 
 def trials_of(*, kept=(), **angles):

@@ -1,0 +1,84 @@
+"""The top of a report: the answer as a table with three errors, one picture, three findings; the rest is folded."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from vis.page.limits import kind_of
+from vis.page.page import Block, Page, Section, Tile, listing, table, text, write_template
+from vis.page.sentences import Sentences
+
+__all__ = ["MOST_ROWS", "answer", "write_page"]
+
+say = Sentences(__package__)
+MOST_ROWS = 6
+_FINDINGS = 3
+_ERRORS = ("± chance", "± grain size", "± rest")
+_SPREAD = re.compile(r"^(?P<mean>[^±]+?)\s±\s(?P<error>\S+)(?P<unit>\s.*)?$")
+_ON_GRAINS = ("spike on grains", "platform on grains", "bed")
+
+
+@dataclass(frozen=True)
+class Top:
+    """A page in its order: what is open, and what is folded."""
+
+    answer: Sequence[Block]
+    picture: Block | None
+    findings: Block | None
+    folded: Sequence[Section]
+
+
+def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
+    """The table of the numbers that a reader wants first, and what its empty cells mean.
+
+    A spread in a tile's value goes into the column of chance. Raises ValueError for more than `MOST_ROWS` tiles.
+    """
+    if not tiles:
+        return []
+    if len(tiles) > MOST_ROWS:
+        raise ValueError(f"{len(tiles)} numbers at the top of a report: at most {MOST_ROWS} are one answer")
+    rows = [_row(tile) for tile in tiles]
+    on_grains = kind_of(result) in _ON_GRAINS
+    shown = [k for k in range(3) if on_grains or any(row[2 + k] for row in rows)]
+    head = ("", "value", *(_ERRORS[k] for k in shown), "")
+    cells = [(*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), row[5]) for row in rows]
+    note = [text(say("empty_cells"), small=True)] if on_grains and any("\N{EN DASH}" in row for row in cells) else []
+    return [table(head, cells, words=True), *note]
+
+
+def _row(tile: Tile) -> tuple[str, ...]:
+    found = _SPREAD.match(tile.value)
+    if any(tile.errors) or not found:
+        return (tile.label, tile.value, *tile.errors, tile.note)
+    unit = found["unit"] or ""
+    return (tile.label, found["mean"] + unit, found["error"] + unit, "", "", tile.note)
+
+
+def write_page(path: Path, page: Page, result: Mapping[str, Any]) -> Path:
+    """Write the page of a result to `path`, all of it or nothing, and return it."""
+    return write_template(path, "page.html", page=page, top=_arranged(page, result))
+
+
+def _arranged(page: Page, result: Mapping[str, Any]) -> Top:
+    """The first scene or else the first figure goes to the top, with the first three findings of the first section."""
+    blocks = [block for section in page.sections for block in section.blocks]
+    pictures = [block for kind in ("scene", "figure") for block in blocks if block.kind == kind]
+    picture = pictures[0] if pictures else None
+    first = next((section for section in page.sections if picture in section.blocks), None)
+    lists = [block for block in (page.sections[0].blocks if page.sections else ()) if block.kind == "list"]
+    said = lists[0].entries if lists else ()
+    sections = []
+    for section in page.sections:
+        kept = list(section.blocks)
+        if section is first and picture is not None:
+            kept.remove(picture)
+        if lists:
+            more = [listing(said[_FINDINGS:])] if len(said) > _FINDINGS else []
+            kept = [left for block in kept for left in (more if block is lists[0] else [block])]
+        if kept:
+            sections.append(replace(section, heading=section.heading or "More on this run", blocks=kept))
+    return Top(answer(page.tiles, result), picture, listing(said[:_FINDINGS]) if said else None, sections)
