@@ -94,7 +94,7 @@ def _compute(settings: CompareSettings, folder: RunFolder, progress: Progress) -
     result["tables"] = _numbers(result, labels)
     if rows := result.get("rows"):
         shown = [[str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))] for row in rows]
-        title = "Sinkage of each row of spikes while both last, deepest [mm]"
+        title = "Largest sinkage of each row of spikes over the common time [mm]"
         result["tables"].append({"title": title, "head": ["row", *labels], "rows": shown})
     if result["differs"]:
         shown = [list(row.values()) for row in result["differs"]]
@@ -239,7 +239,7 @@ def _numbers(result: Json, labels: tuple[str, str]) -> list[Json]:
         if (row["first_whole"], row["second_whole"]) != (row["first"], row["second"]) or row["over"] != "shared time"
     ]
     return [
-        _table(f"Numbers over the first {end:.4g} s, which both last, and {less}", labels, shared),
+        _table(f"Numbers over the common time, the first {end:.4g} s, and {less}", labels, shared),
         _table(f"Numbers of each run as a whole, over its own {lasts} s", labels, whole, differences=False),
     ]
 

@@ -38,7 +38,7 @@ def write_bed_report(report: Report) -> Path:
     command = result["experiment"]
     sections = [
         Section("", [*tables(result), *picture, *report_scene(report.folder), *drawn]),
-        Section("How each stage came to rest", [listing(criteria)]),
+        Section("Rest after each stage", [listing(criteria)]),
         report.numbers(),
         report.again(f"hedgebed {command} run.toml\nhedgebed bed show bed.npz", "bits"),
     ]

@@ -42,7 +42,7 @@ def write_compare_report(report: Report) -> Path:
     sections = [
         *([Section("", _drives(report, labels))] if penetrations else _tumbles(report, labels)),
         Section("Every number, side by side", _numbers(result, labels)),
-        *([Section("What the two were given", given)] if given else []),
+        *([Section("Settings of the two runs", given)] if given else []),
         again("hedgebed compare run.toml"),
     ]
     lead = ["compare", *(f"{run['label']}: {run['title']}" for run in result["runs"])]
@@ -56,9 +56,9 @@ def _tumbles(report: Report, labels: Labels) -> list[Section]:
     seen = _seen(report, labels) if result["pictures"] else []
     return [
         Section("", [listing(result["departures"]["sentences"]), path]),
-        *([Section("Seen side by side", seen)] if seen else []),
+        *([Section("Pictures side by side", seen)] if seen else []),
         Section("States and angle", [states]),
-        Section("Into the ground", [*ground, *_row_sinkage(result, labels)]),
+        Section("Sinkage and forces", [*ground, *_row_sinkage(result, labels)]),
         Section("Energy", [energy]),
     ]
 
@@ -149,11 +149,11 @@ def _numbers(result: Result, labels: Labels) -> list[Block]:
     shared = [row for row in rows if row["over"] == "shared time"]
     whole = [_row(row | {"first": row["first_whole"], "second": row["second_whole"]}) for row in rows]
     return [
-        table(head, [_row(row) for row in shared], title=f"Over the first {end:.4g} s, which both last"),
+        table(head, [_row(row) for row in shared], title=f"Over the common time, the first {end:.4g} s"),
         table(
             ("quantity", *labels, "unit"),
             [(*row[:3], row[-1]) for row in whole],
-            title=f"Of each run as a whole, over its own {lasts} s",
+            title=f"Over the whole of each run, {lasts} s",
         ),
     ]
 
@@ -171,7 +171,7 @@ def _row_sinkage(result: Result, labels: Labels) -> list[Block]:
     rows = [
         (str(row["row"]), *(f"{1e3 * row[key]:.3g}" for key in ("first", "second"))) for row in result.get("rows", [])
     ]
-    return table_of(("row", *labels), rows, title="Sinkage of each row while both last, deepest [mm]")
+    return table_of(("row", *labels), rows, title="Largest sinkage of each row over the common time [mm]")
 
 
 # Figures --------------------------------------------------------------------------------------------------------------

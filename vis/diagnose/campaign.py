@@ -97,7 +97,7 @@ def write_inspection_report(report: Report) -> Path:
     found = [capital(what) + "." for what in result["warnings"]]
     rows = [[str(cell) for cell in row] for row in trials["rows"]]
     sections = [
-        Section("What was found", [listing(found) if found else text("Nothing odd was found in the recordings.")]),
+        Section("Findings", [listing(found) if found else text("Nothing odd was found in the recordings.")]),
         Section("", [table(trials["head"], rows, title="Trials", words=True)]),
         Section("The recordings", [*drawn, table(head, [_row(entry) for entry in result["recordings"]])]),
         again("hedgebed campaign check run.toml", ""),

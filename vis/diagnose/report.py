@@ -40,13 +40,13 @@ def write_diagnosis_report(report: Report) -> Path:
     left = [_gap_table(diagnosis), *_in_units(diagnosis), *drawn["residuals"], *_phase_table(diagnosis)]
     sections = [
         Section("", [listing(result.get("summary", [])), *drawn["trajectories"]]),
-        Section("What is left", [*left, *drawn["latent"]]),
+        Section("Remaining misfit", [*left, *drawn["latent"]]),
         Section("Where the base model fails", [*([listing(departures)] if departures else []), *_where(diagnosis)]),
         Section("Candidates", [*drawn["evidence"], *_evidence(diagnosis)]),
         Section("What these trials can distinguish", _distinguished(diagnosis)),
         Section("The next experiment", [text(following)] if following else []),
         Section("Numbers", _numbers(diagnosis)),
-        Section("What was found in the recordings", _findings(diagnosis)),
+        Section("Findings in the recordings", _findings(diagnosis)),
         again("hedgebed diagnose THIS_FOLDER/run.toml", f"With hedgebed {result['version']}, where it was started from "
               "(the campaign's path is as given):"),
     ]  # fmt: skip
@@ -262,7 +262,7 @@ def _numbers(diagnosis: Result) -> list[Block]:
          error(after[name], name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["before"].items() if name in after
     ]  # fmt: skip
-    added = table_of(("effect", "parameter", "value", "standard error", "unit"), effects, title="What was added")
+    added = table_of(("effect", "parameter", "value", "standard error", "unit"), effects, title="Added effects")
     head = ("parameter", "before", "standard error", "after", "standard error", "unit")
     fitted = table_of(head, base, title="The base model's parameters")
     blocks = [*_sizes(diagnosis), *added, *_equations(diagnosis), *fitted] if effects else fitted

@@ -136,7 +136,7 @@ def report_of(dpi: int | None = None) -> Callable[[Callable[..., Path]], Callabl
 def again(command: str, before: str = "In this folder:", after: str = "") -> Section:
     """How to do the run again; an empty `before` or `after` is left out."""
     blocks = [text(before)] if before else []
-    return Section("To do this again", [*blocks, code(command), *([text(after, small=True)] if after else [])])
+    return Section("To repeat this run", [*blocks, code(command), *([text(after, small=True)] if after else [])])
 
 
 def given(entries: Mapping[str, Result]) -> Block:

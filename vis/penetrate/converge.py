@@ -32,8 +32,8 @@ def write_converge_report(report: Report) -> Path:
     drawn = [_figure(report, name, told) for name, told in result["convergence"].items()]
     sections = [
         Section("", [listing(result["departures"]["sentences"]), first]),
-        Section("Quantity by quantity", drawn),
-        Section("What was made, and what each change changes", others),
+        Section("Quantities over grain size", drawn),
+        Section("Variants, and the effect of each change", others),
         report.numbers(std=True),
         report.again("hedgebed converge run.toml", "bits"),
     ]

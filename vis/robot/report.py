@@ -49,12 +49,12 @@ def write_robot_report(
     if pictures and NAME in frame_names(home):
         made = draw_runs([SpaceReel(home)], home, "robot", by=colour, film=film, progress=report.rest())
         notes = [text(ARROWS, small=True), *(text(note) for note in made.notes)]
-        seen = [Section("Seen", [*report_scene(home), *shown(made), *notes])]
+        seen = [Section("Pictures", [*report_scene(home), *shown(made), *notes])]
     quantities = result["quantities"]
     sections = [
         Section("", [listing(result["departures"]["sentences"])]),
         *seen,
-        Section("In numbers over time", [*drawn, *say_grains(result)]),
+        Section("Over time", [*drawn, *say_grains(result)]),
         Section("The trial", [given(result["trial"])]),
         report.numbers(beside=(result.get("grains") or {}).get("beside") or {}),
         report.again("hedgebed mujoco run.toml"),

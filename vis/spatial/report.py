@@ -53,7 +53,7 @@ def write_spatial_report(
         made = draw_runs([SpaceReel(home)], home, "space", by=colour, film=film, progress=report.rest())
         seen = [
             Section(
-                "Seen",
+                "Pictures",
                 [*report_scene(home), *shown(made), text(ARROWS, small=True), *(text(note) for note in made.notes)],
             )
         ]

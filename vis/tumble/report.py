@@ -91,7 +91,7 @@ def _seen(report: Report, colour: str, film: bool) -> Section:
     if reel.frames is not None and "surface" in reel.frame(len(reel) - 1).maps:
         drawn.stills.append(draw_tracks(reel, report.figures / "tracks.png"))
     notes = [text(say("camera"), small=True), *(text(note) for note in drawn.notes)]
-    return Section("Seen from near", [*report_scene(report.folder), *shown(drawn), *notes])
+    return Section("Close-up", [*report_scene(report.folder), *shown(drawn), *notes])
 
 
 def _tiles(result: Result) -> list[Tile]:

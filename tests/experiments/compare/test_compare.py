@@ -53,7 +53,7 @@ def test_numbers_that_go_with_how_long_a_run_lasts_are_compared_over_the_time_th
     words = ["compare", str(runs / "sand"), str(runs / "brick"), "--no-pictures", "--out", str(out), "--quiet"]
     assert main(words) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    said = re.findall(r"Numbers o[^\[]*?[\d.]+ s\b(?:, which both last, and \w+ less \w+)?", printed)
+    said = re.findall(r"Numbers o[^\[]*?[\d.]+ s\b(?:, and \w+ less \w+)?", printed)
     golden("compare/both_last", said)
     result = json.loads((out / "result.json").read_text())
     rows = {row["name"]: row for row in result["compared"]}
@@ -166,7 +166,7 @@ def test_pictures_of_a_run_are_made_again_without_opengl_too(runs, monkeypatch, 
     drawn = [Path(name).name for name in json.loads(capsys.readouterr().out)["pictures"]]
     assert {"tumble-start.png", "tumble-half.png", "tumble-end.png", "trajectory.png"} <= set(drawn)
     page = (runs / "brick" / "report.html").read_text()
-    assert "Seen from near" in page and "no OpenGL" in page
+    assert "Close-up" in page and "no OpenGL" in page
 
 
 def test_render_lists_what_it_has_drawn_and_no_film_of_before(runs, tmp_path, monkeypatch, capsys):
