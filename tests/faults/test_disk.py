@@ -147,7 +147,7 @@ def logs(home):
     return "\n".join(path.read_text() for path in sorted(home.glob("*.log")))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_two_commands_at_once_on_one_cache_or_one_folder_lose_nothing(tmp_path):
     """Two make the same bed and keep it in the same files; of two that have one folder, one is refused."""
     (tmp_path / "case.toml").write_text(GRAINS)

@@ -143,7 +143,7 @@ def test_ctrl_c_ends_processes_and_command_in_words_and_resume_makes_the_same_ta
     assert (out / "table.csv").read_bytes() == (tmp_path / "one" / "table.csv").read_bytes()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_cases_of_the_verification_suite_come_out_the_same_in_two_processes(tmp_path):
     """All but the times; with the curves of their plots."""
     pytest.importorskip("distributed")
