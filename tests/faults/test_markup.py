@@ -22,7 +22,7 @@ MARKUP = (
     '" onmouseover="window.taken = 1" autofocus onfocus="window.taken = 1" x="',
     "<svg onload=window.taken=1>",
     "{{ 7 * 7 }}${7 * 7}<a href='javascript:window.taken = 1'>x</a>",
-    'x"\n[[trial]]\nid = "made by a name',
+    'x"\n[[trial]]\nid = "made-by-a-name',
 )
 INERT = """
 [...document.querySelectorAll('*')].filter((e) => [...e.attributes].some((a) => a.name.startsWith('on')
@@ -88,7 +88,7 @@ def test_no_name_in_a_campaign_runs_in_the_page_of_its_diagnosis_or_is_toml(brow
     assert opened(browser, tmp_path / "out" / "report.html")[1] == scripts
     for path in (tmp_path / "out").rglob("*.toml"):
         trials = tomllib.loads(path.read_text(encoding="utf-8")).get("trial", [])
-        assert "made by a name" not in [trial["id"] for trial in trials]
+        assert "made-by-a-name" not in [trial["id"] for trial in trials]
 
 
 def texts_marked(value, markup):
