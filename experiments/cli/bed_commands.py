@@ -141,7 +141,7 @@ def _foot(
             if value is not None and not 0 < value < math.inf:
                 raise ValueError(f"{name} = {value:g} must be positive and finite")
         if not -90 <= gamma <= 90:
-            raise ValueError(f"gamma = {gamma:g} degrees: -90 (up) to 90 (down) would do")
+            raise ValueError(f"gamma = {gamma:g} degrees: -90 (up) to 90 (down) is accepted")
         if shape not in SHAPES and not Path(shape).is_file():
             raise ValueError(f"shape = {shape!r} is no file, and no built-in shape: {', '.join(SHAPES)}")
         body = shaped(shape, size, scale)

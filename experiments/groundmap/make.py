@@ -17,7 +17,7 @@ from .maps import DATA, NAMES
 __all__ = ["made_map", "main"]
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
-PACKED = ("sand-rained", "sand-0.60")
+PACKED = ("sand-rained", "sand-0.575", "sand-0.60")
 RANGES = {
     "gravity": (9.80665e-6, 9.80665), "tip_diameter": (0.001, 0.1), "grain": (0.0, 0.2),
 }  # fmt: skip

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments import tumble
+from experiments import groundmap, tumble
 from experiments.converge.statistics import interval_of
 from rigid.ground_file import GroundFile, read_ground
 from vis.page.plots import BED, MODEL, new_panels
@@ -49,6 +49,15 @@ def power_law(size: str) -> Path:
     return GroundFile(**made).write(HERE / f"power-irreversible-{size}.toml")
 
 
+def looked_up() -> Path:
+    """The pair of `hedgebed ground` for grains of 0.2 mm, written beside this script."""
+    with tempfile.TemporaryDirectory() as folder:
+        groundmap.run(groundmap.Settings(), Path(folder) / "run")
+        text = (Path(folder) / "run" / "ground.toml").read_text(encoding="utf-8")
+    (HERE / "ground-0.2mm.toml").write_text(text, encoding="utf-8")
+    return HERE / "ground-0.2mm.toml"
+
+
 def on_law(**options: object) -> dict[str, tuple[float, float]]:
     """Value and standard deviation of each quantity, in the units of the table."""
     with tempfile.TemporaryDirectory() as folder:
@@ -76,6 +85,7 @@ def main() -> None:
         "power-irreversible of 2.4 mm": {"ground": str(power_law("2.4mm"))},
         "spring-damper of 1 mm": {"ground": str(RESULTS / "calibrate-sand-1mm" / "ground.toml")},
         "power-irreversible of 1 mm": {"ground": str(power_law("1mm"))},
+        "hedgebed ground, 0.2 mm": {"ground": str(looked_up())},
     }
     found = {name: on_law(**options) for name, options in laws.items()}
     grains = {size: on_grains(size) for size in SIZES}
@@ -98,7 +108,7 @@ def main() -> None:
             cells.append(f"{value:.1f} ± {std:.1f}" if std else f"{value:.1f}")
         print(f"| {words} | {' | '.join(cells)} |")
     shown = ("trajectory_angle", "ahead_1s", "sinkage_largest", "sinkage_start")
-    drawing, panels = new_panels(4, height=3.0, sharey=True)
+    drawing, panels = new_panels(4, height=3.4, sharey=True)
     for axis, name in zip(panels, shown, strict=True):
         for place, size in enumerate(SIZES):
             values = grains[size][name]
