@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from experiments.campaign import Campaign, Recording
 from experiments.runs.types import Json
 
-from .penetration import EFFECTS, Hidden, correlated, draw_kind, tables_of
+from .penetration import EFFECTS as PLAIN
+from .penetration import Hidden, correlated, draw_kind, tables_of
 from .rig_bed import LAWS, Bed, Law, Path, draw_law, drive, drop, push
 
 __all__ = ["EFFECTS", "NUISANCES", "OUTSIDE", "make_rig"]
@@ -30,7 +31,8 @@ SIZES = (0.012, 0.02, 0.032)  # diameters [m]; numbers of a bed are those of the
 
 _LOUD = 1.3
 _MOST_ROWS = 1200
-OUTSIDE = ("relaxation", "collapse", "magnet", "cell-drift", "ringing", "rate", "wrong-mass")
+EFFECTS = (*PLAIN, "relaxation")
+OUTSIDE = ("collapse", "magnet", "cell-drift", "ringing", "rate", "wrong-mass")
 
 _WRONG_MASS = 0.06
 _HALVINGS = 9
@@ -109,7 +111,7 @@ def draw_rig(random: Random, effects: tuple[str, ...], outside: str | None, want
         (k * math.exp(random.normal(0, 0.5)), c * math.exp(random.normal(0, 0.5))) if free
         else (k / max(1 + 0.1 * random.standard_normal(), 0.7), c / max(1 + 0.2 * random.standard_normal(), 0.4))
     )  # fmt: skip
-    must_return = bool({"plastic-sinkage", "adhesion", "shaft-friction"} & set(effects)) or outside == "relaxation"
+    must_return = bool({"plastic-sinkage", "adhesion", "shaft-friction", "relaxation"} & set(effects))
     style = {
         "returns": must_return or chance(0.8), "above": 0.0 if chance(0.25) else between(0.001, 0.01),
         "hold": 0.0 if chance(0.25) else between(0.05, 1.0), "ramp": between(0.005, 0.05), "eased": chance(0.5),

@@ -336,7 +336,8 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                     gone.fill(0.0)
                 else:
                     if row > starts[path]:
-                        gone = settled(gone, 0.5 * (z + before), times[row] - times[row - 1], numbers, k)
+                        half = 0.5 * (times[row] - times[row - 1])
+                        gone = settled(settled(gone, before, half, numbers, k), z, half, numbers, k)
                     share = taken(z, 1.0 if z > before else -1.0, before, share, numbers, k)
                     before = z
                 top, deepest = ti.max(top, z), ti.max(deepest, z)

@@ -40,13 +40,27 @@ TERM = Term(
 )  # fmt: skip
 
 
-def push_settle(gone, z, span, relax_share, relax_soon):
-    """The same after `span` more at the depth z, exactly: c z ln(exp(e / (c z)) + span / tau)."""
+def push_settle(gone, z, span, relax_share, relax_fast, relax_soon):
+    """The same after `span` more at the depth z, exactly: c z ln(exp(e / (c z)) + span / tau).
+
+    By one time constant instead (`relax_fast`, f): e' = (f / (1 + f) z - e) / tau, where the loading curve is 1 + f
+    times as steep. That is a spring f K in series with a dashpot beside the bed's spring K, the standard linear solid
+    (Zener 1948, Elasticity and Anelasticity of Metals), but that these two cannot pull: e stays at most f / (1 + f) z.
+    K stays what a slow push meets.
+    """
     after = gone
     if relax_share > 0.0:
         size = relax_share * max(z, 1e-12)
         after = gone + size * log(1.0 + span / relax_soon * exp(-gone / size))
+    elif relax_fast > 0.0:
+        end = relax_fast / (1.0 + relax_fast) * z
+        after = min(end + (gone - end) * exp(-span / relax_soon), end)
     return after
+
+
+def push_loading(grown, relax_fast):
+    """1 + f times as steep, before anything has relaxed."""
+    return grown * (1.0 + relax_fast)
 
 
 def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
@@ -66,12 +80,18 @@ CANDIDATE = fit.Candidate(
         bench="push one spike in, hold it for a minute and read the force",
     ),
     push=fit.Push(
-        rank=45, law={"settle": push_settle}, lengths={"relax_soon": SOON},
+        rank=45, law={"settle": push_settle, "loading": push_loading}, lengths={"relax_soon": SOON},
         forms=(
             fit.Form("logarithmic", (fit.amplitude("relax_share", "plain", 0.03, 0.0, 0.15),
                                      fit.between("relax_soon", "time", log(5e-3), log(5.0))),
                      ((0.02, log(0.05)), (0.05, log(0.5))),
                      "K * (z - e), de/dt = relax_share * z / relax_soon * exp(-e / (relax_share * z))"),
+            fit.Form("with one time constant", (fit.amplitude("relax_fast", "plain", 0.3, 0.0, 3.0),
+                                                fit.between("relax_soon", "time", log(5e-3), log(5.0))),
+                     ((0.1, log(0.05)), (0.3, log(0.5))),
+                     "(1 + relax_fast) * K * (z - e), "
+                     "de/dt = (relax_fast / (1 + relax_fast) * z - e) / relax_soon, "
+                     "e at most relax_fast / (1 + relax_fast) * z"),
         ),
         apart={
             "shaft-friction": "Hold the spike for a minute: a force that relaxes goes on falling by equal steps for "

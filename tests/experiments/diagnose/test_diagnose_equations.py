@@ -70,6 +70,8 @@ def told(form_id: str, numbers: dict[str, float], z: float, v: float, deepest: f
 
         until = z / SPEED if v > 0 else DEEPEST / SPEED + (DEEPEST - z) / (0.4 * SPEED)
         names["e"] = solve_ivp(slope, (0, until), [0.0], rtol=1e-8, atol=1e-14, max_step=2e-3).y[0, -1]
+        if "relax_fast" in numbers and v < 0:  # tau is longer than the way back lasts
+            names["e"] = min(names["e"], numbers["relax_fast"] / (1 + numbers["relax_fast"]) * z)
     for clause in clauses:
         name, _, right = clause.partition(" = ")
         if right:
