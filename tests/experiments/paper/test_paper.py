@@ -339,7 +339,7 @@ def test_the_report_shows_the_figures_there_are_trials_for(small):
     page = (small / "report.html").read_text()
     count = result_of(small)["integrations"]
     words_of_it = (f"{count} integrations", "all friction of sand: they are ours", "as the paper fixed it")
-    for words in ("Figure 6", "Figure 7", "Figure 8", "not judged", "What the text states", *words_of_it):
+    for words in ("Figure 6", "Figure 7", "Figure 8", "not judged", "Statements of the text", *words_of_it):
         assert words in page
     assert not (small / "figures" / "figure5.png").exists()  # that one is of steel
     assert "http://" not in page and "https://" not in page
