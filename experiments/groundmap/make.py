@@ -6,7 +6,7 @@ check the scaling). docs/results/README.md has the commands of those runs.
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ def _result(name: str) -> Any:
     return json.loads((RESULTS / name / "result.json").read_text(encoding="utf-8"))
 
 
-def made_map() -> dict[str, Any]:
+def made_map() -> Mapping[str, Any]:
     """The table of sand."""
     flagship = _result("converge-flagship")
     lines = {}

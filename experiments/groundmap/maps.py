@@ -21,7 +21,7 @@ import numpy as np
 
 from .settings import say
 
-__all__ = ["DATA", "Answer", "GroundMap", "Line", "Number", "map_names", "read_map"]
+__all__ = ["DATA", "Answer", "GroundMap", "Line", "Number", "read_map"]
 
 DATA = Path(__file__).with_name("maps.toml")
 NAMES = ("stiffness", "damping", "sinkage")
@@ -137,11 +137,6 @@ def _line(table: Mapping[str, Any]) -> Line:
 def _tables() -> Mapping[str, Any]:
     found = tomllib.loads(DATA.read_text(encoding="utf-8"))
     return {name: table for name, table in found.items() if isinstance(table, dict)}
-
-
-def map_names() -> list[str]:
-    """The materials that have a map."""
-    return list(_tables())
 
 
 def read_map(material: str) -> GroundMap:

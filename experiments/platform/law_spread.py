@@ -7,8 +7,8 @@ covariance, so that the parameters count as independent. The error of the law it
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
 
+from experiments.runs.types import Json
 from rigid.ground_file import GroundFile
 
 __all__ = ["Answer", "moved", "spread_of_law", "with_spread"]
@@ -56,7 +56,7 @@ def spread_of_law(fitted: GroundFile, answer: Callable[[GroundFile], Answer], be
     return {key: None if key in missing else math.sqrt(square) for key, square in squares.items()}
 
 
-def with_spread(quantities: dict[str, Any], stds: Mapping[str, float | None]) -> dict[str, Any]:
+def with_spread(quantities: Mapping[str, Json], stds: Mapping[str, float | None]) -> dict[str, Json]:
     """`quantities` of a result with these standard deviations."""
     return {
         name: entry | {"std": stds[name]} if name in stds and entry["value"] is not None else entry
