@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from coupling import BedGround, CoupledTumble, LeftTheBedError, SpatialRun
+from coupling.lammps import LammpsEndedError
 from coupling.robot import LostRobotError, RobotRun
 from coupling.stepper import Reporting
 from dem import BedFailure
@@ -18,6 +19,7 @@ from experiments.runs.whole_runs import publish
 
 from . import say
 from .bed_progress import show_bed
+from .lammps import lammps_ended
 
 __all__ = ["CHECKPOINT", "Followed", "Frames"]
 
@@ -97,6 +99,8 @@ class Followed(ABC, Generic[Run]):
         try:
             with held_back() as asked_to_stop:
                 found = run.run(**reporting)
+        except LammpsEndedError as error:
+            raise RuntimeError(lammps_ended(error)) from error
         except RuntimeError as error:  # a grain lost, an overlap past its bound, a spike beyond the bed
             folder.save_checkpoint(f"{CHECKPOINT}.failed", run.state())
             left = say("state_kept", name=CHECKPOINT)

@@ -11,6 +11,7 @@ from experiments.platform.settings import NotNegative, Positive
 from experiments.runs.strict import StrictSettings
 
 from . import say
+from .lammps_settings import RANKS
 
 __all__ = ["OF_THE_MASTER", "GrainsSettings", "TumbleBedSettings"]
 
@@ -98,6 +99,7 @@ class TumbleBedSettings(GrainsSettings):
 
     bed_size: tuple[Positive, Positive, Positive] = (0.5, 0.06, 0.046)
     """Bed: length along the motion, width for one spike (both periodic) and depth [m]."""
+    ranks: int | None = Field(None, ge=1, le=4096, description=RANKS)
     bed_repeats: int = Field(1, ge=1, le=100)
     """Bed: number of copies of the prepared bed, end to end along the motion [1]."""
     coarse: Positive | None = None

@@ -149,7 +149,7 @@ def _read(name: str, path: Path) -> _Source:
     settings = PenetrateSettings(**folder.settings)
     if (kept := path / MATERIAL_COPY).is_file():
         settings = settings.model_copy(update={"material": str(kept)})
-    if settings.ground != "bed":
+    if not settings.on_grains:
         raise ValueError(f"runs = {str(path)!r} is a run on ground = {settings.ground!r}: one in a bed was expected")
     return _Source(name, folder, settings, folder.read_result())
 

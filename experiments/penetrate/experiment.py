@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 
 from coupling import BedGround, Run
+from coupling.lammps import LammpsEndedError
 from experiments.campaign.files import keep_model, place_campaign
 from experiments.grains.advice import resolution_advice
 from experiments.grains.bed_progress import show_bed
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
+from experiments.grains.lammps import in_lammps, lammps_ended
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -56,7 +58,7 @@ modulus is enough (jsc-1a-dense-heights, four grains across the tip, eight deep:
 def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     if settings.ground == "spring-damper":
         return run_without_bed(settings, folder, progress)
-    if settings.ground != "bed":
+    if not settings.on_grains:
         return run_on_law(settings, folder, progress)
     with folder.lock():
         result = compute(settings, folder, progress)
@@ -154,6 +156,8 @@ class _Work:
     def _ground(self, bed: Any) -> BedGround:
         """The spike over a bed, whose overlaps end a run past `beds.overlap_bound`."""
         bed.overlap_limit = beds.overlap_bound(self.settings)
+        if self.settings.ground == "lammps":
+            return in_lammps(bed, make_spike(self.settings), self.settings, self.progress)
         return BedGround(bed, make_spike(self.settings))
 
     def _prepared(self, seed: int) -> Any:
@@ -242,6 +246,8 @@ class _Work:
             with held_back() as asked_to_stop:
                 on_frame, interval = (frames.write, frames.interval) if frames else (None, None)
                 series = stepper.run(on_step=on_step, on_frame=on_frame, frame_interval=interval)
+        except LammpsEndedError as error:
+            raise RuntimeError(lammps_ended(error)) from error
         except RuntimeError as error:  # the bed's: a NaN, a grain lost, an overlap past its bound
             if self._made_stiffer(error, unit.seed, unit):
                 return False

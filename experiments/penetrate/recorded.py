@@ -77,7 +77,7 @@ def campaign_of_run(run: str | Path, *, sensors: SpikeSensors | None = None) -> 
         raise ValueError(f"{str(run)!r} is not finished ({folder.status}): `hedgebed resume {run}` first")
     result = folder.read_result()
     settings = PenetrateSettings(**folder.settings)
-    if settings.ground != "bed":
+    if not settings.on_grains:
         raise ValueError(f"{str(run)!r} is a run on ground = {settings.ground!r}: one in a bed was expected")
     return campaign_of(settings, result, folder, sensors or SpikeSensors())
 

@@ -5,6 +5,7 @@ import math
 from dem.engine.values import refuse_sleep
 from experiments.campaign.files import check_target
 from experiments.grains.bearing import UNSURE
+from experiments.grains.lammps import check_lammps
 from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.staged import check_bed_stages
 from experiments.grains.where import check_memory, check_where
@@ -31,9 +32,10 @@ def check(settings: PenetrateSettings) -> None:
         read_law(settings.model, settings)
     if settings.campaign is not None:
         check_target(settings.campaign)
-    if settings.ground != "bed":
+    if not settings.on_grains:
         fitted_ground(settings.ground)
         return
+    check_lammps(settings)
     stuff = beds.find_material(settings)
     if settings.bed_stages is not None:
         size, grain, spread = settings.bed_size, settings.grain, settings.spread

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from experiments.grains.advice import costs, times_as_long
+from experiments.grains.lammps_settings import ON_GRAINS, RANKS, lammps_fault
 from experiments.runs.strict import NotNegative, Positive, SeedNumber, StrictSettings, Threads
 from rigid.ground_file import is_ground_file
 from rigid.platform.rig import STANDARD_GRAVITY
@@ -118,8 +119,9 @@ class PenetrateSettings(StrictSettings):
 
     # Beside it
     ground: str = "bed"
-    """Ground of the spike: bed (of grains), spring-damper (that of `model`, without grains), or the law of a
-    ground.toml."""
+    """Ground of the spike: bed (of grains), lammps (a bed whose grains are in LAMMPS), spring-damper (that of `model`,
+    without grains), or the law of a ground.toml."""
+    ranks: int | None = Field(None, ge=1, le=4096, description=RANKS)
     model: str | None = Field(None, min_length=1)
     """A model.toml that `diagnose` wrote for pushes. Its law, with all effects, is compared with bed and spring-damper.
     With ground = spring-damper it also gives tip, mass and load that are not given here."""
@@ -178,10 +180,15 @@ class PenetrateSettings(StrictSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        for finding in (self._spike(), self._bed(), self._runs(), self._beside()):
+        for finding in (self._spike(), self._bed(), self._runs(), self._beside(), lammps_fault(self)):
             if finding:
                 raise ValueError(finding + self._perhaps_millimetres())
         return self
+
+    @property
+    def on_grains(self) -> bool:
+        """Whether the ground is made of grains."""
+        return self.ground in ON_GRAINS
 
     def _perhaps_millimetres(self) -> str:
         """What to ask of a length above a metre; empty where there is none."""
@@ -194,7 +201,7 @@ class PenetrateSettings(StrictSettings):
         return ""
 
     def _spike(self) -> str | None:
-        on_grains, shaft, across = self.ground == "bed", self.shaft_diameter, self.tip_diameter / self.grain
+        on_grains, shaft, across = self.on_grains, self.shaft_diameter, self.tip_diameter / self.grain
         if on_grains and across < 1:
             return say("tip_thin", s=self, least=5 * self.grain, most=self.tip_diameter / 5)
         if on_grains and across < 4.999 and not self.allow_coarse:
@@ -220,7 +227,7 @@ class PenetrateSettings(StrictSettings):
         return None
 
     def _bed(self) -> str | None:
-        if self.ground != "bed":  # there is none then
+        if not self.on_grains:  # there is no bed then
             return say("sleep_without_bed") if self.sleep else None
         width, height = min(self.bed_size[:2]), self.bed_size[2]
         wide, deep = 4 * self.tip_diameter, self.depth + self.tip_diameter
@@ -292,13 +299,13 @@ class PenetrateSettings(StrictSettings):
         return None
 
     def _beside(self) -> str | None:
-        if self.ground not in ("bed", "spring-damper") and not is_ground_file(self.ground):
+        if not self.on_grains and self.ground != "spring-damper" and not is_ground_file(self.ground):
             return say("no_ground", s=self)
         if is_ground_file(self.ground) and self.model is not None:
             return say("model_and_file", s=self)
         if self.ground == "spring-damper" and self.model is None:
             return "ground = 'spring-damper' needs model, the model.toml whose K and C it has: none is given"
-        if self.ground != "bed" and self.campaign is not None:
+        if not self.on_grains and self.campaign is not None:
             return say("campaign_without_bed", s=self)
         return None
 

@@ -22,9 +22,9 @@ _CORES = 2
 
 def core_seconds(command: str, settings: BaseModel) -> float | None:
     """About how long a run takes one core [s], its bed included; None where nothing is known."""
-    if isinstance(settings, PenetrateSettings) and command == "penetrate" and settings.ground == "bed":
+    if isinstance(settings, PenetrateSettings) and command == "penetrate" and settings.on_grains:
         return 3600 * core_hours(settings) * len(settings.seeds)
-    if isinstance(settings, TumbleSettings) and settings.ground == "bed":
+    if isinstance(settings, TumbleSettings) and settings.on_grains:
         return _CORES * cost_of_tumble(settings).seconds
     return ON_A_LAW if command in ("hop", "tumble", "penetrate") else None
 

@@ -35,7 +35,7 @@ __all__ = ["check", "resume", "run"]
 
 def check(settings: TumbleSettings) -> None:
     """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
-    if settings.ground == "bed":
+    if settings.on_grains:
         from .on_grains import PlanarOnBed  # loads Taichi
 
         PlanarOnBed(settings).check()
@@ -53,7 +53,7 @@ def check(settings: TumbleSettings) -> None:
 
 def _carry_out(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
     with folder.lock():
-        if settings.ground != "bed":
+        if not settings.on_grains:
             return _on_law(settings, folder, progress)
         from .on_grains import PlanarOnBed  # loads Taichi
 

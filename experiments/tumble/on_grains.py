@@ -18,8 +18,9 @@ from coupling.members import FEWEST_SLOTS, Member, slots_of
 from dem import Bed, Graded
 from experiments.grains.flight import lies_in_flight
 from experiments.grains.graded import graded_under
-from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
-from experiments.grains.softening import PUSHED, Softening
+from experiments.grains.lammps import check_lammps, in_lammps
+from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
+from experiments.grains.softening import PUSHED, Softening, run_limit
 from experiments.grains.staged import check_bed_stages, packing_warning
 from experiments.platform.numbers import platform_numbers, tip_angles, tip_depth, torque_within_limit
 from experiments.platform.settled import check_lengths
@@ -251,6 +252,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
     # The run
 
     def announce(self, progress: Progress) -> None:
+        self.progress = progress
         settings, plan = self.settings, self.plan
         for sentence in opening(
             settings, plan, grains=self.grain_count(), softening=self.softening(), lowering_speed=self.lowering_speed
@@ -307,6 +309,22 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
 
     def layout(self, bed: Bed) -> Mapping[str, Any]:
         return {"origin": (self.origin, 0.5 * bed.size[1]), "begin": self.settings.place}
+
+    def ground(self, bed: Bed) -> BedGround:
+        """The platform on the prepared bed, in LAMMPS where its grains are to live there."""
+        s = self.settings
+        if s.ground != "lammps":
+            return super().ground(bed)
+        bed.overlap_limit = run_limit(s.max_overlap)
+        return in_lammps(
+            bed, self.members(), s, self.progress, copies=self.copies, touch=TOUCH * self.weight / self.copies,
+            friction=s.spike_friction, restitution=s.spike_restitution, **self.layout(bed),
+        )  # fmt: skip
+
+    def check(self) -> None:
+        """As `PlatformOnBed.check`, and whether LAMMPS is there where it is asked for."""
+        check_lammps(self.settings)
+        super().check()
 
     def run_on(self, ground: BedGround) -> CoupledTumble:
         lowered = {"lower_gravity": True} if self.settings.settle_gravity is not None else {}

@@ -115,7 +115,7 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
         "departures": {"sentences": tumble_sentences(trajectory)},
         "trial": plan.trial_table(trial.weight),
         "surface": plan.surface,
-        "ground": settings.ground if fitted is None else fitted.law,
+        "ground": ("bed" if settings.on_grains else settings.ground) if fitted is None else fitted.law,
         **({} if fitted is None else {"ground_file": {"material": fitted.material, "source": fitted.source}}),
         "actuator": settings.actuator,
         "method": trajectory.method,

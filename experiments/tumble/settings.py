@@ -8,6 +8,8 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from experiments.grains.lammps_settings import ON_GRAINS as GRAINS
+from experiments.grains.lammps_settings import lammps_fault
 from experiments.grains.settings import OF_THE_MASTER, TumbleBedSettings
 from experiments.platform.settings import NotNegative, PlatformSettings, Positive
 from rigid.checks import nearest
@@ -36,7 +38,7 @@ class TrialSettings(PlatformSettings):
         "spring-damper",
         description="Law of the force of the ground: "
         f"{' or '.join(', '.join(GROUNDS).rsplit(', ', 1))}, or a ground.toml of one spike; for tumble also bed (of "
-        "grains).",
+        "grains) or lammps (a bed whose grains are in LAMMPS).",
     )
     ground_parameters: tuple[str, ...] = ()
     """Parameters of a law other than the spring-damper, for one spike, as name=value in SI units."""
@@ -72,11 +74,16 @@ class TrialSettings(PlatformSettings):
             raise ValueError(finding)
         return self
 
+    @property
+    def on_grains(self) -> bool:
+        """Whether the ground is made of grains."""
+        return self.ground in GRAINS
+
     def _ground(self) -> str | None:
         if self.ground == "spring-damper":
             given = " ".join(self.ground_parameters)
             return say("parameters_of_other_laws", given=given) if given else None
-        if self.ground == "bed":
+        if self.on_grains:
             return say("parameters_of_a_bed") if self.ground_parameters else None
         if is_ground_file(self.ground) and self.ground_parameters:
             return say("parameters_of_a_file", s=self, given=" ".join(self.ground_parameters))
@@ -128,7 +135,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
     @classmethod
     def _as_long_as_grains_allow(cls, given: Any) -> Any:
         others = ("duration", "gravity", "drop_speed")
-        if not isinstance(given, dict) or given.get("ground") != "bed" or given.get("tumbles", 1) != 1:
+        if not isinstance(given, dict) or given.get("ground") not in GRAINS or given.get("tumbles", 1) != 1:
             return given
         return given if any(given.get(key) is not None for key in others) else given | {"duration": ON_GRAINS}
 
@@ -140,7 +147,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
         return self
 
     def _known_ground(self) -> str | None:
-        grounds = [*GROUNDS, "bed"]
+        grounds = [*GROUNDS, *GRAINS]
         if self.ground in grounds or is_ground_file(self.ground):
             return None
         known = nearest(self.ground, grounds)
@@ -169,7 +176,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
         )
 
     def _on_grains(self) -> str | None:
-        given, on_bed, coupled = self.bed_settings_given(), self.ground == "bed", self.method == "coupled"
+        given, on_bed, coupled = self.bed_settings_given(), self.on_grains, self.method == "coupled"
         if (on_bed or coupled) and (fault := self._row_or_landing() or self.stepping_fault()):
             return fault
         if coupled and not on_bed:
@@ -186,7 +193,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
             return say("campaign_on_bed", s=self)
         if key := self._beyond_the_torque() or self._first_given("sweep", "model"):
             return say("not_on_bed", key=key)
-        if fault := self.sleep_fault() or self._settled_under():
+        if fault := self.sleep_fault() or self._settled_under() or lammps_fault(self):
             return fault
         return say("method_on_bed", s=self) if self.method == "paper" else None
 

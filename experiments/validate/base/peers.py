@@ -10,12 +10,12 @@ import shutil
 import signal
 import subprocess
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from scipy.optimize import brentq
+from coupling.lammps.law import TANGENTIAL, dashpot_input
+from coupling.lammps.words import box_of, data_file, digits, spheres
 
 from .case import Outcome
 
@@ -24,9 +24,7 @@ __all__ = [
     "lammps_restitution", "run_deck", "run_peer", "spheres",
 ]  # fmt: skip
 
-LAMMPS_TANGENTIAL = {"displacement": "mindlin", "rescaled": "mindlin_rescale/force"}
-"""LAMMPS' names of our springs (`Material.tangential`)."""
-_LAMMPS_TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
+LAMMPS_TANGENTIAL = TANGENTIAL
 _LAST_LINES = 6
 _GRACE = 10.0  # for mpirun to end its ranks [s]
 # Quiet, and one thread a rank.
@@ -137,36 +135,10 @@ def deck_of(peer: str, lines: Sequence[str], *, boundary: str, skin: str = "2e-4
     return "\n".join([*head, *lines]) + "\n"
 
 
-def data_file(box: Sequence[str], atoms: Sequence[str], velocities: Sequence[str] = (), *, types: int = 1) -> str:
-    """The data file that both read: a row of ``spheres`` for each grain; then velocity and spin."""
-    lines = ["grains of hedgebed\n", f"{len(atoms)} atoms", f"{types} atom types\n", *box, "\nAtoms\n"]
-    lines += [f"{k} {row}" for k, row in enumerate(atoms, 1)]
-    lines += ["\nVelocities\n", *(f"{k} {row}" for k, row in enumerate(velocities, 1))] if velocities else []
-    return "\n".join(lines) + "\n"
-
-
-def spheres(radii: np.ndarray, places: np.ndarray, density: float, figures: int = 17) -> list[str]:
-    """Type, diameter, density and position of each."""
-    rows = zip(radii, places, strict=True)
-    return [f"1 {digits((2 * radius, density, *place), figures)}" for radius, place in rows]
-
-
-def digits(values: Iterable[float], figures: int = 17) -> str:
-    """Numbers, all their digits or so many."""
-    return " ".join(f"{value:.{figures}g}" for value in values)
-
-
-def box_of(*sides: float, figures: int = 17) -> list[str]:
-    """The lines of a box from 0 on."""
-    return [f"0 {side:.{figures}g} {axis}lo {axis}hi" for axis, side in zip("xyz", sides, strict=True)]
-
-
 def lammps_restitution(restitution: float) -> float:
     """What to ask LAMMPS' ``damping tsuji`` for, to have the dashpot of a restitution [1].
 
-    Its dashpot is alpha(e) sqrt(m* 4/3 E* a), alpha the polynomial of its manual (pair_style granular); that of Tsuji
-    et al. in closed form is 2 sqrt(5/6) |beta| sqrt(m* 2 E* a), beta = ln e / sqrt(ln^2 e + pi^2).
+    That of Tsuji et al. in closed form is sqrt(5) |beta| in LAMMPS' measure, beta = ln e / sqrt(ln^2 e + pi^2).
     """
     log = math.log(restitution)
-    wanted = math.sqrt(5) * -log / math.hypot(log, math.pi)
-    return float(brentq(lambda e: np.polyval(_LAMMPS_TSUJI, e) - wanted, 0.05, 1.2, xtol=1e-15))
+    return dashpot_input(math.sqrt(5) * -log / math.hypot(log, math.pi))

@@ -1,0 +1,12 @@
+"""Grains in LAMMPS, a program of its own under MPI, as a bed: the same bodies, the same master, the same balance.
+
+`LammpsBed` takes over the grains of a `dem.Bed`, `LammpsGround` puts a body on them.
+
+Imports `dem`, `rigid`, and of `coupling` the ground of a bed.
+"""
+
+from .bed import LammpsBed
+from .ground import LammpsGround
+from .process import INSTALL, LammpsEndedError, LammpsMissingError, find_lammps
+
+__all__ = ["INSTALL", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError", "find_lammps"]

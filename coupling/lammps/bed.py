@@ -1,0 +1,430 @@
+"""A bed whose grains live in LAMMPS: what `BedGround` and the experiments use of `dem.Bed`, answered by LAMMPS.
+
+The grains begin where those of a `dem.Bed` are, with their velocities and spins. The springs of friction and rolling
+begin without stretch, since LAMMPS reads none; `settle` lets the grains come to rest again.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from dem import Bed, BedFailure
+from dem.contact.law import pair_row
+from dem.engine.values import Grains
+from dem.grains.materials import Facing, Material
+from dem.grains.packing import bulk_packing, surface_height
+from rigid.ground.reaction import State
+
+from .law import MeanContact, law_words
+from .process import Lammps
+from .regions import MovingBody, pieces_of
+from .words import box_of, data_file, digits, spheres
+
+__all__ = ["LammpsBed"]
+
+Vector = np.ndarray
+FLOOR = 0
+MOST_BODIES = 12  # LAMMPS has 32 groups; a body of two pieces takes two
+STILL = 1e-5  # Mean kinetic energy of a bed at rest [m g d]
+_SPELL, _MOST_SPELLS = 1.5, 60  # How long grains are left to come to rest at a time [sqrt(d / g)], how often at most
+_SKIN = 0.05  # Of the neighbour lists [d]
+_COLUMNS = "id x y z xu yu zu vx vy vz omegax omegay omegaz fx fy fz"
+
+
+class LammpsBed:
+    """The grains of ``bed`` in LAMMPS on ``ranks`` processes, over the same floor, periodic in x and y.
+
+    ``begin``: where LAMMPS' box begins along x [m]. A body does not reach across its ends.
+
+    Raises ValueError, naming it, for what has no counterpart: bodies that are already in the bed, a restitution below
+    LAMMPS' dashpot. Raises LammpsMissingError where LAMMPS cannot be started.
+    """
+
+    precision = "float64"
+
+    def __init__(self, bed: Bed, *, ranks: int, begin: float = 0.0) -> None:
+        bodies = int(bed.state()["numbers"][1])
+        if bodies != 1 or not bed.has_floor:
+            raise ValueError(
+                f"the bed has {bodies} bodies: for LAMMPS it needs its floor and no other body; prepare it anew"
+            )
+        self.material: Material = bed.material
+        self.size, self.height, self.gravity = bed.size, bed.height, bed.gravity
+        self.time_step, self.grain_count, self.seed = bed.time_step, bed.grain_count, bed.seed
+        self.recipe, self.surface, self.packing_fraction = bed.recipe, bed.surface, bed.packing_fraction
+        self.mean_diameter, self.overlap_limit = bed.mean_diameter, bed.overlap_limit
+        self.ranks, self.begin, self.tensile = ranks, float(begin), bed.settings.tensile
+        self.steps = self.grain_steps = 0
+        self._seen = 0.0  # Largest overlap that was seen, over the mean diameter of the pair [1]
+        grains = bed.grains(contacts=False)
+        self.radius, self.mass = grains.radius, grains.mass
+        self.weight = float(self.mass.sum()) * math.hypot(*self.gravity)
+        self._rows = [bed.state()["body_pair"][FLOOR].astype(float)]  # Pair parameters of floor and bodies
+        self._grain_row = pair_row(self.material, tensile=self.tensile)
+        # The contact that carries a column of half the bed's depth on one grain's share of the area.
+        load = 0.5 * self.weight * self.mean_diameter**2 / (self.size[0] * self.size[1])
+        self._mean = MeanContact.of(self.radius, self.mass, young=0.5 * self._grain_row[0], load=load)
+        self._bodies: list[MovingBody] = []
+        self._sums, self._reactions = np.zeros(0), np.zeros((1, 6))
+        self._set_up = False  # Whether LAMMPS is ready to go on without a setup
+        self._lammps = Lammps(ranks)
+        self._begin_anew(grains)
+        self._origin = self._dumped()[:, 4:7]
+
+    def __repr__(self) -> str:
+        grains = f"{self.grain_count} grains of {self.material.name!r}"
+        return f"LammpsBed({grains} on {self.ranks} ranks, time {self.time:g} s)"
+
+    # The box
+
+    def _begin_anew(self, grains: Grains) -> None:
+        """Read the grains, and give them law, floor and gravity."""
+        deepest = 4 * float(self.radius.max())
+        places = grains.position.copy()
+        places[:, 0] = self.begin + (places[:, 0] - self.begin) % self.size[0]
+        places[:, 1] %= self.size[1]
+        box = box_of(*self.size[:2], self.height + deepest, low=(self.begin, 0.0, -deepest))
+        atoms = spheres(self.radius, places, self.material.density)
+        moving = [digits(row) for row in np.hstack([grains.velocity, grains.spin])]
+        (self._lammps.folder / "grains.data").write_text(data_file(box, atoms, moving), encoding="ascii")
+        self._lammps.tell([*self._head(), "read_data grains.data", *self._interactions()])
+
+    def _head(self) -> list[str]:
+        return [
+            "echo none", "units si", "atom_style sphere", "boundary p p f", "newton off", "comm_modify vel yes",
+            "processors * * 1",
+        ]  # fmt: skip
+
+    def _interactions(self) -> list[str]:
+        """What a restart file does not have, or not for certain: law, floor, gravity, integrator, lists."""
+        g = math.hypot(*self.gravity)
+        grains, floor = self._words(self._grain_row), self._words(self._rows[FLOOR])
+        return [
+            f"neighbor {_SKIN * self.mean_diameter:.17g} bin", "neigh_modify delay 0 every 1 check yes",
+            "pair_style granular", f"pair_coeff * * {grains}",
+            "fix motion all nve/sphere", f"fix pull all gravity {g:.17g} vector {digits(self.gravity)}",
+            f"fix floor all wall/gran granular {floor} zplane 0.0 NULL contacts",
+            "compute floor all reduce sum f_floor[2] f_floor[3] f_floor[4]",
+            f"timestep {self.time_step:.17g}",
+            "thermo_style custom step", "thermo_modify lost error norm no",
+        ]  # fmt: skip
+
+    def _words(self, row: Sequence[float]) -> str:
+        return law_words(row, self.material, tensile=self.tensile, mean=self._mean)
+
+    # The bodies
+
+    def add_body(self, shape: Any, *, position: Sequence[float], **facing: Any) -> int:
+        """Put a body into the bed and return its number (`dem.Bed.add_body`).
+
+        Raises ValueError for shapes that LAMMPS' regions cannot have, and for too many bodies.
+        """
+        if len(self._bodies) >= MOST_BODIES:
+            raise ValueError(f"a bed in LAMMPS takes at most {MOST_BODIES} bodies")
+        faced = Facing(**facing)
+        faced.refuse_for(self.material)
+        row = pair_row(self.material, faced, tensile=self.tensile)
+        number = len(self._bodies) + 1
+        self._bodies.append(MovingBody(number, pieces_of(shape), self._words(row), np.array(position, dtype=float)))
+        self._rows.append(np.array(row))
+        self._reactions = np.zeros((number + 1, 6))
+        self._set_up = False
+        return number
+
+    def move_body(self, body: int, **changes: Any) -> None:
+        """Set a body's pose and motion, of which what is not given stays (`dem.Bed.move_body`)."""
+        moved = self._body(body)
+        names = ("position", "velocity", "turn", "spin")
+        moved.place(*(np.asarray(changes.get(name, getattr(moved, name)), dtype=float) for name in names))
+
+    def move_bodies(
+        self, bodies: Sequence[int], *, positions: Vector, velocities: Vector, turns: Vector, spins: Vector
+    ) -> None:
+        """Set the pose and motion of several bodies at once (`dem.Bed.move_bodies`)."""
+        for body, *values in zip(bodies, positions, velocities, turns, spins, strict=True):
+            self._body(body).place(*values)
+
+    def _body(self, body: int) -> MovingBody:
+        if not 1 <= body <= len(self._bodies):
+            raise ValueError(f"body = {body}: there is no such body in the bed")
+        return self._bodies[body - 1]
+
+    def body_position(self, body: int) -> Vector:
+        """Position of a body's origin [m], shape [3]."""
+        return self._body(body).position.copy()
+
+    def body_turn(self, body: int) -> Vector:
+        """Rotation of a body: a unit quaternion, scalar first, shape [4]."""
+        return self._body(body).turn.copy()
+
+    def young_of(self, body: int) -> float:
+        """Twice the effective modulus of a grain and this body [Pa]."""
+        return float(self._rows[body][0])
+
+    # Time
+
+    @property
+    def time(self) -> float:
+        """Time since the grains are in LAMMPS [s]."""
+        return self.steps * self.time_step
+
+    @property
+    def awake_count(self) -> int:
+        """Number of grains that are computed: all."""
+        return self.grain_count
+
+    def advance(self, steps: int = 1, *, drag_time: float = math.inf) -> None:
+        """Advance by a number of time steps (`dem.Bed.advance`).
+
+        Raises ValueError for a drag, which is not passed on to LAMMPS. Raises LammpsEndedError where LAMMPS ends, as
+        when a rank is killed, a grain leaves the box or a number is not a number.
+        """
+        if math.isfinite(drag_time):
+            raise ValueError(f"drag_time = {drag_time} s: a bed in LAMMPS has no drag")
+        duration = steps * self.time_step
+        self._prepare()
+        commands = [line for body in self._bodies for line in body.motion(self.steps)]
+        for body in self._bodies:
+            low, high = body.reach(duration, self.mean_diameter)
+            self._check_inside(body, low, high)
+            commands += body.select(low, high)
+        self._lammps.tell([*commands, f"run {steps} pre no post no"])
+        self.steps += steps
+        self.grain_steps += steps * self.grain_count
+        for body in self._bodies:
+            body.position = body.position + duration * body.velocity
+            body.angle += duration * float(body.spin[1])
+        before, self._sums = self._sums, self._read_sums()
+        mean = (self._sums - before) / max(1, steps)
+        self._reactions = self._by_body(mean)
+
+    def _prepare(self) -> None:
+        """Make the bodies that are new, and have LAMMPS set up its lists and forces; nothing where that is done."""
+        if self._set_up:
+            return
+        new = [line for body in self._bodies for line in body.motion(self.steps)]
+        new += [line for body in self._bodies if not body.made for line in body.create()]
+        counted = " ".join(f"c_{name}[*]" for name in self._summed)
+        again = ["unfix sums"] if self._sums.size else []
+        self._lammps.tell([*again, *new, f"fix sums all ave/time 1 1 1 {counted} ave running", "run 0 post no"])
+        self._sum_start = self.steps
+        self._sums, self._set_up = self._read_sums(), True
+
+    @property
+    def _summed(self) -> list[str]:
+        """Computes of LAMMPS whose sums over time are read: the floor's, then each piece's of each body."""
+        return ["floor", *(name for body in self._bodies for name in body.names)]
+
+    def _read_sums(self) -> Vector:
+        """Sums over the steps since `_prepare` of all forces and moments on grains [N, N m].
+
+        LAMMPS gives means over all steps so far, the first one included.
+        """
+        count = 3 + 6 * sum(len(body.names) for body in self._bodies)
+        means = self._lammps.ask(*(f"f_sums[{k}]" for k in range(1, count + 1)))
+        return np.array(means) * (self.steps - self._sum_start + 1)
+
+    def _by_body(self, mean: Vector) -> Vector:
+        """Force and moment on floor and bodies [N, N m], shape [body, 6], of the means over their pieces."""
+        found = np.zeros((len(self._bodies) + 1, 6))
+        found[FLOOR, :3] = -mean[:3]
+        at = 3
+        for k, body in enumerate(self._bodies, 1):
+            for _ in body.names:
+                found[k] -= mean[at : at + 6]
+                at += 6
+        return found
+
+    def _check_inside(self, body: MovingBody, low: Vector, high: Vector) -> None:
+        """Raise BedFailure where a body that may touch grains reaches across an end of the box."""
+        if low[2] > self.surface + self.mean_diameter or body.across:
+            return
+        tip = body.position
+        reach = max(float(np.abs(piece.corners()[:, :2]).max()) for piece in body.pieces) + 0.5 * self.mean_diameter
+        for axis, begin in ((0, self.begin), (1, 0.0)):
+            if not begin + reach <= tip[axis] <= begin + self.size[axis] - reach:
+                raise BedFailure(
+                    f"a body at {'xy'[axis]} = {tip[axis]:.4g} m reaches across the end of the bed in LAMMPS, from "
+                    f"{begin:.4g} to {begin + self.size[axis]:.4g} m: a longer or wider bed would do"
+                )
+
+    def reactions(self) -> Vector:
+        """Mean force [N] and torque about its origin [N m] of the last `advance` on each body, shape [body, 6]."""
+        return self._reactions
+
+    def reaction(self, body: int) -> tuple[Vector, Vector]:
+        """The same of one body."""
+        return self._reactions[body][:3], self._reactions[body][3:]
+
+    def settle(self) -> float:
+        """Let the grains come to rest, with all bodies where they are; how long it took [s]. Time is 0 again.
+
+        At rest as a prepared bed is: mean kinetic energy below 1e-5 m g d. Raises RuntimeError where they do not come
+        to rest.
+        """
+        unit = math.sqrt(self.mean_diameter / math.hypot(*self.gravity))
+        spell, began = math.ceil(_SPELL * unit / self.time_step), self.steps
+        limit = STILL * self.weight * self.mean_diameter
+        for _ in range(_MOST_SPELLS):
+            self.advance(spell)
+            if self.kinetic_energy < limit:
+                break
+        else:
+            raise RuntimeError(f"the bed in LAMMPS did not come to rest in {_MOST_SPELLS * _SPELL * unit:.3g} s")
+        taken, grains = (self.steps - began) * self.time_step, self.grains(contacts=False)
+        area = self.size[0] * self.size[1]
+        self.packing_fraction = bulk_packing(grains.position[:, 2], self.radius, area)
+        self.surface = surface_height(grains.position[:, 2], self.radius, area, bulk=self.packing_fraction)
+        return taken
+
+    # What the grains do
+
+    def _dumped(self) -> Vector:
+        """Rows of _COLUMNS of all grains, by id, shape [grain_count, 16]."""
+        self._prepare()
+        path = self._lammps.folder / "grains.txt"
+        self._lammps.tell([
+            f"write_dump all custom {path.name} {_COLUMNS} modify sort id format float %.17g"
+        ])  # fmt: skip
+        self._lammps.wait()
+        text = path.read_text(encoding="ascii")
+        rows = text[text.index("ITEM: ATOMS") :].partition("\n")[2]
+        found = np.fromstring(rows, sep=" ").reshape(-1, len(_COLUMNS.split()))
+        if len(found) != self.grain_count:
+            raise BedFailure(f"LAMMPS has {len(found)} grains of {self.grain_count}: the others left the box")
+        return found
+
+    def grains(self, *, contacts: bool = True) -> Grains:
+        """The grains now, in the order of ids (`dem.Bed.grains`); ``contacts``: with how many each has."""
+        rows = self._dumped()
+        position = rows[:, 1:4].copy()
+        position[:, :2] %= np.array(self.size[:2])
+        count = np.zeros(0, dtype=np.int32)
+        if contacts:
+            first, second, _ = self._look(position)
+            count = np.bincount(np.concatenate([first, second]), minlength=self.grain_count).astype(np.int32)
+            count += position[:, 2] < self.radius
+        return Grains(
+            np.arange(self.grain_count), position, self.radius, self.mass, rows[:, 7:10], rows[:, 10:13],
+            rows[:, 13:16], rows[:, 4:7] - self._origin, count,
+        )  # fmt: skip
+
+    def _touching(self, position: Vector) -> tuple[Vector, Vector, Vector]:
+        """Pairs of grains that overlap, and by how much [m], shape [pair] each."""
+        inside = position.copy()
+        period = np.array(self.size[:2])
+        inside[:, :2] %= period
+        inside[:, :2][inside[:, :2] >= period] = 0.0  # the remainder of a number just below 0 rounds to the period
+        inside[:, 2] -= inside[:, 2].min()
+        tree = cKDTree(inside, boxsize=(*period, 0.0))
+        pairs = tree.query_pairs(2 * float(self.radius.max()), output_type="ndarray")
+        apart = inside[pairs[:, 0]] - inside[pairs[:, 1]]
+        apart[:, :2] -= period * np.round(apart[:, :2] / period)
+        overlap = self.radius[pairs].sum(axis=1) - np.linalg.norm(apart, axis=1)
+        touching = overlap > 0
+        return pairs[touching, 0], pairs[touching, 1], overlap[touching]
+
+    def _look(self, position: Vector) -> tuple[Vector, Vector, Vector]:
+        """`_touching`, with the largest overlap kept. Raises BedFailure past its bound, which only a look can see."""
+        first, second, overlap = self._touching(position)
+        largest = float((overlap / (self.radius[first] + self.radius[second])).max(initial=0.0))
+        self._seen = max(self._seen, largest)
+        if largest > self.overlap_limit:
+            raise BedFailure(
+                f"an overlap of {100 * largest:.3g} % of a diameter went past its bound of "
+                f"{100 * self.overlap_limit:g} % before t = {self.time:.6g} s; make the grains stiffer (young = "
+                f"{self.material.young:.3g} Pa now) or the bound larger"
+            )
+        return first, second, overlap
+
+    @property
+    def max_overlap(self) -> float:
+        """Largest overlap over mean diameter of the pair [1] that was seen since this was set, now included."""
+        self._look(self._dumped()[:, 1:4])
+        return self._seen
+
+    @max_overlap.setter
+    def max_overlap(self, value: float) -> None:
+        self._seen = float(value)
+
+    def spring_energy(self, position: Vector) -> float:
+        """What the normal springs of grains hold with their centres there [J]: Hertz, 4/15 (2 E*) sqrt(R*) d^5/2."""
+        first, second, overlap = self._look(position)
+        r_1, r_2 = self.radius[first], self.radius[second]
+        between = np.sqrt(r_1 * r_2 / (r_1 + r_2)) * overlap**2.5
+        pressed = np.maximum(0.0, self.radius - position[:, 2])
+        floor = np.sqrt(self.radius) * pressed**2.5
+        return 4 / 15 * float(self._grain_row[0] * between.sum() + self._rows[FLOOR][0] * floor.sum())
+
+    @property
+    def kinetic_energy(self) -> float:
+        """Kinetic energy of the grains [J], of translation and rotation."""
+        rows = self._dumped()
+        moving = 0.5 * self.mass @ (rows[:, 7:10] ** 2).sum(axis=1)
+        return float(moving + 0.2 * (self.mass * self.radius**2) @ (rows[:, 10:13] ** 2).sum(axis=1))
+
+    def momentum(self) -> Vector:
+        """Momentum of the grains [N s], shape [3], half a step ahead, as the forces bring it (`dem.Bed.momentum`)."""
+        axes = "xyz"
+        found = self._lammps.ask(*(f"mass(all)*vcm(all,{a})+0.5*dt*fcm(all,{a})" for a in axes))
+        return np.array(found)
+
+    def mark_origin(self) -> None:
+        """Count the displacements of the grains from here on."""
+        self._origin = self._dumped()[:, 4:7]
+
+    # What is kept
+
+    def state(self) -> State:
+        """LAMMPS' restart file, as bytes, and where the bodies are: what `restore` goes on from.
+
+        The run goes on to the same motion but for rounding, since LAMMPS makes new lists in another order.
+        """
+        self._lammps.tell(["write_restart kept.restart noinit"])
+        self._lammps.wait()
+        path = self._lammps.folder / "kept.restart"
+        kept = np.frombuffer(path.read_bytes(), dtype=np.uint8).copy()
+        path.unlink()
+        rows = [[*body.position, *body.velocity, *body.turn, *body.spin, body.angle, body.across, body.made]
+                for body in self._bodies]  # fmt: skip
+        return {
+            "restart": kept,
+            "bodies": np.array(rows, dtype=float).reshape(-1, 16),
+            "numbers": np.array([self.steps, self.grain_steps, self.surface, self.packing_fraction]),
+            "origin": self._origin.copy(),
+        }
+
+    def restore(self, state: State) -> None:
+        """Go on from what `state` gave. Raises ValueError for the state of another number of bodies."""
+        rows = np.asarray(state["bodies"], dtype=float)
+        if len(rows) != len(self._bodies):
+            raise ValueError(f"the state has {len(rows)} bodies, this bed has {len(self._bodies)}")
+        path = self._lammps.folder / "kept.restart"
+        path.write_bytes(np.asarray(state["restart"], dtype=np.uint8).tobytes())
+        steps, grain_steps, self.surface, self.packing_fraction = (float(x) for x in np.asarray(state["numbers"]))
+        self.steps, self.grain_steps = int(steps), int(grain_steps)
+        self._origin = np.array(state["origin"], dtype=float)
+        commands: list[str] = []
+        for body, row in zip(self._bodies, rows, strict=True):
+            body.position, body.velocity, body.turn, body.spin = row[:3], row[3:6], row[6:10], row[10:13]
+            body.angle, body.across, body.made = float(row[13]), round(row[14]), False
+            commands += body.motion(self.steps)
+            if row[15]:
+                commands += body.create()
+        head = [line for line in self._head() if not line.startswith(("units", "atom_style", "boundary"))]
+        self._lammps.tell(["clear", *head, f"read_restart {path.name}", *self._interactions(), *commands])
+        self._lammps.wait()
+        path.unlink()
+        self._sums, self._set_up = np.zeros(0), False
+
+    def close(self) -> None:
+        """End LAMMPS."""
+        self._lammps.close()
+
+    @property
+    def processes(self) -> list[int]:
+        """Process ids of mpiexec and LAMMPS."""
+        return self._lammps.processes

@@ -1,0 +1,67 @@
+"""Grains in LAMMPS as a ground: `BedGround` with what LAMMPS tells of energies."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from coupling.bed_ground import BedGround
+from coupling.poses import Vector
+
+from .bed import LammpsBed
+
+__all__ = ["LammpsGround"]
+
+
+class LammpsGround(BedGround):
+    """A `LammpsBed` under a body; parameters as of `BedGround`.
+
+    Explicit coupling alone: a step cannot be taken back. Of the energies LAMMPS tells the kinetic one; height and
+    normal springs follow from the grains' places. What friction's springs hold, and what was lost where, is not told.
+    """
+
+    bed: LammpsBed
+
+    def checkpoint(self) -> Any:
+        """Raises ValueError: steps in LAMMPS are not repeated."""
+        raise ValueError(
+            "iterations is above 1: a bed in LAMMPS takes explicit coupling alone, iterations = 1 would do"
+        )
+
+    def energies(self) -> dict[str, float]:
+        """Kinetic energy, height and normal springs (Hertz) of the grains, `copies` times [J]."""
+        bed = self.bed
+        grains = bed.grains(contacts=False)
+        moving = 0.5 * grains.mass @ (grains.velocity**2).sum(axis=1)
+        turning = 0.2 * (grains.mass * grains.radius**2) @ (grains.spin**2).sum(axis=1)
+        height = -float(grains.mass @ (grains.position @ np.array(bed.gravity)))
+        springs = bed.spring_energy(grains.position)
+        for body, surface in self._surfaces().items():
+            distance, _, curvature = surface(grains.position.copy())
+            pressed = np.maximum(0.0, grains.radius - distance)
+            radius = grains.radius / (1 + grains.radius * curvature)
+            springs += 4 / 15 * bed.young_of(body) * float((np.sqrt(radius) * pressed**2.5).sum())
+        found = {"kinetic": float(moving + turning), "potential": height, "normal": springs}
+        return {name: self.copies * value for name, value in found.items()}
+
+    def work_taken(self) -> dict[str, float]:
+        """Nothing: LAMMPS does not sum what contacts take."""
+        return {}
+
+    def pushes(self) -> tuple[Vector, Vector]:
+        """As `BedGround.pushes`, from the grains' places."""
+        bed, grains = self.bed, self.bed.grains(contacts=False)
+        points, forces = [np.zeros((0, 3))], [np.zeros((0, 3))]
+        for body, surface in self._surfaces().items():
+            distance, normal, curvature = surface(grains.position.copy())
+            overlap = grains.radius - distance
+            touching = overlap > 0
+            radius = (grains.radius / (1 + grains.radius * curvature))[touching]
+            push = 2 / 3 * bed.young_of(body) * np.sqrt(radius) * overlap[touching] ** 1.5
+            points.append(grains.position[touching] - distance[touching, None] * normal[touching])
+            forces.append(-push[:, None] * normal[touching])
+        return np.concatenate(points) - self.origin, np.concatenate(forces)
+
+    def angular_momentum(self) -> Vector:
+        """Not a number: LAMMPS does not tell what crosses the periodic sides."""
+        return np.full(3, math.nan)

@@ -1,0 +1,88 @@
+"""The contact law of a bed in the words of LAMMPS' `pair_style granular` and `fix wall/gran granular`.
+
+The map starts from a row of pair parameters (`dem.contact.law.pair_parameters`), so that grains, floor and bodies all
+go through it. E* and G* are the effective moduli, a the contact radius, m* the reduced mass, S_n = 2 E* a.
+
+| here | in LAMMPS |
+|---|---|
+| Hertz, DMT, JKR | `hertz/material`, `dmt`, `jkr` with E = 2 E* and Poisson's ratio 0, whose effective modulus is E* |
+| surface energy gamma (pull-off 4 pi gamma R*, 3 pi gamma R*) | the same number |
+| normal dashpot factor sqrt(m* S_n) | `damping tsuji` with the number whose polynomial is factor sqrt(3/2) |
+| no pull by the dashpot | `limit_damping` |
+| tangential spring 8 G* a, `rescaled` or `displacement` | `mindlin_rescale/force` or `mindlin` with k_t = 8 G* |
+| tangential dashpot | x_gammat = tangential over normal factor |
+| rolling friction | `rolling sds`: its spring is constant, 8 G* a of a mean contact; its bound is the same |
+| twisting | `twisting marshall`: spring and dashpot are the same; its bound is 2/3 mu a F_n, ours 3 pi / 16 mu a F_n |
+
+The polynomial of `damping tsuji` is in LAMMPS' manual (pair_style granular).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from dem.contact.law import PAIR_WIDTH
+from dem.grains.materials import Material
+
+from .words import digits
+
+__all__ = ["TANGENTIAL", "MeanContact", "dashpot_input", "law_words"]
+
+TANGENTIAL = {"displacement": "mindlin", "rescaled": "mindlin_rescale/force"}
+"""LAMMPS' names of our springs (`Material.tangential`)."""
+_NORMAL = {"none": "hertz/material", "dmt": "dmt", "jkr": "jkr"}
+_TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
+_LEAST, _MOST = 0.05, 1.2  # Between which the polynomial falls
+
+
+@dataclass(frozen=True)
+class MeanContact:
+    """The contact for which constant springs of rolling are chosen: contact radius [m] and reduced mass [kg]."""
+
+    radius: float
+    mass: float
+
+    @classmethod
+    def of(cls, radii: np.ndarray, masses: np.ndarray, *, young: float, load: float) -> "MeanContact":
+        """That of two mean grains pressed together by ``load`` [N]; ``young``: effective modulus E* [Pa] (Hertz)."""
+        reduced = 0.5 * float(np.mean(radii))
+        return cls(radius=(0.75 * load * reduced / young) ** (1 / 3), mass=0.5 * float(np.mean(masses)))
+
+
+def dashpot_input(factor: float) -> float:
+    """What to ask ``damping tsuji`` for, to have a dashpot alpha sqrt(m* 4/3 E* a) with alpha = ``factor`` [1].
+
+    Raises ValueError for a dashpot stronger than LAMMPS' polynomial can give.
+    """
+    low, high = (float(np.polyval(_TSUJI, end)) for end in (_MOST, _LEAST))
+    if not low <= factor <= high:
+        raise ValueError(
+            f"the normal dashpot has the factor {factor:.4g}: LAMMPS' `damping tsuji` gives {max(low, 0.0):.3g} to "
+            f"{high:.4g}; a larger restitution would do"
+        )
+    return float(brentq(lambda e: np.polyval(_TSUJI, e) - factor, _LEAST, _MOST, xtol=1e-15))
+
+
+def law_words(row: Sequence[float], material: Material, *, tensile: bool, mean: MeanContact) -> str:
+    """The words of one kind of contact, for `pair_coeff` and for `fix wall/gran granular`.
+
+    ``row``: its pair parameters, as `dem.contact.law.pair_row` gives them. ``material``: of the grains. ``tensile``:
+    whether dashpots may pull. ``mean``: the contact for which the springs of rolling are chosen. Raises ValueError for
+    a restitution that LAMMPS' dashpot does not reach.
+    """
+    if len(row) != PAIR_WIDTH:
+        raise ValueError(f"row has {len(row)} numbers: a row of pair parameters has {PAIR_WIDTH}")
+    two_e, eight_g, damping, friction, rolling, tangential_damping, turning_damping, pi_w = map(float, row)
+    words = [_NORMAL[material.cohesion], digits((two_e, dashpot_input(math.sqrt(1.5) * damping), 0.0))]
+    if material.cohesion != "none":
+        words.append(digits([pi_w / (2 * math.pi)]))
+    ratio = tangential_damping / damping if damping else 0.0
+    words += ["tangential", TANGENTIAL[material.tangential], digits((eight_g, ratio, friction))]
+    if material.rolling_friction > 0:
+        root = math.sqrt(mean.mass * two_e * mean.radius)
+        words += ["rolling sds", digits((eight_g * mean.radius, turning_damping * root, rolling)), "twisting marshall"]
+    words.append("damping tsuji")
+    return " ".join([*words, *([] if tensile else ["limit_damping"])])

