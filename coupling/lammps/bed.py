@@ -64,9 +64,7 @@ class LammpsBed:
         self.weight = float(self.mass.sum()) * math.hypot(*self.gravity)
         self._rows = [bed.state()["body_pair"][FLOOR].astype(float)]  # Pair parameters of floor and bodies
         self._grain_row = pair_row(self.material, tensile=self.tensile)
-        # The contact that carries a column of half the bed's depth on one grain's share of the area.
-        load = 0.5 * self.weight * self.mean_diameter**2 / (self.size[0] * self.size[1])
-        self._mean = MeanContact.of(self.radius, self.mass, young=0.5 * self._grain_row[0], load=load)
+        self._mean = MeanContact.of(self.radius, self.mass)
         self._bodies: list[MovingBody] = []
         self._sums, self._reactions = np.zeros(0), np.zeros((1, 6))
         self._set_up = False  # Whether LAMMPS is ready to go on without a setup
@@ -195,31 +193,33 @@ class LammpsBed:
         self.steps += steps
         self.grain_steps += steps * self.grain_count
         for body in self._bodies:
-            body.position = body.position + duration * body.velocity
-            body.angle += duration * float(body.spin[1])
+            body.go_on(duration)
         before, self._sums = self._sums, self._read_sums()
         mean = (self._sums - before) / max(1, steps)
         self._reactions = self._by_body(mean)
 
     def _prepare(self) -> None:
         """Make the bodies that are new, and have LAMMPS set up its lists and forces; nothing where that is done."""
-        if self._set_up:
+        if self._set_up and all(body.made and not body.jumped for body in self._bodies):
             return
-        new = [line for body in self._bodies for line in body.motion(self.steps)]
-        new += [line for body in self._bodies if not body.made for line in body.create()]
-        counted = " ".join(f"c_{name}[*]" for name in self._summed)
-        again = ["unfix sums"] if self._sums.size else []
-        self._lammps.tell([*again, *new, f"fix sums all ave/time 1 1 1 {counted} ave running", "run 0 post no"])
+        new = [line for body in self._bodies if not body.made for line in body.create()]
+        late, now = ([line for body in self._bodies for line in body.motion(self.steps, late=k)] for k in (1, 0))
+        names = [name for body in self._bodies for name in body.names]
+        self._lammps.tell([*(["unfix sums"] if self._sums.size else []), *late, *new])
+        if names:
+            # LAMMPS takes a region's velocity from its place a step before. So a setup with the bodies there comes
+            # first, in which they touch nothing, lest contacts end.
+            chosen = [line for body in self._bodies for line in body.select(*body.reach(0.0, self.mean_diameter))]
+            self._lammps.tell([*(f"group {name} clear" for name in names), "run 0 post no", *now, *chosen])
+        counted = " ".join(f"c_{name}[*]" for name in ["floor", *names])
+        self._lammps.tell([f"fix sums all ave/time 1 1 1 {counted} ave running", "run 0 post no"])
+        for body in self._bodies:
+            body.jumped = False
         self._sum_start = self.steps
         self._sums, self._set_up = self._read_sums(), True
 
-    @property
-    def _summed(self) -> list[str]:
-        """Computes of LAMMPS whose sums over time are read: the floor's, then each piece's of each body."""
-        return ["floor", *(name for body in self._bodies for name in body.names)]
-
     def _read_sums(self) -> Vector:
-        """Sums over the steps since `_prepare` of all forces and moments on grains [N, N m].
+        """Sums over the steps since `_prepare` of forces and moments on grains [N, N m]: the floor's, each piece's.
 
         LAMMPS gives means over all steps so far, the first one included.
         """
@@ -368,9 +368,11 @@ class LammpsBed:
 
     def momentum(self) -> Vector:
         """Momentum of the grains [N s], shape [3], half a step ahead, as the forces bring it (`dem.Bed.momentum`)."""
-        axes = "xyz"
-        found = self._lammps.ask(*(f"mass(all)*vcm(all,{a})+0.5*dt*fcm(all,{a})" for a in axes))
-        return np.array(found)
+        self._prepare()
+        return np.array(self._lammps.ask(*(f"mass(all)*vcm(all,{axis})+0.5*dt*fcm(all,{axis})" for axis in "xyz")))
+
+    def track_contact_work(self) -> None:
+        """Nothing: LAMMPS does not sum the work of contacts (`LammpsGround.work_taken`)."""
 
     def mark_origin(self) -> None:
         """Count the displacements of the grains from here on."""
@@ -411,6 +413,7 @@ class LammpsBed:
         for body, row in zip(self._bodies, rows, strict=True):
             body.position, body.velocity, body.turn, body.spin = row[:3], row[3:6], row[6:10], row[10:13]
             body.angle, body.across, body.made = float(row[13]), round(row[14]), False
+            body.known = False
             commands += body.motion(self.steps)
             if row[15]:
                 commands += body.create()

@@ -45,7 +45,6 @@ class LammpsEndedError(RuntimeError):
     """LAMMPS has ended: a rank was killed, or it refused a command. What it holds is lost."""
 
 
-@cache
 def find_lammps() -> tuple[str, str]:
     """The paths of mpiexec and of LAMMPS: those beside this Python first, then those on the PATH.
 

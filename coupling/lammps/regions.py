@@ -17,7 +17,7 @@ import numpy as np
 
 from dem.shapes.basic import Ball, Cone, Cylinder, Shape
 from dem.shapes.solids import Box
-from rigid.spatial.quaternions import to_matrix
+from rigid.spatial.quaternions import multiply, to_matrix
 
 from .words import digits
 
@@ -25,6 +25,7 @@ __all__ = ["MovingBody", "Piece", "pieces_of"]
 
 Vector = np.ndarray
 _IN_PLANE = 1e-6  # How far from the plane of motion, or from its normal, an axis may be [rad]
+_JUMP, _ARM = 1e-9, 0.1  # A larger change of place [m], or over this arm [m] of angle, is no motion
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 
 
@@ -126,7 +127,9 @@ class MovingBody:
         self.across = 0  # 1 or -1 where the body's z axis lies across the plane, along y or -y
         shapes = [piece.shape for piece in self.pieces]
         self.centred = len(shapes) == 1 and isinstance(shapes[0], Ball) and not any(shapes[0].center)
-        self.made = False  # Whether LAMMPS has its regions
+        self.made = False  # Whether LAMMPS has its regions, as they are to be
+        self.jumped = False  # Whether it was put elsewhere than where its motion led
+        self.known = False  # Whether LAMMPS has regions of these names
 
     def place(self, position: Vector, velocity: Vector, turn: Vector, spin: Vector) -> None:
         """Set pose and motion. Raises ValueError for a body that leaves the plane of motion, x and z."""
@@ -135,7 +138,7 @@ class MovingBody:
         across = round(float(along[1])) if math.hypot(along[0], along[2]) < _IN_PLANE else 0
         spins_out = math.hypot(spin[0], spin[2]) > _IN_PLANE * max(1.0, abs(float(spin[1])))
         leans = not across and abs(along[1]) > _IN_PLANE
-        if spins_out or (not self.centred and (leans or (self.made and across != self.across))):
+        if spins_out or (leans and not self.centred):
             raise ValueError(
                 "this body turns out of the plane of motion, x and z: LAMMPS' regions turn about one constant axis, "
                 "which is y here; the ground `bed` takes such a body"
@@ -143,14 +146,25 @@ class MovingBody:
         if across and not self.centred and not all(isinstance(piece.shape, Cylinder) for piece in self.pieces):
             raise ValueError("a body whose z axis lies across the plane of motion must be one Cylinder in LAMMPS")
         angle = math.atan2(-side[2], side[0]) if across or self.centred else math.atan2(along[0], along[2])
-        self.angle = angle + 2 * math.pi * round((self.angle - angle) / (2 * math.pi))
-        self.across = across
+        angle += 2 * math.pi * round((self.angle - angle) / (2 * math.pi))
+        jump = float(np.abs(position - self.position).max()) > _JUMP or abs(angle - self.angle) > _JUMP / _ARM
+        self.jumped, self.angle = self.jumped or jump, angle
+        if across != self.across:  # regions have their axes from the start
+            self.across, self.made = across, False
         self.position, self.velocity = np.array(position, dtype=float), np.array(velocity, dtype=float)
         self.turn, self.spin = np.array(turn, dtype=float), np.array(spin, dtype=float)
 
-    def motion(self, step: int) -> list[str]:
-        """Commands that let it go on from here at time step ``step`` with its velocity and spin."""
-        starts = (*self.position, self.angle)
+    def go_on(self, duration: float) -> None:
+        """Let it go on for ``duration`` [s] with its velocity and spin, as its regions do."""
+        half = 0.5 * duration * float(self.spin[1])
+        self.position = self.position + duration * self.velocity
+        self.angle += 2 * half
+        self.turn = multiply(np.array([math.cos(half), 0.0, math.sin(half), 0.0]), self.turn)
+
+    def motion(self, step: int, *, late: int = 0) -> list[str]:
+        """Commands that let it go on from here at time step ``step``, or so many steps late, with its velocity and
+        spin."""
+        starts, step = (*self.position, self.angle), step + late
         rates = (*self.velocity, float(self.spin[1]))
         return [
             f"variable {self.name}{axis} equal {start:.17g}+({rate:.17g})*(step-{step})*dt"
@@ -167,8 +181,10 @@ class MovingBody:
 
     def create(self) -> list[str]:
         """Commands that make its groups, regions, walls, and the sums of force and moment on it."""
-        name, lines = self.name, []
+        name, lines = self.name, list[str]()
         for piece, own in zip(self.pieces, self.names, strict=True):
+            if self.known:
+                lines += [f"uncompute {own}", f"unfix {own}", f"region {own} delete", f"group {own} delete"]
             moved = f"side out units box move v_{name}x v_{name}y v_{name}z rotate v_{name}t 0 0 0 0 1 0"
             lines += [
                 f"group {own} empty",
@@ -180,7 +196,7 @@ class MovingBody:
                 f"variable {own}mz atom (f_{own}[5]-v_{name}x)*f_{own}[3]-(f_{own}[6]-v_{name}y)*f_{own}[2]",
                 f"compute {own} {own} reduce sum f_{own}[2] f_{own}[3] f_{own}[4] v_{own}mx v_{own}my v_{own}mz",
             ]
-        self.made = True
+        self.made = self.known = True
         return lines
 
     def select(self, low: Vector, high: Vector) -> list[str]:

@@ -15,6 +15,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from coupling.lammps.process import LammpsMissingError, find_lammps
 from experiments.cli import probes
 from experiments.runs.memory import cores_there, memory_there
 from experiments.runs.version import __version__
@@ -121,6 +122,15 @@ def _peer(name: str, commands: Sequence[str], package: str) -> Finding:
     return Finding(name, found is not None, found or "not found", f"apt install {package} (only for bench)")
 
 
+def _lammps() -> Finding:
+    """LAMMPS and mpiexec, for ``--ground lammps`` and for the race of beds."""
+    try:
+        launcher, program = find_lammps()
+    except LammpsMissingError as error:
+        return Finding("LAMMPS", False, str(error), "only for --ground lammps and bench")
+    return Finding("LAMMPS", True, f"{program}, started by {launcher}")
+
+
 def examine() -> list[Finding]:
     """Look at everything. Takes a few seconds: Taichi and OpenGL are tried in processes of their own."""
     with ThreadPoolExecutor(max_workers=2) as pool:
@@ -137,7 +147,7 @@ def examine() -> list[Finding]:
             _cache(),
             _opengl(opengl.result()),
             _peer("LIGGGHTS", ["liggghts"], "liggghts"),
-            _peer("LAMMPS", ["lmp", "lammps"], "lammps"),
+            _lammps(),
             _peer("YADE", ["yade"], "yade"),
             _peer("MPI", ["mpirun"], "openmpi-bin"),
             _peer("C compiler", ["cc"], "gcc"),

@@ -1,13 +1,33 @@
 """`--ground lammps --ranks N`: the prepared bed goes over to LAMMPS."""
 
-from typing import Any
-
-from coupling import BedGround
-from experiments.runs.progress import Progress
+from typing import TYPE_CHECKING, Any
 
 from . import say
 
-__all__ = ["check_lammps", "in_lammps", "lammps_ended"]
+if TYPE_CHECKING:
+    from coupling import BedGround
+    from experiments.runs.progress import Progress
+
+__all__ = ["ON_GRAINS", "RANKS", "check_lammps", "in_lammps", "lammps_ended", "lammps_fault"]
+
+ON_GRAINS = ("bed", "lammps")
+"""Grounds made of grains: in this process, and in LAMMPS."""
+RANKS = "Ground lammps: processes under mpiexec [1]; 1 if not given."
+
+
+def lammps_fault(settings: Any) -> str | None:
+    """What LAMMPS does not take of these settings, in words; or ranks without LAMMPS. None where all is well."""
+    given = settings.model_dump()
+    if settings.ground != "lammps":
+        return None if settings.ranks is None else say("ranks_without_lammps", s=settings)
+    wanted = {"iterations": 1, "sleep": False, "arch": "cpu", "settle_gravity": None, "precision": "float64"}
+    for key, value in wanted.items():
+        if given.get(key, value) != value:
+            return say("not_in_lammps", key=key, value=given[key], use=value, why=say(f"lammps_{key}"))
+    shaft = given.get("shaft_diameter")
+    if shaft is not None and shaft != given["tip_diameter"]:
+        return say("shaft_in_lammps", s=settings)
+    return None
 
 
 def lammps_ended(error: RuntimeError) -> str:
@@ -27,8 +47,8 @@ def check_lammps(settings: Any) -> None:
 
 
 def in_lammps(
-    bed: Any, body: Any, settings: Any, progress: Progress, *, begin: float = 0.0, **options: Any
-) -> BedGround:
+    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, **options: Any
+) -> "BedGround":
     """The grains of a prepared bed in LAMMPS, at rest there, under a spike or members; `options`: of `BedGround`."""
     from coupling.lammps import LammpsBed, LammpsGround
 

@@ -11,7 +11,7 @@ from experiments.platform.settings import NotNegative, Positive
 from experiments.runs.strict import StrictSettings
 
 from . import say
-from .lammps_settings import RANKS
+from .lammps import RANKS
 
 __all__ = ["OF_THE_MASTER", "GrainsSettings", "TumbleBedSettings"]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from experiments.grains.advice import costs, times_as_long
-from experiments.grains.lammps_settings import ON_GRAINS, RANKS, lammps_fault
+from experiments.grains.lammps import ON_GRAINS, RANKS, lammps_fault
 from experiments.runs.strict import NotNegative, Positive, SeedNumber, StrictSettings, Threads
 from rigid.ground_file import is_ground_file
 from rigid.platform.rig import STANDARD_GRAVITY

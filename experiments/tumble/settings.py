@@ -8,8 +8,8 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.grains.lammps_settings import ON_GRAINS as GRAINS
-from experiments.grains.lammps_settings import lammps_fault
+from experiments.grains.lammps import ON_GRAINS as GRAINS
+from experiments.grains.lammps import lammps_fault
 from experiments.grains.settings import OF_THE_MASTER, TumbleBedSettings
 from experiments.platform.settings import NotNegative, PlatformSettings, Positive
 from rigid.checks import nearest

@@ -2,7 +2,8 @@
 
 ``suite.SUITE`` lists them; a family of cases is a module with ``CASES``.
 
-Imports `dem`, `experiments.bed`, `experiments.calibrate`, `experiments.pool`, `experiments.runs`, `rigid`, `vis`.
+Imports `coupling.lammps`, `dem`, `experiments.bed`, `experiments.calibrate`, `experiments.pool`, `experiments.runs`,
+`rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

@@ -1,4 +1,4 @@
 """What cases of the verification suite are made of: cases, bands, parts that are kept, the document.
 
-Imports `dem`, `experiments.runs`.
+Imports `coupling.lammps`, `dem`, `experiments.runs`.
 """

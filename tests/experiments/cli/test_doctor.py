@@ -54,7 +54,7 @@ def machine(monkeypatch, tmp_path):
         "opengl": {"ok": True, "renderer": "llvmpipe"},
     }
     monkeypatch.setattr(doctor, "probe", lambda *arguments, timeout=90.0: answers[arguments[-1]])
-    monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
+    monkeypatch.setattr(doctor.shutil, "which", lambda name, **options: None)
     monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path / "beds"))
     return answers
 
@@ -95,9 +95,13 @@ def test_the_cache_is_measured(machine, tmp_path):
 
 
 def test_peers_that_are_there_are_found(machine, monkeypatch):
-    monkeypatch.setattr(doctor.shutil, "which", lambda name: f"/usr/bin/{name}" if name == "lmp" else None)
-    lammps = by_name()["LAMMPS"]
-    assert lammps.ok and lammps.detail == "/usr/bin/lmp" and "lammps" in lammps.remedy
+    def which(name, **options):
+        return f"/usr/bin/{name}" if name in ("yade", "lmp") else None
+
+    monkeypatch.setattr(doctor.shutil, "which", which)
+    yade, lammps = by_name()["YADE"], by_name()["LAMMPS"]
+    assert yade.ok and yade.detail == "/usr/bin/yade" and "yade" in yade.remedy
+    assert not lammps.ok and lammps.detail.startswith("mpiexec not found") and "lammps" in lammps.detail
     assert not by_name()["LIGGGHTS"].ok
 
 

