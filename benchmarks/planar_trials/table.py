@@ -17,6 +17,7 @@ import numpy as np
 from rigid import EFFECTS, Trial, simulate, simulate_batch
 from rigid.planar.dynamics import System
 from rigid.planar.located import integrate
+from vis.paper.figures import COLOURS
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -122,9 +123,10 @@ def draw_states(path: Path) -> None:
     figure, axes = plt.subplots(1, 2, figsize=(9, 2.6), sharey=True)
     order = {"pivot": 0, "slip": 1, "hop": 2, "stand": 0}
     for axis, (surface, mu_s) in zip(axes, SURFACES.items(), strict=True):
-        for torque in TORQUES:
+        for torque, colour in zip(TORQUES, COLOURS, strict=False):
             run = simulate(case(0.0085, torque, mu_s), duration=DURATION)
-            axis.step(np.degrees(run.theta), [order[name] for name in run.state_names], label=f"{torque:g} N m")
+            states = [order[name] for name in run.state_names]
+            axis.step(np.degrees(run.theta), states, label=f"{torque:g} N m", color=colour)
         axis.set(title=f"{surface}, 0.0085 g", xlabel="theta [deg]", xlim=(0, 45), yticks=(0, 1, 2))
         axis.set_yticklabels(["pivot", "slip", "hop"])
         axis.grid(alpha=0.3)

@@ -17,9 +17,10 @@ from vis.page.plots import BED, GREY, INK, MODEL, STATES, Array, handle, legend_
 from vis.page.report import Report, Result
 from vis.page.states import States, state_runs
 
-__all__ = ["FIGURES", "PaperRun", "in_order"]
+__all__ = ["COLOURS", "FIGURES", "PaperRun", "in_order"]
 
-_TORQUES = ("#0072B2", "#E69F00", "#CC79A7", "#56B4E9", "#009E73")
+COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#56B4E9", "#009E73")
+"""Of the torques, the smallest first."""
 _HARD = ("steel", "brick")
 VARIANTS = ("low", "nominal", "high", "paper")
 """Of a case: friction at the lower end of its band, as it is, at the upper end; the paper's fixed step."""
@@ -43,7 +44,7 @@ class PaperRun:
 
     def colour(self, torque: float) -> str:
         """The colour of a torque."""
-        return _TORQUES[self.torques.index(torque) % len(_TORQUES)]
+        return COLOURS[self.torques.index(torque) % len(COLOURS)]
 
     def label(self, torque: float) -> str:
         """A torque in words."""

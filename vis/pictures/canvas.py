@@ -141,7 +141,7 @@ class Page:
             draw(axis)
             self._rulers(axis, place, section)
             figure.text(0.03, 0.965, title, fontsize=16, fontweight="bold", va="top")
-            figure.text(0.03, 0.905, lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35)
+            figure.text(0.03, 0.905, lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35, bbox=HALO)
             if note:
                 figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
             self.colour_bar(figure, (0.885, 0.2, 0.018, 0.5), 11.5).ax.tick_params(labelsize=11)

@@ -138,9 +138,10 @@ class Scene(Rendered):
         camera = self._plotter.camera
         view = np.array([0.0, -1.0, 0.40])  # from straight ahead: a depth on the ruler is the same all across the cut
         camera.focal_point = tuple(centre)
-        camera.position = tuple(centre + view / np.linalg.norm(view) * 5.0 * reach)
+        camera.position = tuple(centre + view / np.linalg.norm(view) * 1.3 * reach)
         camera.up = (0.0, 0.0, 1.0)
-        camera.clipping_range = (2.5 * reach, 7.5 * reach)
+        # From near: the shading of gaps stripes what is flat where the camera is far away (`Stage.render`).
+        camera.clipping_range = (0.1 * reach, 2.5 * reach)
         corners = [(x, y, z) for x in (low[0], high[0]) for y in (cut, high[1]) for z in (low[2], high[2])]
         self._fit(np.array([*corners, (centre[0], cut, high[2] + 0.55 * height)]))
 

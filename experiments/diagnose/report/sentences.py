@@ -78,7 +78,7 @@ def size_sentences(diagnosis: Row) -> list[str]:
 
 def remark_sentences(diagnosis: Row) -> list[str]:
     """Which numbers are implausible."""
-    return [f"Hard to believe: {remark}." for remark in diagnosis.get("remarks", [])]
+    return [f"Hard to believe: {remark.removesuffix('.')}." for remark in diagnosis.get("remarks", [])]
 
 
 def worse_sentences(diagnosis: Row) -> list[str]:
