@@ -25,6 +25,7 @@ from rigid.spatial.spatial import SpatialTrial
 
 from .planar_body import PlacedBody, placement_time
 from .poses import Pose, Twist, Vector, Wrench, moved
+from .stick_slip import StickSlip
 
 __all__ = ["SpatialBody"]
 
@@ -279,18 +280,16 @@ class SpatialBody(PlacedBody):
         return torques
 
 
-class _Friction:
+class _Friction(StickSlip):
     """The friction of tips under Coulomb bounds in one step."""
 
     def __init__(
         self, body: SpatialBody, dt: float, twist: Twist, wrench: Wrench, contacts: dict[int, Contact]
     ) -> None:
-        self.dt, self.tips = dt, sorted(contacts)
-        self.loads = np.array([contacts[tip].normal_force for tip in self.tips])
-        self.mu_s = np.array([float(contacts[tip].mu_s or 0.0) for tip in self.tips])
-        self.mu_d = np.array([float(contacts[tip].mu_d or 0.0) for tip in self.tips])
+        super().__init__(contacts[tip] for tip in sorted(contacts))
+        self.dt = dt
         centre = body.place + 0.5 * dt * twist.velocity
-        self.arms = np.array([contacts[tip].point - centre for tip in self.tips])
+        self.arms = np.array([contacts[tip].point - centre for tip in self.points])
         half = to_matrix(from_turn(0.5 * dt * twist.spin))
         self.arms_end = self.arms @ half.T
         turn = multiply(from_turn(dt * twist.spin), body.turn)
@@ -304,37 +303,11 @@ class _Friction:
         self.masses, self.inverse = self.masses * slowed[0], self.inverse / slowed[1]
         before = body.twist
         slips = (before.velocity + np.cross(before.spin, self.arms))[:, :2]
-        self.sticking = {tip for tip in self.tips if tip in body.sticking}
-        self.sliding: dict[int, Vector] = {}
-        for k, tip in enumerate(self.tips):
-            size = float(np.linalg.norm(slips[k]))
-            if tip in self.sticking:
-                continue
-            if tip in body.sliding and float(slips[k] @ body.sliding[tip]) <= 0:
-                self.sticking.add(tip)  # it has turned back, and sticks where its bound allows it
-            elif size > 0:
-                self.sliding[tip] = slips[k] / size
-            else:
-                self.sticking.add(tip)
+        self.begin(slips, body.sticking, body.sliding)
 
     def solve(self) -> tuple[Vector, Vector]:
         """Force [N] and torque [N m] of friction; who slides and who sticks is in `sliding` and `sticking` then."""
-        for _ in range(6 * len(self.tips) + 6):
-            force = self._with()
-            over = [
-                k for k, tip in enumerate(self.tips)
-                if tip in self.sticking and math.hypot(*force[k]) > self.mu_s[k] * self.loads[k] * (1 + 1e-12)
-            ]  # fmt: skip
-            slips = self._slips(force)
-            back = [k for k, tip in enumerate(self.tips) if tip in self.sliding and slips[k] @ self.sliding[tip] < 0]
-            if not over and not back:
-                break
-            for k in over:
-                self.sticking.discard(self.tips[k])
-                self.sliding[self.tips[k]] = -force[k] / math.hypot(*force[k])
-            for k in back:
-                del self.sliding[self.tips[k]]
-                self.sticking.add(self.tips[k])
+        force = self.settle()
         pushes = np.column_stack([force, np.zeros(len(force))])
         return pushes.sum(axis=0), np.cross(self.arms, pushes).sum(axis=0)
 
@@ -345,13 +318,9 @@ class _Friction:
         spin = self.spin + self.dt * self.inverse @ np.cross(self.arms, pushes).sum(axis=0)
         return np.asarray((velocity + np.cross(spin, self.arms_end))[:, :2])
 
-    def _with(self) -> Vector:
-        """Friction of each tip in these modes [N], shape [tip, 2]."""
-        force = np.zeros((len(self.tips), 2))
-        for k, tip in enumerate(self.tips):
-            if tip in self.sliding:
-                force[k] = -self.mu_d[k] * self.loads[k] * self.sliding[tip]
-        held = [k for k, tip in enumerate(self.tips) if tip in self.sticking]
+    def _held(self, force: Vector) -> Vector:
+        """See `StickSlip`: the mean slip of those that stick, and their turning, become zero."""
+        held = [k for k, tip in enumerate(self.points) if tip in self.sticking]
         if not held:
             return force
         loads = self.loads[held]
@@ -368,7 +337,7 @@ class _Friction:
 
     def _shapes(self, held: list[int], share: Vector) -> Vector:
         """Forces of one unit of each multiplier, shape [2 or 3, tip, 2]."""
-        shapes = np.zeros((2 if len(held) == 1 else 3, len(self.tips), 2))
+        shapes = np.zeros((2 if len(held) == 1 else 3, len(self.points), 2))
         shapes[0, held, 0] = shapes[1, held, 1] = share
         if len(held) > 1:
             away = self.arms[held] - share @ self.arms[held]

@@ -62,19 +62,19 @@ def moving(robot, *rates):
     return robot
 
 
-def grain_bed(*, gravity=9.81, young=1e7):
-    """Three layers of large grains, almost at rest."""
+def grain_bed(*, gravity=9.81, young=1e7, diameter=6e-3):
+    """Three layers of 16 by 16 large grains, almost at rest."""
     from dem import Bed
     from dem.grains.materials import SAND
 
-    d, rows = 6e-3, 16
+    d, rows = diameter, 16
     layers = [
         ((i + 0.5 + 0.5 * (k % 2)) * d, (j + 0.5 + 0.5 * (k % 2)) * d, (0.5 + k * math.sqrt(0.5)) * d)
         for k in range(3) for i in range(rows) for j in range(rows)
     ]  # fmt: skip
     bed = Bed.from_grains(
         SAND, positions=np.array(layers) % [rows * d, rows * d, 1.0], radii=np.full(len(layers), 0.5 * d), young=young,
-        max_overlap=0.1, size=(rows * d, rows * d, 0.05), height=0.3, threads=1, gravity=gravity,
+        max_overlap=0.1, size=(rows * d, rows * d, d / 6e-3 * 0.05), height=d / 6e-3 * 0.3, threads=1, gravity=gravity,
     )  # fmt: skip
     bed.advance(200)
     bed.surface = float((bed.grains().position[:, 2] + 0.5 * d).max())

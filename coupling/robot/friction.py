@@ -4,12 +4,12 @@ As in `coupling.spatial_body`, for several feet that the robot's joints connect:
 f_k = N_k (c + b z x (rho_k - mean rho)), and their mean slip and turning about the vertical are zero at the step's end.
 """
 
-import math
 from typing import Any
 
 import numpy as np
 
 from coupling.poses import Twist, Vector
+from coupling.stick_slip import StickSlip
 from rigid.ground.reaction import Contact
 from rigid.spatial.quaternions import from_turn, to_matrix
 
@@ -18,18 +18,15 @@ __all__ = ["FeetFriction"]
 FIXED = 1e-9  # Mobility over that of the most mobile direction below which the robot cannot move that way [1]
 
 
-class FeetFriction:
+class FeetFriction(StickSlip):
     """Friction of `contacts` on the feet of `robot` in a step of `dt` [s].
 
     ``twist``: of the feet in the step; ``free``: generalised velocities at its end without friction, shape (nv,).
     """
 
     def __init__(self, robot: Any, dt: float, twist: Twist, free: Vector, contacts: list[Contact]) -> None:
-        self.points = [contact.member for contact in contacts]
+        super().__init__(contacts)
         self.feet = [int(robot.owners[point]) for point in self.points]
-        self.loads = np.array([contact.normal_force for contact in contacts])
-        self.mu_s = np.array([float(contact.mu_s or 0.0) for contact in contacts])
-        self.mu_d = np.array([float(contact.mu_d or 0.0) for contact in contacts])
         velocities, spins = twist.velocity.reshape(-1, 3), twist.spin.reshape(-1, 3)
         places = robot.pose.position.reshape(-1, 3)
         count = len(places)
@@ -50,41 +47,11 @@ class FeetFriction:
         slips = np.concatenate(rows)  # of generalised velocities, shape (2 point, nv)
         self.free = slips @ free
         self.answer = dt * (slips @ robot.solve(np.concatenate(pushes)).T)  # slips of forces, shape (2 point, 2 point)
-        self.sticking = {point for point in self.points if point in robot.sticking}
-        self.sliding: dict[int, Vector] = {}
-        for point, slip in zip(self.points, before, strict=True):
-            if point in self.sticking:
-                continue
-            size = float(np.linalg.norm(slip))
-            if size == 0 or (point in robot.sliding and float(slip @ robot.sliding[point]) <= 0):
-                self.sticking.add(point)  # it has turned back, and sticks where its bound allows it
-            else:
-                self.sliding[point] = slip / size
+        self.begin(np.array(before), robot.sticking, robot.sliding)
 
     def solve(self) -> Vector:
         """Wrenches of friction on the feet [N, N m], shape (foot, 6)."""
-        force = np.zeros((len(self.points), 2))
-        for _ in range(6 * len(self.points) + 6):
-            force = self._with()
-            over = [
-                k for k, point in enumerate(self.points)
-                if point in self.sticking and math.hypot(*force[k]) > self.mu_s[k] * self.loads[k] * (1 + 1e-12)
-            ]  # fmt: skip
-            slips = self._slips(force)
-            back = [
-                k for k, point in enumerate(self.points) if point in self.sliding and slips[k] @ self.sliding[point] < 0
-            ]
-            if not over and not back:
-                break
-            for k in over:
-                self.sticking.discard(self.points[k])
-                self.sliding[self.points[k]] = -force[k] / math.hypot(*force[k])
-            for k in back:
-                del self.sliding[self.points[k]]
-                self.sticking.add(self.points[k])
-        else:  # not settled who sticks: nobody is held by more than the bound
-            size = np.maximum(np.hypot(force[:, 0], force[:, 1]), 1e-300)
-            force = force * np.minimum(1.0, self.mu_s * self.loads / size)[:, None]
+        force = self.settle()
         rows = np.zeros((self.count, 6))
         for foot, (x, y, z), (along, across) in zip(self.feet, self.arms, force, strict=True):
             rows[foot] += (along, across, 0.0, -z * across, z * along, x * across - y * along)
@@ -94,12 +61,8 @@ class FeetFriction:
         """Horizontal velocity of each point at the step's end [m/s], shape (point, 2)."""
         return np.asarray((self.free + self.answer @ force.ravel()).reshape(-1, 2))
 
-    def _with(self) -> Vector:
-        """Friction of each point in these modes [N], shape (point, 2)."""
-        force = np.zeros((len(self.points), 2))
-        for k, point in enumerate(self.points):
-            if point in self.sliding:
-                force[k] = -self.mu_d[k] * self.loads[k] * self.sliding[point]
+    def _held(self, force: Vector) -> Vector:
+        """See `StickSlip`: of each foot the mean slip of those that stick, and their turning, become zero."""
         shapes, means = self._shapes()
         if not len(shapes):
             return force

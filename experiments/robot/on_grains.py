@@ -75,6 +75,7 @@ class RobotForecast(Forecast):
     run: RobotRun
     low: tuple[float, float]
     high: tuple[float, float]  # Corners of where feet come down, x and y from the robot's origin [m]
+    sunk: tuple[tuple[int, ...], ...]  # Of each foot the numbers of its parts that go at least half as deep as it does
 
 
 class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotForecast]):
@@ -85,13 +86,11 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         self.duration, self.surface, self.counterweight = settings.duration, settings.surface, 0.0
         self.gravity = plan.numbers["gravity"].value
         robot = self._robot = plan.robot()
-        self.widths, self.areas, self.narrowest = {}, {}, math.inf  # Of the feet [m], [m2]; of any part [m]
+        self.widths, self.narrowest = {}, math.inf  # Of the feet and of any part [m]
         for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
             matrix = to_matrix(turn)
             widths = [width_of(part, matrix) for part in foot.parts]
             self.widths[foot.name], self.narrowest = max(widths), min(self.narrowest, *widths)
-            self.areas[foot.name] = sum(plan_area(part.vertices @ matrix.T) for part in foot.parts)
-        self.spike_diameter = min(self.widths.values())
         self.reach = 2 * max(foot.reach for foot in robot.feet)
 
     @cached_property
@@ -104,26 +103,49 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         near = depth > 0
         if not near.any():  # it never comes down
             near = np.ones_like(near)
-        low, high = self._footprint(feet, near)
+        low, high, sunk = self._footprint(feet, near)
         return RobotForecast(
-            run=run, low=(float(low[0]), float(low[1])), high=(float(high[0]), float(high[1])),
+            run=run, low=(float(low[0]), float(low[1])), high=(float(high[0]), float(high[1])), sunk=sunk,
             deepest=float(depth.max()),
             fastest=float(speeds.max(where=near[1:], initial=0.05)), rise=float(rows["z"].max() - rows["z"][0]),
         )  # fmt: skip
 
-    def _footprint(self, feet: Array, near: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Corners of what the feet cover from above where they are `near` the ground, x and y from the origin [m].
+    def _footprint(self, feet: Array, near: NDArray[np.bool_]) -> tuple[Array, Array, tuple[tuple[int, ...], ...]]:
+        """Corners of what the feet cover from above where they are `near` the ground, x and y from the origin [m]; of
+        each foot the parts that go at least half as deep as the foot, or all where none goes into the ground.
 
         Of `SEEN` moments evenly over the run; ``feet``: `RobotRun.feet`; ``near``: shape (row, foot).
         """
         low, high = np.full(2, math.inf), np.full(2, -math.inf)
+        sunk: list[tuple[int, ...]] = []
         for k, foot in enumerate(self._robot.feet):
-            rows = np.flatnonzero(near[:, k])
-            vertices = np.concatenate([part.vertices for part in foot.parts])
+            rows, lowest = np.flatnonzero(near[:, k]), np.full(len(foot.parts), math.inf)
             for row in rows[np.linspace(0, len(rows) - 1, min(SEEN, len(rows))).astype(int)]:
-                points = feet[row, k, :2] + vertices @ to_matrix(feet[row, k, 3:7])[:2].T
-                low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-        return low, high
+                turn = to_matrix(feet[row, k, 3:7]).T
+                for part, own in enumerate(foot.parts):
+                    points = feet[row, k, :3] + own.vertices @ turn
+                    low, high = np.minimum(low, points[:, :2].min(axis=0)), np.maximum(high, points[:, :2].max(axis=0))
+                    lowest[part] = min(lowest[part], points[:, 2].min())
+            reached = lowest <= 0.5 * lowest.min() if lowest.min() < 0 else np.ones(len(lowest), dtype=bool)
+            sunk.append(tuple(np.flatnonzero(reached).tolist()))
+        return low, high, tuple(sunk)
+
+    @cached_property
+    def _standing(self) -> list[tuple[float, float]]:
+        """Of each foot: width of the widest of its `RobotForecast.sunk` parts [m], and the area of these parts [m2]."""
+        found = []
+        for foot, sunk, turn in zip(
+            self._robot.feet, self.forecast.sunk, self._robot.pose.turn.reshape(-1, 4), strict=True
+        ):
+            matrix, parts = to_matrix(turn), [foot.parts[k] for k in sunk]
+            area = sum(plan_area(part.vertices @ matrix.T) for part in parts)
+            found.append((max(width_of(part, matrix) for part in parts), area))
+        return found
+
+    @cached_property
+    def spike_diameter(self) -> float:  # type: ignore[override]
+        """Width of the narrowest foot, by its `RobotForecast.sunk` parts [m]."""
+        return min(width for width, _ in self._standing)
 
     def check(self) -> None:
         """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this robot."""
@@ -160,7 +182,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
     @property
     def pressure(self) -> float:
         """Of the weight under the smallest foot alone [Pa]."""
-        return self.weight / max(min(self.areas.values()), 1e-12)
+        return self.weight / max(min(area for _, area in self._standing), 1e-12)
 
     @property
     def lowering_speed(self) -> float | None:

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spatial_runs import ball, grain_bed, model_of, moving
+from spatial_runs import EXAMPLES, ball, grain_bed, model_of, moving
 
-from coupling import BedGround, LeftTheBedError, Master, SpatialBody
+from coupling import BedGround, LeftTheBedError, Master, SpatialBody, spatial_members
 from coupling.members import HULL, ball_member
 from coupling.robot import BedFeet, MujocoRobot, RobotRun
+from rigid.platform.files import find_platform
 from rigid.platform.platform import Platform
 from rigid.platform.solids import box_vertices
 from rigid.spatial.spatial import SpatialTrial
@@ -69,6 +70,32 @@ def test_a_ball_on_grains_moves_as_the_masters_own_body_in_space():
     assert np.abs(robot.data.qpos[:3] - body.place).max() < 1e-5
     assert robot.rates[:3] == pytest.approx(body.twist.velocity, abs=2e-3)
     assert run.energy_residual < 0.01 and run.balance_numbers["momentum_residual"][0] < 1e-14
+
+
+def test_the_hedgehog_lands_on_grains_as_the_spatial_model_does_on_the_same():
+    """24 spikes and the hull of the shipped MJCF against `SpatialBody`, thrown on 768 grains of 30 mm."""
+    file = EXAMPLES / "mujoco-hedgehog" / "hedgehog.xml"
+    robot = MujocoRobot(file, ["spike_*", "hull"], keyframe="thrown", height=0.005)
+    robot.model.opt.gravity[:] = 0.0, 0.0, -1.0
+    start, (along, across, up, *spin) = robot.data.qpos[:3].copy(), robot.data.qvel[:6].tolist()
+    grains, middle = {"gravity": 1.0, "young": 1e7, "diameter": 0.03}, {"origin": (0.24, 0.24), "friction": 0.5}
+    run = RobotRun(robot, BedFeet(grain_bed(**grains), robot.feet, **middle), duration=0.12, substeps=4)
+    run.run()
+    platform = find_platform("hedgehog")
+    body = SpatialBody(
+        SpatialTrial(platform=platform, gravity=1.0),
+        position=start,
+        velocity=(along, across, up),
+        angular_velocity=spin,
+    )
+    bed = BedGround(grain_bed(**grains), spatial_members(platform), bounded_across=True, **middle)
+    body.start(bed.lag)
+    master = Master(body, bed, substeps=4)
+    for _ in range(run.master.count):
+        master.step()
+    assert run.columns["fz"].max() > 10 * 5.3  # ten times its weight: it has landed
+    assert np.abs(robot.data.qpos[:3] - body.place).max() < 2e-6
+    assert np.abs(robot.data.qpos[3:7] - body.pose.turn).max() < 2e-5
 
 
 def test_momentum_and_angular_momentum_of_robot_and_grains_are_kept_and_energy_is_accounted_for():
