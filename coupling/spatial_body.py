@@ -23,9 +23,9 @@ from rigid.ground.reaction import Contact, Reaction, State
 from rigid.spatial.quaternions import from_turn, multiply, to_matrix
 from rigid.spatial.spatial import SpatialTrial
 
+from .contact_state import StickSlip
 from .planar_body import PlacedBody, placement_time
 from .poses import Pose, Twist, Vector, Wrench, moved
-from .stick_slip import StickSlip
 
 __all__ = ["SpatialBody"]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from coupling.contact_state import StickSlip
 from coupling.poses import Twist, Vector
-from coupling.stick_slip import StickSlip
 from rigid.ground.reaction import Contact
 from rigid.spatial.quaternions import from_turn, to_matrix
 
