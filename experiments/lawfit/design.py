@@ -19,6 +19,7 @@ import numpy as np
 
 from experiments.converge.costs import core_hours
 from experiments.converge.design import BASE, Member, Variant
+from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.pool.together import Where, run_all, whole_folder
 from experiments.runs.folder import RunFolder
@@ -110,8 +111,12 @@ def check_design(settings: LawFitSettings) -> None:
     Where.of(settings).check()
     cells, seeds = cells_of(settings), _seeds(settings)[:2]
     for cell in cells:
-        for load in (cell.base.weight, *cell.loads):
-            penetrate.check(cell.base.model_copy(update={"load": load}) if cell.loads else cell.base)
+        penetrate.check(cell.base)
+        for load in cell.loads:
+            heavy = cell.base.model_copy(update={"load": load})
+            penetrate.check(heavy)
+            if beds.sinks_away(heavy):
+                raise ValueError(say("load_sinks", load=load, name=cell.name, most=beds.resting_load(heavy)))
     least = sum(_cost(cell, [_member(cell, seed) for seed in seeds]) for cell in cells)
     budget = settings.budget or 0.0
     if least > budget:

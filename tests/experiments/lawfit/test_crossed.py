@@ -138,6 +138,8 @@ def test_what_cannot_be_crossed_is_refused_by_name():
             lawfit.Settings(**(TWO | given))
     with pytest.raises(ValueError, match="cone-40mm"):
         lawfit.check(lawfit.Settings(**(TWO | {"tips": ("ball:12mm", "cone:40mm")})))
+    with pytest.raises(ValueError, match="loads has 50 N"):
+        lawfit.check(lawfit.Settings(**(TWO | {"loads": (50.0,)})))
     with pytest.raises(ValueError, match="4 tips"):
         lawfit.check(lawfit.Settings(**(TWO | {"budget": 1.0})))
 
