@@ -123,7 +123,7 @@ def _where(settings: LawFitSettings, pair: Json) -> list[str]:
 
 
 def _off(error: float) -> str:
-    return f"{100 * abs(error):.2g} % too {'stiff' if error > 0 else 'soft'}"
+    return f"{100 * abs(error):.{2 if abs(error) < 1 else 3}g} % too {'stiff' if error > 0 else 'soft'}"
 
 
 def _of_sinkage(one: Json) -> str:
