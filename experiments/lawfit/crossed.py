@@ -22,7 +22,7 @@ from .dimensionless import (
 )
 from .fit import LawFit, fit_law, fit_usable
 from .settings import say
-from .trust import beyond, held_out
+from .trust import beyond, held_out, paired
 from .words import ends_of, error_of, ranked
 
 __all__ = ["Crossed", "crossed_result"]
@@ -70,13 +70,23 @@ def crossed_result(cells: Mapping[str, Data], progress: Progress) -> Crossed:
         fits[law.name] = fit_usable(fit_law(law, data))
         laws.append(_entry(fits[law.name], data))
         progress.update(done)
-    laws = ranked(laws)
+    laws = _usable_first(laws)
     best = fits[laws[0]["name"]]
     tangents = [row for name, own in cells.items() for row in _tangents(best, name, own)]
     tables = [{"title": say("table_crossed"), **_law_rows(laws)}]
     tables.append({"title": say("table_tangents", law=best.candidate.name), **_tangent_rows(tangents)})
     bounds = [say("crossed_bound", law=law["name"], keys=", ".join(law["at_bound"])) for law in laws if law["at_bound"]]
     return Crossed(fits, laws, tangents, tables, _sentences(laws), [*_unlike_beds(cells), *bounds])
+
+
+def _usable_first(laws: Sequence[Json]) -> list[Json]:
+    """The laws in their order, those with a parameter at a bound behind all others."""
+    usable = [law for law in laws if not law["at_bound"]] or list(laws)
+    first = ranked(usable)
+    rest = sorted((law for law in laws if law not in first), key=lambda law: float(law["held_out"]["beds"]))
+    for law in rest:
+        law["above_best"] = asdict(paired(law["held_out"]["of_beds"], first[0]["held_out"]["of_beds"]))
+    return [*first, *rest]
 
 
 def _unlike_beds(cells: Mapping[str, Data]) -> list[str]:
@@ -144,7 +154,8 @@ def _law_rows(laws: Sequence[Json]) -> Json:
         above, own = law["above_best"], law["held_out"]
         beyond_both = [law["beyond"].get(kind) for kind in ("speed", "depth")]
         rows.append([
-            law["name"], f"{100 * own['beds']:.3g} % ({ends_of(own['interval'])})",
+            law["name"] + (" *" if law["at_bound"] else ""),
+            f"{100 * own['beds']:.3g} % ({ends_of(own['interval'])})",
             "-" if law is laws[0] else f"{100 * above['value']:+.2g} ± {50 * (above['high'] - above['low']):.2g} %",
             *("-" if one is None else f"{100 * one['rms']:.3g} %" for one in (law["gravity_out"], law["tip_out"])),
             *("-" if one is None else error_of(one["error"], one["interval"]) for one in beyond_both),

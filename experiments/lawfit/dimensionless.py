@@ -32,7 +32,7 @@ from .fit import Estimated, LawFit, interval
 
 __all__ = ["CROSSED", "CrossedData", "CrossedLaw", "Tangent", "cross", "crossed_laws", "shape_of", "tangent_at"]
 
-_EXPONENT, _SETTLING = (0.3, 3.9), (1e-2, 50.0)
+_EXPONENT, _SETTLING = (0.0, 3.9), (1e-2, 50.0)
 """Bounds of exponents and of T [1]."""
 CROSSED = {
     "scaled-spring-damper": ("linear", "damper"), "scaled-katsuragi-durian": ("linear", "square"),
@@ -200,7 +200,7 @@ class CrossedLaw:
         for name in self.free:
             if name.startswith("n"):
                 own = exponents.get(name.removeprefix("n_"), min(exponents.values()) - 0.3)
-                guess[name] = max(own, _EXPONENT[0] + 0.1)
+                guess[name] = max(own, 0.3)
             elif name == "T":
                 guess[name] = 1.0
         for name in self.free:

@@ -65,9 +65,10 @@ class OneCell:
 
     @property
     def exported(self) -> Fitted:
-        """The best law that can be a ground."""
-        good = (law["name"] for law in self.laws if law["name"] != ADDED_MASS)
-        return next((self.fits[name] for name in good if not _beyond_the_law(self.fits[name])), self.fits[PAIR])
+        """The best law that can be a ground and has no parameter at a bound; the spring-damper where there is none."""
+        fits = [self.fits[law["name"]] for law in self.laws if law["name"] != ADDED_MASS]
+        good = [fit for fit in fits if not _beyond_the_law(fit) and not any(map(fit.at_bound, fit.candidate.free))]
+        return good[0] if good else self.fits[PAIR]
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """The rows that were fitted, and each law's force there."""
