@@ -64,7 +64,9 @@ class Quantity(_Entries):
     std: Annotated[Number, Field(description="Spread between seeds: 0 for what is exact, null where unknown.")]
     unit: Annotated[str, Field(description='SI; "1" for a pure number.')]
     note: str = ""
-    interval: Annotated[tuple[float, float] | None, Field(description="90 % interval, where one is known.")] = None
+    interval: Annotated[
+        list[float] | None, Field(min_length=2, max_length=2, description="90 % interval, where one is known.")
+    ] = None
 
 
 class Departures(_Entries):
