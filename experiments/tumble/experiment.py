@@ -91,8 +91,12 @@ def _with_the_law_s(
         trajectory, _ = _integrate(settings, other, duration=settings.duration)
         return {name: entry["value"] for name, entry in quantities_of(trajectory).items()}
 
-    of_the_law = {name: best[name]["value"] for name in best if name != "energy_residual"}
-    return with_spread(best, spread_of_law(plan.fitted, answer, of_the_law))
+    return with_spread(best, spread_of_law(plan.fitted, answer, _of_the_law(best)))
+
+
+def _of_the_law(quantities: dict[str, Json]) -> dict[str, float | None]:
+    """Values of the quantities that depend on the law of the ground."""
+    return {name: quantities[name]["value"] for name in quantities if name != "energy_residual"}
 
 
 def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -114,8 +118,14 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     else:
         trajectory, full = _integrate(settings, plan, duration=settings.duration)
         result = result_of(settings, plan, trajectory, full)
-        if plan.fitted is not None and sweep is None:
-            result["quantities"] = _with_the_law_s(settings, plan, result["quantities"], copied, platform)
+    if plan.fitted is not None:
+        known = sweep is None and settings.method != "coupled"  # each deviation takes two trials a parameter
+        found = result["quantities"]
+        result["quantities"] = (
+            _with_the_law_s(settings, plan, found, copied, platform)
+            if known
+            else with_spread(found, dict.fromkeys(_of_the_law(found)))
+        )
     progress.update(1.0)
     write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
     folder.write_series("motion", motion_columns(trajectory))

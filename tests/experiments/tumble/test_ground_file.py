@@ -162,6 +162,11 @@ def test_a_tumble_and_a_hop_on_a_file_state_deviations_and_what_no_law_knows(wri
         assert sum("ploughing" in text for text in result["warnings"]) == 1
 
 
+def test_a_sweep_states_no_deviation_of_its_trial_and_not_that_it_is_exact(written, tmp_path):
+    settings = tumble.Settings(ground=written(), duration=0.1, mu_d=0.3, sweep=("mu_s=0.5:0.6:0.1",))
+    assert tumble.run(settings, tmp_path / "run")["quantities"]["sinkage_start"]["std"] is None
+
+
 def test_a_file_without_deviations_says_that_the_answer_has_none(written, tmp_path):
     path = written(stds={"stiffness": 0.0, "damping": 0.0})
     result = tumble.run(tumble.Settings(ground=path, duration=0.3), tmp_path / "run")
