@@ -2,7 +2,7 @@
 
 from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from experiments.platform.settings import NotNegative, PlatformSettings, Positive
 from rigid.checks import nearest
@@ -30,12 +30,12 @@ class FmuSettings(PlatformSettings):
     height: NotNegative | None = None
     """Height of the centre over the surface at the start [m]; if not given, the platform rests on two rows of
     spikes."""
-    x_start: float = Field(0.0, description="Position along the surface at the start [m].")
-    theta_start: float = Field(0.0, description="Angle at the start, clockwise [rad]; needs height.")
-    vx_start: float = Field(0.0, description="Velocity along the surface at the start [m/s].")
-    vz_start: float = Field(0.0, description="Velocity upwards at the start [m/s]; needs height.")
-    omega_start: float = Field(0.0, description="Angular velocity at the start, clockwise [rad/s].")
-    wheel_speed_start: float = 0.0
+    x_start: FiniteFloat = Field(0.0, description="Position along the surface at the start [m].")
+    theta_start: FiniteFloat = Field(0.0, description="Angle at the start, clockwise [rad]; needs height.")
+    vx_start: FiniteFloat = Field(0.0, description="Velocity along the surface at the start [m/s].")
+    vz_start: FiniteFloat = Field(0.0, description="Velocity upwards at the start [m/s]; needs height.")
+    omega_start: FiniteFloat = Field(0.0, description="Angular velocity at the start, clockwise [rad/s].")
+    wheel_speed_start: FiniteFloat = 0.0
     """Speed of the wheel at the start [rad/s]; a positive torque of the motor increases it. A brake on a wheel with a
     negative speed turns the platform clockwise."""
     torque_in_flight: bool = False

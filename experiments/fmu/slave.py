@@ -229,14 +229,13 @@ class PlatformSlave(Fmi3Slave):
                 found[name] = str(file)
         return found
 
-    def setup_experiment(self, start_time: float) -> None:
-        self.time = self._from = start_time
-
     def exit_initialization_mode(self) -> None:
         self.run  # noqa: B018  (made, and checked)
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
         run = self.run
+        if run.time == 0:  # pythonfmu3 0.3.4 does not hand on the start time of the initialisation
+            self._from = current_time
         own = self._from + run.time
         try:
             if not abs(current_time - own) <= 1e-9 * max(1.0, abs(own)):

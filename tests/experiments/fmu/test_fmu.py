@@ -1,5 +1,7 @@
 """`hedgebed fmu`: the FMU in fmpy, an importer that is not ours, against the runs of `hedgebed tumble`."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -167,6 +169,15 @@ def test_the_motor_stops_at_the_largest_speed_of_the_wheel_and_a_brake_holds_it(
     assert not held[:, 3].any()
 
 
+def test_time_may_begin_anywhere(fmu):
+    late, early = (
+        fmpy.simulate_fmu(str(fmu), start_time=begin, stop_time=begin + 0.01, step_size=STEP, output_interval=STEP,
+                          start_values={"torque": 0.22}, output=["theta"])
+        for begin in (2.5, 0.0)
+    )  # fmt: skip
+    assert late["time"][-1] == pytest.approx(2.51) and np.allclose(late["theta"], early["theta"], rtol=1e-9, atol=0)
+
+
 def test_two_instances_do_not_know_of_each_other(fmu, instance):
     first, second = instance(torque=0.22), instance(torque=0.22, surface="sand")
     both = [(first.go(1), second.go(1)) for _ in range(30)]
@@ -294,6 +305,14 @@ def test_a_law_and_a_platform_in_files_travel_with_the_fmu(tmp_path, instance):
     assert np.abs(rows[:, 2] - exact.theta[1:]).max() < 1e-4 * np.abs(exact.theta).max()
 
 
+def test_without_pythonfmu3_the_command_says_what_to_install(tmp_path, monkeypatch, capsys):
+    monkeypatch.delitem(sys.modules, "experiments.fmu.slave", raising=False)
+    monkeypatch.delattr("experiments.fmu.slave", raising=False)
+    monkeypatch.setitem(sys.modules, "pythonfmu3", None)
+    assert main(["fmu", str(tmp_path / "new.fmu")]) == 2
+    assert "hedgebed[fmi]" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -303,6 +322,7 @@ def test_a_law_and_a_platform_in_files_travel_with_the_fmu(tmp_path, instance):
         (["there.fmu"], "exists"),
         (["new.fmu", "--gravity", "1", "--rig", "0.01"], "rig"),
         (["new.fmu", "--ground", "bekkr"], "bekker"),
+        (["new.fmu", "--x-start", "nan"], "--x-start"),
         (["new.fmu", "--ground", "power", "--stiffness", "3"], "ground_parameters"),
         (["new.fmu", "--surface", "snad"], "sand"),
         (["new.fmu", "--longest-step", "1e-3", "--stiffness", "1e9"], "longest_step"),
