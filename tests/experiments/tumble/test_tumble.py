@@ -477,7 +477,7 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--mu-s", "0.2", "--mu-d", "0.3"], ["mu_d = 0.3", "mu_s = 0.2"]),
         (["--surface", "snow"], ["surface = 'snow'", "steel, brick, sand, sand-weak, jsc1a"]),
         (["--ground", "moon"], ["ground = 'moon'", "spring-damper"]),
-        (["--ground", "grains"], ["ground = 'grains'", "rft, bed (of grains)"]),
+        (["--ground", "grains"], ["ground = 'grains'", "rft, bed, lammps (of grains)"]),
         (["--ground", "beds"], ["ground = 'beds'", "did you mean 'bed'?"]),
         (["--ground", "power", "--stiffness", "100"], ["stiffness = 100", "ground_parameters"]),
         (["--ground", "power", "--ground-parameters", "n=2"], ["n is no parameter of power", "exponent"]),
