@@ -32,13 +32,14 @@ class AngleOfBeds:
 
 def kept_angles() -> tuple[KeptAngle, ...]:
     """Those of one bed each."""
-    return tuple(KeptAngle(**entry) for entry in _read()["case"])
+    return tuple(KeptAngle(**entry) for entry in _tables("case"))
 
 
 def angles_of_beds() -> tuple[AngleOfBeds, ...]:
     """Those of several beds each."""
-    return tuple(AngleOfBeds(**entry) for entry in _read()["beds"])
+    return tuple(AngleOfBeds(**entry) for entry in _tables("beds"))
 
 
-def _read() -> dict[str, list[dict[str, Any]]]:
-    return tomllib.loads(Path(__file__).with_name("grains.toml").read_text(encoding="utf-8"))
+def _tables(name: str) -> Any:
+    """The tables of grains.toml with a name."""
+    return tomllib.loads(Path(__file__).with_name("grains.toml").read_text(encoding="utf-8"))[name]
