@@ -7,6 +7,7 @@ import numpy as np
 
 from coupling.bed_ground import BedGround
 from coupling.poses import Vector
+from rigid.ground.reaction import Facts
 
 from .bed import LammpsBed
 
@@ -21,6 +22,13 @@ class LammpsGround(BedGround):
     """
 
     bed: LammpsBed
+
+    def __repr__(self) -> str:
+        return f"LammpsGround({self.bed!r} under {self.spike or f'{len(self.members)} members'})"
+
+    def describe(self) -> Facts:
+        """As `BedGround.describe`, with the program and the number of its processes."""
+        return super().describe() | {"engine": "LAMMPS", "ranks": self.bed.ranks}
 
     def checkpoint(self) -> Any:
         """Raises ValueError: steps in LAMMPS are not repeated."""

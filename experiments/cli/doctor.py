@@ -15,7 +15,6 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from coupling.lammps.process import LammpsMissingError, find_lammps
 from experiments.cli import probes
 from experiments.runs.memory import cores_there, memory_there
 from experiments.runs.version import __version__
@@ -124,6 +123,8 @@ def _peer(name: str, commands: Sequence[str], package: str) -> Finding:
 
 def _lammps() -> Finding:
     """LAMMPS and mpiexec, for ``--ground lammps`` and for the race of beds."""
+    from coupling.lammps.process import LammpsMissingError, find_lammps  # loads Taichi
+
     try:
         launcher, program = find_lammps()
     except LammpsMissingError as error:

@@ -47,8 +47,13 @@ def carry_out(
             say(f"stopped; `hedgebed resume {folder.path}` finishes it")
             return STOPPED
         except RuntimeError as error:
+            from coupling.lammps.process import LammpsEndedError  # loads Taichi
+
+            again = "the same settings would fail the same way again"
+            if isinstance(error, LammpsEndedError):
+                again = f"`hedgebed resume {folder.path}` continues from the last checkpoint"
             say(f"failed: {error}")
-            say(f"what was finished is kept in {folder.path}; the same settings would fail the same way again")
+            say(f"what was finished is kept in {folder.path}; {again}")
             return FAILED
         except ValueError as error:
             if fresh and not folder.has_work:  # refused before any work: leave nothing behind

@@ -19,7 +19,6 @@ from experiments.runs.whole_runs import publish
 
 from . import say
 from .bed_progress import show_bed
-from .lammps import lammps_ended
 
 __all__ = ["CHECKPOINT", "Followed", "Frames"]
 
@@ -99,8 +98,8 @@ class Followed(ABC, Generic[Run]):
         try:
             with held_back() as asked_to_stop:
                 found = run.run(**reporting)
-        except LammpsEndedError as error:
-            raise RuntimeError(lammps_ended(error)) from error
+        except LammpsEndedError:  # there is no state to be saved
+            raise
         except RuntimeError as error:  # a grain lost, an overlap past its bound, a spike beyond the bed
             folder.save_checkpoint(f"{CHECKPOINT}.failed", run.state())
             left = say("state_kept", name=CHECKPOINT)

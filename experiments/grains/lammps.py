@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from coupling import BedGround
     from experiments.runs.progress import Progress
 
-__all__ = ["ON_GRAINS", "RANKS", "check_lammps", "in_lammps", "lammps_ended", "lammps_fault"]
+__all__ = ["ON_GRAINS", "RANKS", "check_lammps", "in_lammps", "lammps_fault"]
 
 ON_GRAINS = ("bed", "lammps")
 """Grounds made of grains: in this process, and in LAMMPS."""
@@ -28,11 +28,6 @@ def lammps_fault(settings: Any) -> str | None:
     if shaft is not None and shaft != given["tip_diameter"]:
         return say("shaft_in_lammps", s=settings)
     return None
-
-
-def lammps_ended(error: RuntimeError) -> str:
-    """What is said where LAMMPS has ended, as when a rank was killed."""
-    return say("lammps_ended", error=error)
 
 
 def check_lammps(settings: Any) -> None:

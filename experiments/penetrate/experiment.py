@@ -22,7 +22,7 @@ from experiments.campaign.files import keep_model, place_campaign
 from experiments.grains.advice import resolution_advice
 from experiments.grains.bed_progress import show_bed
 from experiments.grains.kept_material import MATERIAL_COPY, keep_material
-from experiments.grains.lammps import in_lammps, lammps_ended
+from experiments.grains.lammps import in_lammps
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -246,8 +246,8 @@ class _Work:
             with held_back() as asked_to_stop:
                 on_frame, interval = (frames.write, frames.interval) if frames else (None, None)
                 series = stepper.run(on_step=on_step, on_frame=on_frame, frame_interval=interval)
-        except LammpsEndedError as error:
-            raise RuntimeError(lammps_ended(error)) from error
+        except LammpsEndedError:  # there is no state to be saved
+            raise
         except RuntimeError as error:  # the bed's: a NaN, a grain lost, an overlap past its bound
             if self._made_stiffer(error, unit.seed, unit):
                 return False

@@ -10,7 +10,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-ON_GRAINS = {"foot_from_stl", "laboratory_bed", "spike_in_sand", "stiffness_and_damping", "tumble_on_grains"}
+ON_GRAINS = {
+    "foot_from_stl", "laboratory_bed", "spike_in_lammps", "spike_in_sand", "stiffness_and_damping", "tumble_on_grains",
+}  # fmt: skip
 names = pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
 
 

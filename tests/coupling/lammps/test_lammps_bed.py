@@ -175,6 +175,7 @@ def test_a_killed_rank_is_an_error_with_a_sentence_and_the_state_before_can_be_g
     assert np.abs(found - expected).max() < 0.01 * np.abs(expected).max()
 
 
+@pytest.mark.long
 def test_the_energies_of_grains_and_springs_are_those_of_our_bed(in_lammps):
     rod = Member(row=0, at=np.zeros(3), turn=np.array([1.0, 0.0, 0.0, 0.0]), radius=0.0035, length=0.03)
     place = {"origin": (0.015, 0.015), "bounded": False}
