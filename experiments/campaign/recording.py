@@ -120,8 +120,17 @@ def _read_cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
         raise ValueError(f"{path}: is not UTF-8 text ({error.reason} at byte {error.start})") from None
     reader = csv.reader(io.StringIO(text))
     try:
-        header = [name.strip() for name in next(reader, [])]
-        return header, [(reader.line_num, row) for row in reader if row]
+        rows, begins = list[tuple[int, list[str]]](), 1
+        for row in reader:
+            if "\n" in "".join(row):
+                raise ValueError(
+                    f"{path}, line {begins}: a quotation mark opens a cell that goes on over several lines; numbers "
+                    "without quotation marks were expected"
+                )
+            rows.append((reader.line_num, row))
+            begins = reader.line_num + 1
+        header = [name.strip() for name in rows[0][1]] if rows else []
+        return header, [(line, row) for line, row in rows[1:] if row]
     except csv.Error as error:
         raise ValueError(f"{path}, line {reader.line_num}: is no CSV ({error})") from None
 

@@ -46,8 +46,10 @@ class Where:
 
     @classmethod
     def of(cls, settings: _Settings) -> "Where":
-        """What the settings say; the variable HEDGEBED_SCHEDULER replaces their scheduler."""
-        return cls(os.environ.get(_VARIABLE) or settings.scheduler, settings.workers)
+        """What the settings say; the variable HEDGEBED_SCHEDULER, where it is set, replaces that."""
+        if scheduler := os.environ.get(_VARIABLE):
+            return cls(scheduler)
+        return cls(settings.scheduler, settings.workers)
 
     def check(self) -> None:
         """Raise ValueError for both, for no number of workers, and where dask is needed and not there."""

@@ -169,3 +169,15 @@ def test_campaigns_with_something_wrong_are_checked_or_refused_in_words(kind, pa
             if ALL and status == 0:
                 assert "<script>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8"), number
             counts[status] += 1
+
+
+@pytest.mark.parametrize("line", [1, 3])
+def test_a_lone_quotation_mark_in_a_recording_is_named_with_its_line(line, tmp_path, monkeypatch):
+    """Found by the fuzzer: the rest of the file was one cell, and the message had all of it."""
+    monkeypatch.chdir(tmp_path)
+    new_campaign(tmp_path / "one", kind="penetration")
+    lines = (tmp_path / "one" / "003.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    lines[line - 1] = lines[line - 1].replace(",", ',"', 1)
+    (tmp_path / "one" / "003.csv").write_text("".join(lines), encoding="utf-8")
+    status, said = outcome("campaign", "check", "one", "--out", "out", "--quiet")
+    assert status == 2 and in_words(said) and f"003.csv, line {line}: " in said and "quotation" in said

@@ -64,7 +64,8 @@ def test_a_scheduler_beside_workers_is_refused_and_the_variable_replaces_it(monk
     with pytest.raises(ValueError, match="workers = 2"):
         Where("tcp://here:1", 2).check()
     monkeypatch.setenv("HEDGEBED_SCHEDULER", "tcp://there:2")
-    assert Where.of(ConvergeSettings(scheduler="tcp://here:1")).scheduler == "tcp://there:2"
+    for given in ({"scheduler": "tcp://here:1"}, {"workers": 2}, {}):
+        assert Where.of(ConvergeSettings(**given)) == Where("tcp://there:2")
 
 
 def test_runs_come_in_their_order_each_once_and_what_is_done_comes_first(tmp_path):
