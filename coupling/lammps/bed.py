@@ -418,7 +418,7 @@ class LammpsBed:
             if row[15]:
                 commands += body.create()
         head = [line for line in self._head() if not line.startswith(("units", "atom_style", "boundary"))]
-        self._lammps.tell(["clear", *head, f"read_restart {path.name}", *self._interactions(), *commands])
+        self._lammps.tell(["clear", *head, f"read_restart {path.name} remap", *self._interactions(), *commands])
         self._lammps.wait()
         path.unlink()
         self._sums, self._set_up = np.zeros(0), False

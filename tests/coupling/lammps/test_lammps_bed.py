@@ -157,6 +157,19 @@ def test_to_keep_the_state_changes_no_bit_and_a_restored_run_goes_on_within_a_pe
     assert np.abs(again - after).max() < 0.01 * np.abs(after).max()
 
 
+def test_a_grain_that_has_just_crossed_a_periodic_side_is_in_the_restored_state():
+    bed = Bed.from_grains(
+        "sand", positions=[[0.029999, 0.01, 0.005], [0.01, 0.01, 0.005]], radii=[2e-3, 2e-3], size=SIZE, young=3e7,
+        velocities=[[0.1, 0.0, 0.0], [0.0, 0.0, 0.0]], height=0.06,
+    )  # fmt: skip
+    crossed = LammpsBed(bed, ranks=1)
+    crossed.advance(10)
+    crossed.restore(crossed.state())
+    crossed.advance(10)
+    assert crossed.grains().position[0, 0] < 1e-3
+    crossed.close()
+
+
 def test_a_killed_rank_is_an_error_with_a_sentence_and_the_state_before_can_be_gone_on_with(bed, in_lammps):
     first = in_lammps()
     body = with_spike(first)
