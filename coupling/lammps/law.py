@@ -8,7 +8,7 @@ go through it. E* and G* are the effective moduli, a the contact radius, m* the 
 | Hertz, DMT, JKR | `hertz/material`, `dmt`, `jkr` with E = 2 E* and Poisson's ratio 0, whose effective modulus is E* |
 | surface energy gamma (pull-off 4 pi gamma R*, 3 pi gamma R*) | the same number |
 | normal dashpot factor sqrt(m* S_n) | `damping tsuji` with the number whose polynomial is factor sqrt(3/2) |
-| no pull by the dashpot | `limit_damping` |
+| no pull by the dashpot | `limit_damping`, which LAMMPS has for Hertz alone: with DMT and JKR the dashpot may pull |
 | tangential spring 8 G* a, `rescaled` or `displacement` | `mindlin_rescale/force` or `mindlin` with k_t = 8 G* |
 | tangential dashpot | x_gammat = tangential over normal factor |
 | rolling friction | `rolling sds`: its spring is constant, 8 G* a at `OVERLAP`; its bound is the same |
@@ -88,4 +88,5 @@ def law_words(row: Sequence[float], material: Material, *, tensile: bool, mean: 
         root = math.sqrt(mean.mass * two_e * mean.radius)
         words += ["rolling sds", digits((eight_g * mean.radius, turning_damping * root, rolling)), "twisting marshall"]
     words.append("damping tsuji")
-    return " ".join([*words, *([] if tensile else ["limit_damping"])])
+    bounded = not tensile and material.cohesion == "none"
+    return " ".join([*words, *(["limit_damping"] if bounded else [])])

@@ -5,6 +5,7 @@ The tests need LAMMPS and mpiexec (`apt install lammps openmpi-bin`), and are sk
 
 import os
 import signal
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,6 +15,7 @@ from coupling import BedGround, CoupledTumble, platform_members
 from coupling.lammps import LammpsBed, LammpsEndedError, LammpsGround, LammpsMissingError, find_lammps
 from coupling.members import Member
 from dem import Ball, Bed, Cylinder
+from dem.grains.materials import material
 from rigid import Trial
 
 try:
@@ -37,11 +39,11 @@ def fallen(*, seed=3, count=7):
     return bed.grains()
 
 
-def at_rest():
+def at_rest(stuff="sand"):
     """A bed of them whose springs of friction are without stretch, as LAMMPS begins."""
     grains = fallen()
     return Bed.from_grains(
-        "sand", positions=grains.position, velocities=grains.velocity, spins=grains.spin, radii=grains.radius,
+        stuff, positions=grains.position, velocities=grains.velocity, spins=grains.spin, radii=grains.radius,
         size=SIZE, young=3e7, height=0.06,
     )  # fmt: skip
 
@@ -103,6 +105,17 @@ def test_a_spike_feels_the_force_of_our_bed_within_one_percent_in_the_first_mill
     np.testing.assert_allclose(mean[1][2], mean[0][2], rtol=0.01)
     # After the first touch, in which LAMMPS' dashpot is of first order in the step.
     assert np.abs(forces[0][2:, 2] - forces[1][2:, 2]).max() < 0.05 * forces[0][:, 2].max()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("cohesion", ["dmt", "jkr"])
+def test_cohesive_grains_push_back_as_ours_do(cohesion):
+    stuff = replace(material("sand"), cohesion=cohesion, surface_energy=0.02)
+    beds = [at_rest(stuff), LammpsBed(at_rest(stuff), ranks=1)]
+    ours, theirs = (pushed(bed, with_spike(bed), 16)[:, 2].mean() for bed in beds)
+    beds[1].close()
+    assert ours > 0.05
+    assert theirs == pytest.approx(ours, rel=0.01)
 
 
 def test_the_momentum_of_grains_is_the_impulse_of_weight_floor_and_spike(in_lammps):
