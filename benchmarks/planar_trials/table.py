@@ -1,4 +1,4 @@
-"""Table and figures of docs/planar.md: `python -m benchmarks.planar_trials.table docs`.
+"""Tables and figures of docs/planar.md and its notebook: `python -m benchmarks.planar_trials.table docs`.
 
 Both integrators and the batch on the paper's cases (two gravities, three torques, steel and brick), how the error at
 the end of a tumble falls with the step, and the list of effects. Writes between the marks of docs/planar.md and
@@ -142,8 +142,8 @@ def main(folder: str) -> None:
     draw_orders(docs / "images" / "planar-orders.png")
     draw_states(docs / "images" / "planar-states.png")
     for page, parts in (
-        (docs / "planar.md", {"cases": table(), "effects": effects()}),
-        (docs / "notes" / "planar.md", {"effects": details()}),
+        (docs / "planar.md", {"effects": effects()}),
+        (docs / "notes" / "planar.md", {"cases": table(), "effects": details()}),
     ):
         text = page.read_text(encoding="utf-8")
         for name, part in parts.items():

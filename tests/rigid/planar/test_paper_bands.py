@@ -130,7 +130,7 @@ HOPS = {
     (STEEL, 0.22): (14.3, 0.63, 0.74),
     (STEEL, 6.0): (9.9, 0.09, None),
 }
-"""At 0.0085 g; the table of docs/planar.md holds the angles."""
+"""At 0.0085 g; the table of docs/notes/planar.md has the angles."""
 
 
 @pytest.fixture(scope="module")
