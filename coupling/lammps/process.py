@@ -2,13 +2,13 @@
 
 LAMMPS is licensed under the GPL. It runs as a separate program, and only text passes between it and hedgebed: rank 0
 reads commands of LAMMPS' own language from one named pipe, and writes the numbers that were asked for to another.
+Between hedgebed and mpiexec is a process that ends LAMMPS where hedgebed is killed (`coupling.lammps.watch`).
 """
 
 import os
 import re
 import select
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -16,6 +16,8 @@ from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+
+from . import watch
 
 __all__ = ["INSTALL", "Lammps", "LammpsEndedError", "LammpsMissingError", "find_lammps"]
 
@@ -94,7 +96,7 @@ def _check_ranks(ranks: int) -> None:
 
 
 class Lammps:
-    """LAMMPS on ``ranks`` processes. It ends with `close`, with this object and with this process.
+    """LAMMPS on ``ranks`` processes. It ends with `close`, with this object and with this process, even by kill -9.
 
     Raises LammpsMissingError where it cannot be started.
     """
@@ -114,9 +116,12 @@ class Lammps:
         self._answers = os.open(self.folder / "answers", os.O_RDWR | os.O_NONBLOCK)
         with self._said.open("wb") as said:
             self._process = subprocess.Popen(
-                [launcher, "-n", str(ranks), program, "-in", "commands", "-log", "log.txt", "-screen", "none"],
-                cwd=self.folder, env={**os.environ, **_ENVIRONMENT}, stdin=subprocess.DEVNULL, stdout=said,
-                stderr=subprocess.STDOUT, start_new_session=True,
+                [
+                    sys.executable, "-I", "-S", watch.__file__, str(self.folder), launcher, "-n", str(ranks), program,
+                    "-in", "commands", "-log", "log.txt", "-screen", "none",
+                ],
+                env={**os.environ, **_ENVIRONMENT}, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT,
+                start_new_session=True,
             )  # fmt: skip
         self._commands = self._open_commands()
 
@@ -134,18 +139,8 @@ class Lammps:
 
     @property
     def processes(self) -> list[int]:
-        """Process ids of mpiexec and of all that it has started."""
-        found, parents = [self._process.pid], {self._process.pid}
-        entries = sorted(int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit())
-        for pid in entries:
-            try:
-                parent = int((Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[1])
-            except (OSError, ValueError):
-                continue
-            if parent in parents:
-                parents.add(pid)
-                found.append(pid)
-        return found
+        """Process ids of the process that watches, of mpiexec and of all that it has started."""
+        return [self._process.pid, *watch.descendants(self._process.pid)]
 
     def tell(self, commands: Iterable[str]) -> None:
         """Have these commands carried out, later. Raises LammpsEndedError where LAMMPS has ended."""
@@ -206,15 +201,11 @@ class Lammps:
             return
         self._ended = self._ended or "LAMMPS was closed"
         os.close(self._commands)
-        try:
+        with suppress(subprocess.TimeoutExpired):
             self._process.wait(_GRACE)
-        except subprocess.TimeoutExpired:
-            self._process.terminate()
-            try:
-                self._process.wait(_GRACE)
-            except subprocess.TimeoutExpired:
-                os.killpg(self._process.pid, signal.SIGKILL)
-                self._process.wait()
+        assert self._process.stdin is not None
+        self._process.stdin.close()  # ends what has not ended
+        self._process.wait()
         os.close(self._answers)
         self._kept.cleanup()
         self._kept = None  # type: ignore[assignment]

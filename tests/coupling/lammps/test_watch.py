@@ -1,0 +1,90 @@
+"""LAMMPS ends with hedgebed, however hedgebed ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from coupling.lammps import LammpsMissingError, find_lammps, process, watch
+
+# Without the rest of hedgebed, which takes seconds to load. LAMMPS is to answer when nobody reads any more.
+MASTER = """
+import sys, time, types
+for name in ("coupling", "coupling.lammps"):
+    sys.modules[name] = types.ModuleType(name)
+    sys.modules[name].__path__ = [sys.argv[1]]  # where relative imports look
+from coupling.lammps.process import Lammps
+lammps = Lammps(1)
+lammps.wait()
+print(lammps.folder, *lammps.processes, flush=True)
+lammps.tell(["shell sleep 0.5", 'print "1" file answers screen no'])
+time.sleep(60)
+"""
+
+
+def alive(pids):
+    """Those that still run."""
+    found = []
+    for pid in pids:
+        try:
+            state = (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            continue
+        if state != "Z":
+            found.append(pid)
+    return found
+
+
+def all_ended(pids, within=5.0):
+    """Whether these processes end within a time [s]."""
+    until = time.monotonic() + within
+    while alive(pids) and time.monotonic() < until:
+        time.sleep(0.02)
+    return not alive(pids)
+
+
+def test_a_closed_pipe_ends_the_command_with_its_children_and_removes_the_folder(tmp_path):
+    folder = tmp_path / "work"
+    folder.mkdir()
+    watcher = subprocess.Popen(
+        [sys.executable, "-I", "-S", watch.__file__, str(folder), "sh", "-c", "sleep 60 & echo ready; wait"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    assert watcher.stdout.readline() == b"ready\n"
+    started = watch.descendants(watcher.pid)
+    assert len(started) == 2
+    watcher.stdin.close()
+    assert watcher.wait(10) == 128 + signal.SIGTERM
+    assert all_ended(started)
+    watcher.stdout.close()
+    assert not folder.exists()
+
+
+def test_the_exit_status_of_the_command_is_passed_on_and_the_folder_stays(tmp_path):
+    command = [sys.executable, "-I", "-S", watch.__file__, str(tmp_path), "sh", "-c", "exit 3"]
+    pipe = os.pipe()
+    assert subprocess.run(command, stdin=pipe[0], check=False).returncode == 3
+    assert tmp_path.exists()
+    for end in pipe:
+        os.close(end)
+
+
+@pytest.mark.long
+def test_after_kill_9_of_hedgebed_no_process_of_lammps_is_left():
+    try:
+        find_lammps()
+    except LammpsMissingError as missing:
+        pytest.skip(str(missing))
+    package = Path(process.__file__).parent
+    master = subprocess.Popen([sys.executable, "-c", MASTER, str(package)], stdout=subprocess.PIPE, text=True)
+    folder, *pids = master.stdout.readline().split()
+    assert len(alive(pids)) >= 2
+    master.stdout.close()
+    master.kill()
+    master.wait()
+    assert all_ended(pids, within=10.0)
+    assert not Path(folder).exists()
