@@ -14,7 +14,6 @@ __all__ = ["GROUND_FILE", "check", "ground_file", "resume", "run"]
 GROUND_FILE = "ground.toml"
 TO_90 = 1.645  # standard deviations of a 90 % interval
 DEPTH = 1.0  # to which the map holds [tip diameters]
-SPEED = 2.0  # to which it holds for 12 mm at 1 g, by the inertial number of the real grains [m/s]
 
 
 def _answer(settings: GroundSettings) -> tuple[GroundMap, Answer]:
@@ -32,7 +31,6 @@ def check(settings: GroundSettings) -> None:
 
 def ground_file(settings: GroundSettings, table: GroundMap, answer: Answer) -> GroundFile:
     """The spring-damper of the answer."""
-    g, size = (settings.gravity / table.reference["gravity"], settings.tip_diameter / table.reference["diameter"])
 
     def estimate(number: Number) -> Estimate:
         low, high = (number.value + sign * TO_90 * number.std for sign in (-1, 1))
@@ -45,8 +43,8 @@ def ground_file(settings: GroundSettings, table: GroundMap, answer: Answer) -> G
         foot=Foot(tip="sphere", diameter=settings.tip_diameter),
         parameters={"stiffness": estimate(answer.stiffness), "damping": estimate(answer.damping)},
         range={
-            "load": (0.0, answer.stiffness.value * depth), "depth": (0.0, depth),
-            "speed": (0.0, SPEED * (g * size) ** 0.5), "gravity": (settings.gravity, settings.gravity),
+            "load": (0.0, answer.stiffness.value * depth + answer.damping.value * answer.speed),
+            "depth": (0.0, depth), "speed": (0.0, answer.speed), "gravity": (settings.gravity, settings.gravity),
             "diameter": (settings.tip_diameter, settings.tip_diameter),
         },
     )  # fmt: skip
@@ -63,6 +61,7 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
         "damping": quantity(c.value, "N s/m", say("of_damping"), std=c.std),
         "sinkage": quantity(sinkage.value, "m", say("of_sinkage", answer=answer), std=sinkage.std),
         "load": quantity(answer.load, "N", "of the sinkage"),
+        "speed": quantity(answer.speed, "m/s", say("of_speed")),
         "packing_fraction": quantity(answer.packing, "1", "of the bed"),
         "grain_ratio": quantity(answer.ratio, "1", "mean grain over tip diameter"),
     }
@@ -70,7 +69,11 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
     if answer.ratio < table.lines["stiffness"].finest:
         warnings.append(say("extrapolated", answer=answer, finest=table.lines["stiffness"].finest))
     if settings.packing is not None and settings.packing != table.packings[0]:
-        warnings.append(say("damping_of_packing"))
+        warnings.append(say("of_packing", answer=answer, measured=table.packed[0]))
+    if not answer.deep:
+        warnings.append(say("shallow", depth=1e3 * table.reference["shallowest"] * settings.tip_diameter))
+    if sinkage.value < settings.grain:
+        warnings.append(say("below_grain", sinkage=1e3 * sinkage.value, grain=1e3 * settings.grain))
     return Result.make(
         "ground",
         title=say("title", s=settings, mm=1e3 * settings.tip_diameter),

@@ -6,13 +6,17 @@ check the scaling). docs/results/README.md has the commands of those runs.
 
 import json
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.stats import t as student
+
 from rigid.result import write_text
 
-from .maps import DATA, NAMES
+from .maps import DATA, NAMES, TO_STD
 
 __all__ = ["made_map", "main"]
 
@@ -40,26 +44,50 @@ def made_map() -> Mapping[str, Any]:
             "ratios": list(ratios), "values": list(values), "chance": list(chance), "grain": found["grain"],
             "finest": min(size["x"] for size in found["sizes"]), "rest": found["rest"],
         }  # fmt: skip
-    forces = [flagship["convergence"][f"force_{k}"]["value"] for k in (2, 3, 4)]
-    exponent = math.log(forces[-1] / forces[0]) / math.log(QUARTERS[-1] / QUARTERS[0])
+    settings = tomllib.loads((RESULTS / "converge-flagship" / "run.toml").read_text(encoding="utf-8"))["settings"]
+    exponents = _exponents(flagship["convergence"])
     results = [_result(f"ground-map/{name}") for name in PACKED]
     packed = [result["quantities"] for result in results]
     beds = [len({run["seed"] for run in result["runs"]}) for result in results]
     stiffness = [entry["stiffness"]["value"] for entry in packed]
-    errors = [
-        entry["stiffness"]["std"] / math.sqrt(count) / entry["stiffness"]["value"]
-        for entry, count in zip(packed, beds, strict=True)
-    ]
     factors = [value / stiffness[0] for value in stiffness]
-    stds = [0.0, *(f * math.hypot(errors[0], error) for f, error in zip(factors[1:], errors[1:], strict=True))]
+    scatter = [entry["stiffness"]["std"] / entry["stiffness"]["value"] for entry in packed]
+    stds = [0.0, *(f * _ratio_std(scatter, beds, k) for k, f in enumerate(factors[1:], start=1))]
     fractions = [entry["packing_fraction"]["value"] for entry in packed]
     return {
         "source": "docs/results/converge-flagship over grain size, docs/results/ground-map over packing",
-        "reference": {"diameter": 0.012, "gravity": 9.80665, "load": 0.219, "exponent": exponent},
+        "reference": {
+            "diameter": settings["tip_diameter"], "gravity": settings["gravity"], "load": 0.219,
+            "speed": max(settings["speeds"]), "exponent": float(np.mean(exponents)),
+            "exponent_std": float(np.std(exponents, ddof=1)),
+            "shallowest": (QUARTERS[0] - 0.125) * settings["depth"] / settings["tip_diameter"],
+        },
         "range": {**RANGES, "packing": (math.floor(1e3 * fractions[0]) / 1e3, math.ceil(1e3 * fractions[-1]) / 1e3)},
-        "packing": {"fractions": fractions, "factors": factors, "stds": stds},
+        "packing": {
+            "fractions": fractions, "factors": factors, "stds": stds, "stiffness": stiffness[0],
+            "ratio": results[0]["bed"]["grain"] / results[0]["spike"]["diameter"],
+        },
         **lines,
     }  # fmt: skip
+
+
+def _exponents(found: Mapping[str, Any]) -> list[float]:
+    """Of force over depth, of each bed of every grain size, from the second to the last quarter of the drive."""
+    return [
+        math.log(deep / shallow) / math.log(QUARTERS[-1] / QUARTERS[0])
+        for last, first in zip(found["force_4"]["sizes"], found["force_2"]["sizes"], strict=True)
+        for deep, shallow in zip(last["values"], first["values"], strict=True)
+    ]
+
+
+def _ratio_std(scatter: Sequence[float], beds: Sequence[int], k: int) -> float:
+    """Relative error of the mean of k over that of the first [1]: Student's half-width of 95 % over `TO_STD`.
+
+    Beds of all packings are taken to scatter alike, relative to their mean, so that the degrees of freedom add up.
+    """
+    free = sum(count - 1 for count in beds)
+    pooled = math.sqrt(sum((count - 1) * s**2 for s, count in zip(scatter, beds, strict=True)) / free)
+    return float(student.ppf(0.975, free)) / TO_STD * pooled * math.sqrt(1 / beds[0] + 1 / beds[k])
 
 
 def _written(value: Any) -> str:

@@ -21,12 +21,12 @@ import numpy as np
 
 from .settings import say
 
-__all__ = ["DATA", "Answer", "GroundMap", "Line", "Number", "read_map"]
+__all__ = ["DATA", "TO_STD", "Answer", "GroundMap", "Line", "Number", "read_map"]
 
 DATA = Path(__file__).with_name("maps.toml")
 NAMES = ("stiffness", "damping", "sinkage")
 POWERS = {"stiffness": (1.0, 2.0), "damping": (0.5, 2.5), "sinkage": (0.0, 1.0)}
-"""Powers of gravity and of the tip's diameter of each number."""
+"""Powers of gravity and of the tip's diameter of each number. A speed has 0.5 and 0.5 (Froude number)."""
 TO_STD = 1.96  # of a 95 % half-width
 SLACK = 1e-9
 
@@ -72,6 +72,8 @@ class Answer:
     load: float
     ratio: float  # d / D [1]
     packing: float
+    speed: float  # of the fastest drives behind it, scaled [m/s]
+    deep: bool  # whether the sinkage is within the depths of the drives
 
 
 @dataclass(frozen=True)
@@ -82,8 +84,11 @@ class GroundMap:
     source: str
     packings: tuple[float, ...]  # rising; the first is that of the reference
     factors: tuple[float, ...]  # of K, at each of them
-    factor_stds: tuple[float, ...]
-    reference: Mapping[str, float]  # diameter [m], gravity [m/s2], load [N], exponent of force over depth
+    factor_stds: tuple[float, ...]  # of the beds
+    packed: tuple[float, float]  # d / D [1] of these beds, and K [N/m] of those at the first packing
+    reference: Mapping[str, float]
+    """diameter [m], gravity [m/s2], load [N], speed of the fastest drives [m/s], exponent of force over depth and its
+    standard deviation between beds, shallowest of the depths from which it comes [diameters]."""
     ranges: Mapping[str, tuple[float, float]]
     lines: Mapping[str, Line]
 
@@ -105,22 +110,33 @@ class GroundMap:
             power_g, power_d = POWERS[name]
             found, scale = self.lines[name].at(ratio), g**power_g * size**power_d
             scaled[name] = Number(scale * found.value, scale * found.std)
-        factor = self._factor(packing)
-        exponent = self.reference["exponent"]
+        factor = self._factor(packing, ratio)
+        exponent, scatter = self.reference["exponent"], self.reference["exponent_std"]
         own_load = self.reference["load"] * g * size**3
-        load = own_load if load is None else load
+        given, load = load, own_load if load is None else load
         stiffness = _times(scaled["stiffness"], factor)
-        more = (load / own_load / factor.value) ** (1 / exponent)
-        at_load = Number(more, more * factor.std / factor.value / exponent)
-        sinkage = _times(scaled["sinkage"], at_load)
+        share = load / own_load / factor.value
+        more = share ** (1 / exponent)
+        of_factor, of_exponent = factor.std / factor.value / exponent, math.log(share) * scatter / exponent**2
+        sinkage = _times(scaled["sinkage"], Number(more, more * math.hypot(of_factor, of_exponent)))
         if sinkage.value > diameter:
             raise ValueError(say("beyond_load", load=load, sinkage=1e3 * sinkage.value, diameter=1e3 * diameter))
-        return Answer(stiffness, scaled["damping"], sinkage, load, ratio, packing)
+        if given is not None and given < own_load and sinkage.value < grain:
+            raise ValueError(say("below_load", load=load, sinkage=1e3 * sinkage.value, grain=1e3 * grain))
+        speed = self.reference["speed"] * (g * size) ** 0.5
+        deep = share == 1.0 or sinkage.value >= self.reference["shallowest"] * diameter
+        return Answer(stiffness, scaled["damping"], sinkage, load, ratio, packing, speed, deep)
 
-    def _factor(self, packing: float) -> Number:
-        """K at this packing over that at the first: straight in its logarithm between the measured ones."""
+    def _factor(self, packing: float, ratio: float) -> Number:
+        """K at this packing over that at the first: straight in its logarithm between the measured ones.
+
+        Whether packing multiplies K at another d / D or adds as much as where it was measured is not known: the
+        difference counts as a half-width of 95 %.
+        """
         value = math.exp(float(np.interp(packing, self.packings, np.log(self.factors))))
-        return Number(value, float(np.interp(packing, self.packings, self.factor_stds)))
+        added = (value - 1) * self.packed[1] / self.lines["stiffness"].at(ratio).value
+        chance = float(np.interp(packing, self.packings, self.factor_stds))
+        return Number(value, chance + abs(1 + added - value) / TO_STD)
 
 
 def _times(number: Number, factor: Number) -> Number:
@@ -150,6 +166,6 @@ def read_map(material: str) -> GroundMap:
     return GroundMap(
         name=material, source=table["source"], packings=tuple(table["packing"]["fractions"]),
         factors=tuple(table["packing"]["factors"]), factor_stds=tuple(table["packing"]["stds"]),
-        reference=table["reference"], ranges={key: (low, high) for key, (low, high) in table["range"].items()},
-        lines=lines,
+        packed=(table["packing"]["ratio"], table["packing"]["stiffness"]), reference=table["reference"],
+        ranges={key: (low, high) for key, (low, high) in table["range"].items()}, lines=lines,
     )  # fmt: skip

@@ -1,13 +1,17 @@
 """`hedgebed ground`: the map gives back the runs it is made of, scales as dry grains do, refuses the rest."""
 
+import dataclasses
 import json
+import math
 from pathlib import Path
 
 import pytest
 
 from experiments.cli.main import BAD_INPUT, DONE, main
+from experiments.groundmap.experiment import ground_file
 from experiments.groundmap.make import made_map
 from experiments.groundmap.maps import TO_STD, read_map
+from experiments.groundmap.settings import GroundSettings
 from rigid.ground_file import read_ground
 
 RESULTS = Path(__file__).parents[3] / "docs" / "results"
@@ -57,11 +61,51 @@ def test_numbers_scale_as_those_of_grains_without_cohesion():
 
 
 def test_runs_at_another_gravity_and_size_follow_the_scaling_of_the_map():
-    """One bed each at 1e-3 g and at twice the size: K within two standard deviations of a bed of the scaled mean."""
-    base = kept("ground-map/sand-rained")["quantities"]["stiffness"]
-    for name, scale in (("sand-rained-1e-3g", 1e-3), ("sand-rained-24mm", 4.0)):
-        found = kept(f"ground-map/{name}")["quantities"]["stiffness"]["value"]
-        assert abs(found / scale - base["value"]) < 2 * base["std"]
+    """One bed each at 1e-3 g and at twice the size: K, C and sinkage within two std of a bed of the scaled mean."""
+    base = kept("ground-map/sand-rained")["quantities"]
+    for name, g, size in (("sand-rained-1e-3g", 1e-3, 1), ("sand-rained-24mm", 1, 2)):
+        found = kept(f"ground-map/{name}")["quantities"]
+        scales = {"stiffness": g * size**2, "damping": math.sqrt(g) * size**2.5, "sinkage_dem": size}
+        for key, scale in scales.items():
+            assert abs(found[key]["value"] / scale - base[key]["value"]) < 2 * base[key]["std"]
+
+
+def test_the_ground_file_ends_at_the_froude_number_of_the_runs_and_its_load_holds_the_rate_part():
+    """The flagship drove at 0.1 and 0.4 m/s into 12 mm at 1 g; load = K D + C v."""
+    table = read_map("sand")
+    for gravity, diameter, speed in ((9.80665, 0.012, 0.4), (9.80665e-2, 0.048, 0.08)):
+        settings = GroundSettings(gravity=gravity, tip_diameter=diameter, grain=diameter / 60)
+        answer = table.answer(**POINT | {"gravity": gravity, "diameter": diameter, "grain": diameter / 60})
+        limits = ground_file(settings, table, answer).range
+        assert limits["speed"][1] == pytest.approx(speed)
+        rate = answer.damping.value * speed
+        assert limits["load"][1] == pytest.approx(answer.stiffness.value * diameter + rate)
+
+
+def test_the_error_of_packing_is_student_s_and_grows_with_the_way_from_the_beds_that_measured_it():
+    """Seven beds in three packings have four degrees of freedom: t = 2.776. Far from their d / D the factor is open."""
+    table = read_map("sand")
+    results = [
+        kept(f"ground-map/{name}")["quantities"]["stiffness"] for name in ("sand-rained", "sand-0.575", "sand-0.60")
+    ]
+    squares = [(entry["std"] / entry["value"]) ** 2 for entry in results]
+    pooled = math.sqrt((2 * squares[0] + squares[1] + squares[2]) / 4)
+    expected = 2.776 / TO_STD * pooled * math.sqrt(1 / 3 + 1 / 2)
+    assert table.factor_stds[2] / table.factors[2] == pytest.approx(expected, rel=1e-3)
+    dense = POINT | {"packing": table.packings[-1]}
+    near, far = (table.answer(**dense | {"grain": grain}).stiffness for grain in (0.0024, 0.0002))
+    assert near.std < 0.3 * near.value and far.std > far.value
+
+
+def test_a_sinkage_that_is_extrapolated_is_less_sure_and_one_below_a_grain_is_told():
+    table = read_map("sand")
+    own = table.answer(**POINT)
+    light = table.answer(**POINT | {"load": 0.1 * own.load})
+    assert own.deep and not light.deep
+    assert light.sinkage.std / light.sinkage.value > own.sinkage.std / own.sinkage.value
+    sure = dict(table.reference) | {"exponent_std": 0.0}
+    same = dataclasses.replace(table, reference=sure).answer(**POINT | {"load": 0.1 * own.load})
+    assert same.sinkage.value == light.sinkage.value and same.sinkage.std < light.sinkage.std
 
 
 def test_a_denser_bed_is_stiffer_and_sinks_less_and_a_heavier_spike_sinks_more():
@@ -81,6 +125,7 @@ def test_a_denser_bed_is_stiffer_and_sinks_less_and_a_heavier_spike_sinks_more()
         (["--packing", "0.7"], "packing"),
         (["--grain", "0.004"], "grain"),
         (["--load", "5"], "load"),
+        (["--load", "1e-9"], "grain"),
         (["--material", "mud"], "material"),
         (["--material", "jsc-1a-loose"], "calibrate"),
     ],
