@@ -9,6 +9,7 @@ fitted.beyond(depth=0.02, speed=0.1)       # one sentence for each number outsid
 ```
 """
 
+import warnings
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -127,8 +128,9 @@ class GroundFile(_Table):
     def tangent(self, *, load: float, speed: float = 0.0) -> tuple[float, float, float]:
         """K = dF/dz [N/m], C = dF/d(dz/dt) [N s/m] and the depth [m] where the law bears `load` [N] at `speed` [m/s].
 
-        K and C are the spring-damper that is right at this load and speed. Of another law they change with both. Raises
-        ValueError for a load that no depth down to a hundred tips bears, or that the surface bears at this speed.
+        K and C are the spring-damper that is right at this load and speed. Of another law they change with both. A
+        load, speed or depth outside the range warns. Raises ValueError for a load that no depth down to a hundred tips
+        bears, or that the surface bears at this speed.
         """
         law, p = self.surface_law, self.surface_law.numbers(self.values)
         deepest = 100 * self.foot.diameter
@@ -143,6 +145,8 @@ class GroundFile(_Table):
         stiffness = (law.force(depth + by, speed, p) - law.force(depth - by, speed, p)) / (2 * by)
         slow = max(speed - fast, 0.0)
         damping = (law.force(depth, speed + fast, p) - law.force(depth, slow, p)) / (speed + fast - slow)
+        for text in self.beyond(load=load, speed=speed, depth=depth):
+            warnings.warn(text, stacklevel=2)
         return stiffness, damping, depth
 
     def to_toml(self) -> str:

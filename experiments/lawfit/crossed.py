@@ -25,7 +25,7 @@ from .settings import say
 from .trust import beyond, held_out, paired
 from .words import ends_of, error_of, ranked
 
-__all__ = ["Crossed", "crossed_result"]
+__all__ = ["Crossed", "crossed_result", "tangents_of"]
 
 _LOADS = (0.25, 0.5, 1.0)
 """Loads of the table of tangents, over the mean force of a cell's drives at their ends [1]."""
@@ -72,11 +72,15 @@ def crossed_result(cells: Mapping[str, Data], progress: Progress) -> Crossed:
         progress.update(done)
     laws = _usable_first(laws)
     best = fits[laws[0]["name"]]
-    tangents = [row for name, own in cells.items() for row in _tangents(best, name, own)]
+    tangents, missing = [], []
+    for name, own in cells.items():
+        rows, left = tangents_of(best, name, own)
+        tangents += rows
+        missing += left
     tables = [{"title": say("table_crossed"), **_law_rows(laws)}]
     tables.append({"title": say("table_tangents", law=best.candidate.name), **_tangent_rows(tangents)})
     bounds = [say("crossed_bound", law=law["name"], keys=", ".join(law["at_bound"])) for law in laws if law["at_bound"]]
-    return Crossed(fits, laws, tangents, tables, _sentences(laws), [*_unlike_beds(cells), *bounds])
+    return Crossed(fits, laws, tangents, tables, _sentences(laws), [*_unlike_beds(cells), *missing, *bounds])
 
 
 def _usable_first(laws: Sequence[Json]) -> list[Json]:
@@ -135,9 +139,9 @@ def _left_out(fitted: LawFit[CrossedLaw], data: CrossedData, groups: Sequence[st
     return {"groups": names, "rms": float(np.sqrt(square / total))}
 
 
-def _tangents(fitted: LawFit[CrossedLaw], name: str, data: Data) -> list[Json]:
-    """K and C in one cell, at a few loads and at the slowest and the fastest speed."""
-    of, rows = data.foundation, []
+def tangents_of(fitted: LawFit[CrossedLaw], name: str, data: Data) -> tuple[list[Json], list[str]]:
+    """K and C in one cell, at a few loads and at the slowest and the fastest speed, and a warning of those without."""
+    of, rows, left = data.foundation, [], []
     largest = float(np.mean([run.force[-1] for run in data.runs if run.kind == "driven"] or [data.force.max()]))
     for load in (float(f"{share * largest:.2g}") for share in _LOADS):
         for speed in dict.fromkeys((data.speeds[0], data.speeds[-1])):
@@ -145,7 +149,10 @@ def _tangents(fitted: LawFit[CrossedLaw], name: str, data: Data) -> list[Json]:
             if found is not None and found.depth.value <= float(data.depth.max()):
                 where = {"tip": of.tip, "diameter": of.diameter, "gravity": of.gravity}
                 rows.append({"cell": name, **where, "law": fitted.candidate.name, **asdict(found)})
-    return rows
+            else:
+                left.append(f"{load:g} N, {speed:.3g} m/s")
+    law = fitted.candidate.name
+    return rows, [say("no_tangent", cell=name, law=law, where="; ".join(left))] if left else []
 
 
 def _law_rows(laws: Sequence[Json]) -> Json:

@@ -216,9 +216,9 @@ def _make(todo: Sequence[Member], certain: Sequence[Member], home: Path, where: 
         whole_folder(one.task, "series")
 
 
-def sure_enough(sure: float, beds: int, tolerance: float) -> bool:
+def sure_enough(sure: float, beds: int, tolerance: float, *, least: int = LEAST_BEDS) -> bool:
     """Whether no more runs are needed."""
-    return beds >= LEAST_BEDS and sure <= tolerance
+    return beds >= least and sure <= tolerance
 
 
 def middle_force(fitted: LawFit[Candidate]) -> Estimated:

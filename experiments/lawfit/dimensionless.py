@@ -34,6 +34,8 @@ __all__ = ["CROSSED", "CrossedData", "CrossedLaw", "Tangent", "cross", "crossed_
 
 _EXPONENT, _SETTLING = (0.0, 3.9), (1e-2, 50.0)
 """Bounds of exponents and of T [1]."""
+_SAME = 1e-3
+"""Froude numbers of drives within this of each other are one [1]."""
 CROSSED = {
     "scaled-spring-damper": ("linear", "damper"), "scaled-katsuragi-durian": ("linear", "square"),
     "power-damper": ("power", "damper"), "power-square": ("power", "square"), "power-early": ("power", "early"),
@@ -126,7 +128,11 @@ def _inertial(of: Foundation) -> float:
 
 
 def cross(cells: Mapping[str, Data]) -> CrossedData:
-    """The runs of all cells without dimensions. Beds of one seed are one bed in all cells."""
+    """The runs of all cells without dimensions. Beds of one seed are one bed in all cells.
+
+    Speeds are typed to a few digits, so one Froude number of the design differs a little between cells: numbers that
+    differ by less than `_SAME` are one, the least of them.
+    """
     runs = []
     for name, data in cells.items():
         of = data.foundation
@@ -139,7 +145,12 @@ def cross(cells: Mapping[str, Data]) -> CrossedData:
             )
             for run in data.runs
         ]  # fmt: skip
-    return CrossedData(next(iter(cells.values())).foundation, tuple(runs))
+    same: dict[float, float] = {}
+    for number in sorted({run.speed for run in runs}):
+        last = next(reversed(same.values()), -math.inf)
+        same[number] = last if number <= last * (1 + _SAME) else number
+    merged = tuple(replace(run, speed=same[run.speed]) for run in runs)
+    return CrossedData(next(iter(cells.values())).foundation, merged)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ of the runs. Of several tips and gravities it is the best law without dimensions
 """
 
 import inspect
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from experiments.runs.types import Json
 from rigid.result import write_json, write_text
 
 from .data import Data, Foundation
-from .dimensionless import CROSSED, CrossedLaw, shape_of
+from .dimensionless import CROSSED, CrossedLaw, shape_of, unit_force
 from .fit import CONFIDENCE, LawFit
 from .laws import Candidate
 from .settings import say
@@ -27,7 +28,7 @@ _HEAD = '''"""{title}
 {about}
 
 Made by hedgebed calibrate; needs Python alone. SI units. The force is that on the tip while it goes in. A call outside
-RANGE, that of the fitted runs, warns.
+RANGE, that of the fitted runs{of_tip}, warns.
 """
 
 import math
@@ -45,23 +46,29 @@ _TAIL = '''
 
 def force({arguments}):
     """Force [N] at a depth [m] of the tip and a speed [m/s] going in."""
-    _check(depth=depth, speed=speed{checked})
+    _check({ranges}, {check_depth}, {check_speed})
     return {call}
 
 
 def force_interval({arguments}):
     """90 % interval of the force [N], over beds."""
+    _check({ranges}, {check_depth}, {check_speed})
     return _interval(lambda numbers: {call_of_numbers})
 
 
 def tangent({arguments_of_load}):
     """K = dF/dz [N/m], C = dF/d(dz/dt) [N s/m] and depth [m] where the law bears a load [N]."""
-    _check(speed=speed{checked})
-    return _tangent(load, speed, NUMBERS{passed})
+    _check({ranges}, {check_load}, {check_speed})
+    stiffness, damping, depth = _tangent(load, speed, NUMBERS{passed})
+    _check({ranges}, {check_depth})
+    return stiffness, damping, depth
 
 
 def tangent_intervals({arguments_of_load}):
     """90 % intervals of K, C and depth of `tangent`, over beds."""
+    _check({ranges}, {check_load}, {check_speed})
+    depth = _tangent(load, speed, NUMBERS{passed})[2]
+    _check({ranges}, {check_depth})
     return [_interval(lambda numbers: _tangent(load, speed, numbers{passed})[k]) for k in range(3)]
 
 
@@ -84,9 +91,9 @@ def _interval(of):
     return value - STUDENT_T * std, value + STUDENT_T * std
 
 
-def _check(**values):
+def _check(ranges, **values):
     for name, value in values.items():
-        low, high = RANGE[name]
+        low, high = ranges[name]
         if not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):
             text = f"{{name}} = {{value:g}} is outside {{low:g}} to {{high:g}}: the law is extrapolated"
             warnings.warn(text, stacklevel=3)
@@ -103,12 +110,16 @@ def _shape(tip, x):
     return 0.25 * math.pi
 
 
+def _range(tip):
+    if tip not in RANGE:
+        raise ValueError(f"tip = {{tip!r}} is not one of {{tuple(RANGE)}}")
+    return RANGE[tip]
+
+
 def _force(depth, speed, p, tip, diameter, gravity):
     x, fr = max(depth, 0.0) / diameter, max(speed, 0.0) / math.sqrt(gravity * diameter)
     if x == 0:
         return 0.0
-    if tip not in TIPS:
-        raise ValueError(f"tip = {{tip!r}} is not one of {{TIPS}}")
     area, unit = _shape(tip, x), BULK_DENSITY * gravity * diameter**3
     inertial = fr * GRAIN / diameter / math.sqrt({packing})
     return {formula}
@@ -123,6 +134,15 @@ _RATE = {
 }  # fmt: skip
 
 
+_CHECKS = {"ranges": "RANGE", "check_depth": "depth=depth", "check_load": "load=load", "check_speed": "speed=speed"}
+_CHECKS_SCALED = {
+    "ranges": "_range(tip)", "check_depth": "depth_over_diameter=depth / diameter",
+    "check_load": "load_over_rho_g_d3=load / (BULK_DENSITY * gravity * diameter**3)",
+    "check_speed": "froude=speed / math.sqrt(gravity * diameter), diameter=diameter, gravity=gravity",
+}  # fmt: skip
+"""Numbers that a call compares with its range."""
+
+
 def export_cell(fitted: LawFit[Candidate], laws: Sequence[Json], folder: Path) -> None:
     """Write law.json and law.py of one tip and gravity: `fitted` is the law, `laws` the entries of all."""
     candidate, data = fitted.candidate, fitted.data
@@ -134,7 +154,7 @@ def export_cell(fitted: LawFit[Candidate], laws: Sequence[Json], folder: Path) -
     extra += f"\n\ndef _force(depth, speed, p):\n    return {loading}(depth, p) + {rate}(depth, speed, p)\n"
     sets = [tuple(map(float, candidate.numbers(theta))) for theta in (fitted.theta, *fitted.left_out)]
     title = say("export_title", law=candidate.name, summary=law.summary, f=of, mm=1e3 * of.diameter)
-    ranges = {"depth": _ends(data, "depth"), "speed": (0.0, max(data.speeds))}
+    ranges = {"depth": _ends(data, "depth"), "speed": _speeds([data]), "load": _ends(data, "force")}
     text = _python(
         title,
         sets,
@@ -162,19 +182,13 @@ def export_crossed(fitted: LawFit[CrossedLaw], laws: Sequence[Json], cells: Mapp
         )
     tips = tuple(dict.fromkeys(shape_of(data.foundation) for data in datas))
     density = sum(data.foundation.bulk_density for data in datas) / len(datas)
-    constants = f"\nTIPS = {tips!r}\nBULK_DENSITY = {density:.6g}  # kg/m3, of the beds\nGRAIN = {of.grain:.6g}  # m\n"
+    constants = f"\nBULK_DENSITY = {density:.6g}  # kg/m3, of the beds\nGRAIN = {of.grain:.6g}  # m\n"
     sets = [dict(zip(law.free, theta.tolist(), strict=True)) for theta in (fitted.theta, *fitted.left_out)]
-    ranges = {
-        "depth": (0.0, max(_ends(data, "depth")[1] for data in datas)),
-        "speed": (0.0, max(max(data.speeds) for data in datas)),
-        "diameter": _least_and_largest([data.foundation.diameter for data in datas]),
-        "gravity": _least_and_largest([data.foundation.gravity for data in datas]),
-    }
+    ranges = {tip: _ranges([data for data in datas if shape_of(data.foundation) == tip]) for tip in tips}
+    widest = max(data.foundation.diameter for data in datas)
     title = say("export_title_crossed", law=law.name, f=of, tips=", ".join(tips))
     extra = constants + _SCALED.format(formula=formula, packing=PACKING)
-    text = _python(
-        title, sets, ranges, extra, parameters=("tip", "diameter", "gravity"), deepest=10 * ranges["diameter"][1]
-    )
+    text = _python(title, sets, ranges, extra, parameters=("tip", "diameter", "gravity"), deepest=10 * widest)
     about = {"law": law.name, "parameters": sets[0], "tips": tips, "laws": list(laws)}
     _write(folder, text, about | _of_foundation(of) | {"bulk_density": density}, ranges)
 
@@ -199,11 +213,11 @@ def _python(
     first, _, about = title.partition("\n")
     head = _HEAD.format(
         title=first, about=about, numbers=repr(sets[0]), names=names, left_out=",\n    ".join(map(repr, sets[1:])), t=t,
-        range=repr(dict(ranges)),
+        range=repr(dict(ranges)), of_tip=" with a tip of this shape" if parameters else "",
     )  # fmt: skip
     tail = _TAIL.format(
         arguments=f"depth, speed=0.0{passed}", arguments_of_load=f"load, speed=0.0{passed}",
-        checked="".join(f", {name}={name}" for name in parameters if name in ranges), passed=passed,
+        passed=passed, **(_CHECKS_SCALED if parameters else _CHECKS),
         call=call("depth", "speed", "NUMBERS"), call_of_numbers=call("depth", "speed"), parameters=passed,
         deepest=deepest, low_call=call("low", "speed"), high_call=call("high", "speed"),
         middle_call=call("middle", "speed"), above=call("z + by", "speed"), below=call("z - by", "speed"),
@@ -229,5 +243,20 @@ def _ends(data: Data, name: str) -> tuple[float, float]:
     return 0.0, float(getattr(data, name).max())
 
 
-def _least_and_largest(values: Sequence[float]) -> tuple[float, float]:
-    return min(values), max(values)
+def _speeds(datas: Sequence[Data], unit: Callable[[Foundation], float] = lambda of: 1.0) -> tuple[float, float]:
+    """Least and largest speed that was fitted, over `unit`; a drop has every speed down to 0."""
+    found = [run.speed / unit(data.foundation) for data in datas for run in data.runs]
+    drops = any(run.kind == "drop" for data in datas for run in data.runs)
+    return 0.0 if drops else min(found), max(found)
+
+
+def _ranges(datas: Sequence[Data]) -> Json:
+    """Range of the runs of one shape: of numbers without dimensions, and of diameter and gravity."""
+    foundations = [data.foundation for data in datas]
+    return {
+        "depth_over_diameter": (0.0, max(_ends(data, "depth")[1] / data.foundation.diameter for data in datas)),
+        "froude": _speeds(datas, lambda of: math.sqrt(of.gravity * of.diameter)),
+        "load_over_rho_g_d3": (0.0, max(_ends(data, "force")[1] / unit_force(data.foundation) for data in datas)),
+        "diameter": (min(of.diameter for of in foundations), max(of.diameter for of in foundations)),
+        "gravity": (min(of.gravity for of in foundations), max(of.gravity for of in foundations)),
+    }

@@ -134,11 +134,18 @@ class LawFit(Generic[Law]):
         return interval(float(self.theta[place]), self.left_out[:, place])
 
     def at_bound(self, name: str) -> bool:
-        """Whether the parameter came out at the end of what it may be."""
-        place = self.candidate.free.index(name)
-        low, high = (ends[place] for ends in self.candidate.bounds())
-        value = float(self.theta[place])
-        return any(math.isfinite(end) and math.isclose(value, end, rel_tol=1e-3, abs_tol=1e-6) for end in (low, high))
+        """Whether the parameter came out at the end of what it may be, or cannot be told from it.
+
+        Of a parameter with two ends, as an exponent, its 90 % interval must lie between them. A strength has one, 0:
+        there the value counts, as the interval of a strength is wide wherever its exponent is free.
+        """
+        place, found = self.candidate.free.index(name), self.parameter(name)
+        low, high = (float(ends[place]) for ends in self.candidate.bounds())
+        if math.isfinite(low) and math.isfinite(high) and not low < found.low <= found.high < high:
+            return True
+        return any(
+            math.isfinite(end) and math.isclose(found.value, end, rel_tol=1e-3, abs_tol=1e-6) for end in (low, high)
+        )
 
 
 def interval(value: float, left_out: Array) -> Estimated:

@@ -9,7 +9,7 @@ import numpy as np
 from experiments.runs.types import Json
 
 from .data import Array, Data, PushRun
-from .fit import Estimated, Law, LawFit, fit_law, interval, mean_of
+from .fit import Estimated, Law, LawFit, fit_law, interval, mean_of, solve_law
 from .laws import Candidate
 
 __all__ = [
@@ -170,14 +170,20 @@ def beyond(fitted: LawFit[Law]) -> dict[str, Beyond]:
 
 
 def _beyond(fitted: LawFit[Law], rest: Data, out: Data, *, left_out: float, fitted_to: float) -> Beyond:
-    theta = fit_law(fitted.candidate, rest, jackknife=False).theta
-    law, beds = fitted.candidate.predict(theta, out), out.force
-    sums = np.array([[law[out.bed_of_row == k].sum(), beds[out.bed_of_row == k].sum()] for k in range(len(out.beds))])
-    error, ends = float(law.sum() / beds.sum() - 1), None
-    if len(sums) > 1:
-        sure = interval(
-            error, np.array([np.divide(*np.delete(sums, k, axis=0).sum(axis=0)) - 1 for k in range(len(sums))])
-        )
+    own = fit_law(fitted.candidate, rest, jackknife=False)
+
+    def error_of(theta: Array, seen: Data) -> float:
+        return float(fitted.candidate.predict(theta, seen).sum() / seen.force.sum() - 1)
+
+    law, beds = fitted.candidate.predict(own.theta, out), out.force
+    error, ends = error_of(own.theta, out), None
+    if len(out.beds) > 1:
+        # A bed is left out of both: the law depends on the beds that it was fitted to.
+        without = [
+            error_of(solve_law(fitted.candidate, rest.without_bed(bed), own.theta, own.share)[0], out.without_bed(bed))
+            for bed in dict.fromkeys((*out.beds, *rest.beds))
+        ]
+        sure = interval(error, np.array(without))
         ends = (sure.low, sure.high)
     rms = math.sqrt(float(np.sum((law - beds) ** 2) / np.sum(beds**2)))
     return Beyond(left_out, fitted_to, rms, error, ends)

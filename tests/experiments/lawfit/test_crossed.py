@@ -9,12 +9,12 @@ from fake_bed import FakeBed
 
 from experiments import lawfit
 from experiments.lawfit.cells import cells_of
-from experiments.lawfit.crossed import crossed_result
+from experiments.lawfit.crossed import crossed_result, tangents_of
 from experiments.lawfit.data import Data, PushRun
 from experiments.lawfit.dimensionless import CrossedLaw, cross, tangent_at
-from experiments.lawfit.fit import fit_law
+from experiments.lawfit.fit import fit_law, interval
 from experiments.lawfit.laws import CANDIDATES
-from experiments.lawfit.synthetic import FOUNDATION, scaled_cells
+from experiments.lawfit.synthetic import FOUNDATION, TRUTHS, scaled_cells, synthetic_data
 from experiments.lawfit.trust import beyond
 from experiments.penetrate import beds
 from experiments.runs.progress import Progress
@@ -209,3 +209,48 @@ def test_the_error_beyond_the_runs_is_that_of_what_was_left_out():
     assert pair["depth"].error < -0.2 and pair["depth"].interval[0] <= pair["depth"].error
     two = Data(FOUNDATION, tuple(run for run in runs if run.speed < 0.3))
     assert "speed" not in beyond(fit_law(CANDIDATES["spring-damper"](FOUNDATION), two))
+
+
+def test_speeds_typed_to_six_digits_are_one_froude_number_in_all_cells():
+    cells = scaled_cells(EARLY, TRUTH, noise=0.0)
+    typed = {
+        name: replace(data, runs=tuple(replace(run, speed=float(f"{run.speed:.6g}")) for run in data.runs))
+        for name, data in cells.items()
+    }
+    data = cross(typed)
+    assert data.speeds == pytest.approx([0.2, 0.4, 0.8], rel=1e-5)
+    fastest = data.only(lambda run: run.speed == data.speeds[-1])
+    assert {run.cell for run in fastest.scaled} == set(cells)
+    found = beyond(fit_law(CrossedLaw("one-pair", EARLY.shapes), data))["speed"]
+    assert (found.left_out, found.fitted_to) == pytest.approx((0.8, 0.4), rel=1e-5)
+
+
+def test_the_interval_beyond_the_runs_is_that_of_fits_without_one_bed_each():
+    law, design = "spring-damper", dict.fromkeys(range(4), (0.1, 0.2, 0.4))
+    data, candidate = synthetic_data(law, TRUTHS[law], design, seed=5), CANDIDATES[law](FOUNDATION)
+    found = beyond(fit_law(candidate, data))
+    without = [beyond(fit_law(candidate, data.without_bed(bed))) for bed in data.beds]
+    for kind, one in found.items():
+        expected = interval(one.error, np.array([other[kind].error for other in without]))
+        assert one.interval == pytest.approx((expected.low, expected.high), rel=0.02)
+
+
+def test_an_exponent_that_cannot_be_told_from_its_bound_counts_as_at_it():
+    fitted = fit_law(EARLY, cross(scaled_cells(EARLY, TRUTH)))
+    assert not any(map(fitted.at_bound, EARLY.free))
+    place = EARLY.free.index("n_flat")
+    left_out = fitted.left_out.copy()
+    left_out[:, place] = fitted.theta[place] + np.array([-1.0, 0.0, 1.0]) * fitted.theta[place]
+    unsure = replace(fitted, left_out=left_out)
+    assert unsure.parameter("n_flat").low < 0
+    assert [name for name in EARLY.free if unsure.at_bound(name)] == ["n_flat"]
+
+
+def test_every_load_and_speed_of_a_cell_has_a_tangent_or_is_named_by_a_warning():
+    # The inertia of these runs bears the smallest loads at the surface when the tip is fast.
+    cells = scaled_cells(CrossedLaw("power-square", EARLY.shapes), np.array([6.0, 9.0, 1.3, 0.9, 6.0]))
+    fitted = fit_law(CrossedLaw("power-square", EARLY.shapes), cross(cells))
+    for name, data in cells.items():
+        rows, warned = tangents_of(fitted, name, data)
+        assert len(rows) + sum(text.count(" N, ") for text in warned) == 3 * 2
+        assert rows and name in warned[0]

@@ -1,8 +1,10 @@
 """law.py and law.json: the law of a calibration in a process that has no hedgebed on its path."""
 
+import importlib
 import json
 import subprocess
 import sys
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -66,22 +68,55 @@ def test_the_exported_law_of_all_tips_and_gravities_has_the_force_and_tangent_of
     cells = scaled_cells(truth, (6.0, 9.0, 1.3, 0.9, 3.0, 0.5))
     fitted = fit_law(CrossedLaw(name, SHAPES), cross(cells))
     export_crossed(fitted, [], cells, tmp_path)
-    where = [(0.003, 0.05, "sphere", 0.013, 3.7), (0.009, 0.15, "flat", 0.016, 9.80665)]
+    where = [(0.003, 0.1, "sphere", 0.012, 3.7), (0.009, 0.15, "flat", 0.016, 9.80665)]
     found = alone(tmp_path, f"""[
-        [law.force(z, tip, d, g, v) for z, v, tip, d, g in {where}], law.tangent(0.08, "sphere", 0.013, 3.7, 0.05)
+        [law.force(z, tip, d, g, v) for z, v, tip, d, g in {where}], law.tangent(0.01, "sphere", 0.012, 3.7, 0.05)
     ]""")  # fmt: skip
     # One density for all cells in the file; the made-up beds have the same.
     for (z, v, tip, d, g), force in zip(where, found[0], strict=True):
         of = replace(cells["sphere-9.81"].foundation, tip=tip, diameter=d, gravity=g)
         assert force == pytest.approx(fitted.candidate.force(fitted.theta, of, z, v), rel=1e-9)
-    of = replace(cells["sphere-9.81"].foundation, diameter=0.013, gravity=3.7)
-    own = tangent_at(fitted, of, 0.08, 0.05)
+    of = replace(cells["sphere-9.81"].foundation, gravity=3.7)
+    own = tangent_at(fitted, of, 0.01, 0.05)
     assert found[1] == pytest.approx([own.stiffness.value, own.damping.value, own.depth.value], rel=1e-3)
 
 
 def test_what_is_outside_the_runs_warns_and_what_no_depth_bears_is_refused(tmp_path):
     data = synthetic_data("spring-damper", TRUTHS["spring-damper"], DESIGNS["three beds, two speeds"], seed=3)
     export_cell(fit_law(CANDIDATES["spring-damper"](FOUNDATION), data), [], tmp_path)
-    for call, named in (("law.force(0.05, 0.1)", "depth = 0.05"), ("law.tangent(1e9, 0.1)", "load = 1e+09")):
-        with pytest.raises(AssertionError, match=named.replace("+", r"\+")):
+    for call, named in (
+        ("law.force(0.05, 0.1)", "depth = 0.05"), ("law.force(0.005)", "speed = 0"),
+        ("law.force_interval(0.05, 0.1)", "depth = 0.05"), ("law.tangent(5.0, 0.1)", "load = 5"),
+        ("law.tangent(1e9, 0.1)", "load = 1e\\+09"), ("law.tangent_intervals(5.0, 0.1)", "load = 5"),
+    ):  # fmt: skip
+        with pytest.raises(AssertionError, match=named):
             alone(tmp_path, call)
+
+
+def test_the_law_of_all_tips_warns_outside_depth_froude_number_and_load_of_the_same_tip(tmp_path, monkeypatch):
+    law = CrossedLaw("power-square", SHAPES)
+    cells = scaled_cells(law, (6.0, 9.0, 1.3, 0.9, 3.0))  # z / D to 0.86, Fr 0.2 to 0.8
+    export_crossed(fit_law(law, cross(cells)), [], cells, tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "law", raising=False)
+    exported = importlib.import_module("law")
+    monkeypatch.delitem(sys.modules, "law")
+
+    def warned(call, *given):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            call(*given)
+        return {str(one.message).split(" = ")[0] for one in caught}
+
+    earth, low = ("sphere", 0.012, 9.80665), ("sphere", 0.012, 0.980665)
+    assert warned(exported.force, 0.006, *earth, 0.15) == set()
+    # 0.15 m/s is in the range under 1 g, and a Froude number of 1.4 under 0.1 g.
+    assert warned(exported.force, 0.006, *low, 0.15) == {"froude"}
+    assert warned(exported.force, 0.006, *earth) == {"froude"}  # at rest: slower than every run
+    # 13 mm is less than the flat tip of 16 mm went, and more than this ball.
+    assert warned(exported.force, 0.013, *earth, 0.15) == {"depth_over_diameter"}
+    assert warned(exported.force_interval, 0.006, "sphere", 0.016, 9.80665, 0.15) == {"diameter"}
+    assert {"load_over_rho_g_d3", "depth_over_diameter"} == warned(exported.tangent, 1.0, *earth, 0.15)
+    assert "load_over_rho_g_d3" in warned(exported.tangent_intervals, 1.0, *earth, 0.15)
+    with pytest.raises(ValueError, match="cone60"):
+        exported.force(0.005, "cone60", 0.012, 9.80665, 0.15)

@@ -202,6 +202,9 @@ def test_the_local_tangent_of_a_spring_damper_is_its_pair_and_of_another_law_the
     drag = fitted.values["drag"]
     assert (k, c) == pytest.approx((fitted.values["stiffness"], 2 * drag * 0.2), rel=1e-6)
     assert depth == pytest.approx((0.3 - drag * 0.04) / fitted.values["stiffness"], rel=1e-9)
+    with pytest.warns(UserWarning) as warned:
+        fitted.tangent(load=3.0, speed=0.45)
+    assert {str(one.message).split(" = ")[0] for one in warned} == {"load", "speed", "depth"}
     with pytest.raises(ValueError, match="load"):
         fitted.tangent(load=1e6)
 
