@@ -33,9 +33,11 @@ def result_of(settings: BedPlatesSettings, runs: list[Json], surfaces: Mapping[s
     fits = {terms: fit_of(plates, surfaces, friction, terms=terms) for terms in TERMS}
     terms = min(fits, key=lambda count: (fits[count].unseen, count))
     fit = fits[terms]
-    kept = _table(settings, plates, surfaces, fit, friction)
     rows = [_row(own, surfaces, fit, friction) for own in _alike(plates)]
     others = [_row(own, surfaces, fit, friction) for own in _alike([run for run in runs if run["beta"] is None])]
+    errors = [row["error"] for row in others]
+    shapes = (float(np.sqrt(np.mean(np.square(errors)))), max(errors)) if errors else None
+    kept = _table(settings, plates, surfaces, fit, friction, shapes)
     of = partial(quantity, runs)
     law = {
         f"gradient_{k + 1}": {"value": fit.factors[k], "std": fit.stds[k] or None, "unit": "N/m3", "note": note}
@@ -48,11 +50,10 @@ def result_of(settings: BedPlatesSettings, runs: list[Json], surfaces: Mapping[s
         "unseen_error": _number(fit.unseen, say("unseen_error")),
         **{f"unseen_error_{n}": _number(fits[n].unseen, say("unseen_error_n", terms=n)) for n in TERMS},
     }  # fmt: skip
-    if others:
+    if shapes:
         worst = max(others, key=lambda row: row["error"])
-        rms = float(np.sqrt(np.mean([row["error"] ** 2 for row in others])))
         quantities |= {
-            "shape_error": _number(rms, say("shape_error")),
+            "shape_error": _number(shapes[0], say("shape_error")),
             "shape_error_worst": _number(worst["error"], f"{worst['body']}, gamma = {worst['gamma']:g} degrees"),
         }
     quantities |= {"speed": of("speed", "m/s", "of the bodies")} | of_beds(runs, "grains of a bed")
@@ -100,7 +101,12 @@ def _row(own: list[Json], surfaces: Mapping[str, Pieces], fit: Fit, friction: fl
 
 
 def _table(
-    settings: BedPlatesSettings, plates: list[Json], surfaces: Mapping[str, Pieces], fit: Fit, friction: float
+    settings: BedPlatesSettings,
+    plates: list[Json],
+    surfaces: Mapping[str, Pieces],
+    fit: Fit,
+    friction: float,
+    shapes: tuple[float, float] | None,
 ) -> RftTable:
     one = plates[0]
     entries = []
@@ -120,6 +126,7 @@ def _table(
         format=RFT_FORMAT, material=one["material"], source="hedgebed bed test plates", gravity=one["gravity"],
         grain=one["grain"], bulk_density=float(np.mean([run["packing_fraction"] for run in plates])) * one["density"],
         surface_friction=friction, factors=fit.factors, stds=fit.stds, left_out=fit.left_out, unseen=fit.unseen,
+        shape_errors=shapes,
         depth=(settings.shallow * settings.depth, settings.depth), side=settings.side, speed=one["speed"],
         plates=tuple(entries), notes=(say("no_history"),),
     )  # fmt: skip

@@ -10,15 +10,33 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
-from cyclopts import App, Parameter
+from cyclopts import App, CoercionError, Parameter
 from rich.console import Console
 from rich.table import Table
 
 from experiments.runs.streams import refusing, say
+from experiments.runs.units import Unit, has_unit
 
 __all__ = ["add_bed_commands"]
 
 _Json = Annotated[bool, Parameter(help="Print it as JSON on stdout and nothing else.", negative="")]
+
+
+def _in_si(kind: str) -> Parameter:
+    """Option of a number in SI units, or with a unit of this kind behind it."""
+
+    def convert(_: Any, tokens: tuple[Any, ...]) -> float:
+        word = tokens[0].value
+        try:
+            return Unit(kind, 1.0).value_of(word) if has_unit(word) else float(word)
+        except ValueError as error:
+            raise CoercionError(str(error), token=tokens[0], target_type=float) from None
+
+    return Parameter(converter=convert, metavar="FLOAT")
+
+
+_Length = Annotated[float, _in_si("length")]
+_Gravity = Annotated[float, _in_si("acceleration")]
 _Bed = Annotated[str, Parameter(help="A file, the folder of a run of bed make, or a name on the shelf.")]
 
 
@@ -121,11 +139,11 @@ def _foot(
     shape: Annotated[str, Parameter(help="ball, cone, cylinder, or a file of a closed surface (STL, OBJ).")],
     /,
     *,
-    depth: Annotated[float, Parameter(help="Depth of the origin of the shape [m]; a built-in one stands on it.")],
+    depth: Annotated[_Length, Parameter(help="Depth of the origin of the shape [m]; a built-in one stands on it.")],
     gamma: Annotated[float, Parameter(help="Direction of motion below the horizontal [degrees].")] = 90.0,
-    size: Annotated[float, Parameter(help="Diameter of a ball, cone or cylinder [m].")] = 0.024,
-    scale: Annotated[float, Parameter(help="Unit of the file [m].")] = 1.0,
-    gravity: Annotated[float | None, Parameter(help="Gravity [m/s2]; that of the table if not given.")] = None,
+    size: Annotated[_Length, Parameter(help="Diameter of a ball, cone or cylinder [m].")] = 0.024,
+    scale: Annotated[_Length, Parameter(help="Unit of the file [m].")] = 1.0,
+    gravity: Annotated[_Gravity | None, Parameter(help="Gravity; that of the table if not given [m/s2].")] = None,
     json: _Json = False,
 ) -> int:
     """Predict the slow force of a bed on a shape of your own."""
@@ -144,18 +162,21 @@ def _foot(
             raise ValueError(f"gamma = {gamma:g} degrees: -90 (up) to 90 (down) is accepted")
         if shape not in SHAPES and not Path(shape).is_file():
             raise ValueError(f"shape = {shape!r} is no file, and no built-in shape: {', '.join(SHAPES)}")
-        body = shaped(shape, size, scale)
-    force, std = found.force(body.pieces, depth=depth, direction=direction_of(gamma), gravity=gravity)
+        body, way = shaped(shape, size, scale), direction_of(gamma)
+        warnings = found.beyond(body.pieces, depth=depth, direction=way)
+    force, std = found.force(body.pieces, depth=depth, direction=way, gravity=gravity)
     size_of_law = found.unseen * float(np.linalg.norm(force))
     if json:
         numbers = {"force": force.tolist(), "std": [None if math.isnan(s) else s for s in std.tolist()]}
-        print(json_module.dumps(numbers | {"law_error": size_of_law, "unit": "N"}, indent=2))
+        errors = {"law_error": size_of_law, "shape_errors": found.shape_errors}
+        print(json_module.dumps(numbers | errors | {"unit": "N", "warnings": warnings}, indent=2))
         return 0
     for axis, value, spread in zip("xyz", force, std, strict=True):
         print(f"force {axis} = {value:.4g}" + ("" if math.isnan(spread) else f" ± {spread:.2g}") + " N")
     print(f"± is one standard deviation between beds; the law missed unseen plates by {100 * found.unseen:.0f} % (rms)")
-    if depth > 1.5 * found.depth[1]:
-        say(f"warning: depth = {depth:g} m is beyond that of the plates, {found.depth[1]:g} m: extrapolated")
-    if gamma < 0:
-        say("warning: gamma is below 0, and no plate was pushed upwards: extrapolated")
+    if found.shape_errors is not None:
+        rms, worst = (100 * error for error in found.shape_errors)
+        print(f"it missed other shapes by {rms:.0f} % (rms), by {worst:.0f} % at worst")
+    for warning in warnings:
+        say(f"warning: {warning}")
     return 0

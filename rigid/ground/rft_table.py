@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Factors = tuple[Finite, Finite, Finite, Finite]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+MOST = 10.0  # times what was measured, in depth and width: beyond it no force is stated
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,7 @@ class RftTable(BaseModel):
     stds: Factors  # standard deviation of each between fits that leave out one bed
     left_out: tuple[Factors, ...]  # The factors of those fits
     unseen: Annotated[float, Field(ge=0)]  # rms of the error of plates that were not fitted, over their force [1]
+    shape_errors: tuple[Finite, Finite] | None = None  # of other shapes: rms and largest, over their force [1]
     depth: tuple[Finite, Finite]  # of the measured plates' middles [m]
     side: Positive  # of the plates [m]
     speed: Positive  # of the plates [m/s]
@@ -158,6 +160,38 @@ class RftTable(BaseModel):
         if count < 2:
             return best, np.full(3, np.nan)
         return best, np.sqrt((count - 1) / count * ((np.array(others) - np.mean(others, axis=0)) ** 2).sum(axis=0))
+
+    def beyond(self, pieces: Pieces, *, depth: float, direction: ArrayLike) -> list[str]:
+        """What is beyond the plates, a sentence each; arguments as in `force`.
+
+        Raises ValueError for a body narrower than a grain, and for one ten times as wide or as deep as the plates.
+        """
+        way = np.asarray(direction, dtype=float)
+        gamma = math.degrees(math.asin(-float(way[2]) / float(np.linalg.norm(way))))
+        width = float(np.ptp(pieces.points, axis=0).max())
+        upright = max((abs(math.sin(math.radians(plate["beta"]))) for plate in self.plates), default=0.0)
+        deep, most = depth - float(pieces.points[:, 2].min()), self.depth[1] + 0.5 * self.side * upright
+        if width < self.grain:
+            raise ValueError(
+                f"the body is {1e3 * width:.3g} mm large, less than one grain of the table, {1e3 * self.grain:.3g} mm"
+            )
+        for what, value, limit in (("large", width, self.side), ("deep", deep, most)):
+            if value > MOST * limit:
+                raise ValueError(
+                    f"the body is {value:.3g} m {what}, the plates {limit:.3g} m: {MOST * limit:.3g} m is the most"
+                )
+        said = []
+        if abs(width - self.side) > self.grain:
+            said.append(f"the body is {1e3 * width:.3g} mm large and the plates {1e3 * self.side:.3g} mm: extrapolated")
+        if deep > most:
+            said.append(f"it reaches {1e3 * deep:.3g} mm deep and the plates {1e3 * most:.3g} mm: extrapolated")
+        measured = sorted({plate["gamma"] for plate in self.plates})
+        flattest = next((g for g in measured if g > 0), 0.0)
+        if gamma < 0:
+            said.append(f"gamma = {gamma:.3g} degrees: no plate was pushed upwards: extrapolated")
+        elif 1e-9 < gamma < flattest - 1e-9:
+            said.append(f"gamma = {gamma:.3g} degrees: no plate was pushed between 0 and {flattest:g} degrees")
+        return said
 
     def to_json(self) -> str:
         """The text of the file."""

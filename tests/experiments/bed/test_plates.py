@@ -96,12 +96,27 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
         format="hedgebed-rft/1", material="sand", source="made up", gravity=9.8, grain=0.004, bulk_density=1450.0,
         surface_friction=0.4, factors=(2e5, 2e5, 2e5, 0.0), stds=(1e4, 1e4, 1e4, 0.0),
         left_out=((1.9e5, 1.9e5, 1.9e5, 0.0), (2.1e5, 2.1e5, 2.1e5, 0.0)), unseen=0.1,
-        depth=(0.01, 0.02), side=0.024, speed=0.1, plates=(),
+        depth=(0.01, 0.02), side=0.024, speed=0.1, plates=({"beta": 90.0, "gamma": 45.0}, {"beta": 0.0, "gamma": 90.0}),
+        shape_errors=(0.2, 0.35),
     )  # fmt: skip
     path = tmp_path / "rft.json"
     path.write_text(table.to_json(), encoding="utf-8")
-    assert main(["bed", "foot", str(path), "cone", "--depth", "0.015", "--json"]) == DONE
-    found = json.loads(capsys.readouterr().out)
+
+    def asked(*options):
+        assert main(["bed", "foot", str(path), "cone", *options, "--json"]) == DONE
+        return json.loads(capsys.readouterr().out)
+
+    found = asked("--depth", "15mm")
+    assert found["warnings"] == [] and found["shape_errors"] == [0.2, 0.35]
+    assert asked("--depth", "0.015", "--gravity", "1e-3g")["force"][2] == pytest.approx(
+        1e-3 * 9.80665 / 9.8 * found["force"][2]
+    )
+    for more, count in (
+        (["0.015", "--gamma", "10"], 1), (["0.015", "--gamma", "-5"], 1), (["0.015", "--gamma", "50"], 0),
+        (["34mm"], 1),
+        (["0.015", "--size", "8mm"], 1),
+    ):  # fmt: skip
+        assert len(asked("--depth", *more)["warnings"]) == count
     half = math.radians(30.0)
     alpha = tractions([[math.cos(half), 0.0, -math.sin(half)]], [0.0, 0.0, -1.0], surface_friction=0.4)[0, 2]
     closed = 2e5 * alpha * math.pi * math.tan(half) / (3 * math.cos(half)) * 0.015**3
@@ -110,6 +125,9 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
     for wrong, named in (
         (["cone", "--depth", "-1"], "depth"), (["mud.stl", "--depth", "0.01"], "mud.stl"),
         (["cone", "--depth", "0.01", "--gamma", "100"], "gamma"),
+        (["cone", "--depth", "0.01", "--size", "0.002"], "grain"),
+        (["cone", "--depth", "0.01", "--size", "20"], "large"),
+        (["cone", "--depth", "1"], "deep"), (["cone", "--depth", "15s"], "depth"),
     ):  # fmt: skip
         assert main(["bed", "foot", str(path), *wrong]) == BAD_INPUT
         assert named in capsys.readouterr().err
