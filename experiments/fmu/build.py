@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.platform.ground_file import fitted_ground
+from experiments.platform.ground_file import fitted_ground, naming_gravity
 from experiments.runs.version import __version__
 
 from . import say
@@ -34,7 +34,8 @@ def check_fmu(file: str | Path, settings: FmuSettings) -> tuple[int, tuple[str, 
     if path.exists():
         raise ValueError(say("exists", file=str(file)))
     plan = _slave().plan_platform(settings)
-    DrivenPlatform(plan.trial, longest_step=settings.longest_step)
+    with naming_gravity(plan.fitted, plan.trial):
+        DrivenPlatform(plan.trial, longest_step=settings.longest_step)
     return plan.trial.spike_count, plan.warnings
 
 

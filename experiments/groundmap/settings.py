@@ -17,7 +17,7 @@ class GroundSettings(StrictSettings):
     """K, C and sinkage of a ball-tipped spike, from the map that ships: no grains are computed."""
 
     material: str = Field("sand", description="Material of the map: sand.")
-    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
+    gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2]; in a rig they are at 1 g.")
     tip_diameter: Positive = Field(
         0.012, description="Diameter of the tip [m].", json_schema_extra={"option_alias": "--spike-diameter"}
     )

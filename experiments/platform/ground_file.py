@@ -1,5 +1,7 @@
 """A law from a ground file under a platform: the file that a run keeps, and whether a tumble leaves its range."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -8,13 +10,16 @@ from pydantic import BaseModel
 
 from experiments.runs.folder import write_text
 from rigid.ground_file import GroundFile, is_ground_file, read_ground
+from rigid.model.trial import Trial
 from rigid.planar.trajectory import Trajectory
+from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
 from .numbers import ball_radius, tip_angles, tip_depth
 
 __all__ = [
-    "GROUND_COPY", "SPIKES_PER_ROW", "fitted_ground", "law_warnings", "range_warnings", "reached", "with_kept_ground",
+    "GROUND_COPY", "SPIKES_PER_ROW", "fitted_ground", "law_warnings", "naming_gravity", "range_warnings", "reached",
+    "with_kept_ground",
 ]  # fmt: skip
 
 GROUND_COPY = "ground.toml"
@@ -76,10 +81,31 @@ def range_warnings(
         name: max(value, fitted.range[name][0])
         for name, value in reached(trajectory, spikes_per_row=count).items()
     }  # fmt: skip
-    return [
-        say("beyond_range", sentence=sentence, fitted=fitted)
-        for sentence in fitted.beyond(**most, gravity=gravity, diameter=diameter)
+    other = _other_gravity(fitted, gravity, in_rig=trajectory.trial.counterweight > 0)
+    return ([other] if other else []) + [
+        say("beyond_range", sentence=sentence, fitted=fitted) for sentence in fitted.beyond(**most, diameter=diameter)
     ]
+
+
+@contextmanager
+def naming_gravity(fitted: GroundFile | None, trial: Trial) -> Iterator[None]:
+    """Put before the ValueError of a trial that the law of `fitted` is of grains under another gravity, if it is."""
+    try:
+        yield
+    except ValueError as error:
+        other = fitted and _other_gravity(fitted, trial.gravity, in_rig=trial.counterweight > 0)
+        if not other:
+            raise
+        raise ValueError(f"{other}. {str(error)[:1].upper()}{str(error)[1:]}") from None
+
+
+def _other_gravity(fitted: GroundFile, gravity: float, *, in_rig: bool) -> str:
+    """Of which gravity the file is, if not of that of the grains [m/s2], and how to get the right one; else ""."""
+    if not fitted.beyond(gravity=gravity):
+        return ""
+    low, high = (f"{limit / STANDARD_GRAVITY:.4g} g" for limit in fitted.range["gravity"])
+    was, here = low if low == high else f"{low} to {high}", f"{gravity / STANDARD_GRAVITY:.4g}"
+    return say("other_gravity_rig" if in_rig else "other_gravity", was=was, here=here, fitted=fitted)
 
 
 def law_warnings(fitted: GroundFile | None) -> list[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from experiments.campaign.files import keep_model
-from experiments.platform.ground_file import with_kept_ground
+from experiments.platform.ground_file import naming_gravity, with_kept_ground
 from experiments.platform.law_spread import Answer, spread_of_law, with_spread
 from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
 from experiments.runs.folder import RunFolder, write_series
@@ -67,7 +67,8 @@ def _check_planar(settings: TumbleSettings, plan: TumblePlan) -> None:
             check_step(plan.trial, PAPER_STEP)
         except ValueError as error:
             raise ValueError(f"method = 'paper': {error}; method = 'located' is accepted") from None
-    _integrate(settings, plan, duration=1e-3)
+    with naming_gravity(plan.fitted, plan.trial):
+        _integrate(settings, plan, duration=1e-3)
 
 
 def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> tuple[Trajectory, float | None]:

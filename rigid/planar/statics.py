@@ -126,9 +126,13 @@ def _give_way(system: System, z: list[float]) -> None:
 def _why_not(system: System, what: str) -> str:
     given = {effect.id: effect.values for effect in system.trial.effects}
     effects = ", ".join(f"{id}.{name} = {value:g}" for id, own in given.items() for name, value in own.items())
-    ground = ", ".join(f"{value:g}" for value in system.q)
+    surface = system.trial.surface
+    units = {parameter.name: f" {parameter.unit}" for parameter in surface.law.parameters if parameter.unit != "1"}
+    ground = ", ".join(
+        f"{slot} = {value:.4g}{units.get(slot, '')}" for slot, value in zip(surface.law.slots, system.q, strict=False)
+    )
     limit = f"; {_offset_that_tips(system.trial)}" if "com-offset" in given else ""
-    return f"it cannot stand: {what} ({effects or 'no effects'}; ground {system.trial.surface.name} of {ground}){limit}"
+    return f"it cannot stand: {what} ({effects or 'no effects'}; a row on {surface.name}: {ground}){limit}"
 
 
 def _offset_that_tips(trial: Trial) -> str:

@@ -146,3 +146,16 @@ def test_the_command_writes_a_ground_file_that_a_tumble_takes(tmp_path):
     assert (out / "report.html").is_file()
     ground = ["--ground", str(out / "ground.toml"), "--duration", "0.2"]
     assert main(["tumble", *ground, "--out", str(tmp_path / "tumble"), "--quiet"]) == DONE
+
+
+def test_a_file_of_low_gravity_is_answered_in_a_rig_by_the_gravity_that_it_needs(tmp_path, capsys):
+    """In a rig the grains are at 1 g: the refusal names both gravities, and the command that makes the right file."""
+    low = tmp_path / "low"
+    assert main(["ground", "--gravity", "0.0085g", "--out", str(low), "--quiet"]) == DONE
+    tumble = ["tumble", "--ground", str(low / "ground.toml"), "--rig", "0.0085", "--torque", "0.22"]
+    assert main([*tumble, "--out", str(tmp_path / "tumble"), "--quiet"]) == BAD_INPUT
+    told = capsys.readouterr().err
+    assert "0.0085 g" in told and "ground --gravity 1g" in told
+    assert "0.6613 N/m" in told and "0.0289 N s/m" in told
+    assert main(["fmu", str(tmp_path / "g.fmu"), "--ground", str(low / "ground.toml")]) == BAD_INPUT
+    assert "ground --gravity 1g" in capsys.readouterr().err
