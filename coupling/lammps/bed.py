@@ -31,6 +31,7 @@ MOST_BODIES = 12  # LAMMPS has 32 groups; a body of two pieces takes two
 STILL = 1e-5  # Mean kinetic energy of a bed at rest [m g d]
 _SPELL, _MOST_SPELLS = 1.5, 60  # How long grains are left to come to rest at a time [sqrt(d / g)], how often at most
 _SKIN = 0.05  # Of the neighbour lists [d]
+_SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 _COLUMNS = "id x y z xu yu zu vx vy vz omegax omegay omegaz fx fy fz"
 
 
@@ -186,9 +187,8 @@ class LammpsBed:
         self._prepare()
         commands = [line for body in self._bodies for line in body.motion(self.steps)]
         for body in self._bodies:
-            low, high = body.reach(duration, self.mean_diameter)
-            self._check_inside(body, low, high)
-            commands += body.select(low, high)
+            self._check_inside(body, duration)
+            commands += body.select(*body.reach(duration, self.mean_diameter))
         self._lammps.tell([*commands, f"run {steps} pre no post no"])
         self.steps += steps
         self.grain_steps += steps * self.grain_count
@@ -238,16 +238,21 @@ class LammpsBed:
                 at += 6
         return found
 
-    def _check_inside(self, body: MovingBody, low: Vector, high: Vector) -> None:
-        """Raise BedFailure where a body that may touch grains reaches across an end of the box."""
-        if low[2] > self.surface + self.mean_diameter or body.across:
-            return
-        tip = body.position
-        reach = max(float(np.abs(piece.corners()[:, :2]).max()) for piece in body.pieces) + 0.5 * self.mean_diameter
+    def _check_inside(self, body: MovingBody, duration: float) -> None:
+        """Raise BedFailure where what may touch grains in the next ``duration`` [s] reaches across an end of the box.
+
+        LAMMPS' regions are not periodic. A body of one section all along y may be as wide as the bed.
+        """
+        travel = body.travel(duration)
+        low, high = body.extent(self.surface + self.mean_diameter + float(travel[2]))
+        if body.spans and low[1] <= _SAME * self.size[1] and high[1] >= (1 - _SAME) * self.size[1]:
+            low[1], high[1] = math.inf, -math.inf
         for axis, begin in ((0, self.begin), (1, 0.0)):
-            if not begin + reach <= tip[axis] <= begin + self.size[axis] - reach:
+            margin = float(self.radius.max() + travel[axis])
+            if low[axis] - margin < begin or high[axis] + margin > begin + self.size[axis]:
                 raise BedFailure(
-                    f"a body at {'xy'[axis]} = {tip[axis]:.4g} m reaches across the end of the bed in LAMMPS, from "
+                    f"a body at {'xy'[axis]} = {body.position[axis]:.4g} m, from {low[axis]:.4g} to "
+                    f"{high[axis]:.4g} m, reaches with a grain's radius across the end of the bed in LAMMPS, from "
                     f"{begin:.4g} to {begin + self.size[axis]:.4g} m: a longer or wider bed would do"
                 )
 

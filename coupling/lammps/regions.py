@@ -26,6 +26,7 @@ __all__ = ["MovingBody", "Piece", "pieces_of"]
 Vector = np.ndarray
 _IN_PLANE = 1e-6  # How far from the plane of motion, or from its normal, an axis may be [rad]
 _JUMP, _ARM = 1e-9, 0.1  # A larger change of place [m], or over this arm [m] of angle, is no motion
+_SIDES = 16  # Of the polygon around a circle
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 
 
@@ -56,6 +57,19 @@ class Piece:
         """Corners of a box around it in the body's axes [m], shape [8, 3]."""
         low, high = _ends(self.shape)
         return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+    def outline(self) -> Vector:
+        """Corners of a polyhedron around it, at most 2 % wider, in the body's axes [m], shape [n, 3]; not of a ball."""
+        shape = self.shape
+        if isinstance(shape, Box | Ball):
+            return self.corners()
+        angle = 2 * math.pi * np.arange(_SIDES) / _SIDES
+        ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_SIDES)]) / math.cos(math.pi / _SIDES)
+        if isinstance(shape, Cone):
+            below, above = shape.bottom_radius, shape.top_radius
+        else:
+            below = above = shape.radius
+        return np.concatenate([below * ring + (0.0, 0.0, shape.bottom), above * ring + (0.0, 0.0, shape.top)])
 
 
 def _ends(shape: Ball | Cylinder | Cone | Box) -> tuple[Vector, Vector]:
@@ -173,11 +187,44 @@ class MovingBody:
 
     def reach(self, duration: float, margin: float) -> tuple[Vector, Vector]:
         """Lower and upper corner of a box around it over the next ``duration`` [s], ``margin`` wider [m]."""
-        axes = to_matrix(self.turn)
-        corners = np.concatenate([piece.corners() for piece in self.pieces]) @ axes.T
-        size = float(np.linalg.norm(corners, axis=1).max())
-        travel = np.abs(self.velocity) * duration + abs(float(self.spin[1])) * size * duration + margin
+        corners = np.concatenate([piece.corners() for piece in self.pieces]) @ to_matrix(self.turn).T
+        travel = self.travel(duration) + margin
         return self.position + corners.min(axis=0) - travel, self.position + corners.max(axis=0) + travel
+
+    def travel(self, duration: float) -> Vector:
+        """How far any of its points goes in the next ``duration`` [s] at most, along each axis [m], shape [3]."""
+        size = max(float(np.linalg.norm(piece.corners(), axis=1).max()) for piece in self.pieces)
+        return np.abs(self.velocity) * duration + abs(float(self.spin[1])) * size * duration
+
+    @property
+    def spans(self) -> bool:
+        """Whether its section is the same all along y, so that it may be as wide as the bed."""
+        return bool(self.across) or all(isinstance(piece.shape, Box) for piece in self.pieces)
+
+    def extent(self, level: float) -> tuple[Vector, Vector]:
+        """Where it begins and ends along x and y [m], shape [2] both, of what is below a height [m].
+
+        Infinity and minus infinity where nothing of it is.
+        """
+        axes, found = to_matrix(self.turn), [np.zeros((0, 2))]
+        for piece in self.pieces:
+            shape = piece.shape
+            if isinstance(shape, Ball):
+                centre = self.position + axes @ np.array(shape.center)
+                above = max(0.0, float(centre[2]) - level)
+                if above < shape.radius:
+                    half = math.sqrt(shape.radius**2 - above**2)
+                    found += [centre[None, :2] - half, centre[None, :2] + half]
+                continue
+            points = self.position + piece.outline() @ axes.T
+            under = points[:, 2] <= level
+            low, high = points[under], points[~under]
+            # Where the edges cross the height, among all lines from a corner below to one above.
+            share = (level - low[:, None, 2]) / (high[None, :, 2] - low[:, None, 2])
+            crossed = low[:, None, :2] + share[..., None] * (high[None, :, :2] - low[:, None, :2])
+            found += [low[:, :2], crossed.reshape(-1, 2)]
+        all_of_them = np.concatenate(found)
+        return all_of_them.min(axis=0, initial=math.inf), all_of_them.max(axis=0, initial=-math.inf)
 
     def create(self) -> list[str]:
         """Commands that make its groups, regions, walls, and the sums of force and moment on it."""

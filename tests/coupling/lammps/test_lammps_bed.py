@@ -232,9 +232,22 @@ def test_a_body_that_leaves_the_plane_the_box_or_the_bed_is_refused(in_lammps):
         bed.move_body(body, turn=(np.cos(0.2), np.sin(0.2), 0.0, 0.0))
     with pytest.raises(ValueError, match="drag_time"):
         bed.advance(1, drag_time=1e-2)
-    bed.move_body(body, position=(0.001, 0.015, bed.surface))
-    with pytest.raises(RuntimeError, match="across the end"):
-        bed.advance(1)
+    lying, leaning = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0), (np.cos(0.5), 0.0, np.sin(0.5), 0.0)
+    roller = bed.add_body(Cylinder(bottom=-0.015, top=0.015, radius=0.003), position=(0.015, 0.015, 0.05))
+    for number, place, turn, axis in (
+        (body, (0.001, 0.015, bed.surface), (1.0, 0.0, 0.0, 0.0), "x"),
+        (body, (0.015, 0.004, bed.surface), (1.0, 0.0, 0.0, 0.0), "y"),
+        (body, (0.015, 0.015, 0.003), leaning, "x"),  # its upper end
+        (roller, (0.0005, 0.015, bed.surface), lying, "x"),
+        (roller, (0.015, 0.016, bed.surface), lying, "y"),
+    ):
+        bed.move_body(number, position=place, turn=turn)
+        with pytest.raises(RuntimeError, match=f"a body at {axis} = .* across the end"):
+            bed.advance(1)
+        bed.move_body(number, position=(0.015, 0.015, 0.05))
+    bed.move_body(roller, position=(0.0, 0.015, 0.05), turn=lying)
+    bed.move_body(body, position=(0.015, 0.015, bed.surface), turn=leaning)
+    bed.advance(1)  # what is above the grains may reach out
     with pytest.raises(ValueError, match="no such body"):
         bed.move_body(7, position=(0.0, 0.0, 0.0))
     bed.overlap_limit = 1e-9

