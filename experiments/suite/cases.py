@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.pool.tasks import task_of
+from experiments.pool.tasks import name_of, task_of
 from experiments.pool.together import Planned
 from experiments.runs.folder import read_json, write_json
 from experiments.runs.reading import read_case, settings_from
@@ -222,9 +222,11 @@ def standing(case: Case, results: Path, work: Path) -> tuple[str, str]:
     """One of done, failed, stopped, running, to do; and why, where that is known."""
     if (results / case.name / "result.json").exists():
         return "done", ""
-    folder = work / case.name
+    folder = work / _folder_name(case)
     if not (folder / "run.toml").exists():
-        return "to do", ""
+        other = re.compile(rf"{re.escape(case.name)}(-[0-9a-f]{{16}})?")
+        found = sorted(path for path in work.glob(f"{case.name}*") if other.fullmatch(path.name))
+        return "to do", f"{found[0]} was begun with other settings or code and is left alone" if found else ""
     try:
         kept = read_json(folder / "status.json")
     except (OSError, ValueError):
@@ -234,11 +236,18 @@ def standing(case: Case, results: Path, work: Path) -> tuple[str, str]:
     return str(kept.get("status", "stopped")), str(kept.get("reason") or "")
 
 
+def _folder_name(case: Case) -> str:
+    return name_of(find_experiment("tumble"), case.settings, label=case.name)
+
+
 def planned(case: Case, results: Path, work: Path) -> Planned:
-    """The run of a case as one of a list, in a folder below `work`; its cost is the estimate [s of two cores]."""
-    task = task_of(find_experiment("tumble"), case.settings, work, name=case.name, reports=True)
+    """The run of a case as one of a list, in a folder below `work`; its cost is the estimate [s of two cores].
+
+    Other settings or other code have another folder. `words` is the name of the case.
+    """
+    task = task_of(find_experiment("tumble"), case.settings, work, name=_folder_name(case), reports=True)
     cost = estimate(case, results)
-    return Planned(task, case.path.stem, 0.0 if isinstance(cost, str) else cost.seconds)
+    return Planned(task, case.name, 0.0 if isinstance(cost, str) else cost.seconds)
 
 
 def keep(folder: Path, target: Path) -> None:

@@ -110,15 +110,19 @@ def _run(
             say(f"{case.name}: failed before ({row['why']}); named in full it is gone on with")
             failed.append(case.name)
         else:
-            todo[case.name] = planned(case, results, work)
+            if row["standing"] == "to do" and row["why"]:
+                say(f"{case.name}: {row['why']}")
+            one = planned(case, results, work)
+            todo[one.task.name] = one
 
     def take(outcomes: Sequence[Outcome]) -> None:
         for outcome in outcomes:
+            name = todo[outcome.name].words
             if outcome.fault:
-                failed.append(f"{outcome.name} ({outcome.fault})")
+                failed.append(f"{name} ({outcome.fault})")
             else:
-                keep(whole_folder(todo[outcome.name].task, *KEPT), results / outcome.name)
-                say(f"{outcome.name}: kept in {results / outcome.name}")
+                keep(whole_folder(todo[outcome.name].task, *KEPT), results / name)
+                say(f"{name}: kept in {results / name}")
 
     with refusing(), stdout_to_stderr(), make_progress(quiet=quiet) as progress:
         try:

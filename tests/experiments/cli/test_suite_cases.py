@@ -12,6 +12,7 @@ from experiments.runs.registry import CASES
 from experiments.suite import cases as suite
 from experiments.suite import commands as suite_commands
 from experiments.suite.cases import Cost, cost_of_tumble, keep
+from experiments.tumble.settings import TumbleSettings
 
 
 def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
@@ -103,7 +104,7 @@ def stubbed(monkeypatch, tmp_path):
     calls = []
 
     def run(task, folder, progress):
-        calls.append((task.name, folder.has_work))
+        calls.append((task.name.rpartition("-")[0], folder.has_work))
         (folder.path / "checkpoint").mkdir(exist_ok=True)
         if len(calls) == 1:
             raise KeyboardInterrupt
@@ -139,6 +140,31 @@ def test_what_has_no_result_is_done_gone_on_with_and_kept(stubbed, tmp_path, cap
     rows = {row["case"]: row["standing"] for row in json.loads(capsys.readouterr().out)}
     assert rows == {name: "done", long: "too long"}
     assert main(["experiments", "run", long, *where, *alone]) == 0 and len(calls) == 4
+
+
+def test_a_run_of_other_settings_or_code_is_not_kept_as_the_result(tmp_path, monkeypatch, unreported, capsys):
+    """Done before with a torque of 0.2 N m; then the case has 0.15, then the code is another."""
+    results, work = tmp_path / "results", tmp_path / "work"
+    monkeypatch.setattr(suite_commands, "estimate", lambda case, _: Cost(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0))
+    monkeypatch.setattr(suite, "estimate", suite_commands.estimate)
+
+    def done(torque):
+        settings = TumbleSettings(duration=0.1, torque=torque)
+        case = suite.Case("grains1-made-up", Path("grains1-made-up.toml"), settings)
+        monkeypatch.setattr(suite_commands, "cases", lambda names=(): [case])
+        tokens = ["--results", str(results), "--work", str(work), "--workers", "1", "--quiet"]
+        assert main(["experiments", "run", *tokens]) == 0
+        kept = (results / case.name / "result.json").read_bytes()
+        (results / case.name / "result.json").unlink()
+        return kept, len(list(work.iterdir()))
+
+    first, second = done(0.2), done(0.15)
+    said = capsys.readouterr().err
+    assert (first[1], second[1]) == (1, 2) and first[0] != second[0]
+    assert "other settings or code" in said
+    assert done(0.2) == (first[0], 2)
+    monkeypatch.setattr(tasks, "code_of", lambda experiment: "other")
+    assert done(0.2) == (first[0], 3)
 
 
 def test_processes_that_cannot_be_are_refused_before_any_run(stubbed, capsys):
