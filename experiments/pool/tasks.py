@@ -55,6 +55,12 @@ class Task:
         """The run folder."""
         return Path(self.home) / self.name
 
+    @property
+    def key(self) -> str:
+        """The name and a digest of all the rest: two tasks have one key only where one outcome does for both."""
+        given = [self.home, self.experiment, self.settings.model_dump(mode="json"), self.code, self.reports]
+        return f"{self.name}-{hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()}"
+
     def on_threads(self, threads: int) -> "Task":
         """The same on so many threads, where its settings leave it open and have anything that takes threads."""
         return replace(self, settings=_with_threads(self.settings, threads))

@@ -1,12 +1,14 @@
 """Where tasks are carried out: this process, processes here, or a cluster of dask.distributed.
 
-The scheduler of dask gives a task to a worker, and to another where that one dies. A task is known to it by the name of
-its run folder, so that a client that comes back finds what is under way; and it goes on without a client. A client that
-is interrupted takes back what has not begun; processes here keep what they have done before they end.
+The scheduler of dask gives a task to a worker, and to another where that one dies. A task is known to it by its key, so
+that a client that comes back finds what is under way; and it goes on without a client. A client that is interrupted
+takes back what has not begun, and another that waits for the same gives it again; processes here keep what they have
+done before they end.
 """
 
 import json
 import logging
+import math
 import os
 import signal
 import threading
@@ -55,36 +57,54 @@ def carry_out_all(
             on_outcome(carry_out(task, lambda share, name=task.name: on_share(name, share), progress))  # type: ignore[misc]
         return
     distributed = required("distributed", f"scheduler = {scheduler!r}" if scheduler else f"workers = {workers}")
+    every, begun = {task.key: task for task in tasks}, set[str]()
+
+    def told(event: tuple[float, dict[str, Any]]) -> None:
+        key, share = event[1]["key"], event[1]["share"]
+        if key in every:
+            begun.add(key)
+            on_share(every[key].name, share)
+
     with _client(distributed, scheduler, workers) as client:
-        client.subscribe_topic(_TOPIC, lambda event: on_share(event[1]["run"], event[1]["share"]))
+        client.subscribe_topic(_TOPIC, told)
         if not client.scheduler_info()["workers"]:
             progress.message(f"no worker is at {scheduler} yet: the runs wait for the first")
-        futures = [
-            client.submit(_on_worker, task, None if scheduler else cores, key=task.name, pure=False, priority=-place)
-            for place, task in enumerate(tasks)
-        ]
-        if scheduler is not None:
-            distributed.fire_and_forget(futures)
+
+        def given(place: int, task: Task) -> Any:
+            where = None if scheduler else cores
+            future = client.submit(_on_worker, task, where, key=task.key, pure=False, priority=-place)
+            if scheduler is not None:
+                distributed.fire_and_forget(future)
+            return future
+
+        futures = {task.key: given(place, task) for place, task in enumerate(tasks)}
         try:
-            for future in distributed.as_completed(futures):
-                on_outcome(_outcome(future, scheduler))
+            ended = distributed.as_completed(futures.values())
+            for future in ended:
+                if future.status == "cancelled" and client.status == "running":  # another client took it back
+                    client.cancel([future])  # forget it here: its key can be given again
+                    futures[future.key] = again = given(list(every).index(future.key), every[future.key])
+                    ended.add(again)
+                else:
+                    on_outcome(_outcome(every[future.key].name, future, scheduler))
         except KeyboardInterrupt:
             if scheduler is not None:
-                client.cancel(futures, force=True)
+                waiting = [future for key, future in futures.items() if key not in begun and not future.done()]
+                client.cancel(waiting, force=True)  # fire_and_forget wants them too
             else:
                 progress.message("stopping as soon as what was done is kept; once more to stop at once")
                 client.run(request_stop, on_error="ignore")
                 with suppress(TimeoutError):
-                    distributed.wait(futures, timeout=_STOPPED_WITHIN)
+                    distributed.wait(list(futures.values()), timeout=_STOPPED_WITHIN)
             raise
 
 
-def _outcome(future: Any, scheduler: str | None) -> Outcome:
+def _outcome(name: str, future: Any, scheduler: str | None) -> Outcome:
     """What a future that has ended holds, or why it holds nothing."""
     if future.status == "finished":
         return future.result()
     if future.status == "error":  # a task reports its own faults: this is its worker's
-        return Outcome(future.key, fault=f"its worker died: {future.exception()}")
+        return Outcome(name, fault=f"its worker died: {future.exception()}")
     where = f"scheduler = {scheduler!r}" if scheduler else "the scheduler here"
     raise RuntimeError(f"{where} has gone away ({future.status}); what was done is kept")
 
@@ -117,19 +137,20 @@ def dask_setup(worker: Any) -> None:
 
 
 def _on_worker(task: Task, cores: int | None) -> Outcome:
-    """The task on a worker, which tells its share to whoever listens; on so many `cores`, if given."""
-    worker, told = required("distributed", "a worker").get_worker(), [0.0]
+    """The task on a worker, which tells its share, 0 as it begins, to whoever listens; on so many `cores`, if given."""
+    worker, told = required("distributed", "a worker").get_worker(), [-math.inf]
 
     def tell(share: float) -> None:
         if time.monotonic() - told[0] >= _EVERY:
             told[0] = time.monotonic()
-            worker.log_event(_TOPIC, {"run": task.name, "share": share})
+            worker.log_event(_TOPIC, {"key": task.key, "share": share})
 
     with _ONE:
         if stop_requested():
             return Outcome(task.name, fault="stopped before it began")
         if cores is not None and "threads" not in type(task.settings).model_fields:
             _keep_to(int(worker.name), cores)
+        tell(0.0)
         try:
             return carry_out(task, tell)
         except KeyboardInterrupt:  # raised further, it would end the worker

@@ -161,7 +161,7 @@ def test_a_run_of_other_settings_or_code_is_not_kept_as_the_result(tmp_path, mon
     first, second = done(0.2), done(0.15)
     said = capsys.readouterr().err
     assert (first[1], second[1]) == (1, 2) and first[0] != second[0]
-    assert "other settings or code" in said
+    assert f"{work}/grains1-made-up-" in said
     assert done(0.2) == (first[0], 2)
     monkeypatch.setattr(tasks, "code_of", lambda experiment: "other")
     assert done(0.2) == (first[0], 3)
