@@ -18,7 +18,7 @@ from dem.grains.materials import Facing, Material
 from dem.grains.packing import bulk_packing, surface_height
 from rigid.ground.reaction import State
 
-from .law import MeanContact, law_words
+from .law import MeanContact, law_words, spring_energy
 from .process import Lammps
 from .regions import MovingBody, pieces_of
 from .words import box_of, data_file, digits, spheres
@@ -159,9 +159,9 @@ class LammpsBed:
         """Rotation of a body: a unit quaternion, scalar first, shape [4]."""
         return self._body(body).turn.copy()
 
-    def young_of(self, body: int) -> float:
-        """Twice the effective modulus of a grain and this body [Pa]."""
-        return float(self._rows[body][0])
+    def pair_of(self, body: int) -> Vector:
+        """Pair parameters of a grain and this body (`dem.contact.law.pair_parameters`)."""
+        return self._rows[body]
 
     # Time
 
@@ -356,13 +356,14 @@ class LammpsBed:
         self._seen = float(value)
 
     def spring_energy(self, position: Vector) -> float:
-        """What the normal springs of grains hold with their centres there [J]: Hertz, 4/15 (2 E*) sqrt(R*) d^5/2."""
+        """What the normal springs of grains hold with their centres there [J] (`coupling.lammps.law.spring_energy`)."""
         first, second, overlap = self._look(position)
         r_1, r_2 = self.radius[first], self.radius[second]
-        between = np.sqrt(r_1 * r_2 / (r_1 + r_2)) * overlap**2.5
         pressed = np.maximum(0.0, self.radius - position[:, 2])
-        floor = np.sqrt(self.radius) * pressed**2.5
-        return 4 / 15 * float(self._grain_row[0] * between.sum() + self._rows[FLOOR][0] * floor.sum())
+        law = self.material.cohesion
+        return spring_energy(self._grain_row, law, overlap, r_1 * r_2 / (r_1 + r_2)) + spring_energy(
+            self._rows[FLOOR], law, pressed, self.radius
+        )
 
     @property
     def kinetic_energy(self) -> float:

@@ -10,6 +10,7 @@ from coupling.poses import Vector
 from rigid.ground.reaction import Facts
 
 from .bed import LammpsBed
+from .law import spring_energy, spring_force
 
 __all__ = ["LammpsGround"]
 
@@ -18,7 +19,8 @@ class LammpsGround(BedGround):
     """A `LammpsBed` under a body; parameters as of `BedGround`.
 
     Explicit coupling alone: a step cannot be taken back. Of the energies LAMMPS tells the kinetic one; height and
-    normal springs follow from the grains' places. What friction's springs hold, and what was lost where, is not told.
+    normal springs, with DMT's cohesion, follow from the grains' places. What friction's springs hold, and what was lost
+    where, is not told; with JKR nor are the normal springs, since stretched contacts hold or not by their history.
     """
 
     bed: LammpsBed
@@ -37,19 +39,21 @@ class LammpsGround(BedGround):
         )
 
     def energies(self) -> dict[str, float]:
-        """Kinetic energy, height and normal springs (Hertz) of the grains, `copies` times [J]."""
+        """Kinetic energy, height and, but for JKR, normal springs of the grains, `copies` times [J]."""
         bed = self.bed
         grains = bed.grains(contacts=False)
         moving = 0.5 * grains.mass @ (grains.velocity**2).sum(axis=1)
         turning = 0.2 * (grains.mass * grains.radius**2) @ (grains.spin**2).sum(axis=1)
         height = -float(grains.mass @ (grains.position @ np.array(bed.gravity)))
-        springs = bed.spring_energy(grains.position)
-        for body, surface in self._surfaces().items():
-            distance, _, curvature = surface(grains.position.copy())
-            pressed = np.maximum(0.0, grains.radius - distance)
-            radius = grains.radius / (1 + grains.radius * curvature)
-            springs += 4 / 15 * bed.young_of(body) * float((np.sqrt(radius) * pressed**2.5).sum())
-        found = {"kinetic": float(moving + turning), "potential": height, "normal": springs}
+        found = {"kinetic": float(moving + turning), "potential": height}
+        law = bed.material.cohesion
+        if law != "jkr":
+            found["normal"] = bed.spring_energy(grains.position)
+            for body, surface in self._surfaces().items():
+                distance, _, curvature = surface(grains.position.copy())
+                pressed = np.maximum(0.0, grains.radius - distance)
+                radius = grains.radius / (1 + grains.radius * curvature)
+                found["normal"] += spring_energy(bed.pair_of(body), law, pressed, radius)
         return {name: self.copies * value for name, value in found.items()}
 
     def work_taken(self) -> dict[str, float]:
@@ -57,7 +61,7 @@ class LammpsGround(BedGround):
         return {}
 
     def pushes(self) -> tuple[Vector, Vector]:
-        """As `BedGround.pushes`, from the grains' places."""
+        """As `BedGround.pushes`, from the grains' places, with the cohesion of grains that touch."""
         bed, grains = self.bed, self.bed.grains(contacts=False)
         points, forces = [np.zeros((0, 3))], [np.zeros((0, 3))]
         for body, surface in self._surfaces().items():
@@ -65,7 +69,7 @@ class LammpsGround(BedGround):
             overlap = grains.radius - distance
             touching = overlap > 0
             radius = (grains.radius / (1 + grains.radius * curvature))[touching]
-            push = 2 / 3 * bed.young_of(body) * np.sqrt(radius) * overlap[touching] ** 1.5
+            push = spring_force(bed.pair_of(body), bed.material.cohesion, overlap[touching], radius)
             points.append(grains.position[touching] - distance[touching, None] * normal[touching])
             forces.append(-push[:, None] * normal[touching])
         return np.concatenate(points) - self.origin, np.concatenate(forces)

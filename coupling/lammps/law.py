@@ -24,13 +24,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from dem.contact.cohesion import jkr_contact
 from dem.contact.law import PAIR_WIDTH
 from dem.grains.materials import Material
 
 from .words import digits
 
-__all__ = ["OVERLAP", "TANGENTIAL", "MeanContact", "dashpot_input", "law_words"]
+__all__ = ["OVERLAP", "TANGENTIAL", "MeanContact", "dashpot_input", "law_words", "spring_energy", "spring_force"]
 
+Row = Sequence[float] | np.ndarray
 TANGENTIAL = {"displacement": "mindlin", "rescaled": "mindlin_rescale/force"}
 """LAMMPS' names of our springs (`Material.tangential`)."""
 OVERLAP = 0.01
@@ -90,3 +92,29 @@ def law_words(row: Sequence[float], material: Material, *, tensile: bool, mean: 
     words.append("damping tsuji")
     bounded = not tensile and material.cohesion == "none"
     return " ".join([*words, *(["limit_damping"] if bounded else [])])
+
+
+def spring_force(row: Row, cohesion: str, overlap: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Force of the normal springs of touching contacts, cohesion included [N] (`dem.contact.cohesion`).
+
+    ``row``: pair parameters. ``overlap``: 0 or more [m], ``radius``: effective radius R* [m], shape [contact] both.
+    """
+    two_e, pi_w = float(row[0]), float(row[-1])
+    if cohesion == "jkr" and pi_w > 0:
+        of_pair = {"surface_energy": pi_w / (2 * math.pi), "effective_young": 0.5 * two_e}
+        pairs = zip(overlap, radius, strict=True)
+        return np.array([jkr_contact(float(d), radius=float(r), **of_pair)[1] for d, r in pairs], dtype=float)
+    push = 2 / 3 * two_e * np.sqrt(radius) * overlap**1.5
+    return push - 2 * pi_w * radius if cohesion == "dmt" else push
+
+
+def spring_energy(row: Row, cohesion: str, overlap: np.ndarray, radius: np.ndarray) -> float:
+    """Energy of the normal springs of touching contacts [J]: 4/15 (2 E*) sqrt(R*) d^5/2, for DMT less 2 pi w R* d.
+
+    Parameters as of `spring_force`. Raises ValueError for JKR, of which it does not know the stretched contacts.
+    """
+    two_e, pi_w = float(row[0]), float(row[-1])
+    if cohesion == "jkr":
+        raise ValueError("cohesion is 'jkr': LAMMPS does not tell which stretched contacts still hold")
+    pressed = 4 / 15 * two_e * float((np.sqrt(radius) * overlap**2.5).sum())
+    return pressed - 2 * pi_w * float((radius * overlap).sum()) if cohesion == "dmt" else pressed

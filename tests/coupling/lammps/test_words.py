@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from coupling.lammps import LammpsMissingError, process
-from coupling.lammps.law import OVERLAP, MeanContact, dashpot_input, law_words
+from coupling.lammps.law import OVERLAP, MeanContact, dashpot_input, law_words, spring_energy, spring_force
 from coupling.lammps.regions import MovingBody, pieces_of
 from dem import Ball, Cone, Cylinder, Material, Mesh
 from dem.contact.law import pair_row
@@ -54,6 +54,26 @@ def test_surface_energy_goes_over_as_it_is(cohesion):
     assert "limit_damping" not in words  # LAMMPS ends with an error where it stands beside cohesion
     free = law_words(pair_row(sticky, Facing(surface_energy=0.0)), sticky, tensile=False, mean=MEAN).split()
     assert float(free[4]) == 0.0
+
+
+@pytest.mark.parametrize("cohesion", ["none", "dmt", "jkr"])
+def test_springs_have_the_cohesion_of_the_law_and_their_energy_is_the_work_of_their_force(cohesion):
+    surface_energy = 0.0 if cohesion == "none" else 0.3
+    stuff = Material("mine", 2650.0, 2e7, 0.25, 0.5, 0.6, cohesion=cohesion, surface_energy=surface_energy)
+    row, radius = pair_row(stuff), np.full(20001, 1e-3)
+    overlap = np.linspace(0.0, 2e-5, 20001)
+    if cohesion == "jkr":
+        overlap, radius = overlap[::2000], radius[::2000]
+    force = spring_force(row, cohesion, overlap, radius)
+    # At zero overlap: nothing, 4 pi gamma R (DMT), 8/9 of 3 pi gamma R (Johnson et al. 1971).
+    at_zero = {"none": 0.0, "dmt": 4 * math.pi * 0.3 * 1e-3, "jkr": 8 / 9 * 3 * math.pi * 0.3 * 1e-3}[cohesion]
+    assert force[0] == pytest.approx(-at_zero, rel=1e-9)
+    if cohesion == "jkr":
+        with pytest.raises(ValueError, match="stretched"):
+            spring_energy(row, cohesion, overlap, radius)
+        return
+    work = float((0.5 * (force[1:] + force[:-1]) * np.diff(overlap)).sum())
+    assert spring_energy(row, cohesion, overlap[-1:], radius[-1:]) == pytest.approx(work, rel=1e-5)
 
 
 def test_a_restitution_that_lammps_dashpot_does_not_reach_is_refused():
