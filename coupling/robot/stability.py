@@ -17,7 +17,7 @@ from coupling.poses import Vector
 from .bed_feet import BedFeet
 from .law_feet import LawFeet
 
-__all__ = ["ITERATED", "ExchangeLoad", "Load", "check_exchange", "plan_area"]
+__all__ = ["ITERATED", "ExchangeLoad", "ExpectedBed", "Load", "check_exchange", "plan_area"]
 
 ITERATED = 10.0
 """Load up to which the iterated exchange settles: K H^2 / m = 40 is the largest that did (docs/coupling.md)."""
@@ -46,15 +46,29 @@ class Load:
         return 2 * self.mass / (b + math.sqrt(b * b + 4 * a * self.mass))
 
 
+@dataclass(frozen=True)
+class ExpectedBed:
+    """What the exchange with a bed depends on, as far as it is known before the bed is made."""
+
+    radius: float  # of a grain, mean [m]
+    overlap_limit: float  # [of a diameter]
+    material: Any  # dem.Material, softened
+    time_step: float  # [s]
+
+
 class ExchangeLoad:
     """The `Load` of `robot` on `ground`, wherever the robot is."""
 
-    def __init__(self, robot: Any, ground: LawFeet | BedFeet) -> None:
+    def __init__(self, robot: Any, ground: LawFeet | BedFeet | ExpectedBed) -> None:
         self.robot, self.ground = robot, ground
         self._laws: list[list[tuple[float, float]]] = []
         self._grain = 0.0, 0.0  # Radius [m], stiffness of its contact [N/m]
         if isinstance(ground, BedFeet):
-            self._grain = _of_grain(ground.bed)
+            bed = ground.bed
+            radius = float(np.mean(bed.grains(contacts=False).radius))
+            ground = ExpectedBed(radius, float(bed.overlap_limit), bed.material, float(bed.time_step))
+        if isinstance(ground, ExpectedBed):
+            self._grain = ground.radius, _of_grain(ground)
             return
         weight = robot.mass * max(robot.gravity, 1e-3)
         for foot, laws in zip(robot.feet, ground.grounds, strict=True):
@@ -130,17 +144,15 @@ def _of_law(law: Any, load: float) -> tuple[float, float]:
     return stiffness, float(law.force(depth, SPEED + rate) - law.force(depth, SPEED)) / rate
 
 
-def _of_grain(bed: Any) -> tuple[float, float]:
-    """Mean radius of a grain [m], and stiffness of its contact with a foot [N/m].
+def _of_grain(bed: ExpectedBed) -> float:
+    """Stiffness of the contact of a grain with a foot [N/m].
 
     The contact is at half the overlap d that the bed is made for. With the effective radius R of a grain on a plane its
     stiffness is 2 E* a, a = sqrt(R d) (Hertz).
     """
-    radius = float(np.mean(bed.grains(contacts=False).radius))
-    overlap = 0.5 * float(bed.overlap_limit) * 2 * radius
-    material = bed.material
-    pair = material.young / (1 - material.poisson**2)  # a rigid foot
-    return radius, 2 * pair * math.sqrt(radius * overlap)
+    overlap = 0.5 * bed.overlap_limit * 2 * bed.radius
+    pair = bed.material.young / (1 - bed.material.poisson**2)  # a rigid foot
+    return float(2 * pair * math.sqrt(bed.radius * overlap))
 
 
 def plan_area(vertices: Any) -> float:
@@ -155,7 +167,7 @@ def plan_area(vertices: Any) -> float:
         return 0.0
 
 
-def check_exchange(robot: Any, ground: LawFeet | BedFeet, *, substeps: int, iterations: int = 1) -> float:
+def check_exchange(robot: Any, ground: LawFeet | BedFeet | ExpectedBed, *, substeps: int, iterations: int = 1) -> float:
     """The load of the robot where it is now over what is stable [1], with `substeps` of the ground in a macro step.
 
     Raises ValueError, naming the foot, where it is above 1, or with `iterations` above 1 above `ITERATED`.

@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from coupling.members import Member
 from coupling.poses import Vector as Array
 from coupling.robot import BedFeet, MujocoRobot, RobotRun
-from coupling.robot.stability import plan_area
+from coupling.robot.stability import ExpectedBed, check_exchange, plan_area
 from dem import Bed
+from dem.contact.timestep import time_step_for
 from experiments.grains.following import Followed
 from experiments.grains.on_bed import Forecast, PlatformOnBed
+from experiments.grains.softening import run_limit
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.spatial.quaternions import to_matrix
@@ -147,6 +149,28 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         """Width of the narrowest foot, by its `RobotForecast.sunk` parts [m]."""
         return min(width for width, _ in self._standing)
 
+    @cached_property
+    def told(self) -> RobotPlan:
+        """The plan, whose words name K of the parts that go into the ground."""
+        feet = zip(self._robot.feet, self.forecast.sunk, strict=True)
+        return self.plan.standing_on(foot.parts[k].name for foot, sunk in feet for k in sunk)
+
+    def announce(self, progress: Progress) -> None:
+        for sentence in self.told.announcement():
+            progress.message(sentence)
+
+    def check_exchange(self) -> float:
+        """The load of the exchange at the start over what is stable [1], on the bed as it is expected.
+
+        Raises ValueError where it would not be stable.
+        """
+        s, robot = self.settings, self.plan.robot()
+        grains = self.material.softened(self.softening().young)
+        step = time_step_for(grains, diameter=s.grain * (1 - s.spread), max_overlap=s.max_overlap)
+        robot.start()
+        bed = ExpectedBed(0.5 * s.grain, run_limit(s.max_overlap), grains, step)
+        return check_exchange(robot, bed, substeps=s.substeps, iterations=s.iterations)
+
     def check(self) -> None:
         """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this robot."""
         s = self.settings
@@ -165,6 +189,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             super().check()
         except RuntimeError as error:
             raise ValueError(say("forecast_fails", error=error)) from error
+        self.check_exchange()
 
     def check_extent(self) -> None:
         s, forecast = self.settings, self.forecast
@@ -212,6 +237,6 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
         return conclude(
-            self.settings, self.plan, run, folder, beside=self.forecast.run, softening=self.softening(),
+            self.settings, self.told, run, folder, beside=self.forecast.run, softening=self.softening(),
             across=self.narrowest / self.settings.grain,
         )  # fmt: skip

@@ -5,8 +5,8 @@ import importlib.util
 import math
 import shutil
 import traceback
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +75,17 @@ class RobotPlan:
         if self.fitted is not None:
             return self.fitted.law
         return "spring-damper" if self.settings.ground == "bed" else self.settings.ground
+
+    def standing_on(self, parts: Iterable[str]) -> "RobotPlan":
+        """The same on grains, with K of the largest of these parts where words name K of a foot."""
+        gravity, numbers = self.numbers["gravity"].value, dict(self.numbers)
+        some = max(self.scales[name] for name in parts)
+        of_all, of_some = (
+            _settle_law(self.settings, self.surface, gravity, most, numbers)
+            for most in (max(self.scales.values()), some)
+        )
+        told = dict(zip(of_all, of_some, strict=True))
+        return replace(self, numbers=numbers, warnings=tuple(told.get(said, said) for said in self.warnings))
 
     def announcement(self) -> list[str]:
         """What was not given, then the warnings."""

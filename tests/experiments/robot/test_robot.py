@@ -23,6 +23,9 @@ pytest.importorskip("mujoco")
 
 HOP = f"{EXAMPLES / 'mujoco-hopper' / 'hop.py'}:control"
 HOPPER = {"model": "hopper", "feet": ("foot",)}
+LANDER = """<mujoco model="lander"><worldbody><body name="body" pos="0 0 0.2"><freejoint/>
+  <geom name="hull" type="cylinder" size="0.1 0.01" mass="1"/>
+  <geom name="tip" type="cylinder" size="0.03 0.01" pos="0 0 -0.12" mass="0.5"/></body></worldbody></mujoco>"""
 ON_BED = HOPPER | {"ground": "bed", "height": 0.012, "grain": 0.012, "bed_size": (0.2, 0.2, 0.16), "duration": 0.2}
 
 
@@ -72,6 +75,7 @@ def test_what_there_is_not_and_what_would_be_unstable_is_refused_before_any_work
         ({"surface": "steel"}, "surface = 'steel' has no grains"),
         ({"gravity": 0.0}, "gravity = 0 m/s2: a bed of grains needs some"),
         ({"model": "hedgehog", "feet": ("tip_*",)}, "is a site, a point, which grains do not touch"),
+        ({"substeps": 200}, "'foot' is too light for this ground.* unstable with substeps = 200"),
     ],
 )
 def test_a_bed_that_does_not_suit_the_robot_is_refused_before_any_work(given, said):
@@ -96,6 +100,19 @@ def test_k_of_sand_goes_with_gravity_and_c_with_its_root_where_that_is_asked_for
     for surface in ("jsc1a", "brick"):
         with pytest.raises(ValueError, match=f"scale_with_gravity.*{surface}"):
             plan_robot(RobotSettings(**low, surface=surface, scale_with_gravity=True))
+
+
+def test_a_hull_that_stays_above_the_grains_does_not_set_the_k_that_a_warning_names(tmp_path):
+    """A body with a plate of 200 mm and, 120 mm below it, a tip of 60 mm: the warning has K of the tip."""
+    (tmp_path / "lander.xml").write_text(LANDER, encoding="utf-8")
+    low = {"gravity": 4.0, "model": str(tmp_path / "lander.xml"), "feet": ("hull", "tip"), "duration": 0.15}
+    settings = RobotSettings(**ON_BED | low | {"bed_size": (0.3, 0.3, 0.2)})
+    on_bed = RobotOnBed(settings, plan_robot(settings))
+    stiffness = on_bed.told.numbers["stiffness"].value
+    (said,) = [said for said in on_bed.told.warnings if "scale-with-gravity" in said]
+    tip = on_bed.plan.scales["tip"] * stiffness
+    assert f"{tip:.3g} N/m" in said and on_bed.plan.scales["hull"] > 5 * on_bed.plan.scales["tip"]
+    assert len(on_bed.told.warnings) == len(on_bed.plan.warnings)
 
 
 def test_a_gravity_beyond_the_range_of_a_ground_file_is_told_before_the_run(tmp_path):
