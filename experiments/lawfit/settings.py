@@ -1,5 +1,6 @@
 """Settings of `hedgebed calibrate`."""
 
+import math
 import re
 from typing import Any, Self
 
@@ -8,7 +9,7 @@ from pydantic import Field, model_validator
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.reading import nearest
 from experiments.runs.strict import Positive, Scheduler, Workers
-from experiments.runs.units import find_unit
+from experiments.runs.units import Unit, find_unit
 from vis.page.sentences import Sentences
 
 __all__ = ["LAWS", "LawFitSettings", "say"]
@@ -41,6 +42,15 @@ def _tip_of(text: str) -> tuple[str, float, float]:
     if not 0 < diameter < 1 or not 1 <= angle < 180 or (found[3] and found[1] != "cone"):
         raise ValueError(say("bad_tip", tip=text))
     return _SHAPES.get(found[1], found[1]), diameter, angle
+
+
+def _same(given: Any, first: Any, unit: Unit | None) -> bool:
+    """Whether a setting, which may be text with a unit, is what the first of a list says."""
+    if isinstance(given, str) and unit is not None:
+        given = unit.value_of(given)
+    if isinstance(given, int | float) and isinstance(first, int | float):
+        return math.isclose(given, first, rel_tol=1e-9)
+    return bool(given == first)
 
 
 class LawFitSettings(PenetrateSettings):
@@ -120,7 +130,7 @@ class LawFitSettings(PenetrateSettings):
             assert unit is not None
             found["gravity"] = unit.value_of(own) if isinstance(own, str) else own
         for name, value in found.items():
-            if name in given and given[name] != value:
+            if name in given and not _same(given[name], value, find_unit(cls.model_fields[name].description)):
                 raise ValueError(say("beside_list", key=name, value=given[name], first=value))
         return given | found
 

@@ -1,6 +1,8 @@
 """The beds of a penetrate run: their material, how soft their grains are made, and each bed of a seed."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from dem import Bed
@@ -18,14 +20,14 @@ from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
 
-from .settings import PenetrateSettings
+from .settings import PenetrateSettings, say
 from .similarity import pace_of
 from .units import RAIN, deepest
 
 __all__ = [
     "bed_step", "choose_softness", "expected_bearing", "expected_stiffness", "find_material", "fingerprint",
     "first_gravity", "overlap_bound", "prepare_bed", "resting_load",
-    "sinks_away", "stages_of", "stiffened",
+    "sinks_away", "stages_of", "stiffened", "within_numbers",
 ]  # fmt: skip
 
 _SPELL, _MOST_SPELLS = 1.5, 60
@@ -142,7 +144,25 @@ def _come_to_rest(bed: Any, *, unit: float) -> None:
 
 
 def choose_softness(settings: PenetrateSettings) -> Softening:
-    """The modulus of the grains for these runs (see `experiments.grains.softening`), or the one that is set."""
+    """The modulus of the grains for these runs (see `experiments.grains.softening`), or the one that is set.
+
+    Raises ValueError where the real grains are too soft, and as `within_numbers`.
+    """
+    with within_numbers(settings):
+        return _softness(settings)
+
+
+@contextmanager
+def within_numbers(settings: PenetrateSettings) -> Iterator[None]:
+    """Raise ValueError, naming the settings that may be it, where a force is too large for a number."""
+    try:
+        yield
+    except OverflowError:
+        key, speed = settings.fastest
+        raise ValueError(say("no_number", s=settings, key=key, speed=speed)) from None
+
+
+def _softness(settings: PenetrateSettings) -> Softening:
     material, stiffness, bears = find_material(settings), expected_stiffness(settings), expected_bearing(settings)
     area = math.pi * settings.tip_diameter**2 / 4
     fastest, speed = settings.fastest

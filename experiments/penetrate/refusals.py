@@ -83,7 +83,8 @@ def _check_reach(settings: PenetrateSettings) -> None:
     stiffness, load = UNSURE * bears.stiffness, settings.weight - bears.held
     for key in ("drop_speeds", "other_drop_speeds"):
         for speed in settings.used(key):
-            depth = drop_depth(speed, settings.mass, load, stiffness)
+            with beds.within_numbers(settings):
+                depth = drop_depth(speed, settings.mass, load, stiffness)
             if depth > floor:
                 room = stiffness * floor**2 - 2 * load * floor
                 slower = f"at most {math.sqrt(room / settings.mass):.2g} m/s" if room > 0 else "a smaller load"

@@ -144,6 +144,15 @@ def test_what_cannot_be_crossed_is_refused_by_name():
         lawfit.check(lawfit.Settings(**(TWO | {"budget": 1.0})))
 
 
+def test_the_first_of_a_list_may_be_given_beside_it_in_any_unit():
+    plain = lawfit.Settings(**TWO)
+    for given in ({"tip_diameter": "12mm", "gravity": "1g"}, {"tip_diameter": 0.012, "gravity": 9.80665}):
+        assert lawfit.Settings(**(TWO | given)) == plain
+    for given, named in (({"tip_diameter": "13mm"}, "tip_diameter = '13mm'"), ({"gravity": "2g"}, "gravity = '2g'")):
+        with pytest.raises(ValueError, match=named):
+            lawfit.Settings(**(TWO | given))
+
+
 EARLY = CrossedLaw("power-early", ("sphere", "flat"))
 TRUTH = np.array([6.0, 9.0, 1.3, 0.9, 3.0, 0.5])  # k and n of both shapes, b, T
 

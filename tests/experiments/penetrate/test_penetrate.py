@@ -380,6 +380,19 @@ def test_bad_settings_are_refused_by_name(given, words):
         PenetrateSettings(**given)
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"gravity": 1e300}, r"gravity = 1e\+300"),
+        ({"load": 1e300}, r"load = 1e\+300"),
+        ({"drop_speeds": (1e200,)}, r"drop_speeds = 1e\+200"),
+    ],
+)
+def test_a_force_that_no_number_holds_is_refused_by_name(given, words):
+    with pytest.raises(ValueError, match=words):
+        penetrate.check(PenetrateSettings(**given))
+
+
 def test_a_card_that_is_not_there_is_refused_before_any_work(fake, monkeypatch):
     from dem.engine import runtime
 
