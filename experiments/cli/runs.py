@@ -4,6 +4,7 @@ import math
 import shutil
 import sys
 import textwrap
+import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -50,8 +51,8 @@ def carry_out(
             from coupling.lammps.process import LammpsEndedError  # loads Taichi
 
             again = "the same settings would fail the same way again"
-            if isinstance(error, LammpsEndedError):
-                again = f"`hedgebed resume {folder.path}` continues from the last checkpoint"
+            if isinstance(error, LammpsEndedError) and not error.refused:
+                again = _goes_on(folder)
             say(f"failed: {error}")
             say(f"what was finished is kept in {folder.path}; {again}")
             return FAILED
@@ -76,6 +77,16 @@ def carry_out(
             say(f"failed; what there was is in {folder.path}")
             return FAILED
     return show_folder(folder, as_json=as_json, verbose=verbose)
+
+
+def _goes_on(folder: RunFolder) -> str:
+    """From where a resumed run goes on: the newest checkpoint, with its time, or the beginning."""
+    kept = [path for path in (folder.path / "checkpoint").glob("*.npz") if not path.stem.endswith(".failed")]
+    if not kept:
+        return f"it has no checkpoint yet: `hedgebed resume {folder.path}` begins this part anew"
+    newest = max(path.stat().st_mtime for path in kept)
+    when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(newest))
+    return f"`hedgebed resume {folder.path}` continues from the checkpoint of {when}"
 
 
 def redraw_old_report(folder: RunFolder, *, quiet: bool) -> None:

@@ -31,12 +31,12 @@ def lammps_fault(settings: Any) -> str | None:
 
 
 def check_lammps(settings: Any) -> None:
-    """Raise ValueError, with what to install, where the grains are to live in LAMMPS and it is not there."""
-    from coupling.lammps import LammpsMissingError, find_lammps
+    """Raise ValueError, with what to install, where grains are to live in LAMMPS and it does not start on `ranks`."""
+    from coupling.lammps import LammpsMissingError, check_ranks
 
     if settings.ground == "lammps":
         try:
-            find_lammps()
+            check_ranks(settings.ranks or 1)
         except LammpsMissingError as error:
             raise ValueError(f"ground = 'lammps': {error}") from None
 

@@ -190,8 +190,9 @@ def test_a_killed_rank_is_an_error_with_a_sentence_and_the_state_before_can_be_g
     kept = first.state()
     expected = pushed(first, body, 2)
     os.kill(first.processes[-1], signal.SIGKILL)
-    with pytest.raises(LammpsEndedError, match="LAMMPS on 1 ranks has ended"):
+    with pytest.raises(LammpsEndedError, match="LAMMPS on 1 ranks has ended") as ended:
         pushed(first, body, 50)
+    assert not ended.value.refused
     with pytest.raises(LammpsEndedError):
         first.state()
     second = in_lammps()

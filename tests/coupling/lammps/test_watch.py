@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from coupling.lammps import LammpsMissingError, find_lammps, process, watch
+from coupling.lammps import LammpsEndedError, LammpsMissingError, find_lammps, process, watch
 
 # Without the rest of hedgebed, which takes seconds to load. LAMMPS is to answer when nobody reads any more.
 MASTER = """
@@ -88,3 +88,14 @@ def test_after_kill_9_of_hedgebed_no_process_of_lammps_is_left():
     master.wait()
     assert all_ended(pids, within=10.0)
     assert not Path(folder).exists()
+
+
+def test_an_error_of_lammps_is_told_apart_from_a_killed_rank():
+    try:
+        lammps = process.Lammps(1)
+    except LammpsMissingError as missing:
+        pytest.skip(str(missing))
+    with pytest.raises(LammpsEndedError, match="ERROR: Unknown command: nonsense") as ended:
+        [lammps.tell(["nonsense"]), lammps.wait()]
+    assert ended.value.refused
+    lammps.close()

@@ -173,6 +173,24 @@ def test_a_lammps_without_granular_is_named(monkeypatch, tmp_path):
         process.find_lammps()
 
 
+@pytest.mark.parametrize("broken", ["lmp", "mpiexec"])
+def test_a_program_that_does_not_run_is_named(broken, monkeypatch, tmp_path):
+    words = {"lmp": "granular wall/gran/region nve/sphere ave/time"}
+    for name in ("lmp", "mpiexec"):
+        text = b"\x7fELF not for this machine" if name == broken else b"#!/bin/sh\necho " + words.get(name, "").encode()
+        (tmp_path / name).write_bytes(text)
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    with pytest.raises(LammpsMissingError, match=rf"{tmp_path / broken} does not run: .*Errno 8.*hedgebed\[lammps\]"):
+        process.check_ranks.__wrapped__(2)
+
+
+def test_a_program_that_does_not_end_is_named():
+    with pytest.raises(LammpsMissingError, match=r"sleep does not run: it does not end within 0\.1 s"):
+        process._said_by(["sleep", "60"], timeout=0.1)
+
+
 @pytest.mark.parametrize("ranks", [0, -1, 1.5, True])
 def test_a_number_of_ranks_that_cannot_be_is_refused(ranks):
     with pytest.raises(ValueError, match="ranks"):

@@ -1,10 +1,16 @@
 """`--ground lammps`: settings that LAMMPS does not take are refused by name, before any work."""
 
+import os
+import re
+
 import pytest
 
+from coupling.lammps import LammpsEndedError, check_ranks
 from experiments.cli.main import main
+from experiments.cli.runs import FAILED, carry_out
 from experiments.grains import lammps
 from experiments.penetrate.settings import PenetrateSettings
+from experiments.runs.folder import RunFolder
 from experiments.tumble.settings import TumbleSettings
 
 TUMBLE, PENETRATE = {"ground": "lammps", "surface": "sand"}, {"ground": "lammps"}
@@ -39,8 +45,32 @@ def test_grains_in_lammps_are_grains():
 
 def test_without_lammps_a_run_is_refused_with_what_to_install(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("coupling.lammps.process.shutil.which", lambda name, **options: None)
+    check_ranks.cache_clear()
     settings = PenetrateSettings(**PENETRATE)
     with pytest.raises(ValueError, match=r"ground = 'lammps': .*hedgebed\[lammps\]"):
         lammps.check_lammps(settings)
     assert main(["penetrate", "--ground", "lammps", "--out", str(tmp_path / "run")]) == 2
     assert "hedgebed[lammps]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("refused", "checkpoint", "said"),
+    [
+        (True, True, "the same settings would fail the same way again"),
+        (False, True, r"hedgebed resume .*continues from the checkpoint of 2001-09-0\d "),
+        (False, False, "has no checkpoint yet: `hedgebed resume .*anew"),
+    ],
+)
+def test_after_an_end_of_lammps_it_is_said_from_where_a_resumed_run_goes_on(
+    refused, checkpoint, said, tmp_path, capsys
+):
+    folder = RunFolder.create(tmp_path / "run", "penetrate", PenetrateSettings(**PENETRATE))
+
+    def work(progress):
+        if checkpoint:
+            folder.save_checkpoint("push", {"x": 1.0})
+            os.utime(folder.path / "checkpoint" / "push.npz", (1e9, 1e9))
+        raise LammpsEndedError("LAMMPS has ended", refused=refused)
+
+    assert carry_out(folder, work, as_json=False, quiet=True) == FAILED
+    assert re.search(said, capsys.readouterr().err.replace("\n", " "))
