@@ -144,7 +144,7 @@ class Beyond:
     fitted_to: float  # The largest that is left
     rms: float  # Rms error of the force there over the rms force [1]
     error: float  # Mean force of the law there over that of the runs, less 1 [1]
-    interval: tuple[float, float] | None  # 90 % of `error`, over beds; None of one bed
+    interval: tuple[float, float] | None  # 90 % of `error`, over beds; None where the fit or what was left out has one
 
 
 DEEPEST = 2 / 3
@@ -177,7 +177,7 @@ def _beyond(fitted: LawFit[Law], rest: Data, out: Data, *, left_out: float, fitt
 
     law, beds = fitted.candidate.predict(own.theta, out), out.force
     error, ends = error_of(own.theta, out), None
-    if len(out.beds) > 1:
+    if min(len(out.beds), len(rest.beds)) > 1:
         # A bed is left out of both: the law depends on the beds that it was fitted to.
         without = [
             error_of(solve_law(fitted.candidate, rest.without_bed(bed), own.theta, own.share)[0], out.without_bed(bed))

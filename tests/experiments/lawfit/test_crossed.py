@@ -242,6 +242,8 @@ def test_the_interval_beyond_the_runs_is_that_of_fits_without_one_bed_each():
     for kind, one in found.items():
         expected = interval(one.error, np.array([other[kind].error for other in without]))
         assert one.interval == pytest.approx((expected.low, expected.high), rel=0.02)
+    slow_in_one = data.only(lambda run: run.bed == "0" or run.speed > 0.3)
+    assert beyond(fit_law(candidate, slow_in_one))["speed"].interval is None
 
 
 def test_an_exponent_that_cannot_be_told_from_its_bound_counts_as_at_it():
