@@ -67,7 +67,10 @@ def result_of(settings: BedPlatesSettings, runs: list[Json], surfaces: Mapping[s
         "plates": rows,
         "shapes": others,
         "warnings": _warnings(settings, runs, fit, others),
-        "files": {TABLE_FILE: kept.to_json(), FUNCTION_FILE: function_of(kept.factors, friction, kept.material)},
+        "files": {
+            TABLE_FILE: kept.to_json(),
+            FUNCTION_FILE: function_of(kept.factors, friction, kept.material, kept.speed),
+        },
     }
 
 
@@ -128,8 +131,14 @@ def _table(
         surface_friction=friction, factors=fit.factors, stds=fit.stds, left_out=fit.left_out, unseen=fit.unseen,
         shape_errors=shapes,
         depth=(settings.shallow * settings.depth, settings.depth), side=settings.side, speed=one["speed"],
-        plates=tuple(entries), notes=(say("no_history"),),
+        plates=tuple(entries), notes=(say("no_history", speed=one["speed"], inertial=_inertial(settings, one)),),
     )  # fmt: skip
+
+
+def _inertial(settings: BedPlatesSettings, run: Json) -> float:
+    """Inertial number of a run [1], as `BedPlatesSettings.inertial_number` has it."""
+    head = 0.5 * run["packing_fraction"] * run["gravity"] * settings.side  # pressure over the grains' density
+    return float(run["speed"] / settings.side * run["grain"] / head**0.5)
 
 
 def _warnings(settings: BedPlatesSettings, runs: list[Json], fit: Fit, others: list[Json]) -> list[str]:

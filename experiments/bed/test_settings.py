@@ -90,7 +90,8 @@ class BedPlatesSettings(BedTestSettings):
     travel: Positive = Field(0.018, description="Way of a body that is dragged level [m]; its second half counts.")
     speed: Positive | None = Field(None, description="Speed [m/s]; that of the inertial number if not given.")
     inertial_number: float = Field(0.1, gt=0, le=0.2)
-    """Inertial number, speed / side x d sqrt(density / pressure), of the bed at half a side's depth [1]."""
+    """Inertial number, speed / side x d sqrt(density / pressure), of the bed at half a side's depth [1].
+    Below some 0.01 motion is slow; the default is faster, to be cheap."""
     shapes: tuple[Annotated[str, Field(min_length=1)], ...] = ("ball", "cone")
     """Bodies that the table has not seen, pushed into the same beds: ball, cone, cylinder, or files of closed surfaces
     (STL, OBJ)."""

@@ -146,7 +146,7 @@ def _foot(
     gravity: Annotated[_Gravity | None, Parameter(help="Gravity; that of the table if not given [m/s2].")] = None,
     json: _Json = False,
 ) -> int:
-    """Predict the slow force of a bed on a shape of your own."""
+    """Predict the force of a bed on a shape of your own that is pushed, at the speed of the table's plates."""
     import numpy as np
 
     from experiments.bed.plates import direction_of, shaped
@@ -168,7 +168,7 @@ def _foot(
     size_of_law = found.unseen * float(np.linalg.norm(force))
     if json:
         numbers = {"force": force.tolist(), "std": [None if math.isnan(s) else s for s in std.tolist()]}
-        errors = {"law_error": size_of_law, "shape_errors": found.shape_errors}
+        errors = {"law_error": size_of_law, "shape_errors": found.shape_errors, "speed": found.speed}
         print(json_module.dumps(numbers | errors | {"unit": "N", "warnings": warnings}, indent=2))
         return 0
     for axis, value, spread in zip("xyz", force, std, strict=True):
@@ -177,6 +177,7 @@ def _foot(
     if found.shape_errors is not None:
         rms, worst = (100 * error for error in found.shape_errors)
         print(f"it missed other shapes by {rms:.0f} % (rms), by {worst:.0f} % at worst")
+    print(f"its plates moved at {found.speed:.3g} m/s; the law knows no rate")
     for warning in warnings:
         say(f"warning: {warning}")
     return 0

@@ -67,7 +67,7 @@ def tractions(
     return np.where((x3 >= -1e-12)[:, None], -normal[:, None] * n + held[:, None] * along, 0.0)
 
 
-_FUNCTION = '''"""Slow push into {material}: force on a body by 3D-RFT (`hedgebed bed test plates`). Needs numpy."""
+_FUNCTION = '''"""Force on a body pushed into {material}: 3D-RFT of plates at {speed:.3g} m/s. Needs numpy."""
 import numpy as np
 
 XI, B = np.array({gradients}), {downward}  # of f1, f2, f3 [N/m3]; of surfaces that face down and move down [1]
@@ -91,12 +91,15 @@ def force(points, normals, areas, direction):
 '''
 
 
-def function_of(factors: ArrayLike, surface_friction: float, material: str) -> str:
-    """A Python file with a function `force`, for use without this package; `factors` as in `rigid.ground.rft_table`."""
+def function_of(factors: ArrayLike, surface_friction: float, material: str, speed: float) -> str:
+    """A Python file with a function `force`, for use without this package; `factors` as in `rigid.ground.rft_table`.
+
+    `speed`: of the plates [m/s], which the file states.
+    """
     *gradients, downward = [float(f"{f:.6g}") for f in np.asarray(factors)]
     table = np.array2string(_COEFFICIENTS, separator=", ", threshold=1000)
     return _FUNCTION.format(
-        material=material, gradients=gradients, downward=downward, friction=surface_friction,
+        material=material, speed=speed, gradients=gradients, downward=downward, friction=surface_friction,
         table=table.replace("\n", "\n                  "),
     )  # fmt: skip
 

@@ -2,17 +2,19 @@
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from experiments.bed import plates
-from experiments.bed.plates_fit import fit_of, predicted_force
+from experiments.bed.plates_fit import fit_of, measured_force, predicted_force
 from experiments.bed.test_settings import BedPlatesSettings
 from experiments.cli.main import BAD_INPUT, DONE, main
 from rigid.ground.rft import tractions
 from rigid.ground.rft_table import RftTable, read_rft
 
+KEPT = Path(__file__).parents[3] / "docs" / "results" / "bed-test-plates"
 SMALL = [
     "--size", "0.036", "0.036", "0.03", "--grain", "0.004", "--side", "0.012", "--depth", "0.006", "--travel", "0.004",
     "--shape-size", "0.012", "--seeds", "1", "--betas", "0", "60", "90", "--gammas", "90", "0", "--shapes", "ball",
@@ -107,7 +109,7 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
         return json.loads(capsys.readouterr().out)
 
     found = asked("--depth", "15mm")
-    assert found["warnings"] == [] and found["shape_errors"] == [0.2, 0.35]
+    assert found["warnings"] == [] and found["shape_errors"] == [0.2, 0.35] and found["speed"] == 0.1
     assert asked("--depth", "0.015", "--gravity", "1e-3g")["force"][2] == pytest.approx(
         1e-3 * 9.80665 / 9.8 * found["force"][2]
     )
@@ -132,6 +134,20 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
         assert main(["bed", "foot", str(path), *wrong]) == BAD_INPUT
         assert named in capsys.readouterr().err
     assert main(["bed", "foot", str(tmp_path / "none.json"), "cone", "--depth", "0.01"]) == BAD_INPUT
+
+
+def test_at_a_tenth_of_the_speed_kept_plates_bear_more_by_what_the_page_says():
+    """The first bed of the kept table again: 1.15 and 1.32 times, within two std of a difference of two pushes."""
+    kept = json.loads((KEPT / "result.json").read_text(encoding="utf-8"))["runs"]
+    slow = json.loads((KEPT / "slow.json").read_text(encoding="utf-8"))["runs"]
+    for run, more in zip(slow, (1.15, 1.32), strict=True):
+        alike = [one for one in kept if (one["beta"], one["gamma"]) == (run["beta"], run["gamma"])]
+        assert run["speed"] == pytest.approx(0.1 * alike[0]["speed"], rel=1e-3)
+        assert (run["young"], run["time_step"]) == (alike[0]["young"], alike[0]["time_step"])
+        forces = [np.linalg.norm(measured_force(one)) for one in alike]
+        force = np.linalg.norm(measured_force(run))
+        assert force / forces[0] == pytest.approx(more, abs=0.005)
+        assert abs(force - forces[0]) < 2 * math.sqrt(2) * np.std(forces, ddof=1)
 
 
 @pytest.mark.long

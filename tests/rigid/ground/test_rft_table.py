@@ -78,7 +78,7 @@ def test_the_deviation_is_that_of_fits_without_one_bed_and_gravity_scales_the_fo
 def test_the_function_without_the_package_gives_the_same_forces():
     """Three different factors, a ball that goes down at an angle and a plate: equal to 1e-5, the digits written."""
     made = {}
-    exec(function_of((2.1e5, 1.7e5, 2.6e5, 1.4), 0.35, "sand"), made)
+    exec(function_of((2.1e5, 1.7e5, 2.6e5, 1.4), 0.35, "sand", 0.1), made)
     for pieces in (box_pieces((0.02, 0.03, 0.002), 60.0), round_pieces([(0.0, 0.0), (0.01, 0.02)])):
         for way in ((1.0, 0.0, -0.5), (0.3, 0.2, -1.0), (1.0, 0.0, 0.0)):
             points = pieces.points - (0.0, 0.0, 0.015)
