@@ -41,9 +41,9 @@ slow: $(VENV)/.installed-test  ## the tests that take minutes: physics against c
 	$(PYTEST) -m slow $(ARGS)
 
 fuzz: $(VENV)/.installed-test  ## settings and campaigns drawn at random, 10,000 and 500, what FUZZED=fuzzed.jsonl has left out
-	HEDGEBED_FUZZ=10000 HEDGEBED_FUZZ_KEPT=$(FUZZED) $(PYTEST) tests/faults/test_fuzz.py $(ARGS)
+	HEDGEBED_FUZZ=10000 HEDGEBED_FUZZ_KEPT=$(abspath $(FUZZED)) $(PYTEST) tests/faults/test_fuzz.py $(ARGS)
 
-torture: $(VENV)/.installed-test  ## files damaged, 1,000 in all, and experiments killed, 50 times in all, resumed to the same bits
+torture: $(VENV)/.installed-test  ## files damaged, 1,200 in all, and experiments killed, 50 times in all, resumed to the same bits
 	HEDGEBED_DAMAGES=200 $(PYTEST) tests/faults/test_damage.py $(ARGS)
 	HEDGEBED_KILLS=50 HEDGEBED_KILLED_KEPT=$(abspath $(KILLED)) $(PYTEST) -m "long or slow" tests/faults/test_killed.py $(ARGS)
 
@@ -131,7 +131,7 @@ $(VENV)/.installed-docs: pyproject.toml | $(VENV)/bin/python
 	@touch $(VENV)/.installed $@
 
 $(VENV)/.installed-test: pyproject.toml | $(VENV)/bin/python
-	@echo "installing hedgebed, what it needs and what tests it into $(VENV) (the first time about 1.4 GB)"
+	@echo "installing hedgebed, what it needs and what tests it into $(VENV) (the first time about 1.8 GB)"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[quadrants,test]'
 	$(WITH_X11)
 	@touch $(VENV)/.installed $@

@@ -10,10 +10,15 @@ import shutil
 import numpy as np
 import pytest
 
+from dem import SAND, Bed
+from dem.engine.state import read_file
+from dem.prepare.bedfile import read_preparation, save_prepared
+from dem.prepare.report import Prepared
 from experiments.campaign.files import new_campaign
 from experiments.cli.main import main
 from experiments.runs.folder import RunFolder
 
+NUMBERS = ("result.json", "campaign.toml")
 DAMAGES = int(os.environ.get("HEDGEBED_DAMAGES", "2"))
 
 
@@ -33,7 +38,22 @@ def whole(tmp_path_factory):
             tokens = ["--duration", "0.2", "--torque", torque, "--out", str(home / name), "--quiet"]
             assert main(["tumble", *tokens]) == 0
     new_campaign(home / "campaign", kind="tumble")
+    assert [main(tokens) for tokens in reading(home / "run", home, home)] == [0, 0]
     return home
+
+
+def reading(run, home, out):
+    """Two commands that read a run: what they write goes below `out`."""
+    return (
+        ["compare", str(run), str(home / "other"), "--out", str(out / "compared"), "--quiet"],
+        ["campaign", "from-run", str(run), str(out / "made")],
+    )
+
+
+def numbers(folder, run):
+    """What a command wrote beside its settings and reports, the path of the run it read left out."""
+    paths = [path for path in folder.rglob("*") if path.name in NUMBERS or path.suffix == ".csv"]
+    return {str(path.relative_to(folder)): path.read_text().replace(str(run), "RUN") for path in paths}
 
 
 def damaged(path, chance):
@@ -78,22 +98,25 @@ def test_a_run_whose_settings_are_damaged_is_not_gone_on_with(seed, whole, tmp_p
 
 @pytest.mark.parametrize("seed", range(DAMAGES))
 def test_a_damaged_file_of_a_run_is_named_by_who_reads_it(seed, whole, tmp_path, capsys):
-    """Settings, status, result and trajectory of one of two runs that are compared, and of a run made a campaign."""
+    """Settings, status, result and trajectory of one of two runs that are compared, and of a run made a campaign.
+
+    Where it is not refused, the numbers are those of the whole run.
+    """
     chance = random.Random(seed)
     run = tmp_path / "run"
     shutil.copytree(whole / "run", run)
+    shutil.copytree(whole / "other", tmp_path / "other")
     name = chance.choice(["run.toml", "status.json", "result.json", "trajectory.csv", "series/motion.csv"])
     damaged(run / name, chance)
-    for tokens in (
-        ["compare", str(run), str(whole / "other"), "--out", str(tmp_path / "compared"), "--quiet"],
-        ["campaign", "from-run", str(run), str(tmp_path / "campaign")],
-    ):
+    for tokens, written in zip(reading(run, tmp_path, tmp_path), ("compared", "made"), strict=True):
         status, said = said_of(tokens, capsys)
         assert "Traceback" not in said and status in (0, 1, 2), said
         if name == "result.json":
             assert status == 2 and str(run / name) in said
         elif status:
             assert str(run) in said or "compare" in said, said
+        else:
+            assert numbers(tmp_path / written, run) == numbers(whole / written, whole / "run"), (name, said)
 
 
 @pytest.mark.parametrize("seed", range(DAMAGES))
@@ -129,3 +152,31 @@ def test_a_checkpoint_that_was_being_replaced_when_the_run_was_killed_is_the_one
     folder.save_checkpoint("work", {"row": 1})
     (tmp_path / "checkpoint" / "work.npz").rename(tmp_path / "checkpoint" / "work.npz.before")
     assert folder.load_checkpoint("work")["row"] == 1
+
+
+@pytest.fixture(scope="module")
+def bed_file(tmp_path_factory):
+    """A prepared bed of four grains."""
+    positions = [[0.01, 0.01, 0.00199], [0.014, 0.01, 0.00199], [0.012, 0.0135, 0.00199], [0.012, 0.0112, 0.0055]]
+    box = {"radii": [0.002] * 4, "size": (0.024, 0.024, 0.016)}
+    bed = Bed.from_grains(SAND, positions=positions, young=1e7, threads=1, **box)
+    return save_prepared(Prepared(bed, {"seed": 1}, []), tmp_path_factory.mktemp("bed") / "bed.npz")
+
+
+@pytest.mark.parametrize("seed", range(DAMAGES))
+def test_a_damaged_bed_is_refused_by_name_or_is_the_same_bed(seed, bed_file, tmp_path):
+    path = tmp_path / "bed.npz"
+    shutil.copy(bed_file, path)
+    damaged(path, random.Random(seed))
+    try:
+        about, (settings, state, _) = read_preparation(path), read_file(path)
+    except ValueError as error:
+        assert str(path) in str(error)
+        return
+    except NotImplementedError as error:  # of zipfile; 2 of 2,000 files
+        pytest.xfail(f"no sentence names the file yet: {error}")
+    whole, (of_whole, state_of_whole, _) = read_preparation(bed_file), read_file(bed_file)
+    assert (about.recipe, settings) == (whole.recipe, of_whole)
+    assert {name: array.tobytes() for name, array in state.items()} == {
+        name: array.tobytes() for name, array in state_of_whole.items()
+    }

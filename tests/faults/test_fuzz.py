@@ -9,6 +9,7 @@ import json
 import os
 import random
 import shutil
+import subprocess
 from collections import Counter
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
@@ -26,7 +27,8 @@ from experiments.runs.registry import EXPERIMENTS
 from rigid.result import toml_value
 
 CASES = int(os.environ.get("HEDGEBED_FUZZ", "24"))
-KEPT = os.environ.get("HEDGEBED_FUZZ_KEPT")
+KEPT = Path(os.environ["HEDGEBED_FUZZ_KEPT"]).resolve() if "HEDGEBED_FUZZ_KEPT" in os.environ else None
+ROOT = Path(__file__).resolve().parents[2]
 PART, CAMPAIGNS = 250, 25
 """Cases of settings and campaigns of a part, at most."""
 PARTS = range(-(-CASES // PART))
@@ -96,16 +98,35 @@ def no_work(monkeypatch, tmp_path):
 @contextmanager
 def kept(name):
     """Skips a part that the file has already; a part that passes adds its line, with how often each status came."""
-    path = Path(KEPT).resolve() if KEPT else None
-    lines = path.read_text(encoding="utf-8").splitlines() if path is not None and path.exists() else []
+    lines = KEPT.read_text(encoding="utf-8").splitlines() if KEPT is not None and KEPT.exists() else []
     if any(json.loads(line)["part"] == name for line in lines):
-        pytest.skip(f"{path} has {name}")
+        pytest.skip(f"{KEPT} has {name}")
     counts = Counter()
     yield counts
-    if path is not None:
+    if KEPT is not None:
         line = {"part": name} | {f"exit {status}": count for status, count in sorted(counts.items())}
-        with path.open("a", encoding="utf-8") as file:
+        with KEPT.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
+
+
+@pytest.mark.parametrize(("target", "variable"), [("fuzz", "FUZZED"), ("torture", "KILLED")])
+def test_make_names_the_file_of_what_is_done_by_its_whole_path(target, variable):
+    """The tests work in folders of their own."""
+    made = subprocess.run(
+        ["make", "-n", target, f"{variable}=some/parts.jsonl"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert f"_KEPT={ROOT / 'some' / 'parts.jsonl'} " in made.stdout
+
+
+def test_a_part_that_the_file_has_is_not_done_again(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "KEPT", tmp_path / "parts.jsonl")
+    for part in ("settings 0", "settings 1"):
+        with kept(part) as counts:
+            counts[2] += 3
+    with pytest.raises(pytest.skip.Exception), kept("settings 1"):
+        pass
+    lines = [json.loads(line) for line in (tmp_path / "parts.jsonl").read_text().splitlines()]
+    assert lines == [{"part": f"settings {part}", "exit 2": 3} for part in (0, 1)]
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -1,7 +1,8 @@
 """Long experiments killed (kill -9) at random moments and resumed: the same bits as of a run left alone.
 
 Each experiment is killed once, `make torture` kills as often as HEDGEBED_KILLS says, in all. HEDGEBED_KILLED_KEPT names
-a file to which every run adds a line as it ends; kills that it has are not done again.
+a file to which every run adds a line as it ends; kills that it has are not done again. A kill counts only where the run
+had kept a file before.
 """
 
 import json
@@ -140,11 +141,26 @@ def files(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
 
 
+NOTHING = "nothing yet"
+
+
+def counted(moments):
+    """How many of these kills met a run that had kept something."""
+    return sum(moment["last_kept"] != NOTHING for moment in moments)
+
+
+def test_a_kill_before_anything_is_kept_does_not_count():
+    found = [
+        counted([{"after_s": 1.0, "last_kept": where(path)}]) for path in (ROOT / "nowhere", ROOT / "tests/faults")
+    ]
+    assert found == [0, 1]
+
+
 def where(folder):
     """The part of the work that was kept last when a run was killed."""
     paths = [path for path in folder.rglob("*") if path.is_file() and path.name not in ("lock", "log")]
     last = max(paths, key=lambda path: path.stat().st_mtime_ns, default=None)
-    return "nothing yet" if last is None else str(last.relative_to(folder))
+    return NOTHING if last is None else str(last.relative_to(folder))
 
 
 def kept_of(name):
@@ -159,7 +175,7 @@ def kept_of(name):
 def test_an_experiment_killed_at_random_moments_ends_in_the_same_bits(name, tmp_path):
     """A run that comes to its end between two kills is compared, and the next begins."""
     before = kept_of(name)
-    killed, runs = sum(len(line["killed"]) for line in before), len(before)
+    killed, runs = sum(counted(line["killed"]) for line in before), len(before)
     assert all(line["same"] for line in before), before
     if killed >= KILLS[name] and before:
         pytest.skip(f"{KEPT} has {killed} kills of it")
@@ -177,8 +193,8 @@ def test_an_experiment_killed_at_random_moments_ends_in_the_same_bits(name, tmp_
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-                killed += 1
                 moments.append({"after_s": round(time.monotonic() - began, 2), "last_kept": where(out)})
+                killed += counted(moments[-1:])
             else:
                 break
         assert status == 0, (tmp_path / "log").read_text()
