@@ -75,7 +75,8 @@ def tangent_intervals({arguments_of_load}):
 def _tangent(load, speed, numbers{parameters}):
     low, high = 1e-9, {deepest:.6g}
     if not {low_call} < load <= {high_call}:
-        raise ValueError(f"load = {{load:g}} N at speed = {{speed:g}} m/s: no depth from 0 to {{high:g}} m bears it")
+        where = "the surface bears more" if {low_call} >= load else f"no depth down to {{high:g}} m bears it"
+        raise ValueError(f"load = {{load:g}} N at speed = {{speed:g}} m/s: {{where}}")
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if {middle_call} >= load else (middle, high)

@@ -87,7 +87,8 @@ def test_what_is_outside_the_runs_warns_and_what_no_depth_bears_is_refused(tmp_p
     for call, named in (
         ("law.force(0.05, 0.1)", "depth = 0.05"), ("law.force(0.005)", "speed = 0"),
         ("law.force_interval(0.05, 0.1)", "depth = 0.05"), ("law.tangent(5.0, 0.1)", "load = 5"),
-        ("law.tangent(1e9, 0.1)", "load = 1e\\+09"), ("law.tangent_intervals(5.0, 0.1)", "load = 5"),
+        ("law.tangent(1e9, 0.1)", "load = 1e\\+09"), ("law.tangent(0.01, 0.1)", "surface"),
+        ("law.tangent_intervals(5.0, 0.1)", "load = 5"),
     ):  # fmt: skip
         with pytest.raises(AssertionError, match=named):
             alone(tmp_path, call)
