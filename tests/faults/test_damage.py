@@ -37,8 +37,8 @@ def whole(tmp_path_factory):
         for name, torque in (("run", "0.2"), ("other", "0.15")):
             tokens = ["--duration", "0.2", "--torque", torque, "--out", str(home / name), "--quiet"]
             assert main(["tumble", *tokens]) == 0
+        assert [main(tokens) for tokens in reading(home / "run", home, home)] == [0, 0]
     new_campaign(home / "campaign", kind="tumble")
-    assert [main(tokens) for tokens in reading(home / "run", home, home)] == [0, 0]
     return home
 
 
