@@ -148,9 +148,12 @@ _NARROW = 24
 """Characters of a first column that is not broken into lines."""
 
 
-def _unit(unit: str, value: Any) -> str:
-    """The unit; beside an angle in radians the same in degrees."""
+def _unit(unit: str, value: Any, std: Any = None) -> str:
+    """The unit; beside an angle in radians the same in degrees, with its spread."""
     if unit == "rad" and isinstance(value, int | float) and math.isfinite(value):
+        if std and math.isfinite(std):
+            angle, spread = math.degrees(value), math.degrees(std)
+            return f"rad   {_number(angle, spread)} ± {_number(spread, spread)} degrees"
         return f"rad   {math.degrees(value):.4g} degrees"
     return "" if unit == "1" or value is None else unit
 
@@ -190,7 +193,7 @@ def _show_all(result: Mapping[str, Any], console: Console) -> None:
         value, std = quantity.get("value"), quantity.get("std")
         cells = [_number(std, None) if std != 0 else "exact"] if spreads else []
         cells += [_interval(quantity.get("interval"))] if intervals else []
-        table.add_row(name, _number(value, std), *cells, _unit(quantity.get("unit", ""), value))
+        table.add_row(name, _number(value, std), *cells, _unit(quantity.get("unit", ""), value, std))
     if quantities:
         console.print(table, markup=False)
     for listed in result.get("tables", []):

@@ -27,6 +27,7 @@ from pythonfmu3 import (
 from experiments.runs.version import __version__
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import DEFAULT_RIG, TumblePlan, plan_tumble
+from rigid.ground_file import is_ground_file
 
 from . import say
 from .driven import DrivenPlatform
@@ -41,6 +42,7 @@ OF_THE_FMU = (
 )  # fmt: skip
 """Settings of `FmuSettings` that `hedgebed tumble` does not have."""
 FILES = ("platform", "ground")  # Settings that may name a file, which the FMU then contains
+OF_THE_SPRING = ("stiffness", "damping")  # Parameters that a ground file gives, if it is of a spring-damper
 NOT_GIVEN = -1.0  # Value of a parameter that takes its number from the surface, or is not used
 UNITS = (
     Unit("m", m=1), Unit("m/s", m=1, s=-1), Unit("m/s2", m=1, s=-2), Unit("rad", rad=1), Unit("rad/s", rad=1, s=-1),
@@ -128,13 +130,17 @@ class PlatformSlave(Fmi3Slave):
 
     def _register(self) -> None:
         settings = FmuSettings(**self._resolved(self._given))
+        of_file = plan_platform(settings) if is_ground_file(settings.ground) else None
         fixed = {"causality": Fmi3Causality.parameter, "variability": Fmi3Variability.fixed}
         self._values: Values = {
-            "surface": settings.surface or "brick", "platform": self._given.get("platform", settings.platform),
+            "surface": of_file.surface if of_file is not None else settings.surface or "brick",
+            "platform": self._given.get("platform", settings.platform),
             "torque_in_flight": settings.torque_in_flight,
         }  # fmt: skip
         for name in NUMBERS:
             value = getattr(settings, name)
+            if of_file is not None and of_file.trial.ground is None and name in OF_THE_SPRING:
+                value = getattr(of_file.trial, name)
             self._values[name] = NOT_GIVEN if value is None else value
         if settings.gravity is None and settings.rig is None:
             self._values["rig"] = DEFAULT_RIG

@@ -39,6 +39,7 @@ class Frames(Protocol):
 class Followed(ABC, Generic[Run]):
     """An experiment that steps a platform: what is drawn, written and concluded of its run."""
 
+    stage = "tumble"  # What the progress calls the run
     settings: Any  # `GrainsSettings` with a duration
     frames: Callable[..., Frames]  # Of a run, a folder, the settings and whether it is `resumed`: what writes frames
     sinkage: Callable[[Any], float]  # Of a run: how deep the platform stands once it is set down [m]
@@ -70,7 +71,7 @@ class Followed(ABC, Generic[Run]):
             progress.message(say("goes_on", time=run.time))
         resumed, settings = kept is not None, self.settings
         drawn = self.frames(run, folder.path, settings, resumed=resumed) if settings.frame_count else None
-        progress.stage("tumble", total=1.0)
+        progress.stage(self.stage, total=1.0)
         saved, placing, late = time.monotonic(), not run.placed, False
 
         def on_step(run: Any) -> None:

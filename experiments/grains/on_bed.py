@@ -236,5 +236,5 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     def carry_out(self, folder: RunFolder, progress: Progress) -> Result:
         """Prepare the bed, follow the run in `folder`, from its checkpoint where there is one; the result."""
         self.announce(progress)
-        progress.plan({"bed": 1.0, "tumble": self.duration + 0.3}, seconds={"report": 10.0})  # with the placement
+        progress.plan({"bed": 1.0, self.stage: self.duration + 0.3}, seconds={"report": 10.0})  # with the placement
         return self.finish(self.stepper(self.bed(self.softening(), progress)), folder, progress)

@@ -1,10 +1,13 @@
 """`hedgebed ground`: K, C and sinkage of a spike from the map that ships, as a result and as a ground.toml."""
 
+import math
+
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
 from experiments.runs.whole_runs import computed_run
 from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
+from rigid.platform.files import find_platform
 
 from .maps import Answer, GroundMap, Number, read_map
 from .settings import GroundSettings, say
@@ -17,6 +20,8 @@ DEPTH = 1.0  # to which the map holds [tip diameters]
 
 
 def _answer(settings: GroundSettings) -> tuple[GroundMap, Answer]:
+    if settings.tip != "sphere":
+        raise ValueError(say("of_other_tip", tip=settings.tip))
     found = read_map(settings.material)
     return found, found.answer(
         gravity=settings.gravity, diameter=settings.tip_diameter, grain=settings.grain, packing=settings.packing,
@@ -25,7 +30,7 @@ def _answer(settings: GroundSettings) -> tuple[GroundMap, Answer]:
 
 
 def check(settings: GroundSettings) -> None:
-    """Raise ValueError for a material without a map and for numbers beyond it."""
+    """Raise ValueError for a material or a tip without a map and for numbers beyond it."""
     _answer(settings)
 
 
@@ -50,7 +55,25 @@ def ground_file(settings: GroundSettings, table: GroundMap, answer: Answer) -> G
     )  # fmt: skip
 
 
+def _of_no_platform(settings: GroundSettings, table: GroundMap, answer: Answer) -> list[str]:
+    """Where the load was not given and is not that of a platform: what that would be, and the sinkage under it."""
+    in_rig = math.isclose(settings.gravity, table.reference["gravity"], rel_tol=1e-3)
+    weight = table.reference["load"] if in_rig else 0.25 * find_platform("hedgehog").mass * settings.gravity
+    if settings.load is not None or math.isclose(answer.load, weight, rel_tol=1e-3):
+        return []
+    try:
+        _, heavier = _answer(settings.model_copy(update={"load": weight}))
+        then = say("at_weight", mm=1e3 * heavier.sinkage.value, std=1e3 * heavier.sinkage.std)
+    except ValueError:
+        then = say("too_heavy", mm=1e3 * settings.tip_diameter)
+    where = say("in_rig" if in_rig else "on_its_own")
+    told = say("no_platform", answer=answer, reference=table.reference["load"], where=where, weight=weight, then=then)
+    return [told]
+
+
 def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) -> Result:
+    if settings.threads is not None:
+        progress.message(say("threads", s=settings))
     progress.stage("look up", total=1.0)
     table, answer = _answer(settings)
     ground_file(settings, table, answer).write(folder.path / GROUND_FILE)
@@ -65,7 +88,7 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
         "packing_fraction": quantity(answer.packing, "1", "of the bed"),
         "grain_ratio": quantity(answer.ratio, "1", "mean grain over tip diameter"),
     }
-    warnings = [say("of_real_grains")]
+    warnings = [*_of_no_platform(settings, table, answer), say("of_real_grains")]
     if answer.ratio < table.lines["stiffness"].finest:
         warnings.append(say("extrapolated", answer=answer, finest=table.lines["stiffness"].finest))
     if settings.packing is not None and settings.packing != table.packings[0]:

@@ -1,10 +1,10 @@
 """Settings of `hedgebed ground`."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from experiments.runs.strict import Positive, StrictSettings
+from experiments.runs.strict import Positive, StrictSettings, Threads
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.sentences import Sentences
 
@@ -21,9 +21,11 @@ class GroundSettings(StrictSettings):
     tip_diameter: Positive = Field(
         0.012, description="Diameter of the tip [m].", json_schema_extra={"option_alias": "--spike-diameter"}
     )
+    tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip: sphere, a ball tip.")
     packing: Annotated[float, Field(gt=0, lt=1)] | None = None
     """Packing fraction [1]; that of the rained bed of the map if not given."""
     grain: Positive = Field(0.0002, description="Mean grain diameter of the soil [m].")
     load: Positive | None = None
     """Load under which the sinkage is stated [N]; if not given, 0.219 N for 12 mm at 1 g, and in proportion to gravity
     and to the cube of the diameter."""
+    threads: Threads = None

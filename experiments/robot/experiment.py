@@ -9,7 +9,7 @@ from experiments.runs.whole_runs import whole_run
 
 from .on_grains import RobotFollowed, RobotOnBed
 from .plan import keep_files, plan_robot, try_controller
-from .settings import RobotSettings
+from .settings import RobotSettings, say
 
 __all__ = ["check", "resume", "run"]
 
@@ -33,8 +33,10 @@ def _carry_out(settings: RobotSettings, folder: RunFolder, progress: Progress) -
         if settings.ground == "bed":
             return RobotOnBed(settings, plan).carry_out(folder, progress)
         followed = RobotFollowed(settings, plan)
+        if settings.threads is not None:
+            progress.message(say("threads_on_law", s=settings))
         followed.announce(progress)
-        progress.plan({"tumble": settings.duration}, seconds={"report": 10.0})
+        progress.plan({followed.stage: settings.duration}, seconds={"report": 10.0})
         run: RobotRun = followed.run_on_law()
         return followed.finish(run, folder, progress)
 

@@ -42,6 +42,7 @@ class RobotFollowed(Followed[RobotRun]):
     """A robot; its run on a surface law."""
 
     settings: RobotSettings
+    stage = "robot"
     frames, write_series = RobotFrames, staticmethod(write_series_of)
     sinkage = staticmethod(deepest_at_start)
 

@@ -99,6 +99,6 @@ class RobotSettings(GrainsSettings):
         if self.ground == "bed":
             return self.sleep_fault()
         for name in GrainsSettings.model_fields:
-            if name not in ON_ANY_GROUND and getattr(self, name) != fields[name].default:
+            if name not in (*ON_ANY_GROUND, "threads") and getattr(self, name) != fields[name].default:
                 return say("of_a_bed", name=name, value=getattr(self, name))
         return None

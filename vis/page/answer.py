@@ -43,8 +43,9 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
         raise ValueError(f"{len(tiles)} numbers at the top of a report: at most {MOST_ROWS} are one answer")
     rows = [_row(tile) for tile in tiles]
     on_grains = kind_of(result) in _ON_GRAINS
+    errors = (say("of_the_law"), *_ERRORS[1:]) if "ground_file" in result else _ERRORS
     shown = [k for k in range(3) if on_grains or any(row[2 + k] for row in rows)]
-    head = ("", "value", *(_ERRORS[k] for k in shown), "")
+    head = ("", "value", *(errors[k] for k in shown), "")
     cells = [(*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), row[5]) for row in rows]
     note = [text(say("empty_cells"), small=True)] if on_grains and any("\N{EN DASH}" in row for row in cells) else []
     return [table(head, cells, words=True), *note]

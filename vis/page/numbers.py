@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["column", "digits_for", "foldable", "plain", "quantity", "quote", "short"]
+__all__ = ["column", "digits_for", "foldable", "in_two_digits", "plain", "quantity", "quote", "short"]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SCALED = {"J", "s", "Pa", "W", "kg"}
@@ -110,6 +110,13 @@ def quantity(entry: Any, *, unit: str | None = None, significant: int | None = N
     if isinstance(value, bool) or not isinstance(value, int | float):
         return "unknown" if value is None else str(value)
     return quote(value, std if isinstance(std, int | float) else None, unit or own, significant=significant or 3)
+
+
+def in_two_digits(entry: Mapping[str, Any]) -> str:
+    """A quantity of result.json with two digits of its value and of its std, also where the std is the larger one."""
+    scale, shown = _scale(entry["value"], entry["unit"])
+    value, std = (plain(entry[key] / scale, 2) for key in ("value", "std"))
+    return f"{value}{_SPACE}±{_SPACE}{std}{_SPACE}{shown}"
 
 
 def _scale(value: float, unit: str) -> tuple[float, str]:

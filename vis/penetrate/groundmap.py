@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vis.page.numbers import quote
+from vis.page.numbers import in_two_digits
 from vis.page.page import Section, Tile, text
 from vis.page.report import Report, report_of
 
@@ -16,11 +16,9 @@ def write_ground_report(report: Report) -> Path:
     """Make report.html of the folder of a look-up, and return it."""
     numbers, source = report.result["quantities"], report.result["map"]["source"]
     tiles = [
-        Tile(name, quote(scale * numbers[key]["value"], scale * numbers[key]["std"], unit), "one standard deviation")
-        for name, key, scale, unit in (
-            ("K", "stiffness", 1.0, "N/m"), ("C", "damping", 1.0, "N s/m"), ("Sinkage", "sinkage", 1e3, "mm"),
-        )
-    ]  # fmt: skip
+        Tile(name, in_two_digits(numbers[key]), "one standard deviation")
+        for name, key in (("K", "stiffness"), ("C", "damping"), ("Sinkage", "sinkage"))
+    ]
     sections = [
         Section("", [text(f"Looked up, not computed, in a map of {source}. ground.toml beside this page is the law.")]),
         report.numbers(std=True),

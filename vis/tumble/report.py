@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 from vis.film.film import draw_runs, shown
 from vis.film.reel import Reel
 from vis.page.folder import read_columns
-from vis.page.numbers import quantity, short
+from vis.page.numbers import quantity, quote, short
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
 from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result, given, report_of, tables, terms_text
@@ -65,7 +65,7 @@ def write_tumble_report(
         Section("Transitions", passages(result["transitions"], angle="theta", label="θ [degrees]")),
         Section("Energy", [energy]),
         Section("The trial", [given(result["trial"]), text(f"{settled} {terms_text(result)}")]),
-        report.numbers(),
+        report.numbers(std="ground_file" in result),
         report.again("hedgebed tumble run.toml", "trajectory.csv"),
     ]
     if "sweep" in result:
@@ -111,7 +111,10 @@ def _value(result: Result, name: str) -> float | None:
 
 def _degrees(result: Result, name: str) -> str:
     value = _value(result, name)
-    return "none" if value is None else f"{short(math.degrees(value), 3)}°"
+    std = result["quantities"].get(name, {}).get("std")
+    if value is None or not std:
+        return "none" if value is None else f"{short(math.degrees(value), 3)}°"
+    return " ± ".join(f"{part.strip()}°" for part in quote(math.degrees(value), math.degrees(std)).split("±"))
 
 
 def _trajectory(report: Report, numbers: Columns, states: States) -> Block:

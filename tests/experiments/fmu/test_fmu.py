@@ -1,6 +1,8 @@
 """`hedgebed fmu`: the FMU in fmpy, an importer that is not ours, against the runs of `hedgebed tumble`."""
 
 import sys
+import zipfile
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -343,3 +345,19 @@ def test_the_command_writes_the_file_that_it_names(tmp_path, capsys):
     start = {variable.name: variable.start for variable in fmpy.read_model_description(file).modelVariables}
     assert start["surface"] == "sand" and float(start["gravity"]) == pytest.approx(9.80665e-3)
     assert [path.name for path in tmp_path.iterdir()] == [file.name]  # no scratch is left
+
+
+def test_the_parameters_of_an_fmu_on_a_ground_file_are_those_of_the_file(tmp_path):
+    """Not -1 and brick: K and C under a row of two spikes, and the surface that friction is of."""
+    fitted = GroundFile(
+        format="hedgebed-ground/1", law="spring-damper", material="sand", source="a test",
+        foot={"tip": "sphere", "diameter": 0.012},
+        parameters={"stiffness": {"value": 70.0, "std": 0.0}, "damping": {"value": 0.5, "std": 0.0}},
+        range=dict.fromkeys(("load", "depth", "speed", "gravity", "diameter"), (0.0, 100.0)),
+    )  # fmt: skip
+    file = build_fmu(tmp_path / "own.fmu", FmuSettings(ground=str(fitted.write(tmp_path / "ground.toml"))))
+    with zipfile.ZipFile(file) as packed:
+        told = ElementTree.fromstring(packed.read("modelDescription.xml"))
+    found = {each.get("name"): each for each in told.iter()}
+    assert float(found["stiffness"].get("start")) == 140.0 and float(found["damping"].get("start")) == 1.0
+    assert found["surface"].find("Start").get("value") == "sand"

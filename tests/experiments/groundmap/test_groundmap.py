@@ -3,10 +3,12 @@
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
 
+from experiments import groundmap as ground
 from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.groundmap.experiment import ground_file
 from experiments.groundmap.make import made_map
@@ -127,7 +129,9 @@ def test_a_denser_bed_is_stiffer_and_sinks_less_and_a_heavier_spike_sinks_more()
         (["--load", "5"], "load"),
         (["--load", "1e-9"], "grain"),
         (["--material", "mud"], "material"),
-        (["--material", "jsc-1a-loose"], "calibrate"),
+        (["--material", "jsc-1a-loose"], "docs/penetrate.md"),
+        (["--tip", "flat"], "bed foot"),
+        (["--tip", "cone"], "penetrate --tip cone"),
     ],
 )
 def test_what_is_beyond_the_map_is_refused_by_name(options, named, tmp_path, capsys):
@@ -159,3 +163,35 @@ def test_a_file_of_low_gravity_is_answered_in_a_rig_by_the_gravity_that_it_needs
     assert "0.6613 N/m" in told and "0.0289 N s/m" in told
     assert main(["fmu", str(tmp_path / "g.fmu"), "--ground", str(low / "ground.toml")]) == BAD_INPUT
     assert "ground --gravity 1g" in capsys.readouterr().err
+
+
+def test_a_load_that_was_not_given_is_set_beside_the_weight_of_a_platform(tmp_path):
+    """At 1 g and 12 mm it is that of the Hedgehog in the rig; elsewhere the warning has the weight there, m g / 4."""
+    low = ground.run(ground.Settings(gravity=0.0085 * 9.80665), tmp_path / "low")
+    assert low["quantities"]["load"]["value"] == pytest.approx(0.219 * 0.0085)
+    assert "0.11 N" in low["warnings"][0] and "ends at a depth of 12 mm" in low["warnings"][0]
+    small = ground.run(ground.Settings(tip_diameter=0.01, grain=0.001), tmp_path / "small")
+    assert "0.219 N on each" in small["warnings"][0] and "sink by" in small["warnings"][0]
+    for name, settings in (("rig", ground.Settings()), ("given", ground.Settings(gravity=1.0, load=0.01))):
+        assert not any("Hedgehog" in text for text in ground.run(settings, tmp_path / name)["warnings"])
+
+
+def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_the_tip_is_a_ball(tmp_path, capsys):
+    assert main(["ground", "--threads", "1", "--out", str(tmp_path / "run")]) == DONE
+    told = capsys.readouterr()
+    assert "ball tip" in told.out and "0.16 ± 1.1 N s/m" in told.out and "4.9 ± 5.2 mm" in told.out
+    assert "threads = 1" in told.err
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "D / D" not in page and "0.16" in page
+
+
+def test_the_report_of_a_tumble_on_a_file_has_the_deviation_of_its_angle_and_of_every_number(tmp_path, capsys):
+    assert main(["ground", "--out", str(tmp_path / "run"), "--quiet"]) == DONE
+    tumble = ["tumble", "--ground", str(tmp_path / "run" / "ground.toml"), "--duration", "1", "--rig", "0.0085"]
+    assert main([*tumble, "--out", str(tmp_path / "tumble"), "--quiet"]) == DONE
+    angle = json.loads((tmp_path / "tumble" / "result.json").read_text(encoding="utf-8"))["quantities"]
+    value, std = (math.degrees(angle["trajectory_angle"][key]) for key in ("value", "std"))
+    assert re.search(rf"rad +{value:.0f} ± {std:.0f} degrees", capsys.readouterr().out)
+    page = (tmp_path / "tumble" / "report.html").read_text(encoding="utf-8")
+    assert f">{value:.0f}°<" in page and f">{std:.0f}°<" in page
+    assert "± law" in page and "± chance" not in page and ">std<" in page

@@ -207,6 +207,13 @@ def test_a_robot_that_the_world_holds_and_a_load_above_the_limit_are_told(tmp_pa
     assert warned == [False, True]
 
 
+def test_threads_on_a_law_are_taken_with_a_message_as_in_a_tumble(tmp_path, capsys):
+    foot = ["hopper", "--feet", "foot", "--duration", "0.02", "--frame-count", "0"]
+    assert main(["mujoco", *foot, "--threads", "1", "--out", str(tmp_path / "run")]) == 0
+    told = capsys.readouterr().err
+    assert "threads = 1" in told and "] tumble" not in told and "] robot" in told
+
+
 @pytest.mark.long
 def test_a_run_on_a_law_leaves_its_series_and_numbers(tmp_path):
     settings = RobotSettings(**HOPPER, controller=HOP, duration=0.45, frame_count=0)
