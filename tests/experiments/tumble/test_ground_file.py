@@ -53,7 +53,7 @@ def test_a_tumble_that_leaves_the_range_says_which_number_and_how_far(written, t
     result = tumble.run(tumble.Settings(ground=written(limits=limits), duration=0.3), tmp_path / "run")
     said = [text.split(" ")[0] for text in result["warnings"] if "outside the range" in text]
     assert said == ["depth"]
-    assert any("0.000102 g" in text for text in result["warnings"] if "ground --gravity 1g" in text)
+    assert any("0.000102 g" in text for text in result["warnings"] if "--gravity 1g" in text)
 
 
 def test_what_a_tumble_reaches_at_rest_is_its_weight_on_four_spikes(written):
