@@ -122,7 +122,7 @@ class LawFitSettings(PenetrateSettings):
         """Tip and gravity of a crossed design are the first of each list. Raises ValueError for others beside it."""
         if not isinstance(given, dict):
             return given
-        found: dict[str, Any] = {}
+        found: dict[str, object] = {}
         if (tips := given.get("tips")) and isinstance(tips, list | tuple):
             found |= dict(zip(("tip", "tip_diameter", "cone_angle"), _tip_of(str(tips[0])), strict=True))
         if (gravities := given.get("gravities")) and isinstance(gravities, list | tuple):

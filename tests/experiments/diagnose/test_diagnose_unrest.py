@@ -82,7 +82,7 @@ def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by()
     best = next(row for row in said["evidence"] if row["effects"] == ["depth-hardening"])
     # Above 1 where less is left than the wander, known to six degrees of freedom, lets expect.
     assert best["closes"] > 0.8 and best["score"] > 10
-    words = ("More replicates", "What is left beside depth-hardening does not repeat")  # not: repeat a trial
+    words = ("More replicates", "The misfit that remains with depth-hardening does not repeat")  # not: repeat a trial
     assert found.next_experiment.startswith(words)
 
 
