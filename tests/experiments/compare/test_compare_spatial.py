@@ -137,7 +137,7 @@ def test_a_run_without_frames_has_its_curves_compared_and_says_why_there_is_no_p
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        ("planar", r"is of tumble spatial and .*planar' of tumble: .*a run in space has an attitude"),
+        ("planar", r"is of tumble spatial and .*planar' of tumble\. .*a run in space has an attitude"),
         ("footless", r"has no series/feet.csv: run it again, `hedgebed tumble spatial .*run.toml`"),
         ("older", r"trajectory.csv of .*older' has no state .*written by an older hedgebed.*: run it again"),
     ],
