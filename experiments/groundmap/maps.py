@@ -113,7 +113,7 @@ class GroundMap:
         factor = self._factor(packing, ratio)
         exponent, scatter = self.reference["exponent"], self.reference["exponent_std"]
         own_load = self.reference["load"] * g * size**3
-        given, load = load, own_load if load is None else load
+        load = own_load if load is None else load
         stiffness = _times(scaled["stiffness"], factor)
         share = load / own_load / factor.value
         more = share ** (1 / exponent)
@@ -121,7 +121,7 @@ class GroundMap:
         sinkage = _times(scaled["sinkage"], Number(more, more * math.hypot(of_factor, of_exponent)))
         if sinkage.value > diameter:
             raise ValueError(say("beyond_load", load=load, sinkage=1e3 * sinkage.value, diameter=1e3 * diameter))
-        if given is not None and given < own_load and sinkage.value < grain:
+        if load < own_load and sinkage.value < grain:
             raise ValueError(say("below_load", load=load, sinkage=1e3 * sinkage.value, grain=1e3 * grain))
         speed = self.reference["speed"] * (g * size) ** 0.5
         deep = share == 1.0 or sinkage.value >= self.reference["shallowest"] * diameter
