@@ -63,7 +63,13 @@ class Task:
 
     def on_threads(self, threads: int) -> "Task":
         """The same on so many threads, where its settings leave it open and have anything that takes threads."""
-        return replace(self, settings=_with_threads(self.settings, threads))
+        given = dict(self.settings)
+        if given.get("threads", threads) is not None:
+            return self
+        try:
+            return replace(self, settings=type(self.settings)(**given | {"threads": threads}))
+        except ValidationError:
+            return self
 
 
 @dataclass(frozen=True)
@@ -187,17 +193,6 @@ def received(task: Task, outcome: Outcome) -> None:
             {"status": "done", "reason": "computed elsewhere", "processor_time": outcome.processor_time},
         )
         assert folder.status == "done"
-
-
-def _with_threads(settings: Settings, threads: int) -> Settings:
-    """The same on so many threads, where the settings leave it open and have anything that takes threads."""
-    given = dict(settings)
-    if given.get("threads", threads) is not None:
-        return settings
-    try:
-        return type(settings)(**given | {"threads": threads})
-    except ValidationError:
-        return settings
 
 
 def _replaced(value: Any, of: Callable[[str], str]) -> Any:
