@@ -23,12 +23,13 @@ from dem.shapes.basic import Shape
 from experiments.runs.types import Json
 from rigid.ground.rft_table import Pieces, box_pieces, mesh_pieces, round_pieces
 
+from .plates_fit import direction_of
 from .plates_result import result_of
 from .settings import say
 from .test_settings import BedPlatesSettings
 from .tests import Tested, bed_test, check_bed
 
-__all__ = ["Push", "Shaped", "check", "direction_of", "pushes", "resume", "run", "shaped"]
+__all__ = ["Push", "Shaped", "check", "pushes", "resume", "run", "shaped"]
 
 SAMPLES = 120  # of each part of a way
 BINS = 6  # stretches of the measured part of a way, of which means are kept
@@ -60,12 +61,6 @@ class Shaped:
     body: Shape
     pieces: Pieces
     low: float
-
-
-def direction_of(gamma: float) -> np.ndarray:
-    """Unit vector of the motion, shape [3]; gamma in degrees."""
-    angle = math.radians(gamma)
-    return np.array([math.cos(angle), 0.0, -math.sin(angle)])
 
 
 def pushes(settings: BedPlatesSettings) -> list[Push]:

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from experiments.runs.types import Json
-from rigid.ground.rft_table import Pieces, law_tractions
+from rigid.ground.rft_table import Pieces, jackknife_std, law_tractions
 
-__all__ = ["Fit", "fit_of", "measured_force", "predicted_force"]
+__all__ = ["Fit", "direction_of", "fit_of", "measured_force", "predicted_force"]
 
 Factors = tuple[float, float, float, float]
 START = 1e5  # [N/m3], from which the search starts
@@ -33,6 +33,12 @@ class Fit:
     stds: Factors
     seen: float
     unseen: float
+
+
+def direction_of(gamma: float) -> np.ndarray:
+    """Unit vector of the motion, shape [3]; gamma in degrees."""
+    angle = math.radians(gamma)
+    return np.array([math.cos(angle), 0.0, -math.sin(angle)])
 
 
 def measured_force(run: Json) -> np.ndarray:
@@ -54,9 +60,7 @@ def _faces(run: Json, pieces: Pieces) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _tractions(factors: ArrayLike, friction: float, run: Json, normals: np.ndarray) -> np.ndarray:
-    angle = math.radians(run["gamma"])
-    way = (math.cos(angle), 0.0, -math.sin(angle))
-    return law_tractions(factors, friction, normals, way)
+    return law_tractions(factors, friction, normals, direction_of(run["gamma"]))
 
 
 def _solved(
@@ -98,8 +102,7 @@ def fit_of(runs: Sequence[Json], surfaces: Mapping[str, Pieces], friction: float
         without = [_solved([run for run in runs if run["bed"] != bed], surfaces, friction, terms, one) for bed in beds]
     stds = (0.0, 0.0, 0.0, 0.0)
     if len(without) > 1:
-        spread = np.array(without) - np.mean(without, axis=0)
-        s = np.sqrt((len(beds) - 1) / len(beds) * (spread**2).sum(axis=0))
+        s = jackknife_std(without)
         stds = (float(s[0]), float(s[1]), float(s[2]), float(s[3]))
     plates = list(dict.fromkeys((run["body"], run["gamma"]) for run in runs))
     seen, unseen = [], []

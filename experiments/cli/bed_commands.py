@@ -149,7 +149,8 @@ def _foot(
     """Predict the force of a bed on a shape of your own that is pushed, at the speed of the table's plates."""
     import numpy as np
 
-    from experiments.bed.plates import direction_of, shaped
+    from experiments.bed.plates import shaped
+    from experiments.bed.plates_fit import direction_of
     from experiments.bed.test_settings import SHAPES
     from rigid.ground.rft_table import read_rft
 

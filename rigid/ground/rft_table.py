@@ -156,10 +156,7 @@ class RftTable(BaseModel):
         scale = 1.0 if gravity is None else gravity / self.gravity
         best = scale * law_force(self.factors, self.surface_friction, pieces, depth, direction)
         others = [scale * law_force(f, self.surface_friction, pieces, depth, direction) for f in self.left_out]
-        count = len(others)
-        if count < 2:
-            return best, np.full(3, np.nan)
-        return best, np.sqrt((count - 1) / count * ((np.array(others) - np.mean(others, axis=0)) ** 2).sum(axis=0))
+        return best, jackknife_std(others) if len(others) > 1 else np.full(3, np.nan)
 
     def beyond(self, pieces: Pieces, *, depth: float, direction: ArrayLike) -> list[str]:
         """What is beyond the plates, a sentence each; arguments as in `force`.
@@ -206,6 +203,12 @@ def law_force(factors: ArrayLike, surface_friction: float, pieces: Pieces, depth
     deep = np.maximum(depth - pieces.points[:, 2], 0.0)
     alpha = law_tractions(factors, surface_friction, pieces.normals, way / np.linalg.norm(way))
     return np.asarray((deep * pieces.areas) @ alpha, dtype=np.float64)
+
+
+def jackknife_std(left_out: ArrayLike) -> Array:
+    """Standard deviation of numbers from those without each bed (Efron 1982), shape [n] from shape [bed, n]."""
+    each = np.asarray(left_out, dtype=float)
+    return np.asarray(np.sqrt((len(each) - 1) / len(each) * ((each - each.mean(axis=0)) ** 2).sum(axis=0)))
 
 
 def law_tractions(factors: ArrayLike, surface_friction: float, normals: ArrayLike, direction: ArrayLike) -> Array:
