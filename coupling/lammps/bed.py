@@ -18,7 +18,7 @@ from dem.grains.materials import Facing, Material
 from dem.grains.packing import bulk_packing, surface_height
 from rigid.ground.reaction import State
 
-from .law import MeanContact, law_words, spring_energy
+from .law import MeanContact, kinetic_energy, law_words, spring_energy
 from .process import Lammps
 from .regions import MovingBody, pieces_of
 from .words import box_of, data_file, digits, spheres
@@ -369,8 +369,7 @@ class LammpsBed:
     def kinetic_energy(self) -> float:
         """Kinetic energy of the grains [J], of translation and rotation."""
         rows = self._dumped()
-        moving = 0.5 * self.mass @ (rows[:, 7:10] ** 2).sum(axis=1)
-        return float(moving + 0.2 * (self.mass * self.radius**2) @ (rows[:, 10:13] ** 2).sum(axis=1))
+        return kinetic_energy(self.mass, self.radius, rows[:, 7:10], rows[:, 10:13])
 
     def momentum(self) -> Vector:
         """Momentum of the grains [N s], shape [3], half a step ahead, as the forces bring it (`dem.Bed.momentum`)."""

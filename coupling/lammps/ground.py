@@ -10,7 +10,7 @@ from coupling.poses import Vector
 from rigid.ground.reaction import Facts
 
 from .bed import LammpsBed
-from .law import spring_energy, spring_force
+from .law import kinetic_energy, spring_energy, spring_force
 
 __all__ = ["LammpsGround"]
 
@@ -42,10 +42,9 @@ class LammpsGround(BedGround):
         """Kinetic energy, height and, but for JKR, normal springs of the grains, `copies` times [J]."""
         bed = self.bed
         grains = bed.grains(contacts=False)
-        moving = 0.5 * grains.mass @ (grains.velocity**2).sum(axis=1)
-        turning = 0.2 * (grains.mass * grains.radius**2) @ (grains.spin**2).sum(axis=1)
+        moving = kinetic_energy(grains.mass, grains.radius, grains.velocity, grains.spin)
         height = -float(grains.mass @ (grains.position @ np.array(bed.gravity)))
-        found = {"kinetic": float(moving + turning), "potential": height}
+        found = {"kinetic": moving, "potential": height}
         law = bed.material.cohesion
         if law != "jkr":
             found["normal"] = bed.spring_energy(grains.position)

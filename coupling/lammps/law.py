@@ -30,7 +30,16 @@ from dem.grains.materials import Material
 
 from .words import digits
 
-__all__ = ["OVERLAP", "TANGENTIAL", "MeanContact", "dashpot_input", "law_words", "spring_energy", "spring_force"]
+__all__ = [
+    "OVERLAP",
+    "TANGENTIAL",
+    "MeanContact",
+    "dashpot_input",
+    "kinetic_energy",
+    "law_words",
+    "spring_energy",
+    "spring_force",
+]
 
 Row = Sequence[float] | np.ndarray
 TANGENTIAL = {"displacement": "mindlin", "rescaled": "mindlin_rescale/force"}
@@ -106,6 +115,12 @@ def spring_force(row: Row, cohesion: str, overlap: np.ndarray, radius: np.ndarra
         return np.array([jkr_contact(float(d), radius=float(r), **of_pair)[1] for d, r in pairs], dtype=float)
     push = 2 / 3 * two_e * np.sqrt(radius) * overlap**1.5
     return push - 2 * pi_w * radius if cohesion == "dmt" else push
+
+
+def kinetic_energy(mass: np.ndarray, radius: np.ndarray, velocity: np.ndarray, spin: np.ndarray) -> float:
+    """Of balls, of translation and rotation [J]; shapes [grain_count] or [grain_count, 3], SI units."""
+    moving = 0.5 * mass @ (velocity**2).sum(axis=1)
+    return float(moving + 0.2 * (mass * radius**2) @ (spin**2).sum(axis=1))
 
 
 def spring_energy(row: Row, cohesion: str, overlap: np.ndarray, radius: np.ndarray) -> float:
