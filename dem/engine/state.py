@@ -5,16 +5,14 @@ arrays of the host, packed, for files; a step of a coupling that is repeated nee
 bed leaving the device.
 """
 
-import tempfile
-import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from dem.files.arrays import read_arrays, whole_file
 from dem.grains.materials import Material, of_before
 
 from .bodies import BedBodies
@@ -24,7 +22,7 @@ from .rows import layout_of, read_fields, take_rows, twins_of, write_fields
 from .sleep import Sleeper
 from .values import BedSettings, Sleep, State
 
-__all__ = ["BedState", "Checkpoint", "adopt", "laid_end_to_end", "read_file", "touching_pairs", "whole_file"]
+__all__ = ["BedState", "Checkpoint", "adopt", "laid_end_to_end", "read_file", "touching_pairs"]
 
 STATE_FORMAT = "hedgebed-bed/4"
 # Before there was cohesion, before contacts remembered their last step, and before springs were rescaled; these files
@@ -226,23 +224,13 @@ def _tables(e: Engine) -> tuple[Any, ...]:
     return (e, *(table for table in (e.rest, e.balance) if table.on))
 
 
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """A file to write to that becomes ``path`` at the end, so that this is written whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent) as scratch:
-        yield (part := Path(scratch) / path.name)
-        part.replace(path)
-
-
 def read_file(path: Path) -> tuple[BedSettings, State, str]:
     """Settings, state and precision of a bed that ``BedState.save`` wrote. Raises ValueError where there is none."""
     try:
-        with Path(path).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            stored = {name: file[name] for name in file.files}
+        stored = read_arrays(path)
     except FileNotFoundError:
         raise ValueError(f"{path}: no such file; a bed saved by Bed.save was expected") from None
-    except (zipfile.BadZipFile, ValueError, OSError, EOFError) as problem:
+    except (ValueError, OSError) as problem:
         raise ValueError(f"{path} is not a bed saved by hedgebed ({problem})") from None
     found = str(stored.get("format", "missing"))
     if found not in STATE_FORMATS:

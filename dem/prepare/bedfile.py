@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from dem.engine.core import BedCore
-from dem.engine.state import read_file, whole_file
+from dem.engine.state import read_file
+from dem.files.arrays import opened, whole_file
 from dem.grains.sizes import Json
 
 from .report import B, Prepared, StageReport
@@ -70,7 +71,7 @@ def read_preparation(path: str | Path) -> Prepared:
     """
     path = Path(path)
     try:
-        with zipfile.ZipFile(path) as archive:
+        with opened(path) as archive:
             if _MEMBER not in archive.namelist():
                 read_file(path)
                 return Prepared(None, {}, [])
@@ -80,7 +81,7 @@ def read_preparation(path: str | Path) -> Prepared:
         return Prepared(None, dict(about["recipe"]), [StageReport(**report) for report in about["reports"]])
     except FileNotFoundError:
         raise ValueError(f"{path}: no such file; a bed saved by hedgebed was expected") from None
-    except (zipfile.BadZipFile, OSError, KeyError, TypeError, ValueError) as problem:
+    except (OSError, KeyError, TypeError, ValueError) as problem:
         raise ValueError(f"{path} is not a bed saved by hedgebed ({problem})") from None
 
 

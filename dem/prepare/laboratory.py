@@ -13,6 +13,7 @@ import numpy as np
 from dem.contact.timestep import time_step_for
 from dem.engine.base import FLOOR
 from dem.engine.values import BedFailure
+from dem.files.arrays import read_arrays
 from dem.grains.graded import Graded
 from dem.grains.materials import Facing, Material
 from dem.grains.sizes import Json
@@ -89,8 +90,7 @@ class Laboratory(Preparation[B]):
                 return
             reports, done = [StageReport(**report) for report in kept["reports"]], int(kept["done"])
             if (densest := self._path.with_suffix(".densest.npz")).exists():
-                with np.load(densest) as file:
-                    self._densest = dict(file)
+                self._densest = read_arrays(densest)
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return
         self.bed, self.notes, self.reports, self.done = bed, notes, reports, done

@@ -1,4 +1,4 @@
 """What every experiment shares: the run folder, progress, reading of settings, resuming, the result.
 
-Imports `rigid`, `vis`.
+Imports `dem`, `rigid`, `vis`.
 """

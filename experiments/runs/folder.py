@@ -18,8 +18,6 @@ import os
 import re
 import sys
 import tomllib
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -30,6 +28,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 from pydantic import BaseModel
 
+from dem.files.arrays import read_arrays
 from hedgebed_renamed import BEFORE_RUN_2
 from rigid.result import check_digests, digest_of, plain, read_json, read_result, toml_value, write_json, write_text
 from rigid.series import read_series, replacing, write_series
@@ -59,8 +58,6 @@ RUN_FORMATS = ("hedgebed-run/1", RUN_FORMAT)  # what can be read; the first has 
 _NAMED = ("material", "surface", "surfaces")
 _NAMES = "names-of-all"  # in a checkpoint: a zip file whose list is cut off is read as a shorter one
 _BEFORE = ".before"  # ends the name of the checkpoint before the last
-_DAMAGED = (OSError, EOFError, KeyError, ValueError, NotImplementedError, zipfile.BadZipFile, zlib.error)
-"""What numpy raises for a file of arrays that is cut off or has a wrong byte; its members have checksums."""
 _POLL = 0.2  # Between two looks whether a folder is free [s]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 
@@ -388,13 +385,12 @@ class RunFolder:
             if not path.exists():
                 continue
             try:
-                with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-                    found = {key: archive[key] for key in archive.files}
+                found = read_arrays(path)
                 names = found.pop(_NAMES, None)
                 if names is not None and sorted(found) != names.tolist():
                     raise ValueError(f"it holds {len(found)} arrays, {len(names)} were written")
                 return found
-            except _DAMAGED as error:
+            except (OSError, ValueError) as error:
                 said = f"{path} is damaged ({error}): the work goes on from the checkpoint before it, or from its start"
                 print(f"hedgebed: {said}", file=sys.stderr, flush=True)
         return None

@@ -9,7 +9,6 @@ to the body's lowest point; the ball starts where it first touches a grain.
 import hashlib
 import json
 import math
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dem import Ball, Bed, Material
+from dem.files.arrays import read_arrays
 from dem.prepare.prepare import cache_folder, fingerprint
 
 __all__ = ["BEADS", "SPREAD", "Drop", "drive_down", "drop", "first_touch", "part", "prepared"]
@@ -154,9 +154,8 @@ def part(
     path = cache_folder() / "validate" / f"{name}-{hashlib.sha256(given.encode()).hexdigest()[:24]}.npz"
     if path.exists():
         try:
-            with np.load(path) as kept:
-                return {key: kept[key] for key in kept.files}
-        except (OSError, ValueError, zipfile.BadZipFile):  # ended while it was written by other means; computed anew
+            return read_arrays(path)
+        except (OSError, ValueError):  # ended while it was written by other means; computed anew
             pass
     found = {key: np.asarray(value) for key, value in compute().items()}
     path.parent.mkdir(parents=True, exist_ok=True)
