@@ -84,12 +84,13 @@ def limits_table(limits: Sequence[Limit]) -> list[str]:
     """The lines of the table of docs/limits.md, a table for each group."""
     lines = []
     for fails, heading in _GROUPS.items():
-        lines += [f"### {heading}", "", "| what | how large, which way | runs | from |", "|---|---|---|---|"]
+        lines += [f"### {heading}", "", "| what | how large, which way | runs of | from |", "|---|---|---|---|"]
         for limit in limits:
             if limit.fails == fails:
                 page, _, heading = limit.source.partition("#")
                 link = f"[{page}]({limit.source})"
-                lines.append(f"| {limit.what} | {limit.size} | {', '.join(limit.runs)} | {link} |")
+                runs = ", ".join(kind.removesuffix(" on grains") for kind in limit.runs)
+                lines.append(f"| {limit.what} | {limit.size} | {runs} | {link} |")
         lines.append("")
     return lines
 
