@@ -68,9 +68,8 @@ def table() -> str:
 
 
 def effects() -> str:
-    """The list of effects in Markdown, short: what each is."""
-    lines = ["| effect | what it is |", "|---|---|"]
-    return "\n".join([*lines, *(f"| `{term.id}` | {term.summary} |" for term in EFFECTS.values())])
+    """The names of the effects."""
+    return ", ".join(f"`{term.id}`" for term in EFFECTS.values()) + "."
 
 
 def details() -> str:
