@@ -1,7 +1,7 @@
 """bench.json of ``benchmarks.gpu`` as Markdown, beside what others have published.
 
-python -m benchmarks.sweep.table DIR/bench.json                      # prints the Markdown
-python -m benchmarks.sweep.table DIR/bench.json docs/performance.md  # puts it between the two marks in that file
+python -m benchmarks.sweep.table DIR/bench.json                            # prints the Markdown
+python -m benchmarks.sweep.table DIR/bench.json docs/notes/performance.md  # puts it between the two marks there
 """
 
 import sys
