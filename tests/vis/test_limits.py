@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 
 import vis
-from vis.page.limits import KINDS, all_limits, kind_of, limits_table, limits_words, put_table
+from vis.page.limits import KINDS, all_limits, kind_of, limits_lines, limits_words, put_lines
 from vis.page.report import Report
 
 ROOT = Path(vis.__file__).parents[1]
 PAGE = ROOT / "docs" / "limits.md"
 
 
-def test_the_page_shows_the_table_of_the_file(tmp_path):
+def test_the_page_shows_the_limits_of_the_file(tmp_path):
     copy = tmp_path / "limits.md"
     copy.write_text(PAGE.read_text())
-    put_table(copy)
+    put_lines(copy)
     assert copy.read_text() == PAGE.read_text()  # python -m vis.page.limits docs/limits.md writes it anew
 
 
@@ -74,5 +74,5 @@ def test_marks_that_are_not_there_and_kinds_that_are_none_are_refused(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("no table\n")
     with pytest.raises(ValueError, match="limits: begin"):
-        put_table(page)
-    assert limits_table([]) == limits_table(())
+        put_lines(page)
+    assert limits_lines([]) == limits_lines(())

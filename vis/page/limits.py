@@ -1,6 +1,6 @@
-"""Known biases (limits.toml): the table of docs/limits.md, and what a report says of its kind of run.
+"""Known biases (limits.toml): the lists of docs/limits.md, and what a report says of its kind of run.
 
-`python -m vis.page.limits docs/limits.md` puts the table between the marks of that page.
+`python -m vis.page.limits docs/limits.md` puts the lists between the marks of that page.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 from .marks import insert
 
-__all__ = ["KINDS", "Limit", "all_limits", "kind_of", "limits_table", "limits_words", "put_table"]
+__all__ = ["KINDS", "Limit", "all_limits", "kind_of", "limits_lines", "limits_words", "put_lines"]
 
 KINDS = ("spike on grains", "platform on grains", "bed", "planar model", "diagnosis")
 """Kinds of runs that limits concern."""
@@ -80,27 +80,27 @@ def limits_words(result: Mapping[str, Any]) -> list[str]:
     return [limit.said for limit in all_limits() if kind in limit.runs and limit.said]
 
 
-def limits_table(limits: Sequence[Limit]) -> list[str]:
-    """The lines of the table of docs/limits.md, a table for each group."""
+def limits_lines(limits: Sequence[Limit]) -> list[str]:
+    """The lines of the lists of docs/limits.md, one for each group: what, which runs, how large, from which page."""
     lines = []
     for fails, heading in _GROUPS.items():
-        lines += [f"### {heading}", "", "| what | how large, which way | runs of | from |", "|---|---|---|---|"]
+        lines += [f"### {heading}", ""]
         for limit in limits:
             if limit.fails == fails:
                 page, _, heading = limit.source.partition("#")
                 link = f"[{page}]({limit.source})"
                 runs = ", ".join(kind.removesuffix(" on grains") for kind in limit.runs)
-                lines.append(f"| {limit.what} | {limit.size} | {runs} | {link} |")
+                lines.append(f"- **{limit.what}** ({runs}): {limit.size} {link}")
         lines.append("")
     return lines
 
 
-def put_table(page: Path) -> None:
-    """Write the table anew between the marks of `page`. Raises ValueError where the marks are not there."""
-    table = "\n".join(limits_table(all_limits()))
-    text = insert(page.read_text(encoding="utf-8"), table, _MARKS, page=str(page))
+def put_lines(page: Path) -> None:
+    """Write the lists anew between the marks of `page`. Raises ValueError where the marks are not there."""
+    lines = "\n".join(limits_lines(all_limits()))
+    text = insert(page.read_text(encoding="utf-8"), lines, _MARKS, page=str(page))
     page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    put_table(Path(sys.argv[1]))
+    put_lines(Path(sys.argv[1]))
