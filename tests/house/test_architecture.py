@@ -30,7 +30,7 @@ def test_what_the_page_names_in_a_file_is_in_that_file():
 @pytest.mark.parametrize("name", PACKAGES)
 def test_the_page_lists_the_package_with_the_clause_that_begins_its_docstring(name):
     first = re.split(r"\n\n", PACKAGES[name])[0].replace("\n", " ")
-    clause = re.search(rf"^\| `{name.replace('.', '/')}/` \| (.*) \|$", PAGE, re.MULTILINE)[1].rstrip(".")
+    clause = re.search(rf"^- `{name.replace('.', '/')}/`: (.*)$", PAGE, re.MULTILINE)[1].rstrip(".")
     assert len(clause.split()) >= 4 and re.match(rf"{re.escape(clause)}( \(|[.,:;])", first), "whole, or up to a comma"
 
 
