@@ -27,6 +27,8 @@ __all__ = [
 
 AGREEMENT = 5.0
 """Degrees within which the paper calls transition angles in agreement."""
+ALONG = 0.5
+"""Degrees below 0 up to which a platform is said to move along the surface: no angle is read more finely."""
 STATED_ANGLE = 22.5
 """The initial trajectory angle by which the paper knows its low-torque experiments [degrees]."""
 LASTING = 0.1
@@ -308,14 +310,14 @@ def _exceeding(trials: Trials, group: Group) -> Claim:
 
 def _negative(trials: Trials, group: Group) -> Claim:
     """Which experiments on granular ground leave downwards."""
-    below = [place for place, angle in group.angles.items() if angle is not None and angle < 0]
+    below = [place for place, angle in group.angles.items() if angle is not None and angle < -ALONG]
     brakes = sum(trials.is_brake(place) for place in below)
     note = say("negative_listed", listed="; ".join(f"{_where(p)}: {group.angles[p]:+.1f}" for p in below) or "none")
     wanted = [place for place in group.angles if trials.is_brake(place)]
     note += _of_grounds(trials, wanted) if group.name == "springs" else say("negative_sand")
     return Claim(
         quote=say("negative_quote"), compared=say("negative_compared", group=group.words),
-        stated=say("five_counted", brakes=4, motors=0), judged_by=say("negative_judged"),
+        stated=say("five_counted", brakes=4, motors=0), judged_by=say("negative_judged", along=ALONG),
         ours=say("five_counted", brakes=brakes, motors=len(below) - brakes),
         met=set(below) == set(wanted) if group.whole else None, note=note + group.lacks,
     )  # fmt: skip
@@ -332,7 +334,7 @@ def _of_grounds(trials: Trials, places: Sequence[Place]) -> str:
         told += here
     if len(told) <= len(places):
         return note
-    return note + say("negative_grounds", below=sum(angle < 0 for _, angle in told), count=len(told))
+    return note + say("negative_grounds", below=sum(angle < -ALONG for _, angle in told), count=len(told))
 
 
 def _hops(trials: Trials) -> Iterator[Claim]:

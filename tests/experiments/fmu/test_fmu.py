@@ -112,12 +112,13 @@ def test_fmpy_finds_no_fault_in_the_file(fmu):
 
 
 def test_a_tumble_is_that_of_hedgebed_tumble_to_the_second_order_of_the_inner_step(fmu, tmp_path):
-    trial, errors = of_tumble(torque=0.22, surface="sand"), []
+    soft = {"torque": 0.22, "surface": "sand", "stiffness": 140.0, "damping": 3.0}
+    trial, errors = of_tumble(**soft), []
     fine = build_fmu(tmp_path / "fine.fmu", FmuSettings(longest_step=STEP / 12))
     for file in (fmu, fine):  # of inner steps of 1/3 and 1/12 ms
         found = fmpy.simulate_fmu(
             str(file), stop_time=0.15, step_size=STEP, output_interval=STEP,
-            start_values={"torque": 0.22, "surface": "sand"}, output=[*CHANNELS, "energy_residual", "torque_work"],
+            start_values=soft, output=[*CHANNELS, "energy_residual", "torque_work"],
         )  # fmt: skip
         errors.append(largest_error(found, trial, until=0.15))
         assert found["theta"][-1] > 0.01  # it turns over
@@ -127,13 +128,14 @@ def test_a_tumble_is_that_of_hedgebed_tumble_to_the_second_order_of_the_inner_st
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("surface", ["brick", "sand"])
-def test_after_the_last_tip_lifts_off_the_torque_ends_within_an_inner_step(fmu, surface):
+@pytest.mark.parametrize("ground", [{"surface": "brick"}, {"surface": "sand", "stiffness": 140.0, "damping": 3.0}])
+def test_after_the_last_tip_lifts_off_the_torque_ends_within_an_inner_step(fmu, ground):
+    given = {"torque": 0.22, **ground}
     found = fmpy.simulate_fmu(
         str(fmu), stop_time=0.9, step_size=STEP, output_interval=STEP, output=[*CHANNELS, "normal_force[1]"],
-        start_values={"torque": 0.22, "surface": surface},
+        start_values=given,
     )  # fmt: skip
-    trial = of_tumble(torque=0.22, surface=surface)
+    trial = of_tumble(**given)
     exact = simulate(trial, duration=0.9, sample_interval=STEP)
     assert exact.state_names[-1] == "hop"
     impulse = trial.torque * 4e-4 / trial.inertia  # tau H / J [rad/s]: of one inner step

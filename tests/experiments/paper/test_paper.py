@@ -87,7 +87,7 @@ def test_a_brake_trial_on_grains_leaves_below_zero_where_the_ground_is_soft_and_
         ("spring-damper", 1.0), ("katsuragi-durian", 0.5), ("katsuragi-durian", 0.05), ("bekker", 0.05), ("rft", 0.05),
     }  # fmt: skip
     stiffnesses = sorted({job.varied["stiffness"] for job in jobs if job.varied["stiffness"] is not None})
-    assert stiffnesses[1:] == [140.0, 150.0]
+    assert stiffnesses[1:] == [77.8, 150.0]
     at = {(job.varied["stiffness"], job.varied["rebound"]): job.trial for job in jobs if job.varied["stiffness"]}
     corners = {
         (stiffness, rebound): math.degrees(

@@ -48,7 +48,7 @@ def test_a_tumble_is_recorded_as_its_own_model_would_be(runs, tmp_path):
                 # The torque begins at once: around t = 0 a step of 0.4 ms and the IMU's window see it differently.
                 assert away[np.abs(found["t_s"]) > 5e-3].max() < most, channel
     surface = campaign.tables.surface
-    assert (surface.stiffness, surface.mu_d, surface.granular) == (140.0, 0.3, False)
+    assert (surface.stiffness, surface.mu_d, surface.granular) == (77.8, 0.3, False)
     assert main(["campaign", "check", str(into), "--out", str(tmp_path / "checked"), "--quiet"]) == 0
 
 
@@ -75,7 +75,7 @@ def test_k_and_c_of_a_row_are_twice_those_fitted_to_a_spike_in_the_same_grains(r
     [
         (
             ("--also", "brick"),
-            "has stiffness = 15000.* and .* 140.0: .* runs that differ only in gravity, torque or seed",
+            "has stiffness = 15000.* and .* 77.8: .* runs that differ only in gravity, torque or seed",
         ),
         (("--depth-std", "1e-4"), "--depth-std is given, and .* is a run of a tumble"),
     ],
