@@ -1,4 +1,4 @@
-"""What result.json says of all tips and gravities together: laws without dimensions, K and C anywhere in the design."""
+"""Entries of result.json for all tips and gravities together: dimensionless laws, and K and C within the design."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -84,7 +84,7 @@ def crossed_result(cells: Mapping[str, Data], progress: Progress) -> Crossed:
 
 
 def _usable_first(laws: Sequence[Json]) -> list[Json]:
-    """The laws in their order, those with a parameter at a bound behind all others."""
+    """The laws in their order, but those with a parameter at a bound last."""
     usable = [law for law in laws if not law["at_bound"]] or list(laws)
     first = ranked(usable)
     rest = sorted((law for law in laws if law not in first), key=lambda law: float(law["held_out"]["beds"]))
@@ -94,7 +94,7 @@ def _usable_first(laws: Sequence[Json]) -> list[Json]:
 
 
 def _unlike_beds(cells: Mapping[str, Data]) -> list[str]:
-    """A warning where cells have different beds: an interval takes all beds for beds of each cell."""
+    """A warning if cells have different beds: an interval assumes that each cell has all beds."""
     beds = {name: set(data.beds) for name, data in cells.items()}
     fewest = min(beds, key=lambda name: len(beds[name]))
     every = set.union(*beds.values())

@@ -1,14 +1,15 @@
-"""Which runs tell K and C: two beds first, then a run where the answer is least sure, until it is sure or time is up.
+"""Choice of the runs that identify K and C: two beds, then further runs until the tolerance or the budget is reached.
 
-It does not stop before `LEAST_BEDS` beds: of two or three that happen to be alike, the interval is too narrow, and a
-rule that stops at the first narrow one would choose those. `experiments.lawfit.synthetic` measures what is left of it.
+The design does not stop before `LEAST_BEDS` beds. Two or three beds that agree by chance have an interval that is too
+narrow, and stopping at the first narrow interval would select them. `experiments.lawfit.synthetic` measures the bias
+that remains.
 
-Every bed gets the same drives, drops and a placement under the load. After each step the spring-damper is fitted. How
-sure it is, is half of the 90 % interval of its force at the middle of the depth and the fastest speed, over the force.
-If C is not told from 0, and is most of it, each bed gets one more drive at twice the fastest speed. Else another bed is
-added. Of several cells (`experiments.lawfit.cells`) each begins with two beds, and the next step is always made in the
-one that is least sure. Costs are estimates made beforehand, so that the same settings lead to the same runs on every
-machine.
+Every bed gets the same drives, drops and a placement under the load. After each step the spring-damper is fitted. Its
+uncertainty is half of the 90 % interval of its force at half the depth and the fastest speed, over the force. If C does
+not differ significantly from 0 and causes most of the uncertainty, each bed gets one more drive at twice the fastest
+speed; otherwise another bed is added. Of several cells (`experiments.lawfit.cells`) each begins with two beds, and the
+next step is made in the cell with the largest uncertainty. Costs are estimates made in advance, so that the same
+settings lead to the same runs on every machine.
 """
 
 from collections.abc import Sequence
@@ -37,17 +38,17 @@ from .settings import LawFitSettings, say
 __all__ = ["Designed", "check_design", "compute_runs", "how_sure", "middle_force", "sure_enough"]
 
 LEAST_BEDS = 4
-"""Beds below which no interval is narrow enough to stop at [1]."""
+"""Least number of beds before the design may stop [1]."""
 
 
 @dataclass
 class Designed:
-    """What was computed, why, and what it told."""
+    """The runs that were computed, and why."""
 
     cells: dict[str, Data] = field(default_factory=dict)  # Name of the cell -> its runs
     steps: list[Json] = field(default_factory=list)
-    """For each step: cell, why, run folders, their cost by estimate [s], and how sure the force was after it [1]."""
-    notes: list[str] = field(default_factory=list)  # Why it ended
+    """For each step: cell, why, run folders, their estimated cost [s], and the relative uncertainty after it [1]."""
+    notes: list[str] = field(default_factory=list)  # Why the design ended
 
 
 @dataclass
@@ -61,7 +62,7 @@ class _Growing:
     paths: list[Path] = field(default_factory=list)
     data: Data | None = None
     sure: float = float("inf")
-    of_rate: bool = False  # Whether C is most of what is not known, and cannot be told from 0
+    of_rate: bool = False  # Whether C causes most of the uncertainty and does not differ significantly from 0
     ended: bool = False
 
     def next_step(self, tolerance: float) -> tuple[str, list[Member]]:
@@ -78,7 +79,7 @@ class _Growing:
         return why, [_member(self.cell, seed), *more]
 
     def take(self, members: Sequence[Member], home: Path, settings: LawFitSettings) -> None:
-        """Fit the runs that were made, `members` being new."""
+        """Fit all runs of the cell, of which `members` are new."""
         self.fast = self.fast or any(member.variant.what != BASE for member in members)
         self.paths += [home / member.folder for member in members]
         self.beds = len({member.seed for member in members} | set(self.seeds[: self.beds]))
@@ -107,7 +108,7 @@ def _seeds(settings: LawFitSettings) -> list[int]:
 
 
 def check_design(settings: LawFitSettings) -> None:
-    """Raise ValueError for runs that cannot be computed, and a budget below what the first two beds cost."""
+    """Raise ValueError for runs that cannot be computed, and for a budget below the cost of the first two beds."""
     Where.of(settings).check()
     cells, seeds = cells_of(settings), _seeds(settings)[:2]
     for cell in cells:
@@ -127,17 +128,17 @@ def check_design(settings: LawFitSettings) -> None:
 
 
 def _cost(cell: Cell, members: Sequence[Member]) -> float:
-    """What `members` take one core, by estimate [s]."""
+    """Estimated cost of `members` [s of one core]."""
     plain = [core_hours(member.settings, bed=cell.new_bed) for member in members if member.variant.what == BASE]
     further = len(plain) * cost_of_further(cell)
     return further + 3600 * sum([*plain, *(member.core_hours for member in members if member.variant.what != BASE)])
 
 
 def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress) -> Designed:
-    """Compute runs, or find them done, until the force is sure in every cell or the budget is used up.
+    """Compute runs, or read those that are done, until every cell reaches the tolerance or the budget is spent.
 
-    Beds that come whatever is found are computed together with the first two. Raises RuntimeError where a run fails:
-    what was computed is kept, and resuming goes on with it.
+    Beds that are needed in any case are computed together with the first two. Raises RuntimeError if a run fails: the
+    finished runs are kept, and resuming continues from them.
     """
     home = Path(settings.members) if settings.members else folder.path / "members"
     growing = [_Growing(cell, _seeds(settings)) for cell in cells_of(settings)]
@@ -169,10 +170,10 @@ def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress
 
 
 def _ended(one: _Growing, tolerance: float) -> str:
-    """Why a cell gets no more runs; empty where it does."""
+    """Why a cell gets no more runs; empty if it gets some."""
     numbers = {"now": one.sure, "tolerance": tolerance, "least": LEAST_BEDS}
     if sure_enough(one.sure, one.beds, tolerance):
-        return say("told", **numbers)
+        return say("within_tolerance", **numbers)
     if one.beds == len(one.seeds) and (one.fast or not one.of_rate):
         return say("enough_beds", beds=one.beds, **numbers)
     return ""
@@ -191,8 +192,8 @@ def _make_further(cell: Cell, member: Member, path: Path, progress: Progress) ->
 
 
 def _certain(cells: Sequence[Cell], seeds: Sequence[int], budget: float) -> list[Member]:
-    """Beds that come whatever is found: the first two of each cell, and up to `LEAST_BEDS` where the budget reaches
-    those in all cells, even where each of them gets the faster drive, which is decided later.
+    """Beds that are needed in any case: the first two of each cell, or `LEAST_BEDS` of each if the budget is sufficient
+    for these in all cells, each with the faster drive, which is decided later.
     """
     first = seeds[:LEAST_BEDS]
     most = [_cost(cell, [_member(cell, seed, faster=faster) for seed in first for faster in (False, True)])
@@ -201,9 +202,9 @@ def _certain(cells: Sequence[Cell], seeds: Sequence[int], budget: float) -> list
 
 
 def _make(todo: Sequence[Member], certain: Sequence[Member], home: Path, where: Where, progress: Progress) -> None:
-    """Compute the runs `todo` that are not done, and those that are `certain` where others can be computed beside them.
+    """Compute the runs of `todo` that are not done, and those of `certain` if several processes are available.
 
-    Raises RuntimeError, naming the run, for the first of `todo` that fails, after the others.
+    If runs of `todo` fail, the others are finished first; then RuntimeError names the first that failed.
     """
     planned = [member.planned(home) for member in todo]
     more = [member.planned(home) for member in certain]

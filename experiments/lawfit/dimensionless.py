@@ -1,4 +1,4 @@
-"""Laws without dimensions, fitted to all tips and gravities together.
+"""Dimensionless laws, fitted to all tips and gravities together.
 
 With rho the bulk density, D the diameter of the tip, x = z / D and Fr = v / sqrt(g D), the force of loading is
 
@@ -9,10 +9,10 @@ each tip shape s, and k (A / D^2) x^n ("area"), with the area A in the plane of 
 Parts of the rate: c Fr ("damper"), b Fr^2 ("square"), b Fr^2 exp(-x / (T Fr)) ("early"), and the static part times a I
 ("inertial", I the inertial number of `experiments.grains.similarity`). With "area", b Fr^2 is times A / D^2.
 
-"early" follows what Roth, Han and Jaeger (arXiv 1910.10358) report: the dependence on speed crosses over to one on
-depth at a characteristic time after the impact, so the force is not a sum of a part of the depth and a part of the
-rate. The form is ours, the simplest that does so: the time since the impact, z / v, is compared with T sqrt(D / g).
-"one-pair" is the rival without scaling: one K and C in N/m and N s/m for all tips and gravities.
+"early" follows Roth, Han and Jaeger (arXiv 1910.10358): at a characteristic time after the impact the dependence on
+speed becomes one on depth, so the force is not a sum of a depth term and a rate term. The form is ours, the simplest
+with this property: the time since the impact, z / v, is compared with T sqrt(D / g). "one-pair" is the rival without
+scaling: one K and C in N/m and N s/m for all tips and gravities.
 
 Each cell is weighted by its rms force, so that all count the same.
 """
@@ -130,8 +130,8 @@ def _inertial(of: Foundation) -> float:
 def cross(cells: Mapping[str, Data]) -> CrossedData:
     """The runs of all cells without dimensions. Beds of one seed are one bed in all cells.
 
-    Speeds are typed to a few digits, so one Froude number of the design differs a little between cells: numbers that
-    differ by less than `_SAME` are one, the least of them.
+    Speeds have a few digits, so a Froude number of the design differs a little between cells. Numbers that differ by
+    less than `_SAME` are replaced by the smallest of them.
     """
     runs = []
     for name, data in cells.items():
@@ -178,11 +178,11 @@ class CrossedLaw:
 
     @property
     def rate_parameter(self) -> str | None:
-        """The free parameter that the rate enters by; None if there is none."""
+        """The free parameter of the rate term; None if there is none."""
         return _RATES[CROSSED[self.name][1]] if self.with_rate else None
 
     def without_rate(self) -> "CrossedLaw":
-        """The same without its part of the rate."""
+        """The same law without its rate term."""
         return replace(self, with_rate=False)
 
     def bounds(self) -> tuple[Array, Array]:
@@ -272,7 +272,7 @@ def crossed_laws(data: CrossedData) -> list[CrossedLaw]:
 
 @dataclass(frozen=True)
 class Tangent:
-    """The spring-damper that is right at a load and a speed."""
+    """The spring-damper tangent to a law at a load and a speed."""
 
     load: float  # [N]
     speed: float  # [m/s]
@@ -284,7 +284,7 @@ class Tangent:
 def tangent_at(fitted: LawFit[CrossedLaw], of: Foundation, load: float, speed: float) -> Tangent | None:
     """K and C of a crossed law at a load [N] and a speed [m/s], with 90 % intervals over beds.
 
-    None where the law bears the load at the surface, or at no depth down to ten tips.
+    None if the law supports the load at the surface, or at no depth down to ten tip diameters.
     """
     found = [_tangent(fitted.candidate, theta, of, load, speed) for theta in (fitted.theta, *fitted.left_out)]
     if any(one is None for one in found):

@@ -1,8 +1,8 @@
 """`hedgebed calibrate RUN ...`: laws fitted to finished runs, compared, and written as ground files.
 
-result.json holds the numbers; series/bins.csv what was fitted with what each law says there; ground.toml the
-spring-damper and laws/NAME.toml every law that a ground can be. Of several tips or gravities these are of the first,
-and cells/NAME has the same of each.
+result.json has the numbers, series/bins.csv the fitted rows with the force of each law, ground.toml the spring-damper,
+and laws/NAME.toml every law that can be a ground. With several tips or gravities these are of the first, and cells/NAME
+has the same of each.
 """
 
 from dataclasses import asdict
@@ -79,7 +79,7 @@ def _compute(settings: LawFitSettings, folder: RunFolder, progress: Progress) ->
 
 
 def _quantities(cells: list[OneCell]) -> dict[str, Json]:
-    """The numbers that a person would quote: of one cell all of them, of several K, C and the error of each."""
+    """The numbers to quote: all of them for one cell; K, C and the error of each for several."""
     if len(cells) == 1:
         return cells[0].quantities
     names = ("stiffness", "damping", "held_out_error")
@@ -87,7 +87,7 @@ def _quantities(cells: list[OneCell]) -> dict[str, Json]:
 
 
 def _entries(cell: OneCell) -> Json:
-    """What result.json says of one cell."""
+    """The entries of one cell in result.json."""
     data = cell.data
     return {
         "foundation": asdict(data.foundation), "best": cell.best, "laws": cell.laws,
@@ -98,7 +98,7 @@ def _entries(cell: OneCell) -> Json:
 
 
 def _more_tables(cells: list[OneCell]) -> list[Json]:
-    """Errors beyond the runs, and what further runs found, where there are any."""
+    """Tables of errors beyond the fitted range and of further runs, if there are any."""
     beyond = beyond_rows({cell.name: cell.laws for cell in cells})
     further = further_rows({cell.name: cell.data for cell in cells})
     found = [{"title": say("table_beyond"), **beyond}, {"title": say("table_further"), **further}]
@@ -106,7 +106,7 @@ def _more_tables(cells: list[OneCell]) -> list[Json]:
 
 
 def _named(cells: list[OneCell], what: str) -> list[str]:
-    """The sentences of all cells, each with the name of its cell where there are several."""
+    """The sentences of all cells, each with the name of its cell if there are several."""
     before = {cell.name: f"{cell.name}: " if len(cells) > 1 else "" for cell in cells}
     return [f"{before[cell.name]}{text}" for cell in cells for text in getattr(cell, what)]
 

@@ -1,7 +1,7 @@
 """A fitted law for use without hedgebed: law.json, and law.py with functions that need Python alone.
 
 law.py has the law itself, its parameters, those of the fits that leave out one bed each (for intervals), and the range
-of the runs. Of several tips and gravities it is the best law without dimensions.
+of the runs. With several tips and gravities it is the best dimensionless law.
 """
 
 import inspect

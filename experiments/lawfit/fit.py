@@ -1,15 +1,15 @@
 """A law fitted to runs in several beds, each bed with a random factor of its own.
 
 The force of bin k in bed b is F = (1 + u_b) f(z, dz/dt; theta) + e, with u_b of variance tau^2 and e of variance
-sigma^2, both normal and independent: beds differ in strength as a whole. The covariance within a bed is then
-sigma^2 (I + lambda f f^T) with lambda = tau^2 / sigma^2 (Laird and Ware, Biometrics 38 (1982), 963). lambda is that of
-the largest likelihood at the present theta, theta that of generalised least squares at the present lambda and f, and
-both are repeated.
+sigma^2, both normal and independent: each bed is stronger or weaker as a whole. The covariance within a bed is then
+sigma^2 (I + lambda f f^T) with lambda = tau^2 / sigma^2 (Laird and Ware, Biometrics 38 (1982), 963). Two
+steps alternate until nothing changes: lambda by maximum likelihood at the present theta, and theta by generalised least
+squares at the present lambda and f.
 
-Bins of one run are not independent, as grains are larger than bins. So standard deviations do not come from that
-likelihood but from leaving out one bed at a time, with the largest of the usual three forms of the variance,
-(G - 1) / G sum (theta_(-g) - theta)^2, and intervals from Student's t of G - 1 degrees of freedom for G beds
-(MacKinnon, Nielsen and Webb, J. Applied Econometrics 38 (2023), 671). `experiments.lawfit.synthetic` checks that.
+Bins of one run are not independent, because grains are larger than bins. So standard deviations do not come from that
+likelihood but from a jackknife over beds, with the largest of the usual three forms of the variance,
+(G - 1) / G sum (theta_(-g) - theta)^2. Intervals have Student's t with G - 1 degrees of freedom for G beds (MacKinnon,
+Nielsen and Webb, J. Applied Econometrics 38 (2023), 671). `experiments.lawfit.synthetic` measures their coverage.
 """
 
 import math
@@ -37,9 +37,9 @@ __all__ = [
 ]
 
 CONFIDENCE = 0.9
-"""Of all intervals."""
+"""Confidence level of all intervals."""
 _ROUNDS = 8
-"""How often theta and lambda are repeated at most; two to four are enough."""
+"""Largest number of alternations of theta and lambda; two to four are sufficient."""
 
 
 @dataclass(frozen=True)
@@ -65,19 +65,19 @@ class Fittable(Protocol):
 
     @property
     def rate_parameter(self) -> str | None:
-        """The free parameter that the rate enters by; None if there is none."""
+        """The free parameter of the rate term; None if there is none."""
 
     def without_rate(self) -> Self:
-        """The same with that parameter kept at 0."""
+        """The same law with that parameter held at 0."""
 
     def bounds(self) -> tuple[Array, Array]:
         """Smallest and largest value of each free parameter, shapes [parameter_count]."""
 
     def start(self, data: Data) -> Array:
-        """A first guess, shape [parameter_count]."""
+        """Initial values of the fit, shape [parameter_count]."""
 
     def predict(self, theta: Array, data: Data) -> Array:
-        """What `data.force` would be, shape [row_count]."""
+        """Predicted `data.force`, shape [row_count]."""
 
 
 Law = TypeVar("Law", bound=Fittable)
@@ -90,12 +90,12 @@ class LawFit(Generic[Law]):
     candidate: Law
     data: Data
     theta: Array  # Free parameters, shape [parameter_count]
-    left_out: Array  # theta without each bed, shape [bed_count, parameter_count]; empty where it was not asked for
+    left_out: Array  # theta without each bed, shape [bed_count, parameter_count]; empty without jackknife
     share: float  # lambda [1/N2]
     sigma: float  # [N]
     log_likelihood: float
     free_rate: Estimated | None = None
-    """The parameter of the rate by a fit in which it came out below 0, where it is kept at 0 here."""
+    """Value of the rate parameter in a free fit that gave less than 0; this fit then holds it at 0."""
 
     @property
     def bed_spread(self) -> float:
@@ -106,7 +106,8 @@ class LawFit(Generic[Law]):
     def bed_spread_interval(self) -> tuple[float, float]:
         """90 % interval of `bed_spread` [1]: that of a standard deviation of as many normal factors as there are beds.
 
-        The noise within a bed is not counted, so that it is narrow where that noise is most of what beds differ by.
+        The noise within a bed is not included. So the interval is too narrow where that noise causes most of the
+        differences between beds.
         """
         free = len(self.data.beds) - 1
         ends = (0.5 + 0.5 * CONFIDENCE, 0.5 - 0.5 * CONFIDENCE)
@@ -122,8 +123,8 @@ class LawFit(Generic[Law]):
     def information(self) -> float:
         """Akaike's information criterion, corrected for few rows: smaller is better [1].
 
-        It takes bins as independent, which they are not, so that a difference grows with the number of bins. No law is
-        called better for it.
+        It assumes independent bins, which they are not, so differences grow with the number of bins. No law is
+        chosen by it.
         """
         count, size = len(self.theta) + 2, len(self.data.force)
         return -2 * self.log_likelihood + 2 * count + 2 * count * (count + 1) / max(1, size - count - 1)
@@ -134,10 +135,10 @@ class LawFit(Generic[Law]):
         return interval(float(self.theta[place]), self.left_out[:, place])
 
     def at_bound(self, name: str) -> bool:
-        """Whether the parameter came out at the end of what it may be, or cannot be told from it.
+        """Whether the parameter is at a bound, or does not differ significantly from one.
 
-        Of a parameter with two ends, as an exponent, its 90 % interval must lie between them. A strength has one, 0:
-        there the value counts, as the interval of a strength is wide wherever its exponent is free.
+        The 90 % interval of a parameter with two bounds, such as an exponent, must lie between them. A strength has one
+        bound, 0; there only the value is tested, because its interval is wide if the exponent is free.
         """
         place, found = self.candidate.free.index(name), self.parameter(name)
         low, high = (float(ends[place]) for ends in self.candidate.bounds())
@@ -149,7 +150,7 @@ class LawFit(Generic[Law]):
 
 
 def interval(value: float, left_out: Array) -> Estimated:
-    """The uncertainty of `value` from those that leave out one bed each (see the module), shape [bed_count >= 2]."""
+    """Jackknife uncertainty of `value` (see the module); `left_out`: values without a bed, shape [bed_count >= 2]."""
     count = len(left_out)
     std = math.sqrt((count - 1) / count * float(np.sum((left_out - value) ** 2)))
     return _within(value, std, count)
@@ -167,7 +168,7 @@ def _within(value: float, std: float, count: int) -> Estimated:
 
 
 def fit_usable(fitted: LawFit[Law]) -> LawFit[Law]:
-    """`fitted`, or where its parameter of the rate is below 0, which no law allows, a fit with it at 0."""
+    """`fitted`; if its rate parameter is below 0, which no law allows, a new fit with that parameter at 0."""
     rate = fitted.candidate.rate_parameter
     if rate is None or fitted.parameter(rate).value >= 0:
         return fitted
@@ -194,7 +195,7 @@ def fit_law(candidate: Law, data: Data, *, jackknife: bool = True) -> LawFit[Law
 
 
 def _moments(data: Data, force: Array) -> tuple[Array, tuple[Array, Array]]:
-    """Of each bed: r.r, and f.r and f.f, shapes [bed_count]; r = F - f."""
+    """For each bed r.r, and f.r and f.f, with the residual r = F - f, shapes [bed_count]."""
     left, beds, count = data.force - force, data.bed_of_row, len(data.beds)
 
     def sums(values: Array) -> Array:
@@ -204,7 +205,7 @@ def _moments(data: Data, force: Array) -> tuple[Array, tuple[Array, Array]]:
 
 
 def _best_share(data: Data, force: Array) -> float:
-    """lambda of the largest likelihood at this force [1/N2]; 0 where a factor of beds does not help."""
+    """lambda of the largest likelihood at this force [1/N2]; 0 if factors of beds do not increase the likelihood."""
     size, (square, (cross, own)) = len(data.force), _moments(data, force)
     scale = float(own.mean()) or 1.0
 
@@ -219,12 +220,12 @@ def _best_share(data: Data, force: Array) -> float:
 
 
 def solve_law(candidate: Fittable, data: Data, theta: Array, share: float | None) -> tuple[Array, float]:
-    """theta and lambda; `share`: a lambda that is kept."""
+    """theta, shape [parameter_count], and lambda [1/N2]; `share`: a fixed lambda, or None to fit it."""
     size = np.where(theta != 0, np.abs(theta), 1.0)
     low, high = candidate.bounds()
     theta = np.clip(theta, low + 1e-9 * size, high - 1e-9 * size)
     beds, count = data.bed_of_row, len(data.beds)
-    # In forces of their own size: a solver stops at an absolute slope, which tiny forces have everywhere.
+    # Forces are scaled by their rms: the solver stops at an absolute slope, which tiny forces always have.
     unit = float(np.sqrt(np.mean(data.force**2))) or 1.0
     force = candidate.predict(theta, data)
     kept = 0.0 if share is None else share

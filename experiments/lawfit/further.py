@@ -1,7 +1,7 @@
-"""Further runs in a bed that its drives do not have: other loads, unloading and loading again, a way sideways.
+"""Further runs in the bed of a finished member: other loads, unloading and reloading, sideways motion.
 
-They are made on the very bed of a finished member and kept in its folder: a series and a note each, found again as long
-as the member is. Such a run is short, so it is made from its beginning again where it was stopped.
+Each is kept as a series and a note in the folder of that member and used again with it. Such a run is short: if it is
+stopped, it starts again from its beginning.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -49,14 +49,14 @@ class Further:
 
 
 def further_runs(cell: Cell) -> list[Further]:
-    """Those of each bed of a cell, the load of every member left out."""
+    """The further runs of each bed of a cell, without the load of the member itself."""
     loads = [Further("placement", load) for load in cell.loads if load != cell.base.weight]
     unloaded = [Further("unloading", depth) for depth in cell.unload_depths]
     return [*loads, *unloaded, *(Further("drag", depth) for depth in cell.drag_depths)]
 
 
 def cost_of_further(cell: Cell) -> float:
-    """What they take one core in one bed, by estimate [s]."""
+    """Their estimated cost in one bed [s of one core]."""
     base, slow = cell.base, min(cell.base.speeds)
     step, stiffness = beds.bed_step(base, beds.choose_softness(base).young), beds.expected_stiffness(base)
     total = 0.0
@@ -79,7 +79,7 @@ def _legs(base: PenetrateSettings, one: Further, speed: float) -> list[Leg]:
 
 
 def make_further(cell: Cell, seed: int, path: Path, progress: Progress) -> None:
-    """Make those runs in the bed of the member `path` that are not there. Raises RuntimeError where one fails."""
+    """Make the missing runs in the bed of the member `path`. Raises RuntimeError if one fails."""
     todo = [one for one in further_runs(cell) if not RunFolder.open(path).is_done(one.id)]
     if not todo:
         return
@@ -124,7 +124,7 @@ def _unloaded(columns: dict[str, Array], depth: float) -> Json:
 
 
 def _work(depth: Array, force: Array) -> float:
-    """Of a leg at constant speed [J]."""
+    """Work over a part of the run at constant speed [J]."""
     return abs(float(np.sum(force) * (depth[-1] - depth[0]) / max(len(depth) - 1, 1)))
 
 
@@ -140,7 +140,7 @@ def _dragged(columns: dict[str, Array], depth: float) -> Json:
 
 
 def read_further(folder: RunFolder, bed: str) -> Iterator[Placement | Unloading | Drag]:
-    """What the further runs in a member's folder found; those that did not come to rest are left out."""
+    """Results of the further runs in a member's folder, without those that did not come to rest."""
     for path in sorted((folder.path / "checkpoint").glob(f"{_NOTE}*.done.json")):
         name = path.name.removesuffix(".done.json")
         found, kind = folder.done_data(name), name.removeprefix(_NOTE).partition("-")[0]

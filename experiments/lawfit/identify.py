@@ -1,4 +1,4 @@
-"""What the runs of a fit can tell and what not, in words; and what each run contributed."""
+"""Sentences on which parameters the runs of a fit identify; and what each run contributed."""
 
 import numpy as np
 
@@ -14,13 +14,13 @@ __all__ = ["identified", "influences", "speed_to_add"]
 QUASI_STATIC = 0.01
 """Inertial number below which a run counts as quasi-static [1] (GDR MiDi, Eur. Phys. J. E 14 (2004), 341)."""
 VISIBLE = 0.2
-"""Share of the force that the rate should have in a run that is to tell C [1]."""
+"""Least share of the rate in the force of a run that is added to identify C [1]."""
 
 
 def speed_to_add(fitted: LawFit[Candidate]) -> float:
-    """Speed of a run that would tell C [m/s]: where the upper end of C's interval makes up `VISIBLE` of the mean force.
+    """Speed of a run that identifies C [m/s]: there the upper end of C's interval gives `VISIBLE` of the mean force.
 
-    At least twice the fastest speed there is.
+    It is two to ten times the fastest speed of the runs.
     """
     data, found = fitted.data, fitted.parameter("damping")
     fastest = max(data.speeds)
@@ -29,7 +29,7 @@ def speed_to_add(fitted: LawFit[Candidate]) -> float:
 
 
 def identified(fitted: LawFit[Candidate]) -> list[str]:
-    """Sentences about what a spring-damper fitted to these runs leaves open; none where K and C are told."""
+    """Sentences on what these runs do not identify of the spring-damper; none if they identify K and C."""
     data, found, said = fitted.data, fitted.parameter("damping"), []
     foundation = data.foundation
     of = {"gravity": foundation.gravity, "diameter": foundation.diameter, "grain": foundation.grain}
@@ -49,7 +49,7 @@ def identified(fitted: LawFit[Candidate]) -> list[str]:
 
 
 def influences(fitted: LawFit[Candidate]) -> list[Json]:
-    """Of each run its rms error over its rms force, and K and C without it."""
+    """For each run its rms error over its rms force, and K [N/m] and C [N s/m] fitted without it."""
     data, found = fitted.data, []
     error = fitted.predicted - data.force
     for number, run in enumerate(data.runs):

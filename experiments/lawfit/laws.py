@@ -1,4 +1,4 @@
-"""The surface laws that are fitted, and what of each is free.
+"""The surface laws that are fitted, and their free parameters.
 
 All but one are laws of `rigid.ground.laws.GROUNDS`, by whose own functions the force is computed. The last is that of
 Katsuragi and Durian with the momentum of the grains that move along, for which a ground has no place: its force depends
@@ -41,17 +41,17 @@ class Candidate:
 
     @property
     def rate_parameter(self) -> str | None:
-        """The free parameter that the rate enters by; None if there is none."""
+        """The free parameter of the rate term; None if there is none."""
         return next((name for name in self.free if name in RATES), None)
 
     def without_rate(self) -> "Candidate":
-        """The same with the parameter of the rate kept at 0."""
+        """The same law with the rate parameter held at 0."""
         rate = self.rate_parameter
         assert rate is not None
         return replace(self, free=tuple(name for name in self.free if name != rate), fixed={**self.fixed, rate: 0.0})
 
     def values(self, theta: Array) -> dict[str, float]:
-        """All parameters by name, the free ones being `theta`."""
+        """All parameters by name, with `theta` for the free ones."""
         return dict(self.fixed) | dict(zip(self.free, map(float, theta), strict=True))
 
     def numbers(self, theta: Array) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""The laws of one tip and gravity: fitted, compared, written as ground files, and said in result.json."""
+"""The laws of one tip and gravity: fit, comparison, ground files, entries of result.json."""
 
 import math
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ class OneCell:
     data: Data
     fits: dict[str, Fitted]
     laws: list[Json]  # The entries of result.json, the best first
-    told: list[str]  # What the runs leave open
+    unidentified: list[str]  # Sentences on parameters that the runs do not identify
     tangents: list[Json]
     contributions: list[Json]
     sentences: list[str]
@@ -59,8 +59,8 @@ class OneCell:
         """Write ground.toml, and laws/NAME.toml of every law that can be a ground, into `folder`."""
         for name, fit in self.fits.items():
             if name != ADDED_MASS and not _beyond_the_law(fit):
-                ground_file(fit, self.data, self.told).write(folder / "laws" / f"{name}.toml")
-        pair = ground_file(self.fits[PAIR], self.data, [*self.told, *self.entries[PAIR]["holds"]])
+                ground_file(fit, self.data, self.unidentified).write(folder / "laws" / f"{name}.toml")
+        pair = ground_file(self.fits[PAIR], self.data, [*self.unidentified, *self.entries[PAIR]["holds"]])
         pair.write(folder / "ground.toml")
 
     @property
@@ -82,12 +82,12 @@ def fit_cell(settings: LawFitSettings, name: str, data: Data, progress: Progress
     progress.stage("laws", total=float(len(candidates)))
     fits: dict[str, Fitted] = {}
     laws: list[Json] = []
-    told: list[str] = []
+    unidentified: list[str] = []
     contributed: list[Json] = []
     for done, candidate in enumerate(candidates, 1):
         free = fit_law(candidate, data)
         fits[candidate.name] = fit_usable(free)
-        told += identified(free) if candidate.name == PAIR else []
+        unidentified += identified(free) if candidate.name == PAIR else []
         contributed += influences(free) if candidate.name == PAIR else []
         laws.append(_law_entry(settings, fits[candidate.name]))
         progress.update(done)
@@ -95,7 +95,7 @@ def fit_cell(settings: LawFitSettings, name: str, data: Data, progress: Progress
     entries = {law["name"]: law for law in laws}
     holds, rest = closing(settings, data, entries, laws[0]["name"])
     entries[PAIR]["holds"] = holds
-    warnings = [*told, *data.notes, *(say(why, name=law, f=data.foundation) for law, why in left.items())]
+    warnings = [*unidentified, *data.notes, *(say(why, name=law, f=data.foundation) for law, why in left.items())]
     warnings += [say("few_beds", beds=len(data.beds))] if len(data.beds) < 3 else []
     warnings += [] if "speed" in entries[PAIR]["beyond"] else [say("two_speeds")]
     if (shown := entries[PAIR]["map"]) is not None and shown["left"]:
@@ -104,14 +104,15 @@ def fit_cell(settings: LawFitSettings, name: str, data: Data, progress: Progress
     warnings += [text for fit in fits.values() for text in _beyond_the_law(fit)]
     others = [law["name"] for law in laws if law["name"] not in (PAIR, ADDED_MASS)]
     return OneCell(
-        name=name, data=data, fits=fits, laws=laws, told=told, tangents=_tangents(fits, data, (PAIR, *others[:1])),
+        name=name, data=data, fits=fits, laws=laws, unidentified=unidentified,
+        tangents=_tangents(fits, data, (PAIR, *others[:1])),
         contributions=contributed, sentences=[*holds, *rest], warnings=warnings,
         quantities=_quantities(settings, fits[PAIR], entries[PAIR], laws[0]),
     )  # fmt: skip
 
 
 def _law_entry(settings: LawFitSettings, fitted: Fitted) -> Json:
-    """What result.json says of one law."""
+    """The entry of one law in result.json."""
     candidate, found = fitted.candidate, error_map(fitted)
     parameters = {
         name: asdict(found) | {"unit": _unit(candidate, name)} for name, found in _fitted_parameters(fitted).items()
@@ -140,7 +141,7 @@ def _unit(candidate: Candidate, name: str) -> str:
 
 
 def _fitted_parameters(fitted: Fitted) -> dict[str, Estimated]:
-    """All fitted parameters within what the law allows: a rate below 0 is 0, with the rest of its interval."""
+    """All fitted parameters within the bounds of the law: a rate below 0 becomes 0, and its interval begins at 0."""
     found = {name: fitted.parameter(name) for name in fitted.candidate.free}
     if (free := fitted.free_rate) is not None:
         rate = next(name for name in RATES if name in fitted.candidate.fixed)
@@ -149,7 +150,7 @@ def _fitted_parameters(fitted: Fitted) -> dict[str, Estimated]:
 
 
 def _notes(fitted: Fitted) -> list[str]:
-    """Which parameters came out at a bound."""
+    """Sentences on parameters at a bound."""
     candidate, said = fitted.candidate, []
     for name, found in _fitted_parameters(fitted).items():
         unit = f" {_unit(candidate, name)}".removesuffix(" 1")
@@ -161,7 +162,7 @@ def _notes(fitted: Fitted) -> list[str]:
 
 
 def _beyond_the_law(fitted: Fitted) -> list[str]:
-    """Why a law cannot be a ground with these parameters; a rate below 0 becomes 0 instead."""
+    """Why a law cannot be a ground with these parameters (a rate below 0 becomes 0 and is no reason)."""
     candidate, said = fitted.candidate, []
     for parameter in candidate.law.parameters:
         if parameter.name in candidate.free and fitted.parameter(parameter.name).value > parameter.highest:
@@ -172,8 +173,8 @@ def _beyond_the_law(fitted: Fitted) -> list[str]:
     return said
 
 
-def ground_file(fitted: Fitted, data: Data, told: Sequence[str]) -> GroundFile:
-    """The law as a file: parameters within what a law may have, the range of the runs, and what a reader must know."""
+def ground_file(fitted: Fitted, data: Data, unidentified: Sequence[str]) -> GroundFile:
+    """The law as a file: parameters within their bounds, the range of the runs, and notes for its user."""
     candidate, foundation = fitted.candidate, data.foundation
     known = {parameter.name: parameter for parameter in candidate.law.parameters}
     parameters, estimates = {}, _fitted_parameters(fitted)
@@ -198,7 +199,7 @@ def ground_file(fitted: Fitted, data: Data, told: Sequence[str]) -> GroundFile:
     tall = [float(run.depth.max()) for run in data.runs]
     return GroundFile(
         format=GROUND_FORMAT, law=candidate.law.name, material=foundation.material, source=say("source"),
-        runs=data.sources, notes=tuple(told),
+        runs=data.sources, notes=tuple(unidentified),
         foot=Foot(tip=foundation.tip, diameter=foundation.diameter, cone_angle=foundation.cone_angle),
         parameters=parameters,
         range={
@@ -212,7 +213,7 @@ def ground_file(fitted: Fitted, data: Data, told: Sequence[str]) -> GroundFile:
 def _rebound(data: Data, stiffest: float) -> Estimate:
     """Share of the deepest depth that springs back: that of the unloadings, or `stiffest` where there is none.
 
-    A smaller one than `stiffest` is not taken, as a step of 1 ms does not follow it.
+    A share below `stiffest` is replaced by it, because a step of 1 ms does not resolve stiffer unloading.
     """
     found = [one.force / (one.stiffness * one.depth) for one in data.unloadings if one.stiffness > 0]
     if len(found) < 2:
@@ -234,7 +235,7 @@ def _columns(data: Data, fits: dict[str, Fitted]) -> dict[str, NDArray[Any]]:
 
 
 def _tangents(fits: dict[str, Fitted], data: Data, names: Sequence[str]) -> list[Json]:
-    """K and C of the spring-damper that is right at a load and a speed, by the laws `names`, each with its spread."""
+    """K and C of the spring-damper tangent to the laws `names` at loads and speeds, each with its spread."""
     largest = float(np.mean([run.force[-1] for run in data.runs if run.kind == "driven"] or [data.force.max()]))
     deepest = max(float(run.depth.max()) for run in data.runs)
     speeds = sorted({run.speed for run in data.runs})
@@ -275,7 +276,7 @@ def _tangent(fitted: Fitted, theta: Any, load: float, speed: float) -> tuple[flo
 
 
 def _quantities(settings: LawFitSettings, pair: Fitted, own: Json, best: Json) -> dict[str, Json]:
-    """The numbers that a person would quote."""
+    """The numbers to quote."""
     found: dict[str, Json] = {}
     for name, one in _fitted_parameters(pair).items():
         note = say("of_pair", found=one, bound="" if name in pair.candidate.free else say("is_bound"))

@@ -1,4 +1,4 @@
-"""From run folders of penetrate to the `Data` of a fit; what cannot be fitted together is refused by name."""
+"""Reads run folders of penetrate into the `Data` of a fit; runs that cannot be fitted together are refused by name."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ def read_cells(settings: LawFitSettings) -> dict[str, Data]:
 
     Raises ValueError, naming the folder and what was found: for no finished run of penetrate in a bed, for a kept
     result without series, for runs of different grains, for a run that is there twice; and for a tip and gravity with
-    fewer than two beds, or with runs at one speed, which cannot tell C from K.
+    fewer than two beds, or with runs at one speed, from which C and K cannot be separated.
     """
     sources = [_read(name, path) for given in settings.runs for name, path in _folders(given)]
     _refuse_mixed(sources)
@@ -172,10 +172,10 @@ def _series(source: _Source, entry: Json) -> Penetration:
 
 
 def _bed_of(settings: PenetrateSettings, seed: int) -> tuple[str, str]:
-    """The same text for runs that begin in the same bed, and the bed that a fit takes them for.
+    """The same text for runs that begin in the same bed, and the bed to which a fit assigns them.
 
-    A fit takes all beds of one seed for one bed, whatever their size or the stiffness of their grains: they begin with
-    the same random numbers, so that their factors need not be independent.
+    A fit treats all beds of one seed as one bed, whatever their size or the stiffness of their grains: they begin with
+    the same random numbers, so their factors need not be independent.
     """
     values = [seed if name == "seed" else getattr(settings, name) for name in _OF_BED]
     bed = f"seed {seed}" + ("" if settings.bed is None else f" of {settings.bed}")

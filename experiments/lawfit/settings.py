@@ -45,7 +45,7 @@ def _tip_of(text: str) -> tuple[str, float, float]:
 
 
 def _same(given: Any, first: Any, unit: Unit | None) -> bool:
-    """Whether a setting, which may be text with a unit, is what the first of a list says."""
+    """Whether a setting, which may be text with a unit, equals the first of a list."""
     if isinstance(given, str) and unit is not None:
         given = unit.value_of(given)
     if isinstance(given, int | float) and isinstance(first, int | float):
@@ -55,7 +55,7 @@ def _same(given: Any, first: Any, unit: Unit | None) -> bool:
 
 class LawFitSettings(PenetrateSettings):
     """K and C, and rival laws, with the range in which they hold: from finished runs of penetrate, or from runs that
-    are chosen and computed until they tell enough.
+    are chosen and computed until the tolerance is reached.
 
     The settings of `penetrate` describe the runs that are computed.
     """
@@ -111,10 +111,8 @@ class LawFitSettings(PenetrateSettings):
         le=200,
         description="Intervals from 0 to the largest depth of all runs, over which each run is averaged [1].",
     )
-    force_error: float = Field(0.2, gt=0, lt=1, description="Error of the force up to which a law is said to hold [1].")
-    sinkage_error: float = Field(
-        0.15, gt=0, lt=1, description="Error of the sinkage up to which a law is said to hold [1]."
-    )
+    force_error: float = Field(0.2, gt=0, lt=1, description="Largest error of the force of a valid law [1].")
+    sinkage_error: float = Field(0.15, gt=0, lt=1, description="Largest error of the sinkage of a valid law [1].")
 
     @model_validator(mode="before")
     @classmethod
@@ -166,7 +164,7 @@ class LawFitSettings(PenetrateSettings):
         return self
 
     def _refuse_settings_of_runs(self) -> None:
-        """Raise ValueError for a setting that the finished runs have decided already."""
+        """Raise ValueError for a setting that finished runs already have."""
         fields = type(self).model_fields
         for name in (*PenetrateSettings.model_fields, "members", "workers", "scheduler", *_OF_DESIGN):
             if getattr(self, name) != fields[name].default:

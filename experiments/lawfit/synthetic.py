@@ -1,11 +1,11 @@
-"""Runs of a known law, to see whether the fit gives it back and how often its intervals hold the truth.
+"""Synthetic runs of a known law, which measure the bias of the fit and the coverage of its intervals.
 
 Each bed multiplies the force by a factor 1 + u with u normal of standard deviation `bed_spread`. The force of a run
 fluctuates besides by `noise` times its mean, normal and correlated over a length of a grain in depth, as forces in
-grains are. The bins of a run are therefore not independent, which the likelihood of a fit takes them to be.
+grains are. So the bins of a run are not independent, although the likelihood of a fit assumes it.
 
 `python -m experiments.lawfit.synthetic OUT.json` measures the coverage of docs/results/calibrate-coverage: of fits to
-so many beds, and of the whole procedure of `design`, which adds beds until the force is sure.
+so many beds, and of the whole procedure of `design`, which adds beds until the tolerance is reached.
 """
 
 import json
@@ -63,7 +63,7 @@ TRUTHS: dict[str, dict[str, float]] = {
     "katsuragi-durian": {"stiffness": 62.0, "drag": 0.6},
     "power-irreversible": {"stiffness": 100.0, "damping": 0.3, "exponent": 1.1},
 }
-"""Law -> its free parameters in the runs that are made up."""
+"""Law -> its free parameters in synthetic runs."""
 
 
 def synthetic_data(
@@ -76,7 +76,7 @@ def synthetic_data(
     noise: float = 0.1,
     bins: int = BINS,
 ) -> Data:
-    """Made-up runs of `law` with the free parameters `truth`, by `design`; the same `seed` gives the same runs.
+    """Synthetic runs of `law` with the free parameters `truth`, by `design`; the same `seed` gives the same runs.
 
     `bins`: intervals over which the rows of a run are averaged, a divisor of 240; the rows are the same for all.
     """
@@ -119,7 +119,7 @@ def scaled_cells(
     noise: float = 0.02,
     seed: int = 1,
 ) -> dict[str, Data]:
-    """Made-up runs of a law without dimensions at three Froude numbers, in `beds` beds of every shape and gravity.
+    """Synthetic runs of a dimensionless law at three Froude numbers, in `beds` beds of every shape and gravity.
 
     Beds differ by 5 %; the force of each interval of depth fluctuates by `noise` times the mean of its run, correlated
     over a grain.
@@ -145,7 +145,7 @@ def scaled_cells(
 def coverage(
     law: str, design: Design, *, count: int, first_seed: int = 0, bed_spread: float = 0.08, noise: float = 0.1
 ) -> dict[str, dict[str, float]]:
-    """How often the 90 % intervals of `count` fits to made-up runs hold the truth, by parameter [1], and the bias."""
+    """Share of `count` fits whose 90 % intervals contain the truth, by parameter [1], and the bias."""
     truth, candidate = TRUTHS[law], CANDIDATES[law](FOUNDATION)
     assert candidate is not None
     inside = dict.fromkeys(truth, 0)
@@ -170,11 +170,11 @@ CROSSED_TRUTHS: dict[str, tuple[float, ...]] = {
     "power-square": (6.0, 9.0, 1.3, 0.9, 2.0),
     "power-early": (6.0, 9.0, 1.3, 0.9, 3.0, 0.5),
 }
-"""Law of all tips and gravities -> its free parameters in the runs that are made up, of a ball and a flat tip."""
+"""Law of all tips and gravities -> its free parameters in synthetic runs of a ball and a flat tip."""
 
 
 def crossed_coverage(law: str, *, count: int, beds: int = 4, first_seed: int = 0) -> dict[str, float]:
-    """How often the 90 % intervals of `count` fits to all cells hold the truth [1], by parameter.
+    """Share of `count` fits to all cells whose 90 % intervals contain the truth [1], by parameter.
 
     "stiffness": of the local K of the ball under the second gravity, at half the depth and the middle speed.
     """
@@ -196,7 +196,7 @@ def crossed_coverage(law: str, *, count: int, beds: int = 4, first_seed: int = 0
 
 
 def beyond_coverage(law: str, design: Design, *, count: int, first_seed: int = 0) -> dict[str, float]:
-    """How often the 90 % intervals of the mean error beyond the runs hold 0, its truth, in `count` fits [1].
+    """Share of `count` fits whose 90 % interval of the mean error beyond the fitted range contains 0, the truth [1].
 
     "speed": the fastest runs were left out; "depth": the deepest third. The beds differ by 8 %.
     """
@@ -219,10 +219,10 @@ def stopping_coverage(
     most: int = 12,
     first_seed: int = 0,
 ) -> dict[str, float]:
-    """How often the last 90 % intervals of `count` runs of the whole procedure hold the truth [1].
+    """Share of `count` runs of the whole procedure whose last 90 % interval contains the truth [1].
 
     Beds of a spring-damper, driven at two speeds each, are added as in `design`, from `least` up to `most`. "force": of
-    the force that is to be sure; "beds": how many there were in the mean; "sure": in how many runs it became sure.
+    the force to which the tolerance applies; "beds": their mean number; "sure": share of runs that reach the tolerance.
     """
     truth = TRUTHS["spring-damper"]
     candidate = CANDIDATES["spring-damper"](FOUNDATION)

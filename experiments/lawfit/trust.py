@@ -1,4 +1,4 @@
-"""Where a fitted law holds: its error over depth and speed, over loads, in beds that it was not fitted to."""
+"""Errors of a fitted law over depth, speed and load, and in held-out beds."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -30,7 +30,7 @@ class ErrorMap:
 
 
 def error_map(fitted: LawFit[Candidate]) -> ErrorMap | None:
-    """The map of a fit, in the runs that it was fitted to; None where there is no drive.
+    """Error map of a fit in its own runs; None without drives.
 
     It has the drives that fill all intervals of depth that the deepest of them fills.
     """
@@ -78,7 +78,7 @@ def within(found: ErrorMap, most: float) -> list[Within]:
 
 
 def sinkage_range(fitted: LawFit[Candidate], found: ErrorMap, most: float) -> tuple[float, float] | None:
-    """Loads [N] between which the depth at which the law bears the load is within `most` of that of the beds.
+    """Range of loads [N] for which the depth predicted by the law is within `most` (relative) of that of the beds.
 
     The depth of the beds is where the mean force of the slowest drive first reaches the load, and the law is taken at
     that speed. None where no load is.
@@ -107,7 +107,7 @@ def _longest(good: Iterable[bool]) -> tuple[int, int]:
 
 
 def held_out(fitted: LawFit[Law]) -> Json:
-    """Rms error of the force over the rms force, of runs that the law was not fitted to [1].
+    """Rms error of the force over the rms force, in held-out runs [1].
 
     "beds": each bed by the fit to all others. "of_beds": the same of each bed alone, in the order of `Data.beds`.
     "beds_std": the scatter of those. "interval": 90 % of "beds", by leaving out one bed more. "speeds": each speed by
@@ -138,7 +138,7 @@ def held_out(fitted: LawFit[Law]) -> Json:
 
 @dataclass(frozen=True)
 class Beyond:
-    """Error of a law beyond the runs that it was fitted to: the outermost of them were left out."""
+    """Error of a law outside its fitted range: the fit omits the outermost runs."""
 
     left_out: float  # Speed of the runs [m/s] or largest depth of the rows [m] that were left out
     fitted_to: float  # The largest that is left
@@ -190,9 +190,9 @@ def _beyond(fitted: LawFit[Law], rest: Data, out: Data, *, left_out: float, fitt
 
 
 def paired(one: Sequence[float], other: Sequence[float]) -> Estimated:
-    """How much `one` is above `other` in the mean, both of the same beds, shapes [bed_count >= 2].
+    """Mean difference of `one` and `other`, both of the same beds, shapes [bed_count >= 2].
 
-    What a bed does to both drops out. The interval is that of Student's t for the mean of the differences.
+    Effects of a bed on both cancel. The interval is that of Student's t for the mean of the differences.
     """
     return mean_of(np.asarray(one, dtype=float) - np.asarray(other, dtype=float))
 
