@@ -1,9 +1,9 @@
 """``hedgebed bench feet``: how many feet a second a surface law is computed for in MuJoCo's own loop.
 
 `coupling.robot.FootForces` is called as MuJoCo calls it, with every foot in contact: robots of one foot and of six. A
-foot is a ball (one point), a box that lies flat (4 of 8 points in contact) or a cylinder on its end (8 of 16). Several
-rounds by processor time; the median counts. For quick trials, in the environment: HEDGEBED_BENCH_CALLS,
-HEDGEBED_BENCH_ROUNDS.
+foot has one point in contact (ball, ellipsoid, capsule on its end), two (capsule and cylinder that lie), 4 of 8 (box)
+or 8 of 16 (cylinder on its end). It goes in and slides. Several rounds by processor time; the median counts. For quick
+trials, in the environment: HEDGEBED_BENCH_CALLS, HEDGEBED_BENCH_ROUNDS.
 """
 
 import statistics
@@ -13,29 +13,36 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from benchmarks.race.machine import begin_timing, column_table, environment_numbers, wide_console
 from coupling.robot import FootForces, find_feet
 from experiments.runs.types import Json
+from rigid.ground.laws import GROUNDS
 
 __all__ = ["run"]
 
-LAWS = ("spring-damper", "hunt-crossley", "rft")
+LAWS = tuple(GROUNDS)
 COUNTS = (1, 6)  # Feet of the robots
 WANTED = 100_000  # Evaluations of one foot a second that control asks for
 SHAPES = {
     "ball": 'type="sphere" size="0.01"',
     "box": 'type="box" size="0.01 0.01 0.01"',
-    "cylinder": 'type="cylinder" size="0.01 0.01"',
+    "cylinder on its end": 'type="cylinder" size="0.01 0.01"',
+    "cylinder that lies": 'type="cylinder" size="0.01 0.01" euler="90 0 0"',
+    "capsule on its end": 'type="capsule" size="0.005 0.005"',
+    "capsule that lies": 'type="capsule" size="0.01 0.01" euler="90 0 0"',
+    "ellipsoid": 'type="ellipsoid" size="0.02 0.015 0.01"',
 }
 _BODY = '<body pos="{x} 0 0.0099"><freejoint/><geom name="foot_{k}" {shape} mass="0.1"/></body>'
 
 
 def _robot(shape: str, count: int) -> tuple[Any, Any]:
-    """Model and data of `count` feet of a shape that are 0.1 mm deep."""
+    """Model and data of `count` feet of a shape, 0.1 mm deep, that go in and slide: all terms are computed."""
     bodies = "".join(_BODY.format(x=0.1 * k, k=k, shape=SHAPES[shape]) for k in range(count))
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
     data = mujoco.MjData(model)
+    data.qvel[:] = np.tile([0.1, 0.02, -0.1, 0.0, 0.0, 0.0], count)
     mujoco.mj_forward(model, data)
     return model, data
 

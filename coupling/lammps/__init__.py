@@ -8,7 +8,9 @@ Imports `dem`, `rigid`, and of `coupling` the ground of a bed.
 from .bed import LammpsBed
 from .ground import LammpsGround
 from .process import INSTALL, LammpsEndedError, LammpsMissingError, check_ranks, find_lammps
+from .regions import OutOfPlaneError, check_plane
 
 __all__ = [
-    "INSTALL", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError", "check_ranks", "find_lammps",
+    "INSTALL", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError", "OutOfPlaneError", "check_plane",
+    "check_ranks", "find_lammps",
 ]  # fmt: skip

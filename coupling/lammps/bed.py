@@ -27,7 +27,7 @@ __all__ = ["LammpsBed"]
 
 Vector = np.ndarray
 FLOOR = 0
-MOST_BODIES = 12  # LAMMPS has 32 groups; a body of two pieces takes two
+MOST_PIECES = 30  # Of all bodies: each takes one of LAMMPS' 32 groups
 STILL = 1e-5  # Mean kinetic energy of a bed at rest [m g d]
 _SPELL, _MOST_SPELLS = 1.5, 60  # How long grains are left to come to rest at a time [sqrt(d / g)], how often at most
 _SKIN = 0.05  # Of the neighbour lists [d]
@@ -121,13 +121,15 @@ class LammpsBed:
 
         Raises ValueError for shapes that LAMMPS' regions cannot have, and for too many bodies.
         """
-        if len(self._bodies) >= MOST_BODIES:
-            raise ValueError(f"a bed in LAMMPS takes at most {MOST_BODIES} bodies")
+        pieces = pieces_of(shape)
+        count = len(pieces) + sum(len(body.pieces) for body in self._bodies)
+        if count > MOST_PIECES:
+            raise ValueError(f"the bodies have {count} pieces: a bed in LAMMPS takes at most {MOST_PIECES}")
         faced = Facing(**facing)
         faced.refuse_for(self.material)
         row = pair_row(self.material, faced, tensile=self.tensile)
         number = len(self._bodies) + 1
-        self._bodies.append(MovingBody(number, pieces_of(shape), self._words(row), np.array(position, dtype=float)))
+        self._bodies.append(MovingBody(number, pieces, self._words(row), np.array(position, dtype=float)))
         self._rows.append(np.array(row))
         self._reactions = np.zeros((number + 1, 6))
         self._set_up = False
@@ -188,7 +190,7 @@ class LammpsBed:
         commands = [line for body in self._bodies for line in body.motion(self.steps)]
         for body in self._bodies:
             self._check_inside(body, duration)
-            commands += body.select(*body.reach(duration, self.mean_diameter))
+            commands += body.select(duration, self.mean_diameter)
         self._lammps.tell([*commands, f"run {steps} pre no post no"])
         self.steps += steps
         self.grain_steps += steps * self.grain_count
@@ -202,6 +204,9 @@ class LammpsBed:
         """Make the bodies that are new, and have LAMMPS set up its lists and forces; nothing where that is done."""
         if self._set_up and all(body.made and not body.jumped for body in self._bodies):
             return
+        for body in self._bodies:
+            if not body.seats:  # it has not been moved yet
+                body.place(body.position, body.velocity, body.turn, body.spin)
         new = [line for body in self._bodies if not body.made for line in body.create()]
         late, now = ([line for body in self._bodies for line in body.motion(self.steps, late=k)] for k in (1, 0))
         names = [name for body in self._bodies for name in body.names]
@@ -209,7 +214,7 @@ class LammpsBed:
         if names:
             # LAMMPS takes a region's velocity from its place a step before. So a setup with the bodies there comes
             # first, in which they touch nothing, lest contacts end.
-            chosen = [line for body in self._bodies for line in body.select(*body.reach(0.0, self.mean_diameter))]
+            chosen = [line for body in self._bodies for line in body.select(0.0, self.mean_diameter)]
             self._lammps.tell([*(f"group {name} clear" for name in names), "run 0 post no", *now, *chosen])
         counted = " ".join(f"c_{name}[*]" for name in ["floor", *names])
         self._lammps.tell([f"fix sums all ave/time 1 1 1 {counted} ave running", "run 0 post no"])
@@ -395,18 +400,20 @@ class LammpsBed:
         path = self._lammps.folder / "kept.restart"
         kept = np.frombuffer(path.read_bytes(), dtype=np.uint8).copy()
         path.unlink()
-        rows = [[*body.position, *body.velocity, *body.turn, *body.spin, body.angle, body.across, body.made]
+        rows = [[*body.position, *body.velocity, *body.turn, *body.spin, body.angle, *body.base.ravel(), body.made]
                 for body in self._bodies]  # fmt: skip
         return {
             "restart": kept,
-            "bodies": np.array(rows, dtype=float).reshape(-1, 16),
+            "bodies": np.array(rows, dtype=float).reshape(-1, 24),
             "numbers": np.array([self.steps, self.grain_steps, self.surface, self.packing_fraction]),
             "origin": self._origin.copy(),
         }
 
     def restore(self, state: State) -> None:
-        """Go on from what `state` gave. Raises ValueError for the state of another number of bodies."""
+        """Go on from what `state` gave. Raises ValueError for the state of other bodies, or of an earlier version."""
         rows = np.asarray(state["bodies"], dtype=float)
+        if rows.size and rows.shape[1] != 24:
+            raise ValueError("the checkpoint of this bed in LAMMPS is of an earlier version: run it anew")
         if len(rows) != len(self._bodies):
             raise ValueError(f"the state has {len(rows)} bodies, this bed has {len(self._bodies)}")
         path = self._lammps.folder / "kept.restart"
@@ -416,11 +423,8 @@ class LammpsBed:
         self._origin = np.array(state["origin"], dtype=float)
         commands: list[str] = []
         for body, row in zip(self._bodies, rows, strict=True):
-            body.position, body.velocity, body.turn, body.spin = row[:3], row[3:6], row[6:10], row[10:13]
-            body.angle, body.across, body.made = float(row[13]), round(row[14]), False
-            body.known = False
-            commands += body.motion(self.steps)
-            if row[15]:
+            commands += body.take_up(row[:-1], self.steps)
+            if row[-1]:
                 commands += body.create()
         head = [line for line in self._head() if not line.startswith(("units", "atom_style", "boundary"))]
         self._lammps.tell(["clear", *head, f"read_restart {path.name} remap", *self._interactions(), *commands])

@@ -48,12 +48,16 @@ class LammpsGround(BedGround):
         law = bed.material.cohesion
         if law != "jkr":
             found["normal"] = bed.spring_energy(grains.position)
-            for body, surface in self._surfaces().items():
+            for body, surface in self._pieces():
                 distance, _, curvature = surface(grains.position.copy())
                 pressed = np.maximum(0.0, grains.radius - distance)
                 radius = grains.radius / (1 + grains.radius * curvature)
                 found["normal"] += spring_energy(bed.pair_of(body), law, pressed, radius)
         return {name: self.copies * value for name, value in found.items()}
+
+    def _pieces(self) -> list[tuple[int, Any]]:
+        """Bodies and their surfaces, several of a body where a grain can touch several at once."""
+        return list(self._surfaces().items())
 
     def work_taken(self) -> dict[str, float]:
         """Nothing: LAMMPS does not sum what contacts take."""
@@ -63,7 +67,7 @@ class LammpsGround(BedGround):
         """As `BedGround.pushes`, from the grains' places, with the cohesion of grains that touch."""
         bed, grains = self.bed, self.bed.grains(contacts=False)
         points, forces = [np.zeros((0, 3))], [np.zeros((0, 3))]
-        for body, surface in self._surfaces().items():
+        for body, surface in self._pieces():
             distance, normal, curvature = surface(grains.position.copy())
             overlap = grains.radius - distance
             touching = overlap > 0

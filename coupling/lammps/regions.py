@@ -1,27 +1,30 @@
 """Bodies as regions of LAMMPS: one region for each piece, moved by variables that the master sets.
 
 LAMMPS' unions of moving regions are of no use here: as walls they have no velocity, and in LAMMPS of 2021 no distance.
-So every piece has its own region and its own `fix wall/gran/region`. Pieces follow one another along the body's z axis.
-A grain belongs to the piece beside its centre, so that it touches only the one that is nearest. A grain that passes
-from one piece to the next begins a new contact there, without friction's history.
+So every piece has its own region and its own `fix wall/gran/region`. A grain between two pieces touches both, as in the
+corner of two bodies. Where two pieces of one body are smooth together (a ball and the cylinder on it, a capsule), each
+has the grains beside it, so that a grain touches only the nearest. A grain that passes from one of these to the next
+begins a new contact there, without friction's history.
 
-A region turns about one axis, which LAMMPS takes as a constant. Here it is y, across the plane of motion.
+A region turns about one axis, which LAMMPS takes as a constant, and has the velocity of that turning. Here the axis is
+y, across the plane of motion. A turning about two axes would need regions that move inside of regions.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dem.shapes.basic import Ball, Cone, Cylinder, Shape
-from dem.shapes.solids import Box
+from dem.shapes.solids import Box, Capsule, Placed
 from rigid.spatial.quaternions import multiply, to_matrix
 
 from .words import digits
 
-__all__ = ["MovingBody", "Piece", "pieces_of"]
+__all__ = ["MovingBody", "OutOfPlaneError", "Piece", "check_plane", "pieces_of"]
 
 Vector = np.ndarray
 _IN_PLANE = 1e-6  # How far from the plane of motion, or from its normal, an axis may be [rad]
@@ -30,33 +33,69 @@ _SIDES = 16  # Of the polygon around a circle
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 
 
-@dataclass(frozen=True)
+class OutOfPlaneError(ValueError):
+    """A body turns out of the plane of motion, x and z."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "this body turns out of the plane of motion, x and z: LAMMPS' regions turn about one constant axis, which "
+            "is y here; the ground `bed` takes such a body"
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Piece:
-    """A primitive, and from where to where along the body's z axis grains belong to it [m]."""
+    """A primitive, where it is in the body, and from where to where along its own z axis grains belong to it [m]."""
 
     shape: Ball | Cylinder | Cone | Box
     begin: float = -math.inf
     end: float = math.inf
+    at: Vector = field(default_factory=lambda: np.zeros(3))  # Of its origin in the body's axes [m]
+    axes: Vector = field(default_factory=lambda: np.eye(3))  # From its axes to the body's
 
-    def words(self, across: int = 0) -> str:
-        """Style and numbers of the region. ``across``: 1 or -1 where the body's z axis lies along y or -y, else 0."""
-        shape = self.shape
+    def seat(self, turn: Vector) -> "Seat":
+        """How its region stands, the body turned by this matrix. Raises OutOfPlaneError where no region can."""
+        axes, shape = turn @ self.axes, self.shape
+        middle = turn @ self.at + axes @ np.array(shape.center if isinstance(shape, Ball | Box) else np.zeros(3))
         if isinstance(shape, Ball):
-            return f"sphere {digits((*shape.center, shape.radius))}"
+            return Seat(0.0, np.zeros((3, 3)), middle)
+        across = np.flatnonzero(np.abs(axes[1]) > 1 - _IN_PLANE**2)  # its axes that lie along y
         if isinstance(shape, Box):
-            return f"block {digits(end for ends in zip(*_ends(shape), strict=True) for end in ends)}"
-        if isinstance(shape, Cone):
-            numbers = (shape.bottom_radius, shape.top_radius, shape.bottom, shape.top)
-            return f"cone z 0 0 {digits(numbers)}"
-        if across:
-            low, high = sorted((across * shape.bottom, across * shape.top))
-            return f"cylinder y 0 0 {digits((shape.radius, low, high))}"
-        return f"cylinder z 0 0 {digits((shape.radius, shape.bottom, shape.top))}"
+            if not len(across):
+                raise OutOfPlaneError
+            side = axes[:, (across[0] + 1) % 3]
+        elif len(across) and across[0] == 2:
+            side = np.array([0.0, 0.0, 1.0])
+        elif abs(axes[1, 2]) < _IN_PLANE:
+            side = axes[:, 2]
+        else:
+            raise OutOfPlaneError
+        angle = math.atan2(side[0], side[2])
+        back = _about_y(-angle)
+        kept = np.array([1.0, 1.0, 1.0] if isinstance(shape, Box) else [0.0, 0.0, 1.0])  # a turn about its axis
+        return Seat(angle, back @ axes * kept, back @ middle)
+
+    def words(self, seat: "Seat") -> str:
+        """Style and numbers of the region, before it is turned by `seat.angle` about y."""
+        shape, (x, y, z) = self.shape, seat.at
+        if isinstance(shape, Ball):
+            return f"sphere {digits((x, y, z, shape.radius))}"
+        if isinstance(shape, Box):
+            half = np.abs(np.round(seat.axes)) @ (0.5 * np.array(shape.size))
+            return f"block {digits(np.column_stack([seat.at - half, seat.at + half]).ravel())}"
+        sense = round(float(seat.axes[1, 2]))
+        radii = (shape.bottom_radius, shape.top_radius) if isinstance(shape, Cone) else (shape.radius,)
+        kind = "cone" if isinstance(shape, Cone) else "cylinder"
+        if sense:
+            low, high = sorted((sense * shape.bottom, sense * shape.top))
+            return f"{kind} y {digits((x, z, *radii[::sense], y + low, y + high))}"
+        return f"{kind} z {digits((x, y, *radii, z + shape.bottom, z + shape.top))}"
 
     def corners(self) -> Vector:
         """Corners of a box around it in the body's axes [m], shape [8, 3]."""
         low, high = _ends(self.shape)
-        return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+        found = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+        return np.asarray(self.at + np.array(found) @ self.axes.T)
 
     def outline(self) -> Vector:
         """Corners of a polyhedron around it, at most 2 % wider, in the body's axes [m], shape [n, 3]; not of a ball."""
@@ -69,7 +108,28 @@ class Piece:
             below, above = shape.bottom_radius, shape.top_radius
         else:
             below = above = shape.radius
-        return np.concatenate([below * ring + (0.0, 0.0, shape.bottom), above * ring + (0.0, 0.0, shape.top)])
+        found = np.concatenate([below * ring + (0.0, 0.0, shape.bottom), above * ring + (0.0, 0.0, shape.top)])
+        return np.asarray(self.at + found @ self.axes.T)
+
+
+@dataclass(frozen=True, eq=False)
+class Seat:
+    """A region's turn about y [rad], and before that turn the piece's axes, 0 where it is round, and its middle or
+    origin [m]."""
+
+    angle: float
+    axes: Vector
+    at: Vector
+
+    def like(self, other: "Seat") -> bool:
+        """Whether one region, turned, is both."""
+        return bool(np.abs(self.axes - other.axes).max() < _IN_PLANE and np.abs(self.at - other.at).max() < _JUMP)
+
+
+def _about_y(angle: float) -> Vector:
+    """The matrix of a turn by this angle [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def _ends(shape: Ball | Cylinder | Cone | Box) -> tuple[Vector, Vector]:
@@ -84,20 +144,59 @@ def _ends(shape: Ball | Cylinder | Cone | Box) -> tuple[Vector, Vector]:
 
 
 def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
-    """A body's pieces, from the lowest to the highest. Raises ValueError, naming it, for what LAMMPS cannot have."""
+    """A body's pieces: a ball or a cone and the shaft on it from the lowest to the highest, others as they are given.
+
+    Raises ValueError, naming it, for what LAMMPS cannot have.
+    """
     parts = [shapes] if isinstance(shapes, Shape) else list(shapes)
-    for part in parts:
-        if not isinstance(part, Ball | Cylinder | Cone | Box):
-            raise ValueError(
-                f"{type(part).__name__} has no counterpart among LAMMPS' regions: a body in LAMMPS is made of Ball, "
-                f"Cylinder, Cone or Box"
-            )
-    if len(parts) == 1:
-        return [Piece(parts[0])]  # type: ignore[arg-type]
-    ordered = sorted(parts, key=_bottom)
+    if len(parts) == 1 or not any(isinstance(part, Cylinder | Cone) for part in parts):
+        return [piece for part in parts for piece in _alone(part)]
+    ordered = sorted((_known(part) for part in parts), key=_bottom)
     seams = [_seam(below, above) for below, above in pairwise(ordered)]
     ends = [-math.inf, *seams, math.inf]
-    return [Piece(part, ends[k], ends[k + 1]) for k, part in enumerate(ordered)]  # type: ignore[arg-type]
+    return [Piece(part, ends[k], ends[k + 1]) for k, part in enumerate(ordered)]
+
+
+def check_plane(shapes: Sequence[Shape], turns: Vector) -> None:
+    """Raise ValueError for a body of these shapes that LAMMPS cannot have, OutOfPlaneError for one that turns as it
+    cannot; ``turns``: its quaternions on the way, shape [n, 4]."""
+    first = to_matrix(turns[0])
+    for piece in pieces_of(shapes):
+        piece.seat(first)
+    sides = np.array([to_matrix(turn) @ first[1] for turn in turns])  # where the side that was along y first is
+    if float(np.hypot(sides[:, 0], sides[:, 2]).max()) > _IN_PLANE:
+        raise OutOfPlaneError
+
+
+def _alone(part: Shape) -> list[Piece]:
+    """The pieces of a shape that stands by itself."""
+    if isinstance(part, Placed):
+        at, axes = np.array(part.position), to_matrix(np.array(part.turn) / math.hypot(*part.turn))
+        return [replace(piece, at=at + axes @ piece.at, axes=axes @ piece.axes) for piece in _alone(part.bare)]
+    if isinstance(part, Capsule):
+        start, along = np.array(part.start), np.array(part.end) - np.array(part.start)
+        length, placed = float(np.linalg.norm(along)), {"at": start, "axes": _upright(along)}
+        return [
+            Piece(Ball(radius=part.radius), -math.inf, 0.0, **placed),
+            Piece(Cylinder(0.0, length, part.radius), 0.0, length, **placed),
+            Piece(Ball((0.0, 0.0, length), part.radius), length, math.inf, **placed),
+        ]
+    return [Piece(_known(part))]
+
+
+def _upright(axis: Vector) -> Vector:
+    """A rotation of z into this direction, as a matrix."""
+    return np.asarray(Rotation.align_vectors([axis], [[0.0, 0.0, 1.0]])[0].as_matrix())
+
+
+def _known(part: Shape) -> Ball | Cylinder | Cone | Box:
+    """The shape. Raises ValueError for one that LAMMPS has no region for."""
+    if isinstance(part, Ball | Cylinder | Cone | Box):
+        return part
+    raise ValueError(
+        f"{type(part).__name__} has no counterpart among LAMMPS' regions: a body in LAMMPS is made of Ball, Capsule, "
+        f"Cylinder, Cone or Box"
+    )
 
 
 def _bottom(shape: Shape) -> float:
@@ -134,39 +233,47 @@ class MovingBody:
     def __init__(self, number: int, pieces: Sequence[Piece], law: str, position: Vector) -> None:
         self.number, self.pieces, self.law = number, list(pieces), law
         self.name = f"b{number}"
-        self.names = [f"{self.name}{'abcdefgh'[k]}" for k in range(len(self.pieces))]
+        self.names = [f"{self.name}p{k}" for k in range(len(self.pieces))]
         self.position, self.velocity = np.array(position, dtype=float), np.zeros(3)
         self.turn, self.spin = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
+        self.base, self.seats = np.eye(3), list[Seat]()  # The turn from which `angle` counts, the regions' seats there
         self.angle = 0.0  # By which the regions are turned about y [rad]
-        self.across = 0  # 1 or -1 where the body's z axis lies across the plane, along y or -y
-        shapes = [piece.shape for piece in self.pieces]
-        self.centred = len(shapes) == 1 and isinstance(shapes[0], Ball) and not any(shapes[0].center)
         self.made = False  # Whether LAMMPS has its regions, as they are to be
         self.jumped = False  # Whether it was put elsewhere than where its motion led
         self.known = False  # Whether LAMMPS has regions of these names
 
     def place(self, position: Vector, velocity: Vector, turn: Vector, spin: Vector) -> None:
-        """Set pose and motion. Raises ValueError for a body that leaves the plane of motion, x and z."""
-        axes = to_matrix(turn)
-        along, side = axes[:, 2], axes[:, 0]
-        across = round(float(along[1])) if math.hypot(along[0], along[2]) < _IN_PLANE else 0
-        spins_out = math.hypot(spin[0], spin[2]) > _IN_PLANE * max(1.0, abs(float(spin[1])))
-        leans = not across and abs(along[1]) > _IN_PLANE
-        if spins_out or (leans and not self.centred):
-            raise ValueError(
-                "this body turns out of the plane of motion, x and z: LAMMPS' regions turn about one constant axis, "
-                "which is y here; the ground `bed` takes such a body"
-            )
-        if across and not self.centred and not all(isinstance(piece.shape, Cylinder) for piece in self.pieces):
-            raise ValueError("a body whose z axis lies across the plane of motion must be one Cylinder in LAMMPS")
-        angle = math.atan2(-side[2], side[0]) if across or self.centred else math.atan2(along[0], along[2])
+        """Set pose and motion. Raises OutOfPlaneError for a body that leaves the plane of motion, x and z."""
+        if math.hypot(spin[0], spin[2]) > _IN_PLANE * max(1.0, abs(float(spin[1]))):
+            raise OutOfPlaneError
+        turned = to_matrix(turn)
+        since = turned @ self.base.T
+        if not self.seats or math.hypot(since[0, 1], since[2, 1]) > _IN_PLANE or since[1, 1] < 0:
+            self._sit(turned)
+            since = np.eye(3)
+        angle = math.atan2(since[0, 2], since[2, 2])
         angle += 2 * math.pi * round((self.angle - angle) / (2 * math.pi))
         jump = float(np.abs(position - self.position).max()) > _JUMP or abs(angle - self.angle) > _JUMP / _ARM
         self.jumped, self.angle = self.jumped or jump, angle
-        if across != self.across:  # regions have their axes from the start
-            self.across, self.made = across, False
         self.position, self.velocity = np.array(position, dtype=float), np.array(velocity, dtype=float)
         self.turn, self.spin = np.array(turn, dtype=float), np.array(spin, dtype=float)
+
+    def _sit(self, turned: Vector) -> None:
+        """Let `angle` count from this turn on; the regions are to be made anew where they are others."""
+        before, self.seats = self.seats, [piece.seat(turned) for piece in self.pieces]
+        same = len(before) and all(new.like(old) for new, old in zip(self.seats, before, strict=True))
+        self.base, self.made, self.jumped = turned, self.made and bool(same), True
+
+    def take_up(self, row: Vector, step: int) -> list[str]:
+        """Go on from kept numbers, in a LAMMPS that has no regions yet, at this time step; the commands of its motion.
+
+        ``row``: position, velocity, turn, spin, angle and base, shape [23].
+        """
+        self.position, self.velocity, self.turn, self.spin = row[:3], row[3:6], row[6:10], row[10:13]
+        self.angle, self.base = float(row[13]), row[14:23].reshape(3, 3)
+        self.seats = [piece.seat(self.base) for piece in self.pieces]
+        self.made = self.known = False
+        return self.motion(step)
 
     def go_on(self, duration: float) -> None:
         """Let it go on for ``duration`` [s] with its velocity and spin, as its regions do."""
@@ -180,16 +287,12 @@ class MovingBody:
         spin."""
         starts, step = (*self.position, self.angle), step + late
         rates = (*self.velocity, float(self.spin[1]))
-        return [
+        lines = [
             f"variable {self.name}{axis} equal {start:.17g}+({rate:.17g})*(step-{step})*dt"
             for axis, start, rate in zip("xyzt", starts, rates, strict=True)
         ]
-
-    def reach(self, duration: float, margin: float) -> tuple[Vector, Vector]:
-        """Lower and upper corner of a box around it over the next ``duration`` [s], ``margin`` wider [m]."""
-        corners = np.concatenate([piece.corners() for piece in self.pieces]) @ to_matrix(self.turn).T
-        travel = self.travel(duration) + margin
-        return self.position + corners.min(axis=0) - travel, self.position + corners.max(axis=0) + travel
+        turns = zip(self.names, self.seats, strict=True)
+        return lines + [f"variable {own}t equal v_{self.name}t+({seat.angle:.17g})" for own, seat in turns]
 
     def travel(self, duration: float) -> Vector:
         """How far any of its points goes in the next ``duration`` [s] at most, along each axis [m], shape [3]."""
@@ -199,7 +302,10 @@ class MovingBody:
     @property
     def spans(self) -> bool:
         """Whether its section is the same all along y, so that it may be as wide as the bed."""
-        return bool(self.across) or all(isinstance(piece.shape, Box) for piece in self.pieces)
+        return all(
+            isinstance(piece.shape, Box) or (isinstance(piece.shape, Cylinder) and round(float(seat.axes[1, 2])))
+            for piece, seat in zip(self.pieces, self.seats, strict=True)
+        )
 
     def extent(self, level: float) -> tuple[Vector, Vector]:
         """Where it begins and ends along x and y [m], shape [2] both, of what is below a height [m].
@@ -210,7 +316,7 @@ class MovingBody:
         for piece in self.pieces:
             shape = piece.shape
             if isinstance(shape, Ball):
-                centre = self.position + axes @ np.array(shape.center)
+                centre = self.position + axes @ (piece.at + piece.axes @ np.array(shape.center))
                 above = max(0.0, float(centre[2]) - level)
                 if above < shape.radius:
                     half = math.sqrt(shape.radius**2 - above**2)
@@ -229,13 +335,13 @@ class MovingBody:
     def create(self) -> list[str]:
         """Commands that make its groups, regions, walls, and the sums of force and moment on it."""
         name, lines = self.name, list[str]()
-        for piece, own in zip(self.pieces, self.names, strict=True):
+        for piece, seat, own in zip(self.pieces, self.seats, self.names, strict=True):
             if self.known:
                 lines += [f"uncompute {own}", f"unfix {own}", f"region {own} delete", f"group {own} delete"]
-            moved = f"side out units box move v_{name}x v_{name}y v_{name}z rotate v_{name}t 0 0 0 0 1 0"
+            moved = f"side out units box move v_{name}x v_{name}y v_{name}z rotate v_{own}t 0 0 0 0 1 0"
             lines += [
                 f"group {own} empty",
-                f"region {own} {piece.words(self.across)} {moved}",
+                f"region {own} {piece.words(seat)} {moved}",
                 f"fix {own} {own} wall/gran/region granular {self.law} region {own} contacts",
                 # Moment about the body's origin of what the grains get: of the arm (point - origin) and the force.
                 f"variable {own}mx atom (f_{own}[6]-v_{name}y)*f_{own}[4]-(f_{own}[7]-v_{name}z)*f_{own}[3]",
@@ -246,23 +352,24 @@ class MovingBody:
         self.made = self.known = True
         return lines
 
-    def select(self, low: Vector, high: Vector) -> list[str]:
-        """Commands that choose the grains each piece may touch: those in this box, beside the piece."""
-        sides = " ".join(f"{a:.17g} {b:.17g}" for a, b in zip(low, high, strict=True))
-        lines = [f"region near block {sides} units box"]
-        up = to_matrix(self.turn)[:, 2]
+    def select(self, duration: float, margin: float) -> list[str]:
+        """Commands that choose the grains each piece may touch in the next ``duration`` [s]: those near it, beside it.
+
+        ``margin``: how far the middle of a grain is beyond the piece at most [m].
+        """
+        lines, turned, travel = list[str](), to_matrix(self.turn), self.travel(duration) + margin
         for piece, own in zip(self.pieces, self.names, strict=True):
-            lines.append(f"group {own} clear")
-            parts = ["near"]
+            corners = self.position + piece.corners() @ turned.T
+            sides = np.column_stack([corners.min(axis=0) - travel, corners.max(axis=0) + travel])
+            lines += [f"group {own} clear", f"region near block {digits(sides.ravel())} units box"]
+            parts, up = ["near"], turned @ piece.axes[:, 2]
             for height, sense, kind in ((piece.begin, 1.0, "above"), (piece.end, -1.0, "below")):
                 if math.isfinite(height):
-                    at, normal = self.position + height * up, sense * up
+                    at, normal = self.position + turned @ piece.at + height * up, sense * up
                     lines.append(f"region {kind} plane {digits((*at, *normal))} units box")
                     parts.append(kind)
             if len(parts) > 1:
                 lines.append(f"region chosen intersect {len(parts)} {' '.join(parts)}")
             lines.append(f"group {own} region {'chosen' if len(parts) > 1 else 'near'}")
-            if len(parts) > 1:
-                lines.append("region chosen delete")
-            lines += [f"region {kind} delete" for kind in parts[1:]]
-        return [*lines, "region near delete"]
+            lines += [f"region {kind} delete" for kind in (["chosen"] if len(parts) > 1 else []) + parts]
+        return lines

@@ -18,6 +18,8 @@ from .feet import Foot
 
 __all__ = ["BedFeet"]
 
+Surface = Callable[[Vector], tuple[Vector, Vector, Vector]]
+"""Points in the bed [m] -> distance [m], outward normal and curvature [1/m] (`distances`)."""
 MOST_LIFT = 0.5  # A start deeper than this in the bed is refused without the height that would do [m]
 
 
@@ -58,6 +60,8 @@ class BedFeet(BedGround):
         self._height = float(bed.surface)
         self.origin = np.array([*origin, self._height])
         self.surface, self.centre, self.clearance = 0.0, (0.0, 0.0), 0.0
+        grains = bed.grains(contacts=False)
+        self._mass, self._grain = float(grains.mass.sum()), 2 * float(np.mean(grains.radius))
         self.bodies = [
             bed.add_body(
                 foot.shapes, position=(*origin, self._height + AWAY), friction=friction, restitution=restitution,
@@ -67,7 +71,6 @@ class BedFeet(BedGround):
         ]  # fmt: skip
         self.members = []
         self._used = list(range(len(self.feet)))
-        self._mass = float(bed.grains().mass.sum())
         self.impulse = np.zeros(3)
         self.drag_time = math.inf
         self.grain_steps = 0
@@ -131,7 +134,7 @@ class BedFeet(BedGround):
                     f"{length:g} m long",
                     lacking=off + foot.reach,
                 )
-        if lowest + self._height < self.grain:
+        if lowest + self._height < self._grain:
             raise LeftTheBedError(
                 f"foot {foot.name!r} sank {-lowest:.3g} m, to within a grain of the floor: the bed is "
                 f"{self._height:.3g} m deep"
@@ -148,7 +151,7 @@ class BedFeet(BedGround):
                 for _ in range(40):
                     middle = 0.5 * (low + high)
                     low, high = (middle, high) if self._overlap(pose, middle)[0] > 0 else (low, middle)
-                would = f"{1e3 * (high + 0.005 * self.grain):.4g} mm higher"
+                would = f"{1e3 * (high + 0.005 * self._grain):.4g} mm higher"
             raise ValueError(
                 f"feet: {worst.name!r} starts in the sand, {1e3 * overlap:.3g} mm into a grain: raise the robot "
                 f"(height), {would} would do"
@@ -164,10 +167,14 @@ class BedFeet(BedGround):
         still = np.zeros((len(self.feet), 3))
         raised = Pose(pose.position + np.tile([0.0, 0.0, lift], len(self.feet)), pose.turn)
         self._put(raised, still, still)
-        found = [float((grains.radius - distances(self.bed, body, grains.position)[0]).max()) for body in self.bodies]
-        worst = int(np.argmax(found))
+        found = [(float((grains.radius - surface(grains.position)[0]).max()), body) for body, surface in self._pieces()]
+        overlap, body = max(found)
         self._put(pose, still, still)
-        return found[worst], self.feet[worst]
+        return overlap, self.feet[self.bodies.index(body)]
 
-    def _surfaces(self) -> dict[int, Callable[[Vector], tuple[Vector, Vector, Vector]]]:
-        return {body: partial(distances, self.bed, body) for body in self.bodies}
+    def _pieces(self) -> list[tuple[int, Surface]]:
+        """Bodies and their surfaces where the feet are now, in the order of `feet`."""
+        return [(body, partial(distances, self.bed, body)) for body in self.bodies]
+
+    def _surfaces(self) -> dict[int, Surface]:
+        return dict(self._pieces())

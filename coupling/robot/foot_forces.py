@@ -17,10 +17,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rigid.checks import check_above_zero
-from rigid.ground.laws import find_law, springback
+from rigid.ground.laws import find_law
 
 from .body import MujocoRobot
-from .feet import Foot, refuse_missing
+from .feet import Foot, Part, refuse_missing
 from .law_feet import LawFeet, refuse_pointless
 from .stability import check_exchange
 
@@ -87,21 +87,15 @@ class FootForces(AbstractContextManager["FootForces"]):
         self._kind = mujoco.mjtObj.mjOBJ_BODY
         self._rates, self._force, self._torque = np.zeros(6), np.zeros(3), np.zeros(3)
         self._depths: WeakKeyDictionary[Any, _Depths] = WeakKeyDictionary()
-        self._plans: list[tuple[Foot, bool, list[tuple[Any, ...]]]] = []
+        self._plans: list[tuple[Foot, list[_Group]]] = []
         count = 0
         for foot in feet:
-            numbers = [
-                found.numbers(given, count=part.share * scales.get(part.name, 1.0))
-                for part in foot.parts
-                for _ in part.centres
-            ]
-            radii = foot.spreads[:, 0, 0]
-            balls = bool(np.array_equal(foot.spreads, radii[:, None, None] * np.eye(3)))
-            rows = zip(foot.centres.tolist(), radii.tolist(), numbers, strict=True)
-            # Of a point: centre, radius, the law's numbers, its place among all.
-            points = [(*centre, radius, p, count + k) for k, (centre, radius, p) in enumerate(rows)]
-            self._plans.append((foot, balls, points))
-            count += len(points)
+            groups = []
+            for part in foot.parts:
+                numbers = found.numbers(given, count=part.share * scales.get(part.name, 1.0))
+                groups += _groups(part, numbers, count)
+                count += len(part.centres)
+            self._plans.append((foot, groups))
         self._zeros = [0.0] * count
 
     def __enter__(self) -> "FootForces":
@@ -154,61 +148,95 @@ class FootForces(AbstractContextManager["FootForces"]):
         if model is not self.model:
             return
         depths = self._remembered(model, data)
-        for foot, balls, points in self._plans:
+        for foot, groups in self._plans:
             body = foot.body
             at = data.xipos[body]
             height = float(at[2])
             if height > foot.reach:
                 continue
-            matrix = data.xmat[body].tolist()
-            arms = None if balls else foot.lowest(data.xmat[body].reshape(3, 3)).tolist()
-            if self._push(data, body, height, matrix, arms, points, depths):
+            if self._push(data, body, height, data.xmat[body].tolist(), groups, depths):
                 self._mujoco.mj_applyFT(model, data, self._force, self._torque, at, body, data.qfrc_passive)
 
-    def _push(
-        self, data: Any, body: int, height: float, m: list[float], arms: Any, points: Any, depths: _Depths
-    ) -> bool:
+    def _push(self, data: Any, body: int, height: float, m: list[float], groups: Any, depths: _Depths) -> bool:
         """Force and torque of a foot about its origin into `_force` and `_torque`; whether there are any."""
         loading, rate_force, mu_d, slow = self._law.loading, self._law.rate_force, self._mu_d, self._slip
         linear, remembers, rebound = self._law.name == "spring-damper", self._law.has_memory, self._rebound
         before, now, sqrt = depths.before, depths.now, math.sqrt
-        self.points += len(points)
+        m0, m1, m2, m3, m4, m5, m6, m7, m8 = m
         fx = fy = fz = tx = ty = tz = 0.0
-        moving: list[float] | None = None
-        for k, (cx, cy, cz, radius, numbers, place) in enumerate(points):
-            if arms is None:
-                az = m[6] * cx + m[7] * cy + m[8] * cz - radius
-                depth = -(height + az)
-                if depth > 0.0:
-                    ax, ay = m[0] * cx + m[1] * cy + m[2] * cz, m[3] * cx + m[4] * cy + m[5] * cz
-            else:
-                ax, ay, az = arms[k]
-                depth = -(height + az)
-            if depth <= 0.0:
+        moving = None
+        for gx, gy, gz, reach, numbers, round_, points in groups:
+            if height + m6 * gx + m7 * gy + m8 * gz > reach:
                 continue
-            if moving is None:
-                self._mujoco.mj_objectVelocity(self.model, data, self._kind, body, self._rates, 0)
-                moving = self._rates.tolist()
-            wx, wy, wz, vx, vy, vz = moving
-            ux, uy = vx + wy * az - wz * ay, vy + wz * ax - wx * az
-            rate = wy * ax - wx * ay - vz
-            if linear:  # the spring-damper without two calls, a fifth of the time of a foot on many points
-                load = numbers[0] * depth + (numbers[1] * rate if rate > 0.0 else 0.0)
-            elif remembers and depth < before[place]:  # `SurfaceLaw.force`, written out as it takes most of the time
-                now[place] = before[place]
-                load = loading(before[place], numbers) * springback(depth, before[place], rebound)
-                load += rate_force(depth, rate, numbers)
-            else:
-                now[place] = depth
-                load = loading(depth, numbers) + rate_force(depth, rate, numbers)
-            if load <= 0.0:
-                continue
-            size = sqrt(ux * ux + uy * uy)
-            share = -mu_d * load / (size if size > slow else slow)
-            px, py = share * ux, share * uy
-            fx, fy, fz = fx + px, fy + py, fz + load
-            tx, ty, tz = tx + ay * load - az * py, ty + az * px - ax * load, tz + ax * py - ay * px
+            self.points += len(points)
+            for cx, cy, cz, radius, spread, place in points:
+                az = m6 * cx + m7 * cy + m8 * cz - radius
+                if not round_:  # the lowest point of an ellipsoid: c - S S z / |S z|
+                    s0, s1, s2, s3, s4, s5 = spread
+                    dx, dy, dz = s0 * m6 + s1 * m7 + s2 * m8, s1 * m6 + s3 * m7 + s4 * m8, s2 * m6 + s4 * m7 + s5 * m8
+                    size = sqrt(dx * dx + dy * dy + dz * dz)
+                    az -= size
+                depth = -(height + az)
+                if depth <= 0.0:
+                    continue
+                if not round_:
+                    size = size if size > 1e-300 else 1.0
+                    cx, cy, cz = (
+                        cx - (s0 * dx + s1 * dy + s2 * dz) / size, cy - (s1 * dx + s3 * dy + s4 * dz) / size,
+                        cz - (s2 * dx + s4 * dy + s5 * dz) / size,
+                    )  # fmt: skip
+                ax, ay = m0 * cx + m1 * cy + m2 * cz, m3 * cx + m4 * cy + m5 * cz
+                if moving is None:
+                    self._mujoco.mj_objectVelocity(self.model, data, self._kind, body, self._rates, 0)
+                    moving = wx, wy, wz, vx, vy, vz = self._rates.tolist()
+                rate = wy * ax - wx * ay - vz
+                if linear:  # the spring-damper without two calls, a fifth of the time of a foot on many points
+                    load = numbers[0] * depth + (numbers[1] * rate if rate > 0.0 else 0.0)
+                elif not remembers:
+                    load = loading(depth, numbers) + rate_force(depth, rate, numbers)
+                elif depth < (top := before[place]):  # `SurfaceLaw.force`, written out as it takes most of the time
+                    now[place] = top
+                    share = 1.0 - (top - depth) / (rebound * top)
+                    load = (loading(top, numbers) * share if share > 0.0 else 0.0) + rate_force(depth, rate, numbers)
+                else:
+                    now[place] = depth
+                    load = loading(depth, numbers) + rate_force(depth, rate, numbers)
+                if load <= 0.0:
+                    continue
+                ux, uy = vx + wy * az - wz * ay, vy + wz * ax - wx * az
+                size = sqrt(ux * ux + uy * uy)
+                share = -mu_d * load / (size if size > slow else slow)
+                px, py = share * ux, share * uy
+                fx, fy, fz = fx + px, fy + py, fz + load
+                tx, ty, tz = tx + ay * load - az * py, ty + az * px - ax * load, tz + ax * py - ay * px
         force, torque = self._force, self._torque  # one by one: NumPy takes three times as long for a tuple
         force[0], force[1], force[2] = fx, fy, fz
         torque[0], torque[1], torque[2] = tx, ty, tz
         return fz > 0.0
+
+
+_Group = tuple[float, float, float, float, tuple[float, ...], bool, list[tuple[Any, ...]]]
+"""Points of a part. Of all: a middle [m], the radius of a ball about it around them [m], the law's numbers, whether
+they are corners or on balls. Of each: its centre [m], its ball's radius [m] or 0, its S as xx, xy, xz, yy, yz, zz
+[m], its place among all points of the feet."""
+
+
+def _groups(part: Part, numbers: tuple[float, ...], first: int) -> list[_Group]:
+    """The points of a part, the `first`th and on, in a lower and an upper half: mostly one of them is in the air."""
+    radii = part.spreads[:, 0, 0]
+    round_ = bool(np.array_equal(part.spreads, radii[:, None, None] * np.eye(3)))
+    sides = part.centres[:, 2] < part.centres[:, 2].mean()
+    found = []
+    for some in (np.flatnonzero(sides), np.flatnonzero(~sides)):
+        if not len(some):
+            continue
+        middle = part.centres[some].mean(axis=0)
+        sizes = np.linalg.norm(part.spreads[some], 2, axis=(1, 2))
+        reach = float((np.linalg.norm(part.centres[some] - middle, axis=1) + sizes).max())
+        rows = [
+            (*part.centres[k].tolist(), float(radii[k]) if round_ else 0.0,
+             part.spreads[k][np.triu_indices(3)].tolist(), first + int(k))
+            for k in some
+        ]  # fmt: skip
+        found.append((*middle.tolist(), reach * (1 + 1e-12), numbers, round_, rows))
+    return found

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from coupling import BedGround
     from experiments.runs.progress import Progress
 
-__all__ = ["ON_GRAINS", "RANKS", "check_lammps", "in_lammps", "lammps_fault"]
+__all__ = ["ON_GRAINS", "RANKS", "check_lammps", "in_lammps", "lammps_fault", "moved_to_lammps"]
 
 ON_GRAINS = ("bed", "lammps")
 """Grounds made of grains: in this process, and in LAMMPS."""
@@ -41,15 +41,22 @@ def check_lammps(settings: Any) -> None:
             raise ValueError(f"ground = 'lammps': {error}") from None
 
 
-def in_lammps(
-    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, **options: Any
-) -> "BedGround":
-    """The grains of a prepared bed in LAMMPS, at rest there, under a spike or members; `options`: of `BedGround`."""
-    from coupling.lammps import LammpsBed, LammpsGround
+def moved_to_lammps(bed: Any, settings: Any, progress: "Progress", *, begin: float = 0.0) -> Any:
+    """The grains of a prepared bed as a `coupling.lammps.LammpsBed`, at rest there."""
+    from coupling.lammps import LammpsBed
 
     moved = LammpsBed(bed, ranks=settings.ranks or 1, begin=begin)
     taken = moved.settle()
     progress.message(
         say("in_lammps", bed=moved, ranks=moved.ranks, taken=taken, change=1e6 * (moved.surface - bed.surface))
     )
-    return LammpsGround(moved, body, begin=begin, **options)
+    return moved
+
+
+def in_lammps(
+    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, **options: Any
+) -> "BedGround":
+    """A spike or members on the grains of a prepared bed in LAMMPS; `options`: of `BedGround`."""
+    from coupling.lammps import LammpsGround
+
+    return LammpsGround(moved_to_lammps(bed, settings, progress, begin=begin), body, begin=begin, **options)

@@ -18,7 +18,7 @@ def check(settings: RobotSettings) -> None:
     """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
     plan = plan_robot(settings)
     try_controller(plan.robot())
-    if settings.ground == "bed":
+    if settings.on_grains:
         RobotOnBed(settings, plan).check()
     else:
         RobotFollowed(settings, plan).run_on_law()
@@ -30,7 +30,7 @@ def _carry_out(settings: RobotSettings, folder: RunFolder, progress: Progress) -
         keep_files(settings, folder.path)
         settings = with_kept_ground(settings, folder.path)
         plan = plan_robot(settings, folder=folder.path)
-        if settings.ground == "bed":
+        if settings.on_grains:
             return RobotOnBed(settings, plan).carry_out(folder, progress)
         followed = RobotFollowed(settings, plan)
         if settings.threads is not None:

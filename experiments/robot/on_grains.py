@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from coupling.members import Member
 from coupling.poses import Vector as Array
-from coupling.robot import BedFeet, MujocoRobot, RobotRun
+from coupling.robot import BedFeet, LammpsFeet, MujocoRobot, RobotRun, refuse_in_lammps
 from coupling.robot.stability import ExpectedBed, check_exchange, plan_area
 from dem import Bed
 from dem.contact.timestep import time_step_for
 from experiments.grains.following import Followed
+from experiments.grains.lammps import check_lammps, moved_to_lammps
 from experiments.grains.on_bed import Forecast, PlatformOnBed
 from experiments.grains.softening import run_limit
 from experiments.runs.progress import Progress
@@ -157,6 +158,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         return self.plan.standing_on(foot.parts[k].name for foot, sunk in feet for k in sunk)
 
     def announce(self, progress: Progress) -> None:
+        self.progress = progress
         for sentence in self.told.announcement():
             progress.message(sentence)
 
@@ -175,6 +177,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
     def check(self) -> None:
         """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this robot."""
         s = self.settings
+        check_lammps(s)
         for foot in self._robot.feet:
             if not foot.shapes:
                 raise ValueError(say("site_on_grains", name=foot.name))
@@ -190,6 +193,9 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             super().check()
         except RuntimeError as error:
             raise ValueError(say("forecast_fails", error=error)) from error
+        if s.ground == "lammps":
+            turns = self.forecast.run.feet[:, :, 3:7]
+            refuse_in_lammps(self._robot.feet, turns[np.linspace(0, len(turns) - 1, min(SEEN, len(turns))).astype(int)])
         self.check_exchange()
 
     def check_extent(self) -> None:
@@ -225,9 +231,12 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         return {"origin": (x, y)}
 
     def ground(self, bed: Bed) -> BedFeet:
-        """The robot's feet on the prepared bed."""
-        s = self.settings
-        return BedFeet(
+        """The robot's feet on the prepared bed, in LAMMPS where its grains are to live there."""
+        s, make = self.settings, BedFeet
+        if s.ground == "lammps":
+            bed.overlap_limit = run_limit(s.max_overlap)
+            bed, make = moved_to_lammps(bed, s, self.progress), LammpsFeet
+        return make(
             bed, self._robot.feet, touch=1e-3 * self.weight, friction=s.spike_friction,
             restitution=s.spike_restitution, **self.layout(bed),
         )  # fmt: skip

@@ -74,7 +74,7 @@ class RobotPlan:
         """Name of the surface law; on grains that of the forecast."""
         if self.fitted is not None:
             return self.fitted.law
-        return "spring-damper" if self.settings.ground == "bed" else self.settings.ground
+        return "spring-damper" if self.settings.on_grains else self.settings.ground
 
     def standing_on(self, parts: Iterable[str]) -> "RobotPlan":
         """The same on grains, with K of the largest of these parts where words name K of a foot."""
@@ -150,7 +150,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     if fitted is not None:
         warnings += [say("fitted", file=fitted, most=largest)] if largest != 1.0 else []
         warnings += [say("beyond_range", sentence=said, file=fitted) for said in _beyond_gravity(fitted, robot.gravity)]
-    if settings.ground in ("spring-damper", "bed"):
+    if settings.on_grains or settings.ground == "spring-damper":
         warnings += _settle_law(settings, surface, robot.gravity, largest, numbers)
     _settle_friction(settings, surface, numbers)
     if surface.guess:

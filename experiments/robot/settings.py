@@ -4,6 +4,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
+from experiments.grains.lammps import ON_GRAINS, RANKS, lammps_fault
 from experiments.grains.settings import GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
 from rigid.checks import nearest
@@ -17,6 +18,8 @@ say = Sentences(__package__)
 
 ON_ANY_GROUND = ("substeps", "extrapolation", "iterations", "frame_count", "checkpoint_interval")
 """Of `GrainsSettings`, those that a surface law takes too."""
+SPRING = (*ON_GRAINS, "spring-damper")
+"""Grounds that take K and C: on grains the forecast does."""
 NOT_OURS = ("lowering_speed", "body_steps")
 """Of `GrainsSettings`, those that a robot has no use for."""
 
@@ -42,7 +45,8 @@ class RobotSettings(GrainsSettings):
     """Material: steel, brick, sand, sand-weak or jsc1a."""
     ground: str = "spring-damper"
     """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, katsuragi-durian, bekker,
-    rft), the file of one (ground.toml, as hedgebed calibrate writes it), or bed: grains."""
+    rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or lammps (a bed whose grains
+    are in LAMMPS; the feet move in the plane of x and z)."""
     ground_parameters: tuple[str, ...] = ()
     """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot."""
     stiffness: Positive | None = None
@@ -60,6 +64,12 @@ class RobotSettings(GrainsSettings):
     bed_size: tuple[Positive, Positive, Positive] = (0.3, 0.3, 0.08)
     """On a bed: its size along x and y (both periodic) and its depth [m]; the feet start over its middle."""
     grain: Positive = Field(0.006, description="On a bed: mean grain diameter [m].")
+    ranks: int | None = Field(None, ge=1, le=4096, description=RANKS)
+
+    @property
+    def on_grains(self) -> bool:
+        """Whether the ground is made of grains."""
+        return self.ground in ON_GRAINS
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -72,18 +82,18 @@ class RobotSettings(GrainsSettings):
         if is_ground_file(self.ground):
             own = self.ground_parameters or self.stiffness is not None or self.damping is not None
             return say("of_a_file", s=self) if own else None
-        known = [*GROUNDS, "bed"]
+        known = [*GROUNDS, *ON_GRAINS]
         if self.ground not in known:
             return say("no_ground", s=self, known=nearest(self.ground, known))
-        if self.ground_parameters and self.ground in ("bed", "spring-damper"):
+        if self.ground_parameters and self.ground in SPRING:
             return say("no_parameters", s=self, given=" ".join(self.ground_parameters))
         of_spring = self.stiffness is not None or self.damping is not None
-        return say("of_the_spring", s=self) if of_spring and self.ground not in ("bed", "spring-damper") else None
+        return say("of_the_spring", s=self) if of_spring and self.ground not in SPRING else None
 
     def _scaled(self) -> str | None:
         if not self.scale_with_gravity:
             return None
-        if self.ground not in ("bed", "spring-damper"):
+        if self.ground not in SPRING:
             return say("scaled_law", s=self)
         return say("scaled_given") if self.stiffness is not None and self.damping is not None else None
 
@@ -96,8 +106,8 @@ class RobotSettings(GrainsSettings):
         for name in NOT_OURS:
             if getattr(self, name) != fields[name].default:
                 return say("not_ours", name=name, value=getattr(self, name))
-        if self.ground == "bed":
-            return self.sleep_fault()
+        if self.on_grains or self.ranks is not None:
+            return self.sleep_fault() or lammps_fault(self)
         for name in GrainsSettings.model_fields:
             if name not in (*ON_ANY_GROUND, "threads") and getattr(self, name) != fields[name].default:
                 return say("of_a_bed", name=name, value=getattr(self, name))

@@ -35,7 +35,10 @@ def springback_energy(depth, top, rebound, force_at_top):
 
 def spring_damper_loading(depth, p):
     """K z."""
-    return p[0] * max(depth, 0.0)
+    z = depth
+    if z < 0.0:
+        z = 0.0
+    return p[0] * z
 
 
 def spring_damper_loading_work(depth, p):
@@ -46,8 +49,11 @@ def spring_damper_loading_work(depth, p):
 def spring_damper_rate_force(depth, rate, p):
     """C dz/dt while going in."""
     force = 0.0
+    inwards = rate
+    if inwards < 0.0:
+        inwards = 0.0
     if depth > 0.0:
-        force = p[1] * max(rate, 0.0)
+        force = p[1] * inwards
     return force
 
 
@@ -58,7 +64,10 @@ def spring_damper_rate_work(depth, rate, p):
 
 def power_loading(depth, p):
     """K z^n."""
-    return p[0] * max(depth, 0.0) ** p[2]
+    z = depth
+    if z < 0.0:
+        z = 0.0
+    return p[0] * z ** p[2]
 
 
 def power_loading_work(depth, p):
@@ -68,7 +77,13 @@ def power_loading_work(depth, p):
 
 def hunt_crossley_rate_force(depth, rate, p):
     """K z^n (3 / 2) alpha dz/dt, and never more than takes the whole force away."""
-    return p[0] * max(depth, 0.0) ** p[2] * max(1.5 * p[1] * rate, -1.0)
+    z = depth
+    share = 1.5 * p[1] * rate
+    if z < 0.0:
+        z = 0.0
+    if share < -1.0:
+        share = -1.0
+    return p[0] * z ** p[2] * share
 
 
 def hunt_crossley_rate_work(depth, rate, p):
@@ -79,8 +94,11 @@ def hunt_crossley_rate_work(depth, rate, p):
 def inertial_rate_force(depth, rate, p):
     """b (dz/dt)^2 while going in."""
     force = 0.0
+    inwards = rate
+    if inwards < 0.0:
+        inwards = 0.0
     if depth > 0.0:
-        force = p[1] * max(rate, 0.0) ** 2
+        force = p[1] * inwards * inwards
     return force
 
 
@@ -91,10 +109,13 @@ def inertial_rate_work(depth, rate, p):
 
 def bekker_loading(depth, p):
     """A(z) (k_c / b + k_phi) z^n, A = a (2 s - s^2) up to the depth h of the full section a, with s = z / h."""
-    z = max(depth, 0.0)
+    z = depth
+    if z < 0.0:
+        z = 0.0
     force = p[0] * z ** p[1]
     if z < p[2]:
-        force = p[0] * z ** (p[1] + 1.0) / p[2] * (2.0 - z / p[2])
+        s = z / p[2]
+        force = force * s * (2.0 - s)
     return force
 
 
@@ -118,12 +139,17 @@ no_rate_work = no_rate_force
 
 def rft_loading(depth, p):
     """2 pi R^3 xi_n (sum of b_k s^(k+2), s = z / R <= 1; beyond, level with the slope) + wall of the shaft."""
-    z = max(depth, 0.0)
-    s = min(z / p[2], 1.0)
+    s = depth / p[2]
+    shaft = 0.0
+    if s > 1.0:
+        shaft = (s - 1.0) * (p[11] + 0.5 * p[12] * (s - 1.0))
+        s = 1.0
+    if s < 0.0:
+        s = 0.0
+    square = s * s
     low = p[3] + s * (p[4] + s * (p[5] + s * p[6]))
     high = p[7] + s * (p[8] + s * (p[9] + s * p[10]))
-    above = max(z / p[2] - 1.0, 0.0)
-    return p[0] * (s * s * (low + s * s * s * s * high) + p[11] * above + 0.5 * p[12] * above * above)
+    return p[0] * (square * (low + square * square * high) + shaft)
 
 
 def rft_loading_work(depth, p):
@@ -141,8 +167,16 @@ def rft_loading_work(depth, p):
 
 def rft_rate_force(depth, rate, p):
     """lambda rho (n.v)^2 over the ball: pi R^2 lambda rho v^2 (1 - (1 - s)^4) / 2 while going in."""
-    left = 1.0 - min(max(depth, 0.0) / p[2], 1.0)
-    return p[1] * max(rate, 0.0) ** 2 * (1.0 - left * left * left * left)
+    left = 1.0 - depth / p[2]
+    inwards = rate
+    if left > 1.0:
+        left = 1.0
+    if left < 0.0:
+        left = 0.0
+    if inwards < 0.0:
+        inwards = 0.0
+    left = left * left
+    return p[1] * inwards * inwards * (1.0 - left * left)
 
 
 def rft_rate_work(depth, rate, p):

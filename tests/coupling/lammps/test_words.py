@@ -8,11 +8,11 @@ import pytest
 
 from coupling.lammps import LammpsMissingError, process
 from coupling.lammps.law import OVERLAP, MeanContact, dashpot_input, law_words, spring_energy, spring_force
-from coupling.lammps.regions import MovingBody, pieces_of
+from coupling.lammps.regions import MovingBody, OutOfPlaneError, pieces_of
 from dem import Ball, Cone, Cylinder, Material, Mesh
 from dem.contact.law import pair_row
 from dem.grains.materials import Facing
-from dem.shapes.solids import Box, Capsule
+from dem.shapes.solids import Box, Capsule, Placed
 
 SAND = Material("mine", 2650.0, 2e7, 0.25, 0.5, 0.6, rolling_friction=0.2)
 MEAN = MeanContact(radius=2e-5, mass=1e-5)
@@ -101,10 +101,9 @@ def test_a_spike_is_a_ball_below_its_middle_and_a_cylinder_above():
 @pytest.mark.parametrize(
     ("shapes", "named"),
     [
-        ([Capsule(start=(0, 0, 0), end=(0, 0, 1), radius=0.1)], "Capsule"),
         ([Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])], "Mesh"),
         ([Ball(radius=0.006), Cylinder(bottom=0.0, top=0.06, radius=0.004)], "as thick as"),
-        ([Box(size=(1, 1, 1)), Ball(radius=2.0)], "several pieces"),
+        ([Box(size=(1, 1, 1)), Cylinder(bottom=0.0, top=0.06, radius=0.004)], "several pieces"),
     ],
 )
 def test_shapes_without_a_counterpart_are_refused_by_name(shapes, named):
@@ -112,17 +111,56 @@ def test_shapes_without_a_counterpart_are_refused_by_name(shapes, named):
         pieces_of(shapes)
 
 
+def test_a_capsule_is_two_balls_and_a_cylinder_and_grains_belong_to_the_one_beside_them():
+    lower, shaft, upper = pieces_of(Capsule(start=(0.0, 0.0, 0.01), end=(0.0, 0.03, 0.01), radius=0.004))
+    assert (lower.end, shaft.begin, shaft.end, upper.begin) == pytest.approx((0.0, 0.0, 0.03, 0.03))
+    body = placed(Capsule(start=(0.0, 0.0, 0.01), end=(0.0, 0.03, 0.01), radius=0.004), (0.0, 0.0, 0.0), turned(0.0))
+    styles = [piece.words(seat).split() for piece, seat in zip(body.pieces, body.seats, strict=True)]
+    assert [words[:2] for words in styles] == [["sphere", "0"], ["cylinder", "y"], ["sphere", "0"]]
+    np.testing.assert_allclose([float(x) for x in styles[1][2:]], [0.0, 0.01, 0.004, 0.0, 0.03], atol=1e-15)
+    np.testing.assert_allclose([float(x) for x in styles[2][1:]], [0.0, 0.03, 0.01, 0.004], atol=1e-15)
+
+
+def test_a_blade_of_a_wheel_is_a_block_that_is_turned_by_its_own_angle_and_the_wheel_lies_across():
+    """The wheel's body is turned by 0.2 about y; the blade stands at 30 degrees, 0.106 from the axle."""
+    side, quarter = math.radians(30), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+    blade = Placed(
+        Box((0.004, 0.05, 0.016)), position=(0.106 * math.sin(side), 0.0, 0.106 * math.cos(side)),
+        turn=tuple(turned(side)),
+    )  # fmt: skip
+    wheel = Placed(Cylinder(-0.025, 0.02, 0.1), turn=quarter)  # its axis along -y
+    body = placed([wheel, blade], (0.0, 0.0, 0.0), turned(0.2))
+    assert [seat.angle for seat in body.seats] == pytest.approx([0.0, 0.2 + side])
+    kind, axis, *numbers = body.pieces[0].words(body.seats[0]).split()
+    assert (kind, axis) == ("cylinder", "y")
+    np.testing.assert_allclose([float(x) for x in numbers], [0.0, 0.0, 0.1, -0.02, 0.025], atol=1e-12)
+    kind, *numbers = body.pieces[1].words(body.seats[1]).split()
+    assert kind == "block"
+    np.testing.assert_allclose([float(x) for x in numbers], [-0.002, 0.002, -0.025, 0.025, 0.098, 0.114], atol=1e-12)
+    body.made, body.jumped = True, False
+    body.place(np.zeros(3), np.zeros(3), turned(0.2 + 1e-12), np.zeros(3))
+    assert body.made and not body.jumped and body.spans
+    lying = np.array([math.cos(0.2), math.sin(0.2), 0.0, 0.0])
+    with pytest.raises(OutOfPlaneError):
+        body.place(np.zeros(3), np.zeros(3), lying, np.zeros(3))
+
+
+def test_a_cone_that_lies_across_is_turned_round_with_its_axis():
+    for sense, wanted in ((1.0, [0.01, 0.02, 0.03, 0.0, 0.1]), (-1.0, [0.01, 0.03, 0.02, -0.1, 0.0])):
+        body = placed(Cone(0.0, 0.1, 0.02, 0.03), (0.0, 0.0, 0.0), np.array([1.0, -sense, 0.0, 0.0]) / math.sqrt(2))
+        kind, axis, _, *numbers = body.pieces[0].words(body.seats[0]).split()
+        assert (kind, axis) == ("cone", "y")
+        np.testing.assert_allclose([float(x) for x in numbers], [0.0, *wanted[1:]], atol=1e-15)
+
+
 def test_a_body_keeps_its_angle_through_whole_turns():
     body = MovingBody(1, pieces_of(Cylinder(bottom=0.0, top=0.1, radius=0.01)), "law", np.zeros(3))
-    for k in range(1, 20):
+    for k in range(20):  # counted from where it was first put
         angle = 0.5 * k
-        turn = np.array([math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0])
-        body.place(np.zeros(3), np.zeros(3), turn, np.array([0.0, 1.0, 0.0]))
+        body.place(np.zeros(3), np.zeros(3), turned(0.3 + angle), np.array([0.0, 1.0, 0.0]))
         assert body.angle == pytest.approx(angle)
         body.go_on(0.1)
         assert body.angle == pytest.approx(angle + 0.1)
-    low, high = body.reach(0.0, 0.0)
-    assert high[0] - low[0] < 2 * 0.1 * math.sqrt(1.04)
 
 
 def turned(angle):

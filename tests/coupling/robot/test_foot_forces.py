@@ -6,6 +6,7 @@ from spatial_runs import EXAMPLES, ball, moving
 
 from coupling.robot import FootForces, LawFeet, MujocoRobot, RobotRun, find_feet, load_model
 from coupling.robot.models import switch_off_floors
+from rigid.ground.laws import find_law
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -64,6 +65,35 @@ def test_its_force_on_feet_of_many_points_is_that_of_the_ground_of_a_run(name, f
     pushed = linear.T @ expected.force + angular.T @ expected.torque
     assert expected.force[2] > 1.0
     assert robot.data.qfrc_passive == pytest.approx(pushed, abs=1e-9)
+
+
+@pytest.mark.parametrize("law", ["spring-damper", "hunt-crossley", "bekker", "rft"])
+@pytest.mark.parametrize(
+    "shape", [("box", ".03 .04 .02"), ("cylinder", ".03 .02"), ("capsule", ".02 .03"), ("ellipsoid", ".03 .05 .02")]
+)
+@pytest.mark.parametrize("tilt", [0.1, 1.5])
+def test_its_wrench_on_a_foot_askew_is_the_sum_over_all_points_of_the_foot(law, shape, tilt):
+    """Each point by `SurfaceLaw.force` at its depth and rate, with its friction, about the foot's origin."""
+    model, mu_d, slow = ball(*shape, height=0.012), 0.3, 0.01
+    data = mujoco.MjData(model)
+    data.qpos[3:7] = np.array([np.cos(0.5 * tilt), 0.6 * np.sin(0.5 * tilt), 0.8 * np.sin(0.5 * tilt), 0.0])
+    data.qvel[:] = 0.2, 0.1, -0.3, 0.5, -0.7, 0.4
+    mujoco.mj_forward(model, data)
+    (foot,) = find_feet(model, data, ["foot"])
+    data.qfrc_passive[:] = 0.0
+    forces = FootForces(model, data, [foot], law=law, mu_d=mu_d, slip_speed=slow)
+    forces(model, data)
+    turn, found = data.xmat[foot.body].reshape(3, 3), find_law(law)
+    speed, spin, push = data.qvel[:3], turn @ data.qvel[3:], np.zeros(6)
+    numbers = found.numbers({}, count=foot.parts[0].share)
+    for arm in foot.lowest(turn):
+        moving = speed + np.cross(spin, arm)
+        load = found.force(-(data.qpos[2] + arm[2]), -moving[2], numbers)
+        slip = moving[:2] * mu_d * load / max(slow, np.hypot(*moving[:2]))
+        force = np.array([*-slip, load])
+        push += np.concatenate([force, turn.T @ np.cross(arm, force)])
+    assert push[2] > 0.1
+    assert data.qfrc_passive == pytest.approx(push, rel=1e-12, abs=1e-12 * push[2])
 
 
 def test_what_cannot_be_is_refused():

@@ -41,6 +41,9 @@ ON_BED = HOPPER | {"ground": "bed", "height": 0.012, "grain": 0.012, "bed_size":
         ({"feet": ()}, "feet"),
         ({"ground": "power", "scale_with_gravity": True}, "scale_with_gravity.*'power'"),
         ({"stiffness": 1.0, "damping": 1.0, "scale_with_gravity": True}, "scale_with_gravity"),
+        ({"ground": "lammps", "iterations": 3}, r"iterations = 3 .* iterations = 1"),
+        ({"ground": "bed", "ranks": 2}, r"ranks = 2 .*ground = 'bed'"),
+        ({"ranks": 2}, r"ranks = 2 .*ground = 'spring-damper'"),
     ],
 )
 def test_what_does_not_go_together_is_refused_by_name(given, said):
@@ -81,6 +84,28 @@ def test_what_there_is_not_and_what_would_be_unstable_is_refused_before_any_work
 def test_a_bed_that_does_not_suit_the_robot_is_refused_before_any_work(given, said):
     with pytest.raises(ValueError, match=said):
         robot.check(RobotSettings(**ON_BED | given))
+
+
+FREE = """<mujoco><worldbody><body name="foot" pos="0 0 0.1" quat="{quat}"><freejoint/>
+  <geom name="foot" type="{kind}" size="{size}" mass="1"/></body></worldbody>
+  <keyframe><key name="thrown" qpos="0 0 0.1 {quat}" qvel="0 0 0 {spin} 0 0"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"kind": "ellipsoid", "size": "0.03 0.04 0.03"}, r"'foot' .ellipsoid.: Mesh has no counterpart among LAMMPS"),
+        ({"spin": 1}, "'foot': this body turns out of the plane of motion"),
+        ({"quat": "0.9 0.2 0 0"}, "'foot': this body turns out of the plane of motion"),
+    ],
+)
+def test_feet_that_lammps_cannot_move_are_refused_before_any_work(given, said, tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.robot.on_grains.check_lammps", lambda *_: None)
+    file = tmp_path / "free.xml"
+    file.write_text(FREE.format(**{"kind": "box", "size": "0.04 0.04 0.04", "quat": "1 0 0 0", "spin": 0} | given))
+    own = {"model": str(file), "ground": "lammps", "keyframe": "thrown", "duration": 0.05, "bed_size": (0.2, 0.2, 0.3)}
+    with pytest.raises(ValueError, match=said):
+        robot.check(RobotSettings(**ON_BED | own))
 
 
 def test_k_of_sand_goes_with_gravity_and_c_with_its_root_where_that_is_asked_for_and_a_warning_names_it():
