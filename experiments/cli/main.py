@@ -29,6 +29,7 @@ from experiments.runs.streams import (
     fault_words,
     file_words,
     is_number,
+    naming,
     refusing,
     say,
     stdout_to_stderr,
@@ -199,7 +200,8 @@ def _resume(
         experiment = find_experiment(run.command)
         kept = run.status is None and (folder / "result.json").exists()  # as docs/results has them: not to be written
         if not kept:
-            settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
+            with naming(folder / "run.toml"):
+                settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
             check_digests(run.path, "run.toml")
             with run.lock():
                 pass

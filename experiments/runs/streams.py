@@ -6,13 +6,14 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
 from types import FrameType
 
 from cyclopts import CoercionError, MissingArgumentError
 from cyclopts.exceptions import UnusedCliTokensError
 
 __all__ = [
-    "RefusedError", "fault_words", "file_words", "is_number", "refusing", "say", "stdout_to_stderr",
+    "RefusedError", "fault_words", "file_words", "is_number", "naming", "refusing", "say", "stdout_to_stderr",
     "terminate_like_ctrl_c",
 ]  # fmt: skip
 
@@ -84,6 +85,15 @@ def refusing() -> Iterator[None]:
         yield
     except ValueError as error:
         raise RefusedError(str(error)) from error
+
+
+@contextmanager
+def naming(file: Path) -> Iterator[None]:
+    """Within, a ValueError names the file: two settings that exclude each other name only themselves."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(str(error) if str(file) in str(error) else f"{file}: {error}") from error
 
 
 @contextmanager

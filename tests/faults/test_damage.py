@@ -86,6 +86,21 @@ def test_a_damaged_result_is_made_again_to_the_same_bits(seed, whole, tmp_path, 
     assert (run / "result.json").read_bytes() == (whole / "run" / "result.json").read_bytes()
 
 
+@pytest.mark.parametrize("with_digests", [True, False])
+def test_settings_that_exclude_each_other_by_damage_name_their_file(with_digests, whole, tmp_path, capsys):
+    """Also where a killed run has no digest of them yet."""
+    run = tmp_path / "run"
+    shutil.copytree(whole / "run", run)
+    (run / "result.json").unlink()
+    if not with_digests:
+        (run / "status.json").unlink()
+    given = (run / "run.toml").read_text()
+    assert "\nspread = 0.15\n" in given  # of grains; the run is on the spring-damper
+    (run / "run.toml").write_text(given.replace("\nspread = 0.15\n", "\nspread = 0.17\n"))
+    status, said = said_of(["resume", str(run), "--quiet"], capsys)
+    assert status == 2 and f"{run / 'run.toml'}: " in said and "Traceback" not in said
+
+
 @pytest.mark.parametrize("seed", range(DAMAGES))
 def test_a_run_whose_settings_are_damaged_is_not_gone_on_with(seed, whole, tmp_path, capsys):
     run = tmp_path / "run"
