@@ -1,9 +1,9 @@
-"""Before a run: what a bed too narrow, too shallow or too coarse does to its numbers, what would do, and its cost.
+"""Advice before a run: the error from a bed too narrow, too shallow or too coarse, what is sufficient, and its cost.
 
 K of a 12 mm spike in `sand` is 103, 80 and 62 N/m with 5, 8 and 12 grains across the tip, on a straight line in the
 size of the grains (docs/results/converge-flagship): 68 with ten, and 120 and 150 on that line with 4 and 3. `COARSE`
-holds these over that with ten. A run takes time with the number of grains and, as a step of the grains goes with their
-size, with its fourth power: 16 times for half the grain.
+has the ratios of these to K with ten. The time of a run is proportional to the number of grains and, because the time
+step is proportional to their size, to d^-4: 16 times for half the grain diameter d.
 """
 
 import math
@@ -16,22 +16,22 @@ from . import say
 __all__ = ["ENOUGH_ACROSS", "ENOUGH_TIPS", "LEAST_BELOW", "costs", "resolution_advice", "times_as_long"]
 
 ENOUGH_TIPS = 6.0
-"""Width of a bed, in tips, from which on nothing is said: that of the bed that ships."""
+"""Width of a bed from which on there is no advice [tip diameters]: that of the shipped case."""
 ENOUGH_ACROSS = 10.0
-"""Grains across a tip from which on nothing is said."""
+"""Grains across a tip from which on there is no advice [1]."""
 LEAST_BELOW = 2.0
-"""Tips between the deepest point and the floor from which on nothing is said."""
+"""Distance of the deepest point from the floor from which on there is no advice [tip diameters]."""
 COARSE = ((3.0, 2.2), (4.0, 1.77), (5.0, 1.51), (8.0, 1.17), (10.0, 1.0))
 """Grains across a tip -> K over that of ten across [1] (see the module)."""
 
 
 def times_as_long(size: Sequence[float], grain: float, *, wanted: Sequence[float], wanted_grain: float) -> float:
-    """How many times as long runs take in a bed of another size [m] and of other grains [m]."""
+    """Factor on the time of runs in a bed of another size [m] and of other grains [m]."""
     return math.prod(wanted) / math.prod(size) * (grain / wanted_grain) ** 4
 
 
 def costs(times: float, seconds: float | None = None) -> str:
-    """What a change that takes `times` as long costs, in words; `seconds`: what the run takes without it, if known."""
+    """The cost of a change that takes `times` as long, in words; `seconds`: time of the run without it, if known."""
     many = f"{times:.2g} times the time"
     return many if seconds is None else f"{many}, about {_clock(times * seconds)} in place of {_clock(seconds)}"
 
@@ -45,10 +45,10 @@ def resolution_advice(
     seconds: float | None = None,
     across: float = ENOUGH_ACROSS,
 ) -> Iterator[str]:
-    """A sentence for each way in which a bed is too small or too coarse; nothing where it is not. Lengths in m.
+    """One sentence for each way in which a bed is too small or too coarse; none for a good bed. Lengths in m.
 
     `tip`: its diameter; `size`: both widths and the depth of the bed; `depth`: how deep the tip is driven; `seconds`:
-    what the runs are expected to take; `across`: grains across the tip from which on nothing is said of them.
+    expected time of the runs; `across`: grains across the tip from which on there is no advice on them.
     """
     width, height = min(size[:2]), size[2]
     if width < ENOUGH_TIPS * tip * (1 - 1e-9):
@@ -69,7 +69,7 @@ def resolution_advice(
 
 
 def _clock(seconds: float) -> str:
-    """A time in two digits and the unit that suits it."""
+    """A time with two digits in a suitable unit."""
     for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * size:
             return f"{float(f'{seconds / size:.2g}'):g} {unit}"

@@ -1,13 +1,13 @@
-"""What a bed bears before it is made: the friction angle of its grains, their cohesion, and how deep a load goes.
+"""Expected strength of a bed before it is made: friction angle and cohesion of its grains, and the depth of a load.
 
 The force on a tip of area A at the depth z is taken as F = K z + A q. K, of the weight of the grains, is 3D-RFT's for a
 flat plate (`softening.bearing_gradient`), which stands for grains of any rolling friction, times 0.41 as fitted to
 `sand-weak` (38 of 92 N/m, docs/results/penetrate) and times `strength`. q is what grains that stick add; it is known by
 measurement for the materials of recipes.toml, and for others `RESISTANCE` times their cohesion.
 
-What another cohesion would change is Terzaghi's bearing capacity of a circular foot (1943, general shear),
+The effect of another cohesion is Terzaghi's bearing capacity of a circular foot (1943, general shear),
 q = 1.3 c N_c, with N_c = (N_q - 1) cot phi and N_q = exp(pi tan phi) tan^2(45 + phi / 2) (Prandtl 1921, Reissner 1924),
-phi of the grains. A cone in `jsc-1a-loose` met some eight times that (docs/bed.md), so it is a lower bound here.
+phi of the grains. It is a lower bound here: a cone in `jsc-1a-loose` met some eight times that (docs/bed.md).
 """
 
 import math
@@ -65,7 +65,7 @@ def cohesion_of(material: Material, grain: float) -> float:
 
 
 def bearing_capacity(cohesion: float, angle: float) -> float:
-    """What a cohesion [Pa] lets a circular foot bear at the surface [Pa] (see the module); `angle` in degrees."""
+    """Bearing capacity of a circular foot at the surface [Pa], from a cohesion [Pa] and an angle [degrees]."""
     phi = math.radians(angle)
     if phi < 1e-6:
         return 1.3 * cohesion * (math.pi + 2)
@@ -75,23 +75,23 @@ def bearing_capacity(cohesion: float, angle: float) -> float:
 
 @dataclass(frozen=True)
 class Bearing:
-    """F = stiffness z + held, as it is expected."""
+    """The expected force F = stiffness z + held."""
 
     stiffness: float  # K [N/m]
     held: float  # What grains that stick bear at the surface [N]
     resistance: float  # The same as a pressure [Pa]
 
     def depth(self, load: float) -> float:
-        """Where a load comes to rest [m]."""
+        """Depth at which a load [N] comes to rest [m]."""
         return max(0.0, load - self.held) / self.stiffness
 
     def load(self, depth: float) -> float:
-        """What comes to rest at a depth [N]."""
+        """Load [N] that comes to rest at a depth [m]."""
         return self.held + self.stiffness * depth
 
 
 def bearing_of(material: Material, *, grain: float, gravity: float, area: float) -> Bearing:
-    """What a bed of grains of this mean diameter [m] bears on a tip of an area [m2] under a gravity [m/s2]."""
+    """Expected force law of a tip of an area [m2] in grains of this mean diameter [m] under a gravity [m/s2]."""
     plate = bearing_gradient(PACKING * material.density, gravity, material.friction) * area
     resistance = 0.0
     if material.cohesion != "none":

@@ -1,4 +1,4 @@
-"""How the preparation of a bed shows in the experiment that wants it."""
+"""Progress of the preparation of a bed within the experiment that needs it."""
 
 from collections.abc import Callable
 
@@ -14,12 +14,12 @@ _CALM, _REST = 4, 14  # Updates of a bed until it is cut level, and while it res
 
 
 def show_bed(progress: Progress, bed: Bed) -> None:
-    """Tell how many grains the bed has, how many of them are awake, and how many grain-steps it has done."""
+    """Show the number of grains, of grains awake, and of grain-steps done."""
     progress.show_grains(grain_count=bed.grain_count, awake_count=bed.awake_count, grain_steps=bed.grain_steps)
 
 
 class Stages:
-    """Shows the stages of a preparation; stops it where it can be gone on with."""
+    """Shows the stages of a preparation; stops it where it can be continued."""
 
     def __init__(self, progress: Progress, asked_to_stop: Callable[[], bool]) -> None:
         self.progress, self.asked_to_stop = progress, asked_to_stop
@@ -29,7 +29,7 @@ class Stages:
         self.progress.stage(name, total=total)
 
     def show_bed(self, bed: Bed) -> None:
-        """The bed as it is; `dem.prepare` tells it before each `update`."""
+        """Show the present bed; `dem.prepare` calls this before each `update`."""
         show_bed(self.progress, bed)
 
     def update(self, done: float) -> None:
@@ -40,10 +40,10 @@ class Stages:
 
 
 class BedProgress(Stages):
-    """Shows the stages of a preparation as one stage of the experiment; stops it where it can be gone on with.
+    """Shows the stages of a preparation as one stage of the experiment; stops it where it can be continued.
 
-    A preparation tells how far the grains have fallen and how still they have become; here that becomes time. `tapped`:
-    a packing fraction is asked for.
+    A preparation reports how far the grains have fallen and how slow they are; here that becomes time. `tapped`:
+    whether a packing fraction is to be reached.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class BedProgress(Stages):
         progress.stage(name, total=1.0)
 
     def stage(self, name: str, total: float | None = None) -> None:
-        """The next part begins; what is no part of its own, as loosening, counts with the one under way."""
+        """The next part begins; a stage without a part of its own, such as loosening, belongs to the present one."""
         if name in (*_SHARES, "tap"):
             self._enter(name)
 

@@ -1,4 +1,4 @@
-"""What results of a platform on a bed of grains have in common: the bed's numbers, its series, and warnings."""
+"""Common parts of the results of a platform on a bed of grains: numbers of the bed, its series, and warnings."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,7 +31,7 @@ BED_COLUMNS = {
 
 
 def write_bed_series(folder: Path, run: AnyRun) -> None:
-    """series/bed.csv: energies of the bed, what its grains lost, momentum that is not accounted for, grain steps."""
+    """series/bed.csv: energies of the bed, losses of its grains, error of the momentum, grain-steps."""
     samples = run.samples | {f"{name}_lost": values for name, values in run.losses.items()}
     columns = {BED_COLUMNS.get(name, f"{name}_J"): values for name, values in samples.items()}
     write_series(folder / "series" / "bed.csv", columns)
@@ -45,7 +45,7 @@ def bed_numbers(
     *,
     in_rig: bool,
 ) -> Json:
-    """What ``grains`` of result.json says of any bed under a platform, and how many grain steps were computed."""
+    """The entry ``grains`` of result.json for any bed under a platform, and the number of grain-steps computed."""
     done = run.samples["grain_steps"]
     steps = (run.master.count - run.placing_steps) * settings.substeps
     return {
@@ -59,7 +59,7 @@ def bed_numbers(
 
 
 def bed_warnings(bed: Bed, surface: str, *, across: float) -> Iterator[str]:
-    """That spikes are few grains across, the packing is not that of the calibration, the grains are doubtful.
+    """Warnings of spikes too few grains across, of a packing unlike that of the calibration, and of doubtful grains.
 
     `across`: a spike's diameter over the grains' [1].
     """
@@ -73,27 +73,27 @@ def bed_warnings(bed: Bed, surface: str, *, across: float) -> Iterator[str]:
 
 
 def overlap_warning(bed: Bed, softening: Softening, max_overlap: float) -> str | None:
-    """That grains overlapped by more than was meant."""
+    """Warning of overlaps above the intended bound."""
     return softening.overlapping(float(bed.max_overlap), max_overlap, stable_overlap(bed.material, max_overlap))
 
 
 def residual_warning(residual: float) -> str | None:
-    """That the energy balance does not close, where `energy_residual` is too large."""
+    """Warning of an energy balance that is not closed, if `energy_residual` is too large."""
     above = {"value": _above(residual, MOST_RESIDUAL), "limit": MOST_RESIDUAL}
     return say("residual", **above) if residual > MOST_RESIDUAL else None
 
 
 def reversal_warning(made: float) -> str | None:
-    """That the bed made energy, where `dissipation_reversal` is too large."""
+    """Warning of energy created by the bed, if `dissipation_reversal` is too large."""
     return say("reversal", value=_above(made, MOST_REVERSAL), limit=MOST_REVERSAL) if made > MOST_REVERSAL else None
 
 
 def unsettled_warning(master: Master) -> str | None:
-    """That macro steps were iterated as often as allowed without converging, where some were."""
+    """Warning of exchange steps that did not converge within the allowed iterations, if there are any."""
     return say("unsettled", many=master.exchange.unsettled, master=master) if master.exchange.unsettled else None
 
 
 def _above(value: float, limit: float) -> str:
-    """A value with as many digits, two at least, as show that it is above the limit."""
+    """A value with enough digits, at least two, to show that it is above the limit."""
     texts = (f"{value:.{digits}g}" for digits in range(2, 18))
     return next((text for text in texts if float(text) > limit), f"{value:g}")

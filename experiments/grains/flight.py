@@ -1,14 +1,14 @@
-"""Flight: how deep a platform lies on grains that weigh as little as it does, and what that asks of their bed.
+"""Flight: the depth of a platform on grains under the same low gravity, and the bed that this needs.
 
-The strength of grains without cohesion goes with gravity as the weight does (Kang et al. 2018, Nat. Commun. 9:1101: F
-linear in depth, K(phi) rho g V; Altshuler et al. 2014: what sinks from rest ends at a depth that g has no part in). So
-in flight a platform lies as deep as it would on Earth with all of its weight. Spikes bear what the surface's K says,
-measured at 1 g, in proportion to g; where that is too little the hull does, a cylinder, by 3D-RFT's pressure under a
-flat plate (`experiments.grains.softening`) over the width that grains know of it:
+Without cohesion the strength of grains is proportional to gravity, as the weight is (Kang et al. 2018, Nat. Commun.
+9:1101: F linear in depth, K(phi) rho g V; Altshuler et al. 2014: the final depth of a body that sinks from rest is
+independent of g). So in flight a platform lies as deep as on Earth with all of its weight. Spikes support the force
+of the surface's K, measured at 1 g, times g / g0. If that is too small, the hull supports the rest: a cylinder, by the
+pressure of 3D-RFT under a flat plate (`experiments.grains.softening`) over its width in the bed:
 
     W = 2 K (g / g0) z + (4/3) w p' d sqrt(2 R d),   z the tips' depth, d the hull's.
 
-While a torque acts a row may come to point straight down, and no tip is faster than on a platform that spins freely.
+While a torque acts, a row may point straight down, and no tip is faster than on a platform that spins freely.
 """
 
 import math
@@ -27,7 +27,7 @@ __all__ = ["Lying", "lies_in_flight"]
 
 @dataclass(frozen=True)
 class Lying:
-    """How a platform lies on grains in flight."""
+    """Depth and contacts of a platform on grains in flight."""
 
     sunk: float  # Depth of the tips that it stands on [m]
     deepest: float  # Depth of a tip that points straight down, the centre as high as at rest [m]
@@ -48,7 +48,7 @@ def lies_in_flight(
 ) -> Lying:
     """`trial` on the grains of `surface`, its hull a cylinder of `hull_radius` and `width` [m], for `duration` [s].
 
-    Raises ValueError where even the hull would sink in by its radius.
+    Raises ValueError if even the hull would sink in by its radius.
     """
     gravity, length = trial.gravity_sim, trial.spike_length
     level = length * math.cos(math.pi / trial.spike_count)

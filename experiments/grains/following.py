@@ -1,4 +1,4 @@
-"""A run of a platform followed to its end in a run folder: checkpoints, Ctrl-C, frames, what is kept of a failure."""
+"""Steps a run of a platform to its end in a run folder: checkpoints, Ctrl-C, frames, the state after a failure."""
 
 import time
 from abc import ABC, abstractmethod
@@ -28,16 +28,16 @@ Run = TypeVar("Run", bound=CoupledTumble | SpatialRun | RobotRun)
 
 
 class Frames(Protocol):
-    """What writes the frames of a run."""
+    """Writer of the frames of a run."""
 
     interval: float  # Between two of them [s]
 
     def write(self, run: Any) -> None:
-        """One frame of what there is now."""
+        """Write one frame of the present state."""
 
 
 class Followed(ABC, Generic[Run]):
-    """An experiment that steps a platform: what is drawn, written and concluded of its run."""
+    """An experiment that steps a platform: its frames, files and result."""
 
     stage = "tumble"  # What the progress calls the run
     settings: Any  # `GrainsSettings` with a duration
@@ -50,14 +50,14 @@ class Followed(ABC, Generic[Run]):
         """The result, its series written."""
 
     def finish(self, run: Run, folder: RunFolder, progress: Progress) -> Result:
-        """Follow `run` to its end, write result and report, and drop the checkpoint; the result."""
+        """Step `run` to its end, write result and report, and delete the checkpoint; returns the result."""
         self.follow(run, folder, progress)
         result = publish(folder, self.conclude(run, folder.path), progress)
         folder.drop_checkpoint(CHECKPOINT)
         return result
 
     def follow(self, run: Run, folder: RunFolder, progress: Progress) -> Any:
-        """What `run.run` returns; the run goes on from its checkpoint where there is one.
+        """Return what `run.run` returns; the run continues from its checkpoint if there is one.
 
         Raises KeyboardInterrupt and RuntimeError with the state saved.
         """

@@ -1,4 +1,4 @@
-"""What a graded bed adds to results of `bed make` and `bed refine`; where a tumble wants fine grains, which it met."""
+"""Results of graded beds for `bed make` and `bed refine`; where a tumble needs fine grains, and which it met."""
 
 from collections.abc import Mapping, Sequence
 from statistics import fmean
@@ -69,7 +69,7 @@ def grading_told(prepared: Prepared) -> Json:
 
 
 def grading_warning(found: Mapping[str, Any], *, after: str = "") -> str | None:
-    """That small grains lie where they do not belong, or could drain, in words; `found`: a `dem.Grading` as a dict."""
+    """Warning of small grains outside their region, or that could drain; `found`: a `dem.Grading` as a dict."""
     if found["strayed_share"] <= MOST_STRAYED and found["drained_share"] <= MOST_DRAINED:
         return None
     return (
@@ -79,7 +79,7 @@ def grading_warning(found: Mapping[str, Any], *, after: str = "") -> str | None:
 
 
 def graded_quantities(found: Sequence[Mapping[str, Any]]) -> dict[str, Json]:
-    """Of the graded beds of a run: how they lie, the worst of them, and how many grains are saved."""
+    """Quantities of the graded beds of a run: their grading, of the worst bed, and the number of grains saved."""
     saved = [1 - bed["grain_count"] / bed["fine_count"] for bed in found]
     drains = f"four in a square let grains through from {1 / THROAT:.2f} on, three from {1 / NARROWEST:.2f}"
     notes = {
@@ -105,7 +105,7 @@ def _mm(value: float | None) -> str:
 def places_touched(trajectory: Trajectory, *, reach: float) -> list[tuple[float, float]]:
     """Where the tips of a planar platform are in the ground along the motion, from its start: (from, to) [m], in order.
 
-    A tip counts from the height `reach` above the surface on [m]. No two stretches meet.
+    A tip counts below the height `reach` above the surface [m]. The stretches do not overlap.
     """
     count, length = trajectory.trial.spike_count, trajectory.trial.spike_length
     x = trajectory.x[:, None] - length * np.sin(tip_angles(count, trajectory.theta))
@@ -115,7 +115,7 @@ def places_touched(trajectory: Trajectory, *, reach: float) -> list[tuple[float,
 
 
 def merged(stretches: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The same length in stretches that do not meet, ascending [m]."""
+    """The same total length in stretches that do not overlap, ascending [m]."""
     found: list[tuple[float, float]] = []
     for low, high in sorted(stretches):
         if found and low <= found[-1][1]:
@@ -137,7 +137,7 @@ def graded_under(
     margin: float = 1.5,
     **options: Any,
 ) -> Graded:
-    """Fine grains where the tips of a forecast come down, coarse ones elsewhere.
+    """Fine grains where the tips of a forecast come down, coarse grains elsewhere.
 
     `length` of the bed [m]; `origin`: x in it of the platform's start [m]; `grain`, `spread`, `coarse` as `fine`,
     `spread` and `coarse` of `dem.Graded`; `margin`: fine sand on either side of a tip's axis, over the spike's diameter
@@ -153,7 +153,7 @@ def graded_under(
 
 
 def coarsest_touched(run: CoupledTumble, graded: Graded, *, size: Sequence[float]) -> float:
-    """The largest mean diameter that belongs where tips of a tumble on such a bed were [m]; `size` of the bed [m]."""
+    """Largest mean diameter at the places of the tips during a tumble on such a bed [m]; `size` of the bed [m]."""
     ground: Any = run.ground
     x, depth = tips_in_ground(run)
     return float(graded.diameter(ground.origin[0] + x, ground.origin[2] - depth, size).max(initial=graded.fine))

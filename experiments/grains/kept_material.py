@@ -1,4 +1,4 @@
-"""A material that is given as a file: the run's folder has a copy, for who reads it and for `hedgebed resume`."""
+"""A material given as a file: the run's folder keeps a copy, for readers and for `hedgebed resume`."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ BASE_COPY = "base.toml"  # Its name in that of a calibration, whose material.tom
 def keep_material(name: str, folder: Path, *, copy: str = MATERIAL_COPY) -> str:
     """Where the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made once.
 
-    Raises ValueError for a name that is none and a file that will not do, unless the copy is there.
+    Raises ValueError for an unknown name and for a faulty file, unless the copy exists.
     """
     from dem.grains.materials import MATERIALS, material
     from hedgebed_renamed import material_of_today

@@ -1,4 +1,4 @@
-"""`--ground lammps --ranks N`: the prepared bed goes over to LAMMPS."""
+"""`--ground lammps --ranks N`: the prepared bed is handed over to LAMMPS."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ RANKS = "Ground lammps: processes under mpiexec [1]; 1 if not given."
 
 
 def lammps_fault(settings: Any) -> str | None:
-    """What LAMMPS does not take of these settings, in words; or ranks without LAMMPS. None where all is well."""
+    """Message on a setting that is not possible in LAMMPS, or on ranks without LAMMPS; None without a fault."""
     given = settings.model_dump()
     if settings.ground != "lammps":
         return None if settings.ranks is None else say("ranks_without_lammps", s=settings)
@@ -31,7 +31,7 @@ def lammps_fault(settings: Any) -> str | None:
 
 
 def check_lammps(settings: Any) -> None:
-    """Raise ValueError, with what to install, where grains are to live in LAMMPS and it does not start on `ranks`."""
+    """Raise ValueError, naming what to install, if grains are to be in LAMMPS and it does not start on `ranks`."""
     from coupling.lammps import LammpsMissingError, check_ranks
 
     if settings.ground == "lammps":

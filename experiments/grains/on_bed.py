@@ -1,4 +1,4 @@
-"""A platform on a bed of grains: all that a run in the plane and a run in space have in common.
+"""A platform on a bed of grains: the common part of runs in the plane and in space.
 
 A variant of `PlatformOnBed` defines the members that stand on the bed, how far they go and how they are stepped. From
 that follow the size of the bed, the stiffness of its grains, the prepared bed, the run and its result. The same trial
@@ -83,16 +83,16 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     @property
     @abstractmethod
     def pressure(self) -> float:
-        """What the load alone presses with under a tip [Pa]."""
+        """Pressure of the load alone under a tip [Pa]."""
 
     @property
     @abstractmethod
     def lowering_speed(self) -> float | None:
-        """Speed at which the platform is set down [m/s]; None where it is not."""
+        """Speed at which the platform is set down [m/s]; None without a placement."""
 
     @abstractmethod
     def members(self) -> list[Member]:
-        """The spikes and the hull that grains meet. Raises ValueError for a platform that no bed takes."""
+        """Spikes and hull in contact with grains. Raises ValueError for a platform that is not possible on a bed."""
 
     @abstractmethod
     def check_extent(self) -> None:
@@ -116,17 +116,17 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         return None
 
     def check_layout(self) -> None:
-        """Raise ValueError for a bed that is laid out as the platform cannot use it."""
+        """Raise ValueError for a layout that the platform cannot use."""
 
     def thrown(self) -> float:
-        """How high over the surface thrown grains are followed [m]."""
+        """Height over the surface up to which thrown grains are computed [m]."""
         return 0.0
 
     # What follows
 
     @cached_property
     def material(self) -> Material:
-        """The grains of the surface; one that holds for one grain size is scaled when the bed is made."""
+        """The grains of the surface; a surface energy given for one grain size is scaled when the bed is made."""
         grains = find_surface(self.surface).grains if self.surface in surface_names() else None
         if grains is None:
             known = ", ".join(name for name in surface_names() if find_surface(name).grains)
@@ -144,7 +144,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         return self.grain_gravity
 
     def check(self) -> None:
-        """Raise ValueError, naming key, value and what would do, for a bed that does not suit this trial."""
+        """Raise ValueError, naming key, value and what is needed, for a bed that is unsuitable for this trial."""
         self.material, self.members()
         if self.settings.sleep:
             refuse_sleep(arch=self.settings.arch, cohesion=self.material.cohesion)
@@ -173,7 +173,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         return self.repeats * expected_grain_count(s.bed_size, s.grain, s.spread)
 
     def softening(self, *, chosen: bool = False) -> Softening:
-        """The modulus of the grains for this run: the one that is set, unless `chosen`, else that of `softening`."""
+        """The modulus of the grains for this run: the setting, unless `chosen`; otherwise that of `softening`."""
         s, forecast = self.settings, self.forecast
         return soften_material(
             self.material, young=None if chosen else s.young, max_overlap=s.max_overlap, grain=s.grain,
@@ -184,14 +184,14 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         )  # fmt: skip
 
     def bed(self, softening: Softening, progress: Progress) -> Bed:
-        """The bed, laid out for the run. Raises RuntimeError where it cannot be prepared."""
+        """The bed, laid out for the run. Raises RuntimeError if it cannot be prepared."""
         try:
             return self.laid_out(self.prepare(softening, progress))
         except RuntimeError as error:
             raise RuntimeError(say("not_prepared", error=error)) from error
 
     def prepare(self, softening: Softening, progress: Progress) -> Bed:
-        """The bed as it is prepared, from the cache where it is there."""
+        """The prepared bed, from the cache if it is there."""
         s, graded = self.settings, self.graded
         options: Json = {
             "size": s.bed_size, "grain": s.grain if graded is None else graded,
@@ -205,7 +205,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
             return staged_bed(self.material, self.stages, **options, progress=progress, asked_to_stop=asked_to_stop)
 
     def laid_out(self, bed: Bed) -> Bed:
-        """The bed as often as it is repeated, in a box as high as its grains may be thrown or carried."""
+        """All copies of the bed, in a box as high as its grains may be thrown or carried."""
         rise = self.forecast.rise
         carried = carried_height(self.material, reach=self.reach, rise=rise, grain=self.settings.grain)
         top = bed.surface + max(self.thrown(), carried)
@@ -220,7 +220,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         )  # fmt: skip
 
     def stepper(self, bed: Bed) -> Run:
-        """The run on the prepared bed, its bound on overlaps set and, with `sleep`, its grains let sleep."""
+        """The run on the prepared bed, with its bound on overlaps and, with `sleep`, its rules of sleep."""
         s = self.settings
         ground = self.ground(bed)
         bed.max_overlap, bed.overlap_limit = 0.0, run_limit(s.max_overlap)
@@ -230,11 +230,11 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         return self.run_on(ground)
 
     def stepping(self) -> Mapping[str, Any]:
-        """How the run is stepped, as every stepper takes it."""
+        """Options of stepping, as every stepper accepts them."""
         return {"duration": self.duration, "lowering_speed": self.lowering_speed, **self.settings.stepping()}
 
     def carry_out(self, folder: RunFolder, progress: Progress) -> Result:
-        """Prepare the bed, follow the run in `folder`, from its checkpoint where there is one; the result."""
+        """Prepare the bed and step the run in `folder`, from its checkpoint if there is one; returns the result."""
         self.announce(progress)
         progress.plan({"bed": 1.0, self.stage: self.duration + 0.3}, seconds={"report": 10.0})  # with the placement
         return self.finish(self.stepper(self.bed(self.softening(), progress)), folder, progress)

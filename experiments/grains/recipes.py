@@ -1,4 +1,4 @@
-"""How a bed of a material is prepared where no stages are given, and what is known of its strength: recipes.toml."""
+"""Default preparation of a bed of each material, and what is known of its strength: recipes.toml."""
 
 import tomllib
 from dataclasses import dataclass
@@ -31,6 +31,6 @@ def _recipes() -> dict[str, Recipe]:
 
 
 def recipe_of(material: Material) -> Recipe:
-    """The recipe of a material: its own where it has one, poured dry where its grains stick, else none."""
+    """The recipe of a material: its own if it has one; poured dry if its grains stick; else none."""
     other = Recipe() if material.cohesion == "none" else Recipe(stages=POURED_DRY)
     return _recipes().get(material.name, other)

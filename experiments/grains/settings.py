@@ -75,11 +75,11 @@ class GrainsSettings(StrictSettings):
         return {name: getattr(self, name) for name in ("substeps", "body_steps", "extrapolation", "iterations")}
 
     def stepping_fault(self) -> str | None:
-        """Steps that do not go into one another, in words."""
+        """Message on steps of which one is no multiple of the other; None without a fault."""
         return say("uneven_steps", s=self) if self.substeps % self.body_steps else None
 
     def sleep_fault(self) -> str | None:
-        """A rule of sleep that is given where nothing sleeps, or that there is no more, in words."""
+        """Message on a rule of sleep without sleep, or one that no longer exists; None without a fault."""
         fields = GrainsSettings.model_fields
         for key in ("sleep_force", "sleep_share"):
             if getattr(self, key) != fields[key].default:

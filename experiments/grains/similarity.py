@@ -1,7 +1,7 @@
 """Similar motions under any gravity: Froude number and inertial number of a tip in grains.
 
-Grains without cohesion are the same problem under any gravity g where lengths are kept, times go with 1 / sqrt(g) and
-moduli with g: what counts is the Froude number v / sqrt(g D) of a tip of diameter D, how far the tip is from
+Grains without cohesion are the same problem under any gravity g if lengths are kept, times scale with 1 / sqrt(g) and
+moduli with g. The similarity parameter is the Froude number v / sqrt(g D) of a tip of diameter D; it is small for
 quasi-static motion. The inertial number d (dv/dz) / sqrt(P / rho) (GDR MiDi 2004, Eur. Phys. J. E 14:341) compares the
 time in which a grain of diameter d falls into a gap with the time of the shear: here dv/dz = v / D, and P = phi rho g D
 is the weight of the grains above a depth of D, so that I = Fr (d / D) / sqrt(phi).

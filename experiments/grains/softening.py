@@ -1,8 +1,8 @@
-"""How soft the grains may be: Young's modulus from the overlap that a run allows itself.
+"""Young's modulus of softened grains, from the largest overlap that a run allows.
 
-The step of a DEM run goes with 1 / sqrt(E), so grains are made as soft as the largest overlap `max_overlap` (share of a
-grain's diameter) allows at the pressures and speeds of *this* run; where not even the real grains are stiff enough,
-that is refused.
+The time step of a DEM run is proportional to 1 / sqrt(E). So grains are as soft as the largest overlap `max_overlap`
+(share of a grain's diameter) allows at the pressures and speeds of *this* run. If not even the real grains are stiff
+enough, the run is refused.
 
 1. Pressure under the tip, from 3D-RFT (Agarwal et al. 2023, arXiv 2205.14920), a flat plate going straight down:
        p = 0.876 xi_n z + lambda rho_b v^2,   xi_n = rho_b g (894 mu^3 - 386 mu^2 + 89 mu), mu held to 0.3-0.9,
@@ -22,7 +22,7 @@ that is refused.
 5. Cohesion presses a grain onto a plane with its pull-off force as well, at most 4 pi gamma R (DMT): as a pressure 2 pi
    gamma / d, which no chain of grains makes larger: it is added in 3 without `chain`.
 
-The estimate is a choice made beforehand; the bed measures its largest overlap, and the result states it.
+The estimate is made in advance; the run measures its largest overlap, and the result states it.
 """
 
 import math
@@ -58,7 +58,7 @@ SOFT = 0.05  # Overlap at and above which grains share the load: `CHAIN`, as `de
 
 @dataclass(frozen=True)
 class Softening:
-    """What was chosen and why."""
+    """The chosen modulus and its reasons."""
 
     young: float  # Young's modulus of the softened grains [Pa]
     pressure: float  # Largest pressure expected under the tip [Pa]
@@ -71,11 +71,11 @@ class Softening:
         return self.real / self.young
 
     def stiffer(self, overlap: float, wanted: float) -> float:
-        """Young's modulus [Pa] that would bring this overlap to the one wanted (Hertz: F goes with E overlap^1.5)."""
+        """Young's modulus [Pa] that changes this overlap to the intended one (Hertz: F ~ E overlap^1.5)."""
         return self.young * (overlap / wanted) ** 1.5
 
     def overlapping(self, overlap: float, bound: float = SMALL, stable: float | None = None) -> str | None:
-        """A warning that grains overlapped by more than was meant, with the modulus that would keep it; or None.
+        """A warning of overlaps above the intended bound, with the modulus that would keep it; or None.
 
         ``bound``: `max_overlap`, which a platform's run may pass (`run_limit`); ``stable``: `stable_overlap` of it.
         """
@@ -103,7 +103,7 @@ def run_limit(max_overlap: float) -> float:
 def stable_overlap(material: Any, max_overlap: float) -> float:
     """Largest overlap [of a diameter] at which the step of a bed made for `max_overlap` is stable for a whole lattice.
 
-    The longest stable step goes with the overlap to the power -1/4 (S_n = 2 E* a, a = sqrt(R* delta)):
+    The longest stable step is proportional to the overlap to the power -1/4 (S_n = 2 E* a, a = sqrt(R* delta)):
     max_overlap (longest / step)^4, by `dem.contact.timestep.longest_step` and `time_step_for`, whatever the
     diameter; never below `max_overlap`.
     """
@@ -134,7 +134,7 @@ def drop_depth(speed: float, mass: float, load: float, stiffness: float) -> floa
 def chain(max_overlap: float) -> float:
     """Largest over mean force of the loaded contacts [1], at a bound of the overlap [of a diameter]; measured.
 
-    Between the two overlaps at which it was measured it goes with the logarithm (see the module, 2).
+    Between the two overlaps at which it was measured it is linear in the logarithm (see the module, 2).
     """
     share = math.log(SOFT / max_overlap) / math.log(SOFT / STIFF)
     return CHAIN + (STIFF_CHAIN - CHAIN) * min(1.0, max(0.0, share))

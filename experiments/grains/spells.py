@@ -1,4 +1,4 @@
-"""Where something holds without a break."""
+"""Unbroken stretches of a condition."""
 
 import numpy as np
 from numpy.typing import ArrayLike

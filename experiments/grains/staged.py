@@ -1,4 +1,4 @@
-"""A bed that goes through stages before an experiment, from the cache where it is there."""
+"""A bed prepared by stages before an experiment, from the cache if it is there."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -20,7 +20,7 @@ __all__ = ["check_bed_stages", "packing_warning", "staged_bed"]
 def check_bed_stages(
     words: Sequence[str], material: Material, *, size: tuple[float, float, float], grain: float, spread: float
 ) -> None:
-    """Raise ValueError, naming ``bed_stages``, for stages that cannot be, or leave no level bed to stand on."""
+    """Raise ValueError, naming ``bed_stages``, for impossible stages, or stages that do not end with a level bed."""
     try:
         plan = [parse_stage(stage) for stage in words]
         sizes = sizes_of(grain, spread)
@@ -35,7 +35,7 @@ def check_bed_stages(
 
 
 def packing_warning(surface: Surface, material: Material, stages: Sequence[str] | None) -> str | None:
-    """That a bed without `stages` will not have the packing its grains were calibrated at, and which stages give it."""
+    """Warning that a bed without `stages` will not have the packing of its calibration, and the stages that give it."""
     if stages is not None or surface.packing is None:
         return None
     compact = f"compact:{surface.packing:g}"
@@ -44,7 +44,7 @@ def packing_warning(surface: Surface, material: Material, stages: Sequence[str] 
 
 
 class _OneStage(Stages):
-    """Shows the stages of a preparation as one of the experiment; stops it where it can be gone on with."""
+    """Shows the stages of a preparation as one of the experiment; stops it where it can be continued."""
 
     def __init__(self, progress: Progress, name: str, count: int, asked_to_stop: Callable[[], bool]) -> None:
         super().__init__(progress, asked_to_stop)
@@ -69,8 +69,8 @@ def staged_bed(
 ) -> Bed:
     """The bed that `hedgebed bed make` with these stages would make; kept under ``HEDGEBED_CACHE``, as rained ones are.
 
-    `name`: how it shows in the progress; `options` of `dem.prepare.prepare.prepare_as`. Raises RuntimeError where the
-    bed cannot be made, and what that does.
+    `name`: how it shows in the progress; `options` of `dem.prepare.prepare.prepare_as`. Raises RuntimeError if the
+    bed cannot be made.
     """
     shown = _OneStage(progress, name, len(stages), asked_to_stop)
     try:

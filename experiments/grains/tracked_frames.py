@@ -35,7 +35,7 @@ Run = TypeVar("Run", bound=CoupledTumble | SpatialRun | RobotRun)
 
 
 class PlatformFrames(ABC, Generic[Run]):
-    """Writes frames/tumble.pvd, and goes on with it where it was stopped."""
+    """Writes frames/tumble.pvd, and continues it after a stop."""
 
     def __init__(self, run: Run, folder: Path, settings: GrainsSettings, *, resumed: bool) -> None:
         self.interval = max(run.duration / max(1, settings.frame_count), run.master.macro_step)

@@ -1,4 +1,4 @@
-"""Where a bed is computed: in the memory and on as many cores as there are, or on a GPU that is there."""
+"""Checks of the machine for a bed: memory, cores, and the GPU."""
 
 from experiments.runs.memory import cores_there, memory_there
 
@@ -21,7 +21,7 @@ def check_memory(count: float, grain: float, key: str) -> None:
 
 
 def check_where(*, arch: str, threads: int | None, precision: str = "float64") -> None:
-    """Raise ValueError for more threads than cores (None: all), and where the backend `arch` does not start here."""
+    """Raise ValueError for more threads than cores (None: all), and if the backend `arch` does not start here."""
     cores = cores_there()
     if threads is not None and threads > cores:
         raise ValueError(say("few_cores", threads=threads, cores=cores))

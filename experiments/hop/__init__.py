@@ -1,4 +1,4 @@
-"""A hop: the wheel speed or torque for a distance, on rigid ground and on ground that gives.
+"""A hop: the wheel speed or torque for a distance, on rigid and on compliant ground.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed hop`; calling one imports what computes.
 

@@ -1,8 +1,8 @@
-"""Hop theory as a tool: the wheel speed that a hop over a distance takes, the launch, the flight, how near escape is.
+"""`hedgebed hop`: the wheel speed for a hop over a distance, the launch, the flight, and the margin to escape.
 
-The launch is that of `rigid.hop`, on rigid ground. Under a brake the torque is known and the wheel's speed is sought,
-under a motor the torque; a motor's wheel then turns as fast as it has become when the platform leaves. The planar model
-then does the same hop from ground that gives (`experiments.hop.on_surface`): both stand in the result.
+The launch is that of `rigid.hop`, on rigid ground. For a brake the torque is given and the wheel's speed
+is computed; for a motor the torque is computed, and its wheel has the speed at lift-off. The planar model computes the
+same hop from compliant ground (`experiments.hop.on_surface`); the result has both.
 """
 
 import math
@@ -37,7 +37,7 @@ OF_THE_LAW = (
 
 
 def check(settings: HopSettings) -> None:
-    """Raise ValueError, naming key, value and what is allowed, for an unknown platform or a hop that cannot be."""
+    """Raise ValueError, naming key, value and what is allowed, for an unknown platform or an impossible hop."""
     plan, hop = find_hop(settings)
     trial = _trial(settings, plan, hop)
     if trial is not None:
@@ -90,7 +90,7 @@ def _trial(settings: HopSettings, plan: HopPlan, hop: Hop) -> Trial | None:
 
 
 def _write_series(settings: HopSettings, folder: RunFolder, hop: Hop, given: SurfaceHop | None) -> None:
-    """The flights of theory and model, and the model's way on the ground."""
+    """The flights of theory and model, and the model's motion on the ground."""
     flights: dict[str, tuple[Launch, Flight]] = {}
     if hop.flight is not None:
         flights["flight"] = hop.launch, hop.flight
@@ -170,7 +170,7 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
 
 
 def _model_quantities(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> dict[str, Json]:
-    """What the planar model makes of the same wheel and torque, and how many times theory's that is."""
+    """Results of the planar model with the same wheel and torque, and their ratios to the theory."""
     left, flown = hop.launch, hop.flight
     other = given.launch if given is not None else None
     flight_of = given.flight if given is not None else None
@@ -206,9 +206,9 @@ SAME_ANGLE = math.radians(1.0)
 def _sentences(
     plan: HopPlan, hop: Hop, given: SurfaceHop | None, *, speed: float, by_brake: bool, sought: float | None
 ) -> list[str]:
-    """The findings: theory on rigid ground, the planar model on ground that gives.
+    """The findings: theory on rigid ground, the planar model on compliant ground.
 
-    `speed` [rad/s] is the wheel's, `sought` [rad/s] that for the distance on ground that gives.
+    `speed` [rad/s] is the wheel's, `sought` [rad/s] that for the distance on compliant ground.
     """
     tumbler, left, flown, torque = plan.tumbler, hop.launch, hop.flight, hop.torque
     turning = f"{speed:.4g} rad/s ({speed * 30 / math.pi:.4g} rpm)"
@@ -236,7 +236,7 @@ def _sentences(
 
 
 def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> list[str]:
-    """How far off rigid ground is, and how near escape the faster of the two launches is."""
+    """Warnings on the error of rigid ground, and on a launch near the escape speed."""
     found, left, flown = [], hop.launch, hop.flight
     if given is not None:
         of_grains = {"gravity": plan.tumbler.gravity, "diameter": plan.tip_diameter}
@@ -263,7 +263,7 @@ def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float |
 
 
 def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None) -> str:
-    """Theory and model side by side, and why they differ, as far as the numbers say so."""
+    """Comparison of theory and model, and the reason of their difference if the numbers show it."""
     if given is None:
         return say("rigid_alone")
     left, flown, other, flight = hop.launch, hop.flight, given.launch, given.flight

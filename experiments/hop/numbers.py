@@ -1,4 +1,4 @@
-"""From the settings of a hop to its numbers, each with where it comes from."""
+"""From the settings of a hop to its numbers, each with its origin."""
 
 import math
 from collections.abc import Mapping
@@ -49,7 +49,7 @@ class HopPlan:
 
     @property
     def ground(self) -> str:
-        """The ground that gives, in words."""
+        """The compliant ground, as text."""
         if self.law is not None:
             return say("of_law", surface=self.surface, law=self.law.name)
         return f"{self.surface} (K = {self.stiffness:g} N/m, C = {self.damping:g} N s/m a row)"

@@ -1,7 +1,7 @@
-"""The same hop from ground that gives: the planar model with K and C under the tips, events located in time.
+"""The same hop from compliant ground: the planar model with K and C under the tips, events located in time.
 
-Hop theory has rigid ground. A spring-damper gives part of its energy back when the platform leaves: tips that hold then
-leave more steeply, tips that slide keep the angle that friction sets and leave faster.
+Hop theory has rigid ground. A spring-damper returns part of its energy when the platform leaves. Tips that
+stick then leave more steeply; tips that slide keep the angle given by friction and leave faster.
 """
 
 import math
@@ -28,7 +28,7 @@ CLOSE = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceHop:
-    """What the planar model does with the same torque and wheel."""
+    """Result of the planar model with the same torque and wheel."""
 
     launch: Launch | None  # None: it does not leave the ground for good
     flight: Flight | None  # None: it does not leave the ground, or does not come down

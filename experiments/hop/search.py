@@ -1,7 +1,7 @@
-"""The hop that is asked for: the least means that go a distance on rigid ground, or how far given means go.
+"""Search of a hop: the smallest effort for a distance on rigid ground, or the distance of a given effort.
 
-Under a brake the torque is known and the wheel's speed is sought, under a motor the torque. A distance that rigid
-ground does not let it go is refused with what each ground allows.
+For a brake the torque is given and the wheel's speed is searched, for a motor the torque. A distance that is impossible
+on rigid ground is refused; the message states what each ground allows.
 """
 
 import math
@@ -41,7 +41,7 @@ class Hop:
 
 @dataclass(frozen=True, kw_only=True)
 class _Means:
-    """What the actuator can do."""
+    """Range of the actuator's effort."""
 
     leave: Callable[[float], Launch | None]
     torque: Callable[[float], float]  # of an effort [N m]
@@ -73,7 +73,7 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
 
 
 def longest_flight(plan: HopPlan, left: Launch) -> float:
-    """When to give up following the planar model [s], by the flight from rigid, flat ground."""
+    """Longest time to step the planar model [s], from the flight on rigid, flat ground."""
     return 2 * left.time + 0.5 + 0.5 * flight(left.speed, left.angle, gravity=plan.tumbler.gravity).time  # type: ignore[union-attr]
 
 
@@ -119,7 +119,7 @@ def _impulsive_speed(plan: HopPlan, settings: HopSettings) -> float:
 
 
 def _hop(settings: HopSettings, means: _Means, effort: float) -> Hop | None:
-    """The hop by this effort; None where it does not leave rigid ground."""
+    """The hop by this effort; None if it does not leave rigid ground."""
     try:
         left = means.leave(effort)
     except RuntimeError as error:
@@ -133,7 +133,7 @@ def _hop(settings: HopSettings, means: _Means, effort: float) -> Hop | None:
 
 
 def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
-    """The least effort whose hop goes the distance on rigid ground. Raises ValueError where none does."""
+    """The smallest effort whose hop reaches the distance on rigid ground. Raises ValueError if none does."""
     distance = plan.distance
     assert distance is not None
 
@@ -165,7 +165,7 @@ def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
 
 
 def _on_surface(settings: HopSettings, plan: HopPlan, means: _Means) -> str:
-    """How the planar model answers a distance that rigid ground does not allow."""
+    """Message on the planar model for a distance that is impossible on rigid ground."""
     by_brake, distance = settings.actuator == "brake", plan.distance
     assert distance is not None
     if plan.spike_count is None:

@@ -18,7 +18,7 @@ DEFAULT_DISTANCE = 5.0
 
 
 class _Question(StrictSettings):
-    """What is asked of a hop: the means for a distance, or how far given means go."""
+    """The question: the effort for a distance, or the distance of a given effort."""
 
     gravity: Positive = Field(1e-3, description="Gravity at the surface [m/s2].")
     distance: Positive | None = None
@@ -58,7 +58,7 @@ class HopSettings(PlatformSettings, _Question):
 
     @property
     def asks_for(self) -> Literal["distance", "wheel_speed", "torque"]:
-        """What was given: a distance to go, or the means to see how far they go."""
+        """What was given: a distance, or an effort."""
         if self.wheel_speed_0 is not None:
             return "wheel_speed"
         return "torque" if self.actuator == "motor" and self.torque is not None else "distance"

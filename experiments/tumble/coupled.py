@@ -1,7 +1,7 @@
-"""`hedgebed tumble --method coupled`: the spring-damper through the coupling's master, as a bed of grains is stepped.
+"""`hedgebed tumble --method coupled`: the spring-damper, stepped by the coupling's master as a bed of grains is.
 
-What comes out is that of `rigid.planar.simulate` to its tolerance (docs/coupling.md). It is for a spring-damper that is
-stepped, recorded and read as grains are, so that only the ground differs between two runs.
+The result is that of `rigid.planar.simulate` within its tolerance (docs/coupling.md). This method steps, records and
+evaluates a spring-damper as grains, so that only the ground differs between two runs.
 """
 
 from dataclasses import replace
@@ -72,7 +72,7 @@ def row_quantities(run: CoupledTumble, *, start: str, ground: str) -> dict[str, 
 def feet_columns(run: CoupledTumble) -> Json:
     """The columns of series/feet.csv: work given and taken; load, friction, slip and sinkage of each row.
 
-    On a law friction is not among them: rows that stick share it, and the law gives only its bound.
+    Friction is missing on a law: rows that stick share it, and the law gives only its bound.
     """
     rows, feet = run.columns, run.feet
     sinkage, load = row_feet(run)

@@ -1,6 +1,6 @@
 """`hedgebed tumble`: one trial of a platform that a flywheel turns over, on any ground.
 
-`ground` and `method` decide here, in one place, who computes it: a bed of grains (`on_grains`), the coupling's master
+`ground` and `method` select here the code that computes it: a bed of grains (`on_grains`), the coupling's master
 on the spring-damper (`coupled`), or the planar model, for which a sweep and a campaign may follow. The folder holds
 trajectory.csv, series/motion.csv (accelerations, wheel, energies), result.json, figures and a report.
 """
@@ -34,7 +34,7 @@ __all__ = ["check", "resume", "run"]
 
 
 def check(settings: TumbleSettings) -> None:
-    """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
+    """Raise ValueError, naming key, value and what is accepted, for faults that the settings class cannot detect."""
     if settings.on_grains:
         from .on_grains import PlanarOnBed  # loads Taichi
 
@@ -72,7 +72,7 @@ def _check_planar(settings: TumbleSettings, plan: TumblePlan) -> None:
 
 
 def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -> tuple[Trajectory, float | None]:
-    """The trajectory, and when the wheel comes to its limit [s], where it does."""
+    """The trajectory, and the time at which the wheel reaches its limit [s], or None."""
     method: Literal["located", "paper"] = "paper" if settings.method == "paper" else "located"
     trial, full = torque_within_limit(
         plan.trial, max_wheel_speed=plan.max_wheel_speed, duration=duration, method=method
@@ -101,7 +101,7 @@ def _of_the_law(quantities: dict[str, Json]) -> dict[str, float | None]:
 
 
 def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> Result:
-    """A tumble on the spring-damper or another law, with its sweep and its campaign where they are asked for."""
+    """A tumble on the spring-damper or another law, with its sweep and its campaign if they are requested."""
     settings = with_kept_ground(settings, folder.path)
     copied = keep_model(settings.model, folder.path)
     platform = platform_numbers(settings.platform, file=keep_platform(settings.platform, folder.path, progress.message))

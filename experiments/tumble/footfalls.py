@@ -1,4 +1,4 @@
-"""Rows of spikes that come down one after the other: how deep each goes, and whether the later ones go deeper."""
+"""Footfalls: rows of spikes that touch one after the other, their depths, and whether these increase."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ GRAZE = 1e-3  # A row that goes less deep [m] has not come down
 
 @dataclass(frozen=True)
 class Footfall:
-    """One row of spikes, from where it touches to where it is out again."""
+    """One row of spikes, from its touch until it leaves the ground."""
 
     row: int
     time: float  # When it touches [s]
@@ -31,13 +31,13 @@ class Footfall:
 
     @property
     def counts(self) -> bool:
-        """Whether it went in by itself and as deep as it goes."""
+        """Whether the row was not placed and has reached its largest depth."""
         return not self.set_down and not self.open
 
 
 @dataclass(frozen=True)
 class Sinking:
-    """By how much each footfall goes deeper than the one before."""
+    """Increase of the depth from one footfall to the next."""
 
     slope: float  # [m a footfall]
     error: float  # Its standard error; its 95 % interval is from
@@ -49,7 +49,7 @@ class Sinking:
 
     @property
     def verdict(self) -> str:
-        """What that says, in a sentence."""
+        """The conclusion, as a sentence."""
         slope, error, low, high, depth = (1e3 * x for x in (self.slope, self.error, self.low, self.high, self.depth))
         rate = say("sinking_rate", slope=slope, error=error, low=low, high=high)
         of = say("sinking_of", count=self.count, beds=self.beds, s="s" if self.beds > 1 else "", depth=depth)
@@ -78,10 +78,10 @@ def find_footfalls(
 
 
 def sinking_over(beds: Sequence[Sequence[Footfall]]) -> Sinking | None:
-    """Least squares over all beds: one slope, a mean depth for each bed. None where too few are left.
+    """Least squares over all beds: one slope, and a mean depth for each bed. None for too few footfalls.
 
-    What was placed and what was still going down at the end are left out. The interval is Student's, with
-    a degree of freedom less for the slope and for every bed.
+    Rows that were placed, and rows that still sink at the end, are left out. The interval is Student's; the slope and
+    every bed take one degree of freedom.
     """
     counted = [[(k, fall.deepest) for k, fall in enumerate(falls) if fall.counts] for falls in beds]
     tables = [np.array(own).T for own in counted if len(own) >= 2]

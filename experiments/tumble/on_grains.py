@@ -1,7 +1,7 @@
 """`hedgebed tumble --ground bed`: the platform on a slice of a bed, beside the same trial on the spring-damper.
 
-In the rig the grains are at 1 g and the platform hangs on its counterweight; with ``gravity`` both are at that. What a
-run in space does alike is in `experiments.grains.on_bed`.
+In the rig the grains are at 1 g and the platform hangs on its counterweight; with ``gravity`` both are at that. The
+part that is common with runs in space is in `experiments.grains.on_bed`.
 """
 
 import math
@@ -47,7 +47,7 @@ HULL_SHARE = 0.95  # The hull's cylinder over the distance of its sides: it stay
 
 @dataclass(frozen=True, kw_only=True)
 class PlanarForecast(Forecast):
-    """What the same trial on the spring-damper says of a slice of a bed."""
+    """Demands on a slice of a bed, from the same trial on the spring-damper."""
 
     trajectory: Trajectory
     behind: float
@@ -85,7 +85,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
 
     @cached_property
     def forecast(self) -> PlanarForecast:
-        """The same trial on the spring-damper; in flight what that cannot know of sand besides."""
+        """The same trial on the spring-damper; in flight with the corrections of `experiments.grains.flight`."""
         settings, trial = self.settings, self.trial
         if is_plain(settings):
             duration = settings.duration
@@ -114,7 +114,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
     def _rolled(self, deepest: float) -> float:
         """Where the tip ahead of the next row touches, rolled on l cos(pi / n) for ROLLED of the way [m]; or 0.
 
-        On springs a row lets go, and the torque ends with it; sand holds one all the time. 0 for what is no tumble.
+        On springs a row leaves the ground, which ends the torque; sand holds one row all the time. 0 for other motions.
         """
         trial, duration = self.trial, self.duration
         if not is_plain(self.settings):
@@ -128,7 +128,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         return ROLLED[trial.actuator] * way + math.sqrt(max(trial.spike_length**2 - (high - 1.5 * deepest) ** 2, 0.0))
 
     def _in_flight(self, law: PlanarForecast) -> PlanarForecast:
-        """What the spring-damper, with its one K for any gravity, cannot know (`experiments.grains.flight`)."""
+        """Corrections for sand in flight: the spring-damper has one K for any gravity (`experiments.grains.flight`)."""
         settings, trial = self.settings, self.trial
         lying = lies_in_flight(
             trial, surface=self.surface, material=self.material, hull_radius=self.hull_radius,
@@ -147,14 +147,14 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
 
     @property
     def first_gravity(self) -> float:
-        """As set to settle under, or that of the grains [m/s2]."""
+        """Gravity while the bed settles: as set, or that of the grains [m/s2]."""
         return self.settings.settle_gravity or self.grain_gravity
 
     @property
     def lowering_speed(self) -> float:
         """As set, or sqrt(g z) [m/s], slow for sand in any gravity: z a grain, in flight how deep it lies.
 
-        Its dynamic pressure, 1.1 rho g z, is what sand bears at a depth of z / 50 (3D-RFT, `softening`).
+        Its dynamic pressure, 1.1 rho g z, equals the strength of sand at a depth of z / 50 (3D-RFT, `softening`).
         """
         if self.settings.lowering_speed is not None:
             return self.settings.lowering_speed
@@ -163,7 +163,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
 
     @property
     def pressure(self) -> float:
-        """Of the weight, in flight of what the torque presses with too, under one spike [Pa]."""
+        """Pressure under one spike by the weight, in flight also by the torque [Pa]."""
         load = self.trial.weight
         if self.counterweight == 0:
             load = max(load, PUSHED[self.trial.actuator] * self.forecast.pushed)
@@ -205,12 +205,12 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
     def thrown(self) -> float:
         """How high over the surface grains are followed [m]: thrown at THROW times the fastest tip's speed.
 
-        No higher than the bed is long: at a small gravity what leaves is not back while a run lasts, and ends it.
+        At most the length of the bed: at a small gravity, grains thrown higher do not return within a run, and end it.
         """
         return min((THROW * self.forecast.fastest) ** 2 / (2 * self.grain_gravity), self.settings.bed_size[0])
 
     def _length_on_grains(self) -> float:
-        """Of a bed whose footprints expected lie in its middle, with room for the farthest that there may be [m]."""
+        """Length of a bed with the expected footprints in its middle and space for the farthest possible one [m]."""
         forecast = self.forecast
         return 2 * (forecast.farthest + MARGIN * self.spike_diameter) - forecast.behind - forecast.ahead
 
@@ -275,7 +275,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         return bed
 
     def whose_spikes(self) -> str | None:
-        """That a body of another size than the platform's stands on the platform's spikes."""
+        """Message that a body of another size than the platform's has the platform's spikes."""
         spikes, own, given = self.spikes, self.plan.platform.spike_length, self.settings.spike_length
         if not spikes.of_platform or given is None or math.isclose(given, own):
             return None
@@ -286,7 +286,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         )  # fmt: skip
 
     def may_leave(self) -> str | None:
-        """That tips may come down beyond the bed before the end; None where they cannot."""
+        """Warning that tips may come down beyond the bed before the end; None if they cannot."""
         s, forecast = self.settings, self.forecast
         ahead = s.bed_length - self.origin
         if ahead >= forecast.farthest + 0.5 * self.spike_diameter:
@@ -311,7 +311,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         return {"origin": (self.origin, 0.5 * bed.size[1]), "begin": self.settings.place}
 
     def ground(self, bed: Bed) -> BedGround:
-        """The platform on the prepared bed, in LAMMPS where its grains are to live there."""
+        """The platform on the prepared bed; its grains are in LAMMPS if the settings say so."""
         s = self.settings
         if s.ground != "lammps":
             return super().ground(bed)
@@ -322,7 +322,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         )  # fmt: skip
 
     def check(self) -> None:
-        """As `PlatformOnBed.check`, and whether LAMMPS is there where it is asked for."""
+        """As `PlatformOnBed.check`; also checks LAMMPS if it is requested."""
         check_lammps(self.settings)
         super().check()
 
@@ -341,7 +341,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
 
 
 def _beside(settings: TumbleSettings) -> TumbleSettings:
-    """The same trial without what is of the bed: grains take all of its numbers but K, C and friction."""
+    """The same trial without the settings of the bed; its numbers are those of the grains, except K, C and friction."""
     kept = {name: getattr(settings, name) for name in settings.model_fields_set}
     own = set(settings.bed_settings_given()) | {"ground"}
     landing = {"torque": 0.0} if settings.drop_speed is not None else {}

@@ -1,4 +1,4 @@
-"""What a tumble on grains leaves: its frames, its series, and the result that stands beside the spring-damper's."""
+"""Output of a tumble on grains: frames, series, and the result beside that of the spring-damper."""
 
 import math
 from dataclasses import asdict
@@ -140,7 +140,7 @@ def conclude(
 
 
 def _same_sand_again(settings: TumbleSettings, run: CoupledTumble, spike: float) -> str | None:
-    """Where the platform's way on a bed of copies is longer than one of them, in words; `spike`: its diameter [m]."""
+    """Warning of a way on a bed of copies that is longer than one copy; `spike`: its diameter [m]."""
     if settings.bed_repeats == 1:
         return None
     piece = settings.bed_size[0]
@@ -167,7 +167,7 @@ def _grains(settings: TumbleSettings, plan: TumblePlan, run: CoupledTumble, soft
 
 
 def _own_quantities(run: CoupledTumble) -> dict[str, Json]:
-    """What a tumble on grains has beyond the planar model's numbers."""
+    """Quantities of a tumble on grains that the planar model does not have."""
     numbers = run.balance_numbers
     found = row_quantities(run, start=say("of_sinkage_start_on_grains"), ground="bed")
     notes = {

@@ -1,4 +1,4 @@
-"""Messages before the bed of a tumble on grains is made: what was set, what follows from it, what may be missing."""
+"""Messages before the bed of a tumble on grains is made: settings, derived numbers, possible shortcomings."""
 
 import math
 import re
@@ -27,7 +27,7 @@ STRONGER = (2.0, 4.0, 8.0)  # Likewise the wheel's speed, or the torque, of a br
 def opening(
     settings: TumbleSettings, plan: TumblePlan, *, grains: float, softening: Softening, lowering_speed: float
 ) -> list[str]:
-    """What was set and what follows from it; how many settings are at their defaults. `grains`: about how many."""
+    """Settings and derived numbers; how many settings have their defaults. `grains`: expected number."""
     fields = TumbleSettings.model_fields
     # A run that is taken up again has all of them set, by its run.toml.
     given = [name for name, field in fields.items() if name in settings.model_fields_set
@@ -58,9 +58,9 @@ def opening(
 
 
 def short_of_way(settings: TumbleSettings, plan: TumblePlan, law: Trajectory) -> str | None:
-    """That a trajectory angle may not come of this duration, in words; None where `law`, the spring-damper's, has one.
+    """Warning that this duration may be too short for a trajectory angle; None if `law`, the spring-damper's, has one.
 
-    A landing has none to speak of.
+    A landing needs none.
     """
     if settings.drop_speed is not None or law.trajectory_angle is not None:
         return None
@@ -81,10 +81,10 @@ def short_of_way(settings: TumbleSettings, plan: TumblePlan, law: Trajectory) ->
 
 
 def _stronger_brake(plan: TumblePlan, duration: float) -> str:
-    """The brake that would bring it LAUNCH_DISTANCE away on the spring-damper, in words.
+    """The brake that moves it by LAUNCH_DISTANCE on the spring-damper, as a sentence.
 
-    A brake gives J_w wheel_speed_0 and no more, and may be too weak to tip it over: the wheel's speed, within its
-    limit, is tried alone, then the torque, then both.
+    The angular impulse of a brake is at most J_w wheel_speed_0, and its torque may be too small to tip the platform.
+    The wheel's speed, within its limit, is tried alone, then the torque, then both.
     """
     trial = plan.trial
     for times in STRONGER:
@@ -106,7 +106,7 @@ def _away(trajectory: Trajectory) -> Any:
 
 
 def _shown(settings: TumbleSettings, name: str) -> str:
-    """A setting as one types it, and its unit as its description has it."""
+    """A setting as typed, and the unit of its description."""
     value = getattr(settings, name)
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -1,9 +1,9 @@
-"""Finished tumbles as a campaign of measured trials: what camera, IMU and wheel would have recorded of them.
+"""Finished tumbles as a campaign of measured trials: simulated recordings of camera, IMU and wheel.
 
-Each run folder is a trial; runs of one condition on beds of other seeds are its replicates. What is stated is what a
-laboratory would know: the platform, the rig, and a surface of K and C per row, fitted to the same bed where a run of
-penetrate is named (`fitted`, twice a spike's), else as the run has them. What is true is grains: nothing stands beside
-it. The start is the run's own: on grains theta and x are near 0 at t = 0, not exactly 0.
+Each run folder is a trial; runs of one condition on beds of other seeds are its replicates. The campaign states what a
+laboratory knows: the platform, the rig, and a surface of K and C per row, fitted to the same bed if a run of penetrate
+is named (`fitted`, twice a spike's), else those of the run. No file has true numbers, because the ground is grains.
+The start is that of the run: on grains theta and x are near 0 at t = 0, not exactly 0.
 """
 
 import math
@@ -37,7 +37,7 @@ FEWEST = 0.1  # A shorter run has too few rows of the camera to be diagnosed [s]
 
 
 class TumbleRecording(StrictSettings):
-    """What goes into a campaign made of tumbles beside the first run, and how noisy it is."""
+    """Further runs and noise of a campaign made of tumbles."""
 
     also: tuple[str, ...] = Field((), description="Tumbles: folders of further runs; each becomes a trial.")
     fitted: str | None = None
@@ -102,7 +102,7 @@ def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = 
 
 
 class _Tumble:
-    """A finished tumble in its folder. Raises ValueError, naming the folder, for what is none or has effects."""
+    """A finished tumble in its folder. Raises ValueError, naming the folder, for other runs and runs with effects."""
 
     def __init__(self, folder: Path) -> None:
         kept = RunFolder.open(folder)
@@ -121,12 +121,12 @@ class _Tumble:
 
     @property
     def ground(self) -> str:
-        """What it tumbled on, in words."""
+        """The ground, as text."""
         named = str(self.result["surface"])
         return f"a bed of {named}" if self.result["ground"] == "bed" else f"the {self.result['ground']} of {named}"
 
     def check_alike(self, first: "_Tumble") -> None:
-        """Raise ValueError for another platform, rig or surface than the first has."""
+        """Raise ValueError if platform, rig or surface differ from those of the first."""
         pairs: dict[str, tuple[Any, Any]] = {name: (first.numbers.get(name), self.numbers.get(name)) for name in SHARED}
         pairs |= {name: (first.result[name], self.result[name]) for name in ("surface", "ground", "spike_count")}
         for name, (before, now) in pairs.items():
@@ -135,7 +135,7 @@ class _Tumble:
                 raise ValueError(say("not_alike", **folders, name=name, now=now, before=before))
 
     def record(self, sensors: SensorSet, *, seed: tuple[int, ...]) -> Measured:
-        """What the sensors make of its series; straight lines between the rows, a millisecond apart at most."""
+        """Simulated readings of its series, interpolated linearly between rows at most a millisecond apart."""
         series = read_series(self.folder / "trajectory.csv")
         motion = read_series(self.folder / "series" / "motion.csv")
         time = series["t_s"]

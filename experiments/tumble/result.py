@@ -81,7 +81,7 @@ def trajectory_columns(trajectory: Trajectory) -> Json:
 
 
 def motion_columns(trajectory: Trajectory) -> Json:
-    """What else the plots show, by time."""
+    """Further columns of the plots, over time."""
     names = {"t_s": "time", "ax_m_s2": "ax", "ay_m_s2": "ay", "wheel_speed_rad_s": "wheel_speed"}
     names |= {f"{energy}_J": f"{energy}_energy" for energy in ("kinetic", "potential", "stored")}
     names |= {f"{energy}_J": energy for energy in ("energy", "torque_work", "dissipated")}
@@ -99,7 +99,7 @@ def title_of(plan: TumblePlan) -> str:
 
 
 def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory, full: float | None) -> Json:
-    """The entries of the result of one trial; what ran it adds its own."""
+    """The entries of the result of one trial; each experiment adds its own."""
     trial, warnings = plan.trial, list(plan.warnings)
     if full is not None:
         warnings.append(say("wheel_at_limit", limit=plan.max_wheel_speed, when=full))
@@ -130,7 +130,7 @@ def result_of(settings: TumbleSettings, plan: TumblePlan, trajectory: Trajectory
 
 
 def tumble_sentences(trajectory: Trajectory) -> list[str]:
-    """The states in their order, each with when and at which angle it was entered; and when the centre was fastest."""
+    """Sentences on the states in their order, each with time and angle of its entry, and on the largest speed."""
     said = [way_through(trajectory.transitions)]
     said += _does_not_tip(trajectory)
     if trajectory.max_speed > 0:
@@ -141,7 +141,7 @@ def tumble_sentences(trajectory: Trajectory) -> list[str]:
 
 
 def way_through(transitions: Sequence[Transition]) -> str:
-    """The states in their order, each with when and at which angle it was entered; the first few of them."""
+    """The first few states in their order, each with time and angle of its entry."""
     changes = [
         f"{state} at {time:.4g} s, {_degrees(angle)}" if time > 0 else f"{state} at once"
         for time, state, angle in transitions[:MOST]
@@ -152,7 +152,7 @@ def way_through(transitions: Sequence[Transition]) -> str:
 
 
 def stayed_words(trajectory: Trajectory) -> str:
-    """That there is no trajectory angle, and how far the centre got instead, and which way."""
+    """Sentence that there is no trajectory angle, with the largest displacement of the centre."""
     along, up = (values - values[0] for values in (trajectory.x, trajectory.y))
     k = int(np.argmax(np.hypot(along, up)))
     far = 1e3 * math.hypot(along[k], up[k])
@@ -160,7 +160,7 @@ def stayed_words(trajectory: Trajectory) -> str:
 
 
 def _does_not_tip(trajectory: Trajectory) -> list[str]:
-    """Whether it stayed on the rows it stood on: a pivot may be no more than a rocking."""
+    """Whether it stayed on its first rows: a pivot may be only a rocking motion."""
     trial, most = trajectory.trial, float(abs(trajectory.theta).max())
     if most >= math.pi / trial.spike_count or any(state == "hop" for _, state, _ in trajectory.transitions):
         return []

@@ -1,7 +1,7 @@
 """Settings of `hedgebed tumble`: one trial of the platform, options by the names of the campaign format.
 
-A number that is not given comes from `model` where there is one, else from the surface or from the defaults, which
-`experiments.tumble.trial` holds and every run prints.
+A number that is not given comes from `model` if there is one, else from the surface or from the defaults in
+`experiments.tumble.trial`, which every run prints.
 """
 
 from typing import Any, Literal, Self
@@ -198,7 +198,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
         return say("method_on_bed", s=self) if self.method == "paper" else None
 
     def _beyond_the_torque(self) -> str | None:
-        """The first effect that grains, and the master, do not have."""
+        """The first effect that is not possible on grains and with the master."""
         ids = [text.partition("=")[0].partition(".")[0].strip() for text in self.effects]
         return next((f"effects = {id}" for id in ids if id not in EFFECTS or not EFFECTS[id].on_torque_alone), None)
 
@@ -206,7 +206,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
         return next((key for key in keys if getattr(self, key)), None)
 
     def _settled_under(self) -> str | None:
-        """Whether another gravity to settle under is possible, in words where it is not."""
+        """Message if another gravity for settling is not possible; else None."""
         if self.settle_gravity is None:
             return None
         said = say("settle_gravity", s=self)

@@ -1,4 +1,4 @@
-"""Which stepper a tumble's settings ask for: one tumble, several in a row, or a landing."""
+"""The stepper for a tumble's settings: one tumble, several in a row, or a landing."""
 
 from dataclasses import asdict
 from typing import Any
@@ -19,7 +19,7 @@ __all__ = ["is_plain", "own_quantities", "own_warning", "row_feet", "sinkage_sta
 
 
 def is_plain(settings: TumbleSettings) -> bool:
-    """Whether it is one tumble, from rest: what the planar model's own integrators do."""
+    """Whether it is one tumble from rest, for which the planar model has its own integrators."""
     return settings.tumbles == 1 and settings.drop_speed is None
 
 
@@ -36,7 +36,7 @@ def stepper_of(settings: TumbleSettings, trial: Trial, ground: Ground, **options
 
 
 def words(settings: TumbleSettings, title: str) -> str:
-    """The title of a result, where it is no plain tumble."""
+    """The title of a result that is not one plain tumble."""
     before, _, after = title.partition(":")
     if settings.drop_speed is not None:
         place = after.split(",")[-1].strip()
@@ -49,8 +49,8 @@ def words(settings: TumbleSettings, title: str) -> str:
 def row_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
     """Depth of each row's tip [m], 0 above the surface, and its load [N], shape [step, row] both.
 
-    The load is the mean over the step before; on a law, at the start, before any, it is what the spring carries at
-    rest, and the depth is that of the row's end now.
+    The load is the mean over the previous step. On a law, at the start, it is the force of the spring at rest, and the
+    depth is the present one of the row's tip.
     """
     sinkage, load = run.feet[:, 3], run.feet[:, 0].copy()
     if not run.ground.gives_friction:
@@ -62,12 +62,12 @@ def row_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sinkage_start(run: CoupledTumble) -> float:
-    """Mean depth of the two rows that it stands on when the torque begins [m]."""
+    """Mean depth of the two rows that carry it when the torque begins [m]."""
     return float(row_feet(run)[0][0, [0, -1]].mean())
 
 
 def own_quantities(run: CoupledTumble) -> tuple[dict[str, Json], Json]:
-    """What a row of tumbles or a landing adds to a result: quantities, and (of a row) its tables and footfalls."""
+    """Additional entries of successive tumbles or a landing: quantities, and (of tumbles) tables and footfalls."""
     if isinstance(run, TumblesInARow):
         quantities, rests = _row(run)
         falls = find_footfalls(run.columns["time"], *row_feet(run))
@@ -112,7 +112,7 @@ def _row(run: TumblesInARow) -> tuple[dict[str, Json], Json]:
 
 
 def own_warning(run: CoupledTumble) -> str | None:
-    """Which tumbles of a row ended without the platform at rest, in words; None where there are none."""
+    """Warning of tumbles that ended before the platform was at rest; None if there are none."""
     if not isinstance(run, TumblesInARow):
         return None
     at_rest, ended, asked, rest = run.rests["at_rest"][1:].tolist(), run.ended, run.tumbles, run.rest

@@ -35,7 +35,7 @@ MOST_ROWS = 24  # Rows that the terminal shows
 _UNITS = {"trajectory_angle": "rad", "max_speed": "m/s", "max_angular_velocity": "rad/s"}
 GAPS = tuple(_UNITS)  # What is compared with the accurate integrator
 COLUMNS = _UNITS | {f"transition_angle_{state}": "rad" for state in ("slip", "hop")}  # Quantity -> unit
-WHEEL_SAMPLES = 128  # Times at which the batch is looked at for the moment of the wheel's limit
+WHEEL_SAMPLES = 128  # Times at which the batch is sampled to find when the wheel reaches its limit
 SUFFIXES = {"1": "", "9.80665 m/s2": "_g"}
 
 Array = NDArray[np.float64]
@@ -44,9 +44,8 @@ Array = NDArray[np.float64]
 class Sweep:
     """Every trial of a sweep, the last key running fastest.
 
-    `model_file` stands in for ``settings.model``, where that was copied, `platform` for ``settings.platform``, where
-    that was read. Raises ValueError for another method than "located" and, naming the point, where a trial of the sweep
-    cannot be.
+    `model_file` replaces ``settings.model`` if that was copied, `platform` replaces ``settings.platform`` if that was
+    read. Raises ValueError for another method than "located" and, naming the point, for an impossible trial.
     """
 
     def __init__(
@@ -88,9 +87,9 @@ class Sweep:
 
     @cached_property
     def shown(self) -> int:
-        """Number of the trial that can stand in the middle, or, in steps of the ranges, nearest to it.
+        """Number of the middle trial, or of the nearest one (in steps of the ranges) that can stand.
 
-        Raises ValueError where none can stand.
+        Raises ValueError if none can stand.
         """
         steps = np.stack(np.unravel_index(np.arange(len(self.plans)), self.counts), axis=1)
         far = np.sum((steps - steps[self.middle]) ** 2, axis=1)
@@ -105,7 +104,7 @@ class Sweep:
         raise ValueError(f"sweep: none of its {len(self.plans)} trials can stand; in the middle {why}")
 
     def run(self, folder: RunFolder) -> Json:
-        """Integrate the sweep, write sweep.csv and return what result.json says of it."""
+        """Integrate the sweep, write sweep.csv and return its entry of result.json."""
         time_step = min(PAPER_STEP, *(0.999 * longest_step(self.plans[place].trial) for place in self.corners))
         batch = self._batch(time_step)
         found: dict[str, Array] = {name: getattr(batch, name) for name in GAPS}
@@ -132,10 +131,10 @@ class Sweep:
         return ", ".join(f"{each.key} = {value:g}" for each, value in values)
 
     def _batch(self, time_step: float) -> BatchTrajectory:
-        """All trials by the batched model, a motor's torque ended where its wheel comes to its limit.
+        """All trials by the batched model; a motor's torque ends when its wheel reaches its limit.
 
-        The wheel of a motor only gains speed: trials that end below the limit never came to it. Of the others the
-        moment is searched by the batch too, until it is known within a step, between two of which the gain is even.
+        The wheel of a motor only gains speed, so trials that end below the limit never reached it. For the others the
+        batch searches the time, until it is known within one step; within a step the speed rises linearly.
         """
         trials, duration = [plan.trial for plan in self.plans], self.settings.duration
         batch = simulate_batch(trials, duration=duration, time_step=time_step)
@@ -191,7 +190,7 @@ class Sweep:
         return {"checked": checked, "angles": angles} | counts | most
 
     def _table(self, found: dict[str, Array], units: dict[str, str]) -> Json:
-        """The trials as the terminal shows them, thinned out evenly where they are many."""
+        """Table of the trials for the terminal, evenly thinned out if there are many."""
         count = len(self.plans)
         shown = sorted({round(k) for k in np.linspace(0, count - 1, min(count, MOST_ROWS))})
         head = [key + ("" if unit == "1" else f" [{unit}]") for key, unit in units.items()]
@@ -207,7 +206,7 @@ class Sweep:
         return {"title": f"The sweep{some}", "head": head, "rows": rows}
 
     def sentences(self, fallen: int, gaps: Json) -> list[str]:
-        """Which trial the result is of, how far the batch is off, and how many trials cannot stand."""
+        """Sentences on the trial of the result, the error of the batch, and the number of trials that cannot stand."""
         which = "in the middle" if self.shown == self.middle else "nearest the middle that can stand"
         where, count = self._where(self.shown), len(self.plans)
         said = [say("which_trial", which=which, where=where, count=count, file=SWEEP_FILE)]
@@ -226,7 +225,7 @@ class Sweep:
 
 
 def _plain(error: ValueError) -> str:
-    """What was wrong: of pydantic's own errors the sentence alone."""
+    """The message of an error; of pydantic's errors only the sentence."""
     if not isinstance(error, ValidationError):
         return str(error)
     return "; ".join(str(detail["msg"]).removeprefix("Value error, ") for detail in error.errors())

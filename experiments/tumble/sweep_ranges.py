@@ -1,4 +1,4 @@
-"""Ranges to sweep a number over, as they are typed: KEY=FROM:TO:STEP, or with a unit, KEY=1mg:9mg:2mg."""
+"""Ranges of a sweep, as typed: KEY=FROM:TO:STEP, or with a unit, KEY=1mg:9mg:2mg."""
 
 import math
 from collections.abc import Iterator
@@ -29,15 +29,15 @@ class SweepRange:
 
     @property
     def is_effect(self) -> bool:
-        """Whether it is a parameter of an effect."""
+        """Whether the key is a parameter of an effect."""
         return "." in self.key
 
 
 def parse_sweep(texts: tuple[str, ...]) -> tuple[SweepRange, ...]:
     """The ranges of one key or two, in the units of `unit_of`.
 
-    Raises ValueError for what is no range, a key there is not, a unit of another kind or behind some of the three
-    numbers only, one key twice, more than two keys, and more trials than 2,500.
+    Raises ValueError for text that is no range, an unknown key, a unit of another kind or at only some of the three
+    numbers, one key twice, more than two keys, and more than 2,500 trials.
     """
     ranges = tuple(_one(text) for text in texts)
     keys = [each.key for each in ranges]
@@ -60,7 +60,7 @@ def unit_of(key: str) -> str:
 
 
 def swept_gravities(ranges: tuple[SweepRange, ...]) -> Iterator[str]:
-    """What the ends of a range of gravities mean in m/s2 and in g, a sentence each."""
+    """One sentence for each end of a range of gravities, in m/s2 and in g."""
     for each in ranges:
         ends = list(dict.fromkeys((each.values[0], each.values[-1])))
         yield from in_both(each.key, ends, find_unit(f"[{unit_of(each.key)}]"))
@@ -90,7 +90,7 @@ def _is_finite(word: str) -> bool:
 
 
 def _numbers(key: str, words: list[str], text: str) -> list[float]:
-    """What FROM, TO and STEP mean in the unit of the key."""
+    """FROM, TO and STEP in the unit of the key."""
     with_unit = [word for word in words if has_unit(word)]
     if not with_unit:
         return [float(word) for word in words]

@@ -1,9 +1,9 @@
-"""`hedgebed campaign` and `hedgebed tumble --campaign`: trials that never were, with what is true of them beside what
-is said of them.
+"""`hedgebed campaign` and `hedgebed tumble --campaign`: synthetic trials, with their true numbers
+beside the stated ones.
 
-DIR/campaign is a campaign as a laboratory would hand it over: stated numbers, uncertainties, noisy recordings.
-DIR/truth.toml is the model that made it: the true numbers, the terms beyond the base model, each trial's true gravity.
-A tumble's campaign goes where it is asked for, and the truth into the tumble's run folder.
+DIR/campaign is a campaign like that of a laboratory: stated numbers, uncertainties, noisy recordings. DIR/truth.toml
+is the model behind it: the true numbers, the terms beyond the base model, each trial's true gravity. With `hedgebed
+tumble` the campaign is written where `--campaign` says, and the truth into the run folder.
 """
 
 import math
@@ -56,7 +56,7 @@ def shared_tables(
     granular: bool,
     rig: tables.RigTable | None,
 ) -> Json:
-    """What a campaign of tumbles and its truth both have.
+    """The tables that a campaign of tumbles and its truth share.
 
     `numbers` of platform, wheel and surface by the names of `Trial`; `kind` and `granular` of the surface. The
     Hedgehog's number of rows is left out, as the format has it.
@@ -83,7 +83,10 @@ def shared_tables(
 def trial_table(
     name: str, trial: Trial | Mapping[str, Any], actuator: Literal["motor", "brake"] = "motor"
 ) -> tables.TumbleTrial:
-    """One trial, its recordings named after it; no counterweight is none, not 0. `actuator`: beside a mapping."""
+    """The table of one trial; its recordings have its name. Without a counterweight the key is absent, not 0.
+
+    `actuator`: that of a trial given as a mapping.
+    """
     numbers = trial if isinstance(trial, Mapping) else {key: getattr(trial, key) for key in NUMBERS}
     given: Json = {key: numbers[key] for key in NUMBERS} | {"counterweight": numbers["counterweight"] or None}
     return tables.TumbleTrial(
@@ -104,7 +107,7 @@ def sensor_set(settings: CampaignSettings, *, noise: float = 1.0) -> SensorSet:
 
 
 def check(settings: CampaignSettings) -> None:
-    """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
+    """Raise ValueError, naming key, value and what is accepted, for faults that the settings class cannot detect."""
     made = _MadeUp(settings, _plans(settings))
     for number, plan in enumerate(made.plans.values(), 1):
         for trial in (plan.trial, made.true_trial(number, plan)):
@@ -114,7 +117,7 @@ def check(settings: CampaignSettings) -> None:
 def record(
     trial: Trial, *, duration: float, sensors: SensorSet, seed: int | tuple[int, ...] | None
 ) -> tuple[Measured, Any]:
-    """Integrate `trial` and record it; the trajectory stands beside it.
+    """Integrate `trial` and record it; returns the recordings and the trajectory.
 
     The trial's effects on sensors and its slope alter the sensors; g_loc is the rig's gravity in the rig, gravity_sim
     without one.
@@ -130,7 +133,7 @@ def record(
 
 
 def _plans(settings: CampaignSettings) -> list[TumblePlan]:
-    """One for each condition, as stated."""
+    """One plan for each condition, with the stated numbers."""
     shared = {name: getattr(settings, name) for name in TrialSettings.model_fields}
     gravities = [{"gravity": value} for value in settings.gravity]
     where = gravities or [{"rig": value} for value in settings.rig]
@@ -139,7 +142,7 @@ def _plans(settings: CampaignSettings) -> list[TumblePlan]:
 
 
 class _MadeUp:
-    """Made-up trials, `settings.trials` of each plan: what is stated of them and what is true."""
+    """Synthetic trials, `settings.trials` of each plan, with their stated and their true numbers."""
 
     campaign: Campaign
     model: TumbleModel  # What is true
@@ -160,7 +163,7 @@ class _MadeUp:
         self.true = self._drawn()
 
     def _drawn(self) -> Json:
-        """The true values of what all trials share, drawn within the stated uncertainties."""
+        """True values of the numbers that all trials share, drawn within the stated uncertainties."""
         if self.settings.exact:
             return self.stated
         values, stream = dict(self.stated), np.random.default_rng([self.settings.seed, 0])
@@ -172,7 +175,7 @@ class _MadeUp:
         return values
 
     def true_trial(self, number: int, plan: TumblePlan) -> Trial:
-        """The trial as it truly is, its gravity drawn anew."""
+        """The trial with its true numbers; its gravity is drawn anew."""
         gravity = plan.trial.gravity_sim
         if not self.settings.exact:
             stream = np.random.default_rng([self.settings.seed, 1, number])
@@ -180,7 +183,7 @@ class _MadeUp:
         return replace(plan.trial, gravity_sim=gravity, **self.true)
 
     def record(self, progress: Progress) -> None:
-        """Integrate and record every trial; the campaign, what is true of it, and a row for each."""
+        """Integrate and record every trial; keeps the campaign, its truth, and a table row for each trial."""
         recordings: dict[tuple[str, str], Recording] = {}
         true_trials, self.rows = [], []
         progress.stage("trials", total=float(len(self.plans)))
@@ -213,7 +216,7 @@ class _MadeUp:
         self.model = TumbleModel(**self._tables(self.true), trial=tuple(true_trials), effect=tuple(effects))
 
     def _tables(self, values: Json) -> Json:
-        """What the campaign and the truth both have, with their own numbers."""
+        """Tables of the campaign and of the truth, each with its own numbers."""
         settings, trial = self.settings, self.first.trial
         numbers = values | {"spike_length": trial.spike_length, "wheel_inertia": trial.wheel_inertia}
         rig = tables.RigTable(wire_length=settings.wire_length, gravity=trial.gravity)
@@ -247,11 +250,11 @@ def check_tumble_campaign(settings: TumbleSettings) -> None:
 
 
 def write_tumble_campaign(settings: TumbleSettings, plan: TumblePlan, folder: Path, progress: Progress) -> Json | None:
-    """Write `campaign_trials` replicates of the tumble to ``settings.campaign``, and what is true of them to `folder`.
+    """Write `campaign_trials` replicates of the tumble to ``settings.campaign``, and their true numbers to `folder`.
 
-    The stated numbers are the tumble's; the true ones are drawn within the uncertainties that `hedgebed campaign` has
-    by default, each trial's gravity anew. Effects are true and not stated. Returns what result.json says of it, None
-    where no campaign is asked for. Raises ValueError where the folder holds something else.
+    The stated numbers are the tumble's; the true ones are drawn within the default uncertainties of `hedgebed
+    campaign`, each trial's gravity anew. Effects are true and not stated. Returns the entry of result.json, or None
+    without a campaign. Raises ValueError if the folder contains something else.
     """
     if settings.campaign is None:
         return None

@@ -1,6 +1,6 @@
 """From the settings of a tumble to the numbers of its trial, each with where it comes from.
 
-What is given wins over the model, the model over the surface's numbers and over the defaults below.
+Given settings override the model; the model overrides the surface's numbers and the defaults below.
 """
 
 import math
@@ -31,7 +31,7 @@ DEFAULT_RIG = 0.0085  # The paper's lower gravity [9.80665 m/s2]
 
 @dataclass(frozen=True)
 class Spikes:
-    """What grains meet of a platform's spikes."""
+    """Spikes of a platform as grains meet them."""
 
     diameter: float  # [m]
     clear: float  # how far they stand out of the hull [m]
@@ -41,8 +41,8 @@ class Spikes:
 def spikes_of(settings: TumbleSettings, own: PlatformNumbers) -> Spikes:
     """The spikes of a tumble on grains: as given, else those of the platform, `own`.
 
-    In the plane a spike stands as long as it is, also where it leans sideways. Raises ValueError, naming the setting,
-    for a platform without spikes.
+    In the plane a spike has its full length, even if it leans sideways. Raises ValueError, naming the setting, for a
+    platform without spikes.
     """
     given = {name: getattr(settings, name) for name in ("spike_diameter", "spike_clear")}
     not_given = tuple(name for name, value in given.items() if value is None)
@@ -137,7 +137,7 @@ def plan_tumble(
 
 
 def _choices(settings: TumbleSettings, surface: str, model: TumbleModel | None) -> dict[str, str]:
-    """The settings that are no numbers of the trial and stand at their defaults."""
+    """Settings with their defaults that are not numbers of the trial."""
     found = {"surface": surface} if settings.surface is None and model is None else {}
     units = {
         "platform": "", "ground": "", "actuator": "", "duration": " s", "method": "", "sample_interval": " s"
@@ -188,7 +188,7 @@ def _settle_gravity(settings: TumbleSettings, model: TumbleModel | None, numbers
 
 
 def _rig_warnings(trial: Trial) -> list[str]:
-    """What has to be said of a counterweight that does not belong to the gravity."""
+    """Warnings of a counterweight that does not match the gravity."""
     if trial.counterweight == 0:
         return []
     hung = (trial.mass - trial.counterweight) * trial.gravity
@@ -198,7 +198,7 @@ def _rig_warnings(trial: Trial) -> list[str]:
 
 
 def _ground(settings: TumbleSettings, fitted: GroundFile | None) -> Ground | None:
-    """The law that is named, or that of a file; None for the spring-damper of K and C."""
+    """The named law, or that of a file; None for the spring-damper of K and C."""
     if (settings.ground if fitted is None else fitted.law) == "spring-damper":
         return None
     if fitted is not None:
@@ -220,7 +220,7 @@ def _assignment(key: str, text: str) -> tuple[str, float]:
 
 
 def _model_effects(model: TumbleModel | None, path: Path | None) -> tuple[Effect, ...]:
-    """The effects of a model; the files of one's own are sought beside it."""
+    """The effects of a model; files of effects of one's own are expected beside it."""
     if model is None or path is None:
         return ()
     try:
@@ -234,7 +234,7 @@ def _model_effects(model: TumbleModel | None, path: Path | None) -> tuple[Effect
 
 
 def _given_effects(texts: tuple[str, ...]) -> tuple[Effect, ...]:
-    """Effects from ``id`` and ``id.parameter=value``; several parameters of one effect may stand apart."""
+    """Effects from ``id`` and ``id.parameter=value``; parameters of one effect need not be adjacent."""
     found: dict[str, dict[str, float]] = {}
     for text in texts:
         head, equals, _ = text.partition("=")
@@ -256,7 +256,7 @@ def _given_effects(texts: tuple[str, ...]) -> tuple[Effect, ...]:
 
 
 def turns_of(motors: Sequence[float], brakes: Sequence[float], wheel_speed: float) -> list[Json]:
-    """What turns the platform in a trial of each torque [N m], as settings have it: motors, then brakes.
+    """The actuator of a trial for each torque [N m] of the settings: motors, then brakes.
 
     `wheel_speed` [rad/s] is that of a brake's wheel at the start.
     """
