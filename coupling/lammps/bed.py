@@ -5,7 +5,7 @@ begin without stretch, since LAMMPS reads none; `settle` lets the grains come to
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -269,18 +269,21 @@ class LammpsBed:
         """The same of one body."""
         return self._reactions[body][:3], self._reactions[body][3:]
 
-    def settle(self) -> float:
+    def settle(self, tell: Callable[[float, float], None] | None = None) -> float:
         """Let the grains come to rest, with all bodies where they are; how long it took [s]. Time is 0 again.
 
-        At rest as a prepared bed is: mean kinetic energy below 1e-5 m g d. Raises RuntimeError where they do not come
-        to rest.
+        At rest as a prepared bed is: mean kinetic energy below 1e-5 m g d. ``tell``: called now and then with the time
+        so far [s] and the kinetic energy over that of rest [1]. Raises RuntimeError where they do not come to rest.
         """
         unit = math.sqrt(self.mean_diameter / math.hypot(*self.gravity))
         spell, began = math.ceil(_SPELL * unit / self.time_step), self.steps
         limit = STILL * self.weight * self.mean_diameter
         for _ in range(_MOST_SPELLS):
             self.advance(spell)
-            if self.kinetic_energy < limit:
+            energy = self.kinetic_energy
+            if tell is not None:
+                tell((self.steps - began) * self.time_step, energy / limit)
+            if energy < limit:
                 break
         else:
             raise RuntimeError(f"the bed in LAMMPS did not come to rest in {_MOST_SPELLS * _SPELL * unit:.3g} s")

@@ -1,5 +1,6 @@
 """`--ground lammps --ranks N`: the prepared bed is handed over to LAMMPS."""
 
+import time
 from typing import TYPE_CHECKING, Any
 
 from . import say
@@ -12,6 +13,7 @@ __all__ = ["ON_GRAINS", "RANKS", "check_lammps", "in_lammps", "lammps_fault", "m
 
 ON_GRAINS = ("bed", "lammps")
 """Grounds made of grains: in this process, and in LAMMPS."""
+_SILENT = 10.0  # Seconds of your clock between two lines while the grains come to rest
 RANKS = "Ground lammps: processes under mpiexec [1]; 1 if not given."
 
 
@@ -46,7 +48,15 @@ def moved_to_lammps(bed: Any, settings: Any, progress: "Progress", *, begin: flo
     from coupling.lammps import LammpsBed
 
     moved = LammpsBed(bed, ranks=settings.ranks or 1, begin=begin)
-    taken = moved.settle()
+    said = time.monotonic()
+
+    def tell(taken: float, energy: float) -> None:
+        nonlocal said
+        if energy > 1 and time.monotonic() - said > _SILENT:
+            said = time.monotonic()
+            progress.message(say("coming_to_rest", taken=taken, energy=energy))
+
+    taken = moved.settle(tell)
     progress.message(
         say("in_lammps", bed=moved, ranks=moved.ranks, taken=taken, change=1e6 * (moved.surface - bed.surface))
     )

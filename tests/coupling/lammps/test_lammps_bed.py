@@ -130,6 +130,13 @@ def test_the_momentum_of_grains_is_the_impulse_of_weight_floor_and_spike(in_lamm
     np.testing.assert_allclose(bed.momentum() - before, impulse, atol=1e-9 * duration * np.abs(weight).max())
 
 
+def test_grains_that_come_to_rest_tell_how_far_they_are(in_lammps):
+    grains, told = in_lammps(), []
+    taken = grains.settle(lambda time, energy: told.append((time, energy)))
+    assert [time for time, _ in told] == sorted(time for time, _ in told) and told[-1][0] == pytest.approx(taken)
+    assert told[-1][1] < 1 and all(energy >= 1 for _, energy in told[:-1])
+
+
 @pytest.mark.long
 def test_two_ranks_give_the_forces_of_one_to_rounding(in_lammps):
     one, two = (pushed(each, with_spike(each), 8) for each in (in_lammps(ranks=1), in_lammps(ranks=2)))
