@@ -18,7 +18,7 @@ from dem.grains.materials import Facing, Material
 from dem.grains.packing import bulk_packing, surface_height
 from rigid.ground.reaction import State
 
-from .law import MeanContact, kinetic_energy, law_words, spring_energy
+from .law import WALL_TRIAL, MeanContact, kinetic_energy, law_words, spring_energy
 from .process import Lammps
 from .regions import MovingBody, pieces_of
 from .words import box_of, data_file, digits, spheres
@@ -69,7 +69,9 @@ class LammpsBed:
         self._bodies: list[MovingBody] = []
         self._sums, self._reactions = np.zeros(0), np.zeros((1, 6))
         self._set_up = False  # Whether LAMMPS is ready to go on without a setup
+        self._worn = False  # Whether floor and bodies have had a setup
         self._lammps = Lammps(ranks)
+        self._wears = self._wears_out()
         self._begin_anew(grains)
         self._origin = self._dumped()[:, 4:7]
 
@@ -91,6 +93,15 @@ class LammpsBed:
         (self._lammps.folder / "grains.data").write_text(data_file(box, atoms, moving), encoding="ascii")
         self._lammps.tell([*self._head(), "read_data grains.data", *self._interactions()])
 
+    def _wears_out(self) -> bool:
+        """Whether a second setup changes the dashpots of walls (`coupling.lammps.law`)."""
+        self._lammps.tell([*self._head(), *WALL_TRIAL, "run 0 post no"])
+        before = self._lammps.ask("fcm(all,z)")
+        self._lammps.tell(["run 0 post no"])
+        after = self._lammps.ask("fcm(all,z)")
+        self._lammps.tell(["clear"])
+        return abs(after[0] - before[0]) > _SAME * abs(before[0])
+
     def _head(self) -> list[str]:
         return [
             "echo none", "units si", "atom_style sphere", "boundary p p f", "newton off", "comm_modify vel yes",
@@ -100,7 +111,7 @@ class LammpsBed:
     def _interactions(self) -> list[str]:
         """What a restart file does not have, or not for certain: law, floor, gravity, integrator, lists."""
         g = math.hypot(*self.gravity)
-        grains, floor = self._words(self._grain_row), self._words(self._rows[FLOOR])
+        grains, floor = self._words(self._grain_row), self._wall_words(self._rows[FLOOR], bodies=bool(self._bodies))
         return [
             f"neighbor {_SKIN * self.mean_diameter:.17g} bin", "neigh_modify delay 0 every 1 check yes",
             "pair_style granular", f"pair_coeff * * {grains}",
@@ -113,6 +124,11 @@ class LammpsBed:
 
     def _words(self, row: Sequence[float]) -> str:
         return law_words(row, self.material, tensile=self.tensile, mean=self._mean)
+
+    def _wall_words(self, row: Sequence[float], *, bodies: bool) -> str:
+        """The same of floor or body. With ``bodies`` in the bed `_prepare` makes two setups."""
+        setups = 2 if bodies and self._wears else 1
+        return law_words(row, self.material, tensile=self.tensile, mean=self._mean, setups=setups)
 
     # The bodies
 
@@ -128,8 +144,9 @@ class LammpsBed:
         faced = Facing(**facing)
         faced.refuse_for(self.material)
         row = pair_row(self.material, faced, tensile=self.tensile)
+        words = self._wall_words(row, bodies=True)
         number = len(self._bodies) + 1
-        self._bodies.append(MovingBody(number, pieces, self._words(row), np.array(position, dtype=float)))
+        self._bodies.append(MovingBody(number, pieces, words, np.array(position, dtype=float)))
         self._rows.append(np.array(row))
         self._reactions = np.zeros((number + 1, 6))
         self._set_up = False
@@ -207,6 +224,8 @@ class LammpsBed:
         for body in self._bodies:
             if not body.seats:  # it has not been moved yet
                 body.place(body.position, body.velocity, body.turn, body.spin)
+        if self._worn and self._wears:
+            self.restore(self.state())  # floor and bodies are made anew, with the history of their contacts
         new = [line for body in self._bodies if not body.made for line in body.create()]
         late, now = ([line for body in self._bodies for line in body.motion(self.steps, late=k)] for k in (1, 0))
         names = [name for body in self._bodies for name in body.names]
@@ -221,7 +240,7 @@ class LammpsBed:
         for body in self._bodies:
             body.jumped = False
         self._sum_start = self.steps
-        self._sums, self._set_up = self._read_sums(), True
+        self._sums, self._set_up, self._worn = self._read_sums(), True, True
 
     def _read_sums(self) -> Vector:
         """Sums over the steps since `_prepare` of forces and moments on grains [N, N m]: the floor's, each piece's.
@@ -433,7 +452,7 @@ class LammpsBed:
         self._lammps.tell(["clear", *head, f"read_restart {path.name} remap", *self._interactions(), *commands])
         self._lammps.wait()
         path.unlink()
-        self._sums, self._set_up = np.zeros(0), False
+        self._sums, self._set_up, self._worn = np.zeros(0), False, False
 
     def close(self) -> None:
         """End LAMMPS."""

@@ -14,7 +14,9 @@ go through it. E* and G* are the effective moduli, a the contact radius, m* the 
 | rolling friction | `rolling sds`: its spring is constant, 8 G* a at `OVERLAP`; its bound is the same |
 | twisting | `twisting marshall`: spring and dashpot are the same; its bound is 2/3 mu a F_n, ours 3 pi / 16 mu a F_n |
 
-The polynomial of `damping tsuji` is in LAMMPS' manual (pair_style granular).
+The polynomial of `damping tsuji` is in LAMMPS' manual (pair_style granular). LAMMPS before the end of 2022 puts the
+number of a wall through it at every setup, in place of what it was (`FixWallGran::init`): a second setup changes the
+dashpot of floor and bodies. `LammpsBed` measures whether it does, and keeps the number of setups known.
 """
 
 import math
@@ -33,6 +35,7 @@ from .words import digits
 __all__ = [
     "OVERLAP",
     "TANGENTIAL",
+    "WALL_TRIAL",
     "MeanContact",
     "dashpot_input",
     "kinetic_energy",
@@ -47,6 +50,14 @@ TANGENTIAL = {"displacement": "mindlin", "rescaled": "mindlin_rescale/force"}
 OVERLAP = 0.01
 """Overlap of the contact whose rolling spring all contacts have, over a diameter [1]. A spike in 343 grains met a force
 that was 0.2 % below that of springs which follow each contact; with springs of contacts at rest, 5 % below."""
+_TRIAL = "hertz/material 1 0.9 0 tangential linear_nohistory 0 0 damping tsuji"
+WALL_TRIAL = (
+    "region trial block 0 2 0 2 0 2 units box", "create_box 1 trial", "create_atoms 1 single 1 1 0.45 units box",
+    "set group all diameter 1.0 density 1.0", "velocity all set 0 0 -1 units box", "timestep 1e-9",
+    "pair_style granular", f"pair_coeff * * {_TRIAL}", "fix motion all nve/sphere",
+    f"fix trial all wall/gran granular {_TRIAL} zplane 0 NULL",
+)  # fmt: skip
+"""A ball of 1 m that a floor brakes: where LAMMPS loses the dashpot's number, a second setup changes the force."""
 _NORMAL = {"none": "hertz/material", "dmt": "dmt", "jkr": "jkr"}
 _TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
 _LEAST, _MOST = 0.05, 1.2  # Between which the polynomial falls
@@ -66,11 +77,14 @@ class MeanContact:
         return cls(radius=mean * math.sqrt(OVERLAP), mass=0.5 * float(np.mean(masses)))
 
 
-def dashpot_input(factor: float) -> float:
+def dashpot_input(factor: float, *, setups: int = 1) -> float:
     """What to ask ``damping tsuji`` for, to have a dashpot alpha sqrt(m* 4/3 E* a) with alpha = ``factor`` [1].
 
-    Raises ValueError for a dashpot stronger than LAMMPS' polynomial can give.
+    ``setups``: how often LAMMPS puts the number through its polynomial, each time in place of the number. Raises
+    ValueError for a dashpot stronger than LAMMPS' polynomial can give.
     """
+    for _ in range(setups - 1):
+        factor = dashpot_input(factor)
     low, high = (float(np.polyval(_TSUJI, end)) for end in (_MOST, _LEAST))
     if not low <= factor <= high:
         raise ValueError(
@@ -80,17 +94,17 @@ def dashpot_input(factor: float) -> float:
     return float(brentq(lambda e: np.polyval(_TSUJI, e) - factor, _LEAST, _MOST, xtol=1e-15))
 
 
-def law_words(row: Sequence[float], material: Material, *, tensile: bool, mean: MeanContact) -> str:
+def law_words(row: Sequence[float], material: Material, *, tensile: bool, mean: MeanContact, setups: int = 1) -> str:
     """The words of one kind of contact, for `pair_coeff` and for `fix wall/gran granular`.
 
     ``row``: its pair parameters, as `dem.contact.law.pair_row` gives them. ``material``: of the grains. ``tensile``:
-    whether dashpots may pull. ``mean``: the contact for which the springs of rolling are chosen. Raises ValueError for
-    a restitution that LAMMPS' dashpot does not reach.
+    whether dashpots may pull. ``mean``: the contact for which the springs of rolling are chosen. ``setups``: as of
+    `dashpot_input`. Raises ValueError for a restitution that LAMMPS' dashpot does not reach.
     """
     if len(row) != PAIR_WIDTH:
         raise ValueError(f"row has {len(row)} numbers: a row of pair parameters has {PAIR_WIDTH}")
     two_e, eight_g, damping, friction, rolling, tangential_damping, turning_damping, pi_w = map(float, row)
-    words = [_NORMAL[material.cohesion], digits((two_e, dashpot_input(math.sqrt(1.5) * damping), 0.0))]
+    words = [_NORMAL[material.cohesion], digits((two_e, dashpot_input(math.sqrt(1.5) * damping, setups=setups), 0.0))]
     if material.cohesion != "none":
         words.append(digits([pi_w / (2 * math.pi)]))
     ratio = tangential_damping / damping if damping else 0.0

@@ -1,7 +1,9 @@
 """One bed of sand in LAMMPS under MPI beside the same bed in this process: the force on a spike, and what steps cost.
 
-    python examples/lammps_bed.py                      # 1,400 grains, one rank; 10 s
-    python examples/lammps_bed.py --size 0.06 0.12 0.05 --copies 7 --ranks 2 --parts 40 --out push.csv
+    python docs/results/lammps-push/push.py                      # 1,400 grains, one rank; 10 s
+    python docs/results/lammps-push/push.py --size 0.06 0.12 0.05 --copies 7 --ranks 2 --parts 40 --out push.csv
+
+`--finer 2 4` repeats all runs with steps that are so many times shorter, from the same grains, over the same time.
 
 LAMMPS and mpiexec must be there: `hedgebed doctor` says how to install them.
 """
@@ -25,6 +27,7 @@ parser.add_argument("--ranks", type=int, nargs="+", default=(1,), help="each is 
 parser.add_argument("--radius", type=float, default=0.006, help="of the spike [m]")
 parser.add_argument("--speed", type=float, default=0.2, help="of the spike [m/s]")
 parser.add_argument("--parts", type=int, default=20, help="means of the force, each over 10 time steps")
+parser.add_argument("--finer", type=int, nargs="+", default=(1,), help="steps in the time of one, here and in LAMMPS")
 parser.add_argument("--alone", action="store_true", help="LAMMPS alone")
 parser.add_argument("--out", type=Path, help="a CSV of the forces")
 
@@ -38,17 +41,18 @@ def processor_time(pids):
     return ticks / os.sysconf("SC_CLK_TCK")
 
 
-def push(bed, start, asked, pids):
+def push(bed, start, asked, pids, finer):
     """Mean force and moment on the spike in each part, shape [parts, 6]; processor time a grain-step [s]."""
+    steps = 10 * finer
     shapes = [Ball(radius=asked.radius), Cylinder(bottom=0.0, top=0.06, radius=asked.radius)]
     body = bed.add_body(shapes, position=start)
     bed.move_body(body, velocity=(0.0, 0.0, -asked.speed))
-    bed.advance(10)  # compiles here, sets up there
+    bed.advance(steps)  # compiles here, sets up there
     found, began = [bed.reactions()[body].copy()], processor_time(pids)
     for _ in range(asked.parts - 1):
-        bed.advance(10)
+        bed.advance(steps)
         found.append(bed.reactions()[body].copy())
-    cost = (processor_time(pids) - began) / (bed.grain_count * 10 * max(1, asked.parts - 1))
+    cost = (processor_time(pids) - began) / (bed.grain_count * steps * max(1, asked.parts - 1))
     return np.array(found), cost
 
 
@@ -58,11 +62,11 @@ def main():
     grains = piece.repeated(asked.copies).grains()
     size = (asked.copies * asked.size[0], *asked.size[1:])
 
-    def fresh():
+    def fresh(finer):
         """The bed without the history of its contacts, which LAMMPS cannot take over."""
         return Bed.from_grains(
             piece.material, positions=grains.position, radii=grains.radius, velocities=grains.velocity,
-            spins=grains.spin, size=size, height=0.2, time_step=piece.time_step, threads=1,
+            spins=grains.spin, size=size, height=0.2, time_step=piece.time_step / finer, threads=1,
         )  # fmt: skip
 
     x, y = 0.5 * size[0], 0.5 * size[1]
@@ -72,20 +76,23 @@ def main():
     start = (x, y, float((grains.position[near, 2] + reach).max()))
     print(f"{len(grains.id)} grains, steps of {piece.time_step:.4g} s")
     columns, costs = {}, {}
-    if not asked.alone:
-        columns["bed"], costs["bed"] = push(fresh(), start, asked, [os.getpid()])
-    for ranks in asked.ranks:
-        began, bed = time.monotonic(), LammpsBed(fresh(), ranks=ranks)
-        pids = bed.processes
-        name = f"lammps on {ranks} ranks"
-        columns[name], costs[name] = push(bed, start, asked, pids)
-        print(f"{name}: {time.monotonic() - began:.3g} s in all")
-        bed.close()
     moments = 10 * piece.time_step * (np.arange(asked.parts) + 0.5)
+    for finer in asked.finer:
+        suffix = "" if finer == 1 else f", steps / {finer}"
+        own = f"bed{suffix}"
+        if not asked.alone:
+            columns[own], costs[own] = push(fresh(finer), start, asked, [os.getpid()], finer)
+        for ranks in asked.ranks:
+            began, bed = time.monotonic(), LammpsBed(fresh(finer), ranks=ranks)
+            name = f"lammps on {ranks} ranks{suffix}"
+            columns[name], costs[name] = push(bed, start, asked, bed.processes, finer)
+            print(f"{name}: {time.monotonic() - began:.3g} s in all")
+            bed.close()
+            if own in columns:
+                so_far = np.cumsum(columns[name][:, 2]) / np.cumsum(columns[own][:, 2])
+                print("  of the bed's mean force so far, after each part:", *(f"{v:.4f}" for v in so_far))
     for name, forces in columns.items():
-        own = forces[:, 2]
-        beside = "" if "bed" not in columns else f", {own.mean() / columns['bed'][:, 2].mean():.4f} of the bed's"
-        print(f"{name}: mean force {own.mean():.5g} N{beside}; {1e9 * costs[name]:.4g} ns of processor a grain-step")
+        print(f"{name}: mean force {forces[:, 2].mean():.5g} N; {1e9 * costs[name]:.4g} ns of processor a grain-step")
     if asked.out is not None:
         with asked.out.open("w", newline="") as file:
             table = csv.writer(file)

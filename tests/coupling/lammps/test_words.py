@@ -25,6 +25,8 @@ def test_the_dashpot_of_tsuji_is_that_of_the_closed_form_through_lammps_polynomi
     e = dashpot_input(alpha)
     manual = 1.2728 - 4.2783 * e + 11.087 * e**2 - 22.348 * e**3 + 27.467 * e**4 - 18.022 * e**5 + 4.8218 * e**6
     assert manual == pytest.approx(alpha, rel=1e-12)
+    # Where LAMMPS puts it through the polynomial twice, the number before e.
+    assert dashpot_input(alpha, setups=2) == pytest.approx(dashpot_input(e), rel=1e-12)
 
 
 def test_the_words_give_back_moduli_friction_and_damping_of_the_pair():
