@@ -38,6 +38,9 @@ class BedFeet(BedGround):
     Raises ValueError for a foot that grains cannot touch (a site), and for more feet or shapes than a bed takes.
     """
 
+    repeatable = True
+    """Whether its steps can be taken back, for an iterated exchange."""
+
     def __init__(
         self,
         bed: Any,

@@ -5,6 +5,7 @@ its origin at the body's centre of mass, where MuJoCo applies forces, and the ax
 
 A surface law acts on points. Each point is the lowest one of a small ellipsoid c + S u, |u| <= 1 (S = 0: a corner;
 S = r: the ball at the end of a capsule; S = r (1 - a a^T): the rim of a wheel about a): c - S S z / |S z|, z upwards.
+A mesh has vertices of its convex hull.
 """
 
 import difflib
@@ -28,6 +29,9 @@ RIM = 8  # Points on the rim of a cylinder that stands on its end
 UPRIGHT = math.sqrt(0.5)  # Cosine between axis and vertical from which on a cylinder or capsule stands on its end
 FINE = 3  # Subdivisions of the ball that stands for an ellipsoid among grains: 1280 triangles, 0.3 % too small
 
+HULL = 64  # Most points of a mesh
+LEVEL = 1e-3  # Points that are that near to a face belong to it, over the size of the mesh [1]
+
 Faces = NDArray[np.int64]
 
 
@@ -40,7 +44,7 @@ class Part:
     vertices: Vector  # Of its surface, for pictures and sizes [m], shape (n, 3); of a site the point alone
     faces: Faces  # Triangles, shape (m, 3)
     shapes: tuple[Any, ...]  # As `dem.Bed.add_body` takes them; none for a site
-    centres: Vector  # Of its points on a law [m], shape (point, 3); none where it has no such points
+    centres: Vector  # Of its points on a law [m], shape (point, 3)
     spreads: Vector  # Their S, shape (point, 3, 3)
     share: float  # Of the law's numbers at each point [1]; those on which it stands sum up to 1
     note: str = ""  # What a person is to know of it
@@ -205,6 +209,8 @@ def _geom(model: Any, data: Any, k: int, name: str) -> Part:
     elif kind == "mesh":
         vertices, faces, note = _closed(name, vertices, faces)
         shape = Mesh(vertices, faces)
+        points, share = _hull_points(vertices, data.xmat[model.geom_bodyid[k]].reshape(3, 3)[2])
+        spreads = np.zeros((len(points), 3, 3))
     else:
         raise ValueError(
             f"feet: {name!r} is a {kind}, which no foot can be: sphere, capsule, cylinder, box, ellipsoid or mesh "
@@ -242,6 +248,26 @@ def mesh_of(model: Any, k: int) -> tuple[Vector, Faces]:
     else:
         return np.zeros((1, 3)), np.zeros((0, 3), dtype=np.int64)
     return np.array(made.vertices, dtype=float), np.array(made.faces, dtype=np.int64)
+
+
+def _hull_points(vertices: Vector, up: Vector) -> tuple[Vector, float]:
+    """Vertices of the convex hull [m], at most `HULL`, each as far as can be from those before, shape (n, 3).
+
+    And the share of the law that each has: it stands on those of the face that looks down most, ``up`` in its axes.
+    """
+    from scipy.spatial import ConvexHull
+
+    points = np.asarray(vertices[ConvexHull(vertices).vertices])
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    apart = np.full(len(points), np.inf)
+    for _ in range(min(HULL, len(points)) - 1):
+        apart = np.minimum(apart, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(apart)))
+    points = points[sorted(chosen)]
+    planes = ConvexHull(points).equations
+    *normal, offset = planes[np.argmin(planes[:, :3] @ up)]
+    below = np.abs(points @ normal + offset) <= LEVEL * float(np.ptp(points, axis=0).max())
+    return points, 1 / int(below.sum())
 
 
 def _closed(name: str, vertices: Vector, faces: Faces) -> tuple[Vector, Faces, str]:

@@ -21,7 +21,7 @@ from rigid.ground.laws import find_law
 
 from .body import MujocoRobot
 from .feet import Foot, Part, refuse_missing
-from .law_feet import LawFeet, refuse_pointless
+from .law_feet import LawFeet
 from .stability import check_exchange
 
 __all__ = ["FootForces"]
@@ -60,7 +60,7 @@ class FootForces(AbstractContextManager["FootForces"]):
     Several may be entered at once, one for each model; they take the place of any other ``mjcb_passive``. `points`
     counts the points evaluated. Each MjData of the model has its own deepest depths. They are forgotten where its time
     goes back or jumps by more than a step (``mj_resetData``, another state); a second call at the same time does not
-    count. Raises ValueError for a law there is not, a part without points, and numbers that cannot be; on entry also
+    count. Raises ValueError for a law there is not, and for numbers that cannot be; on entry also
     for a step at which the exchange of a run would be unstable.
     """
 
@@ -78,7 +78,6 @@ class FootForces(AbstractContextManager["FootForces"]):
     ) -> None:
         mujoco = self._mujoco = refuse_missing()
         check_above_zero("in m/s", slip_speed=slip_speed)
-        refuse_pointless(feet)
         found, given, scales = find_law(law), parameters or {}, scales or {}
         self.model, self._data, self.feet, self.points, self._law = model, data, list(feet), 0, found
         self._make_ground = partial(LawFeet, self.feet, law=law, parameters=given, scales=scales)

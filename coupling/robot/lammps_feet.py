@@ -27,6 +27,8 @@ class LammpsFeet(BedFeet, LammpsGround):
     see `LammpsGround`.
     """
 
+    repeatable = False
+
     def __init__(self, bed: Any, *given: Any, **options: Any) -> None:
         super().__init__(bed, *given, **options)
         grain = 0.5 * bed.mean_diameter
@@ -81,5 +83,8 @@ def refuse_in_lammps(feet: list[Foot], turns: Vector) -> None:
                 check_plane(part.shapes, turns[:, k])
             except OutOfPlaneError as error:
                 raise ValueError(f"feet: {part.name!r}: {error}") from None
-            except ValueError as error:
-                raise ValueError(f"feet: {part.name!r} ({part.kind}): {error}; ground = 'bed' takes it") from None
+            except ValueError:
+                raise ValueError(
+                    f"feet: {part.name!r} is of the kind {part.kind}, for which LAMMPS has no region: sphere, capsule, "
+                    f"cylinder or box would do, or ground = 'bed'"
+                ) from None

@@ -13,7 +13,7 @@ from rigid.ground.reaction import Contact, Facts, Reaction, Turned
 
 from .feet import Foot
 
-__all__ = ["LawFeet", "refuse_pointless"]
+__all__ = ["LawFeet"]
 
 
 class LawFeet(LawPoints):
@@ -27,11 +27,12 @@ class LawFeet(LawPoints):
     time_step : [s], of which a macro step has `substeps`.
     scales : name of a part -> how many times the law it has, such as its area over that the law is of [1].
 
-    Raises ValueError for a law or parameter there is not, and for a part that has no points.
+    Raises ValueError for a law or parameter there is not.
     """
 
     lag = 0.0
     gives_friction = False
+    repeatable = True
     surface, centre, clearance, depth_limit = 0.0, (0.0, 0.0), 0.0, math.inf
 
     def __init__(
@@ -47,7 +48,6 @@ class LawFeet(LawPoints):
     ) -> None:
         self.feet, scales = list(feet), scales or {}
         self.grounds: list[list[SurfaceGround]] = []
-        refuse_pointless(feet)
         for foot in feet:
             own = []
             for part in foot.parts:
@@ -133,12 +133,3 @@ class LawFeet(LawPoints):
 
     def _laws(self) -> dict[str, SpringDamper | SurfaceGround]:
         return {f"{k}-{j}": ground for k, own in enumerate(self.grounds) for j, ground in enumerate(own)}
-
-
-def refuse_pointless(feet: Sequence[Foot]) -> None:
-    """Raise ValueError, naming the part, for one that has no points for a surface law."""
-    for part in (part for foot in feet for part in foot.parts if not len(part.centres)):
-        raise ValueError(
-            f"feet: {part.name!r} is a {part.kind}, which has no points for a surface law: grains would do, or a "
-            f"sphere, capsule, cylinder, box or ellipsoid"
-        )

@@ -32,6 +32,8 @@ def load_model(path: str | Path) -> Any:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         said = " ".join(str(error).split())
+        if "package:" in said:
+            said += "; MuJoCo finds no ROS packages: write the file's place from the folder of the model instead"
         raise ValueError(f"model = {str(path)!r} is no model that MuJoCo reads: {said}") from None
 
 

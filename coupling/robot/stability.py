@@ -54,6 +54,7 @@ class ExpectedBed:
     overlap_limit: float  # [of a diameter]
     material: Any  # dem.Material, softened
     time_step: float  # [s]
+    repeatable: bool = True  # Whether its steps can be taken back, for an iterated exchange
 
 
 class ExchangeLoad:
@@ -178,7 +179,7 @@ def check_exchange(robot: Any, ground: LawFeet | BedFeet | ExpectedBed, *, subst
     if found > most:
         fits = int(worst.longest() / ground.time_step)
         remedies = [f"substeps = {fits}"] if fits >= 1 else ["a smaller time step of the ground"]
-        if iterations == 1 and found <= ITERATED:
+        if ground.repeatable and iterations == 1 and found <= ITERATED:
             remedies.append("iterations = 20")
         remedies.append("a heavier foot (or joint armature)")
         raise ValueError(

@@ -171,7 +171,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         grains = self.material.softened(self.softening().young)
         step = time_step_for(grains, diameter=s.grain * (1 - s.spread), max_overlap=s.max_overlap)
         robot.start()
-        bed = ExpectedBed(0.5 * s.grain, run_limit(s.max_overlap), grains, step)
+        bed = ExpectedBed(0.5 * s.grain, run_limit(s.max_overlap), grains, step, repeatable=s.ground != "lammps")
         return check_exchange(robot, bed, substeps=s.substeps, iterations=s.iterations)
 
     def check(self) -> None:
@@ -181,7 +181,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         for foot in self._robot.feet:
             if not foot.shapes:
                 raise ValueError(say("site_on_grains", name=foot.name))
-            if self.widths[foot.name] < FEWEST_ACROSS * s.grain * (1 - 1e-9):
+            if self.widths[foot.name] < FEWEST_ACROSS * s.grain * (1 - 1e-6):  # meshes are in single precision
                 across, most = self.widths[foot.name] / s.grain, self.widths[foot.name] / FEWEST_ACROSS
                 raise ValueError(say("small_foot", s=s, name=foot.name, width=self.widths[foot.name], across=across,
                                      fewest=FEWEST_ACROSS, most=most))  # fmt: skip

@@ -9,7 +9,7 @@ from spatial_runs import ball, grain_bed, model_of
 from coupling.robot import BedFeet, LawFeet, MujocoRobot, find_feet, load_model
 from coupling.robot.distances import distances
 from coupling.robot.feet import mesh_of
-from rigid.spatial.quaternions import from_turn, to_matrix
+from rigid.spatial.quaternions import from_turn, multiply, to_matrix
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -122,9 +122,43 @@ class NoBed:
     """Refused before anything of a bed is asked for."""
 
 
-def test_a_mesh_has_no_points_for_a_law_and_a_site_no_surface_for_grains():
-    with pytest.raises(ValueError, match="'rock' is a mesh, which has no points"):
-        LawFeet(made(["rock"]))
+MESH = """<mujoco><asset><mesh name="own" vertex="{}"/></asset><worldbody><body name="foot" pos="0 0 {}"><freejoint/>
+<geom name="foot" type="mesh" mesh="own" mass="1"/></body></worldbody></mujoco>"""
+
+
+def of_mesh(vertices, height):
+    """A free body with the convex hull of these points [m] as its geom ``foot``."""
+    return model_of(MESH.format(" ".join(map(str, np.ravel(vertices))), height))
+
+
+def test_a_law_pushes_a_mesh_of_a_box_as_the_box():
+    corners = np.array([[x, y, z] for x in (-0.03, 0.03) for y in (-0.02, 0.02) for z in (-0.01, 0.01)])
+    forces = []
+    for model in (of_mesh(corners, 0.009), ball("box", "0.03 0.02 0.01", height=0.009)):
+        robot, still = MujocoRobot(model, "foot"), np.zeros(3)
+        ground = LawFeet(robot.feet, parameters={"stiffness": 1000.0, "damping": 0.0})
+        for turned in (robot.pose.turn, multiply(from_turn(np.array([0.0, 0.02, 0.0])), robot.pose.turn)):
+            forces.append(ground.step(robot.pose.position, still, 1e-6, turned, still))
+    assert forces[0].force[2] == pytest.approx(1000.0 * 0.001, rel=1e-5)
+    for mesh, box in zip(forces[:2], forces[2:], strict=True):
+        assert mesh.force == pytest.approx(box.force, rel=1e-5) and mesh.torque == pytest.approx(box.torque, abs=1e-7)
+
+
+def test_a_fine_mesh_of_a_ball_stands_on_at_most_64_points_that_are_spread_over_it():
+    """64 points on a ball leave gaps of some 0.4 rad, over which its lowest point is up to 1 - cos 0.4 too high.
+
+    It stands on three of them.
+    """
+    directions = np.random.default_rng(1).normal(size=(600, 3))
+    model = of_mesh(0.05 * directions / np.linalg.norm(directions, axis=1)[:, None], 0.1)
+    (foot,) = MujocoRobot(model, "foot").feet
+    assert foot.centres.shape == (64, 3) and foot.parts[0].share == pytest.approx(1 / 3)
+    for turn in np.random.default_rng(2).normal(size=(40, 3)):
+        matrix = to_matrix(from_turn(turn))
+        assert 0 <= foot.lowest(matrix)[:, 2].min() - foot.bottom(matrix) < 0.05 * (1 - np.cos(0.4))
+
+
+def test_a_site_has_no_surface_for_grains():
     with pytest.raises(ValueError, match="'mark' is a site"):
         BedFeet(NoBed(), made(["mark"]))
 

@@ -7,6 +7,7 @@ from spatial_runs import EXAMPLES, ball, moving
 from coupling.robot import FootForces, LawFeet, MujocoRobot, RobotRun, find_feet, load_model
 from coupling.robot.models import switch_off_floors
 from rigid.ground.laws import find_law
+from rigid.ground_file import read_ground
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -94,6 +95,19 @@ def test_its_wrench_on_a_foot_askew_is_the_sum_over_all_points_of_the_foot(law, 
         push += np.concatenate([force, turn.T @ np.cross(arm, force)])
     assert push[2] > 0.1
     assert data.qfrc_passive == pytest.approx(push, rel=1e-12, abs=1e-12 * push[2])
+
+
+def test_a_law_of_a_file_has_the_area_of_the_foot_over_that_of_its_tip():
+    sand, model = read_ground(EXAMPLES.parents[1] / "docs" / "results" / "calibrate-sand-1mm" / "ground.toml"), ball()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    feet = find_feet(model, data, ["foot"])
+    once, more = (
+        pushed(FootForces(model, data, feet, law=sand.law, parameters=sand.values, scales=scales), model, data, 1e-3)
+        for scales in ({}, {"foot": 25.0})
+    )
+    assert once == pytest.approx(sand.surface_law.force(1e-3, 0.0, sand.surface_law.numbers(sand.values)))
+    assert more == pytest.approx(25 * once)
 
 
 def test_what_cannot_be_is_refused():

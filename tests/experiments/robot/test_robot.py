@@ -94,7 +94,7 @@ FREE = """<mujoco><worldbody><body name="foot" pos="0 0 0.1" quat="{quat}"><free
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"kind": "ellipsoid", "size": "0.03 0.04 0.03"}, r"'foot' .ellipsoid.: Mesh has no counterpart among LAMMPS"),
+        ({"kind": "ellipsoid", "size": "0.03 0.04 0.03"}, r"'foot' is of the kind ellipsoid, .* or ground = 'bed'"),
         ({"spin": 1}, "'foot': this body turns out of the plane of motion"),
         ({"quat": "0.9 0.2 0 0"}, "'foot': this body turns out of the plane of motion"),
     ],
