@@ -20,15 +20,15 @@ OF_THE_MASTER = (
     "substeps", "body_steps", "extrapolation", "iterations", "tumbles", "tumble_turn", "drop_speed", "drop_along",
     "drop_spin", "drop_theta",
 )  # fmt: skip
-"""Those that ``method = "coupled"`` takes on the spring-damper too."""
+"""Settings that ``method = "coupled"`` also accepts on the spring-damper."""
 
 
 _ONCE = {"spike_diameter": 0.012, "spike_clear": 0.04}
-"""Defaults until 2026-11-23, which every run.toml of before has, on the spring-damper too."""
+"""Defaults until 2026-11-23, which every older run.toml has, also on the spring-damper."""
 
 
 class GrainsSettings(StrictSettings):
-    """What a bed of grains under any platform is made of, and how it is coupled; SI units."""
+    """The bed of grains under any platform, and its coupling; SI units."""
 
     bed_size: tuple[Positive, Positive, Positive] = (0.7, 0.7, 0.05)
     """Bed: size along x and y (both periodic) and depth [m]."""
@@ -65,13 +65,13 @@ class GrainsSettings(StrictSettings):
     """No longer used; accepted at its default so that older run.toml files can be read [1]."""
     sleep_share: Positive = Field(0.5, description="No longer used, as sleep_force [1].")
     frame_count: int = Field(30, ge=0, le=1000, description="Bed: number of frames for ParaView; 0: none.")
-    checkpoint_interval: Positive = Field(60.0, description="Bed: time between two checkpoints, of your clock [s].")
+    checkpoint_interval: Positive = Field(60.0, description="Bed: time between two checkpoints, in real time [s].")
     arch: Literal["cpu", "cuda"] = Field("cpu", description="Bed: processor that computes it.")
     threads: int | None = Field(None, ge=1, description="Bed: CPU threads; all cores if not given.")
     cache: bool = Field(True, description="Bed: keep prepared beds on disk and use them again.")
 
     def stepping(self) -> Mapping[str, Any]:
-        """How the master steps the run."""
+        """Options of the master."""
         return {name: getattr(self, name) for name in ("substeps", "body_steps", "extrapolation", "iterations")}
 
     def stepping_fault(self) -> str | None:

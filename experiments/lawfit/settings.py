@@ -60,18 +60,18 @@ class LawFitSettings(PenetrateSettings):
     The settings of `penetrate` describe the runs that are computed.
     """
 
-    # Runs that are there
+    # Finished runs
     runs: tuple[str, ...] = ()
-    """Folders of finished runs of penetrate, or folders that hold such run folders (the members of a converge run)."""
+    """Folders of finished runs of penetrate, or folders with such run folders (the members of a converge run)."""
 
-    # Runs to be computed
+    # New runs
     budget: Positive | None = None
-    """Time that one core may take for runs by their estimate [s], such as 30min; then runs are chosen and computed."""
+    """Estimated time of one core for new runs [s], such as 30min; the runs are then chosen and computed."""
     tolerance: float = Field(0.1, gt=0, lt=1)
-    """Half of the 90 % interval of the force, over the force, at which no more runs are added [1]."""
-    most_beds: int = Field(12, ge=2, le=100, description="Beds at most [1].")
+    """Relative half-width of the 90 % interval of the force at which no more runs are added [1]."""
+    most_beds: int = Field(12, ge=2, le=100, description="Largest number of beds [1].")
     members: str | None = Field(None, min_length=1)
-    """Folder where the computed runs are kept, each found again by its settings; 'members' in the run's folder if not
+    """Folder of the computed runs, where runs of the same settings are used again; 'members' in the run's folder if not
     given."""
     workers: Workers = None
     scheduler: Scheduler = None
@@ -153,7 +153,7 @@ class LawFitSettings(PenetrateSettings):
             if (deep := max(getattr(self, key), default=0.0)) > self.depth:
                 raise ValueError(say("below_depth", key=key, value=deep, depth=self.depth))
         if len(set(self.runs)) < len(self.runs):
-            raise ValueError(f"runs = {list(self.runs)} holds a folder twice: each once was expected")
+            raise ValueError(f"runs = {list(self.runs)} contains a folder twice: give each once")
         if bool(self.runs) == (self.budget is not None):
             raise ValueError(say("runs_or_budget" if not self.runs else "runs_and_budget", s=self))
         if self.ground != "bed" or self.bed is not None or self.model is not None:
