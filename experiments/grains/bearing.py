@@ -7,7 +7,7 @@ measurement for the materials of recipes.toml, and for others `RESISTANCE` times
 
 The effect of another cohesion is Terzaghi's bearing capacity of a circular foot (1943, general shear),
 q = 1.3 c N_c, with N_c = (N_q - 1) cot phi and N_q = exp(pi tan phi) tan^2(45 + phi / 2) (Prandtl 1921, Reissner 1924),
-phi of the grains. It is a lower bound here: a cone in `jsc-1a-loose` met some eight times that (docs/bed.md).
+phi of the grains. It is a lower bound here: a cone in `jsc-1a-loose` met some eight times that (docs/notes/bed.md).
 """
 
 import math
@@ -38,7 +38,7 @@ it is an extrapolation."""
 OF_PLATE = 0.41
 """K of `sand-weak` over that of a flat plate in 3D-RFT: 38 of 92 N/m [1]."""
 _RESISTANCE = 450.0
-"""What a tip meets for their cohesion in grains that stick, over it [1]: 70 of 79 kPa for 150 Pa (docs/bed.md)."""
+"""What a tip meets for their cohesion in grains that stick, over it [1]: 70 of 79 kPa for 150 Pa (bed.md in docs/notes)."""
 _OF_ADHESION = 1.2
 """Cohesion over surface energy per diameter [1]: 1.0 to 1.5 in the four materials of JSC-1A (docs/materials.md)."""
 UNSURE = 2.0
