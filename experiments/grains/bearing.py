@@ -38,7 +38,7 @@ it is an extrapolation."""
 OF_PLATE = 0.41
 """K of `sand-weak` over that of a flat plate in 3D-RFT: 38 of 92 N/m [1]."""
 _RESISTANCE = 450.0
-"""What a tip meets for their cohesion in grains that stick, over it [1]: 70 of 79 kPa for 150 Pa (bed.md in docs/notes)."""
+"""What a tip meets for their cohesion in grains that stick, over it [1]: 70 of 79 kPa for 150 Pa: docs/notes/bed.md."""
 _OF_ADHESION = 1.2
 """Cohesion over surface energy per diameter [1]: 1.0 to 1.5 in the four materials of JSC-1A (docs/materials.md)."""
 UNSURE = 2.0
