@@ -58,13 +58,13 @@ def bed_numbers(
     }  # fmt: skip
 
 
-def bed_warnings(bed: Bed, surface: str, *, across: float) -> Iterator[str]:
-    """Warnings of spikes too few grains across, of a packing unlike that of the calibration, and of doubtful grains.
+def bed_warnings(bed: Bed, surface: str, *, across: float, foot: str = "spike") -> Iterator[str]:
+    """Warnings of feet too few grains across, of a packing unlike that of the calibration, and of doubtful grains.
 
-    `across`: a spike's diameter over the grains' [1].
+    `across`: a foot's diameter over the grains' [1]; `foot`: what a foot is called.
     """
     if across < 10:
-        yield say("few_grains_across", across=across)
+        yield say("few_grains_across", across=across, foot=foot)
     own = find_surface(surface)
     if own.packing is not None and abs(bed.packing_fraction - own.packing) > PACKING_OFF:
         yield say("packing_off", packing=bed.packing_fraction, surface=own)

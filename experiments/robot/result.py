@@ -137,7 +137,8 @@ def conclude(
     """The result, its series written. On grains `beside` is the robot on the spring-damper."""
     write_series_of(run, folder)
     robot = run.robot
-    what = f"a bed of {plan.surface.name}" if settings.on_grains else f"{plan.surface.name} ({plan.law})"
+    where = " in LAMMPS" if settings.ground == "lammps" else ""
+    what = f"a bed of {plan.surface.name}{where}" if settings.on_grains else f"{plan.surface.name} ({plan.law})"
     title = say("title", name=robot.name, what=what, gravity=robot.gravity)
     warnings: list[str | None] = [
         *plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master),
@@ -151,7 +152,7 @@ def conclude(
         "title": title, "status": "done", "quantities": quantities_of(run),
         "departures": {"sentences": _sentences(run)},
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
-        "surface": plan.surface.name, "ground": settings.ground if settings.on_grains else plan.law,
+        "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
         "duration": settings.duration,
         "feet": [foot.name for foot in robot.feet], "warnings": warnings, "macro_step": run.macro_step,
         "robot_step": robot.step, "steps": run.master.count,
@@ -170,7 +171,7 @@ def conclude(
         warnings += [
             grains.reversal_warning(run.dissipation_reversal),
             grains.overlap_warning(bed, softening, settings.max_overlap),
-            *grains.bed_warnings(bed, plan.surface.name, across=across),
+            *grains.bed_warnings(bed, plan.surface.name, across=across, foot="foot"),
             say("one_bed"),
         ]
     result["warnings"] = [warning for warning in warnings if warning]

@@ -7,6 +7,7 @@ import pytest
 from spatial_runs import EXAMPLES, grain_bed
 from tumble_runs import stop_at
 
+from coupling.lammps import LammpsMissingError, find_lammps
 from experiments.cli.main import main
 from experiments.robot import experiment as robot
 from experiments.robot.on_grains import RobotFollowed, RobotOnBed
@@ -280,6 +281,27 @@ def test_on_a_small_bed_a_stopped_run_goes_on_to_the_same_bits_and_is_drawn(tmp_
     assert not seen.block and len(seen.times) >= 2 and len(seen.frame(0).grains["position"]) == 768
     assert [line["dashed"] for line in seen.panels[0]["lines"]] == [False, False, False, True]  # and the spring-damper
     assert json.loads((tmp_path / "whole" / "result.json").read_text())["grains"]["grain_count"] == 768
+
+
+@pytest.mark.long
+def test_on_grains_in_lammps_a_stopped_run_goes_on_to_its_end(tmp_path, monkeypatch):
+    try:
+        find_lammps()
+    except LammpsMissingError as missing:
+        pytest.skip(str(missing))
+    monkeypatch.setattr(RobotOnBed, "prepare", lambda *_: grain_bed())
+    monkeypatch.setattr(RobotOnBed, "check", lambda *_: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    given = ON_BED | {"ground": "lammps", "bed_size": (0.096, 0.096, 0.05), "grain": 0.006, "height": 0.003}
+    settings = RobotSettings(**given | {"duration": 0.05, "frame_count": 2, "checkpoint_interval": 1e3})
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        stop_at(patch, 60)
+        robot.run(settings, tmp_path)
+    result = robot.resume(tmp_path)
+    motion = read_series(tmp_path / "series" / "motion.csv")
+    assert motion["t_s"][-1] == pytest.approx(0.05, rel=0.01) and (np.diff(motion["t_s"]) > 0).all()
+    assert result.quantities["largest_force"].value > 1.0 and result.quantities["energy_residual"].value < 0.02
+    assert result["ground"] == "bed" and "LAMMPS" in result["title"] and "dissipated_friction" not in result.quantities
 
 
 def test_a_robot_on_a_law_is_shown_on_a_block_with_its_curves_and_arrows_in_weights(tmp_path, monkeypatch):
