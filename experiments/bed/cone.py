@@ -36,8 +36,6 @@ def place_of(push: int, size: tuple[float, ...]) -> tuple[float, float]:
 
 
 def _test(settings: BedConeSettings, bed: Any, about: Json, push: int, tell: Callable[[float], None]) -> Tested:
-    if settings.max_overlap is not None:
-        bed.overlap_limit = settings.max_overlap
     found = push_cone(
         bed, diameter=settings.diameter, angle=settings.angle, depth=settings.depth, speed=settings.speed,
         shaft=settings.shaft, friction=settings.friction, place=place_of(push, bed.size), tell=tell,

@@ -148,7 +148,6 @@ def speed_of(settings: BedPlatesSettings, grain: float, density: float, gravity:
 def _test(settings: BedPlatesSettings, bed: Any, about: Json, copy: int, tell: Callable[[float], None]) -> Tested:
     push = pushes(settings)[copy]
     shape = _body_of(push, settings)
-    bed.overlap_limit = settings.max_overlap
     speed = speed_of(settings, about["grain"], about["density"], about["gravity"])
     rows = np.array(list(_pushed(settings, bed, push, shape, speed, tell)))
     columns = dict(zip(("way_m", "depth_m", "force_x_N", "force_y_N", "force_z_N", "measured"), rows.T, strict=True))

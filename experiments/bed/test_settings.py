@@ -34,6 +34,8 @@ class BedTestSettings(StrictSettings):
     """Packing fraction of the bed [1]; that after settling if not given."""
     gravity: Positive = Field(STANDARD_GRAVITY, description="Gravity of the grains [m/s2].")
     seeds: Seeds = (1, 2, 3)
+    max_overlap: float | None = Field(None, ge=0.01, le=0.15)
+    """Largest overlap of grains in the test [of a diameter]; the bound of the bed if not given."""
     threads: Threads = None
 
     @model_validator(mode="after")
@@ -69,8 +71,6 @@ class BedConeSettings(BedTestSettings):
     )
     friction: float | None = Field(None, ge=0, le=10)
     """Friction coefficient between grains and cone [1]; that of the grains if not given."""
-    max_overlap: float | None = Field(None, ge=0.01, le=0.15)
-    """Largest overlap of grains under the cone [of a diameter]; the bound of the bed if not given."""
     pushes: int = Field(2, ge=1, le=20, description="Pushes into each bed, each into a new copy at another place.")
 
 

@@ -162,6 +162,8 @@ def bed_test(
 
     def one_test(settings: Settings, bed: Any, folder: RunFolder, which: str, copy: int, tell: Any) -> Run:
         about = _about(bed)
+        if settings.max_overlap is not None:
+            bed.overlap_limit = settings.max_overlap
         try:
             found = test(settings, bed, about, copy, tell)
         except ValueError as error:  # a bed whose surface lies otherwise than its depth says

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from golden import golden
 
-from dem import SAND, Bed
+from dem import SAND, Bed, BedFailure
 from dem.measure import cutting
 from dem.measure.cutting import cohesion_of, cut_and_load
 from dem.measure.penetrometer import ConePush, cone_gradient, cone_length, standard_speed
@@ -83,6 +83,29 @@ def result_of(folder):
     assert (folder / "report.html").exists()
     assert {"profiles.png", "index.png"} & {file.name for file in (folder / "figures").iterdir()}
     return json.loads((folder / "result.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("test", "measure", "own"), [("repose", "angle_of_repose", []), ("cut", "cut_and_load", ["--width", "0.03"])]
+)
+def test_the_bound_on_overlaps_is_a_setting_and_else_that_of_the_bed(test, measure, own, tmp_path, monkeypatch):
+    """Its message proposes a larger bound: the bed that is tested has it."""
+    bounds = []
+
+    def stop(bed, **options):
+        bounds.append(bed.overlap_limit)
+        raise BedFailure("seen")
+
+    monkeypatch.setattr(f"experiments.bed.{test}.{measure}", stop)
+    places = [[x, 0.01, 0.00199] for x in np.arange(0.002, WIDE[0], 0.004)]
+    Bed.from_grains(
+        SAND, positions=places, radii=[0.002] * len(places), size=WIDE, young=1e7, threads=1, max_overlap=0.04
+    ).save(tmp_path / "bed.npz")
+    for k, given in enumerate([[], ["--max-overlap", "0.12"]]):
+        tokens = ["--bed", str(tmp_path / "bed.npz"), "--threads", "1", "--quiet", "--out", str(tmp_path / f"{k}")]
+        assert main(["bed", "test", test, *tokens, *own, *given]) not in (DONE, BAD_INPUT)
+    assert bounds == [0.04, 0.12]
+    assert main(["bed", "test", test, *tokens, "--max-overlap", "0.3"]) == BAD_INPUT
 
 
 @pytest.mark.slow
