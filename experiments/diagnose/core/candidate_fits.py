@@ -19,6 +19,7 @@ WORTH = 3.0  # nats by which an effect must raise the tempered evidence
 BEHIND = 30.0  # nats behind the best beyond which a fit stops early: the chi-square is seven times as large
 _FINISHED, _NEAR_BY = 8, 8.0  # number of candidates fitted to the end, and all within so many nats of the best
 FOLLOWED = 3
+_SEEN = 0.5  # standard deviations of chi-square from which on a fit leaves something for another shape
 _SMALL_PART, _PARTS = 0.3, (0.1, 1.0)  # of a form's amplitude alone, and of its starts, for fits beside other forms
 
 Tell = Callable[[str, float], None]
@@ -54,6 +55,12 @@ class CandidateFits:
             return verdict
         other = self._recoloured(hypothesis.fit)
         return verdict if other is hypothesis.fit else open_gate(other, seed=self.seed)[1]
+
+    def _leaves_nothing(self, hypothesis: Hypothesis) -> bool:
+        """Whether another shape has nothing to explain: neither in the sum over all samples nor by the gate. Where the
+        noise is less than stated, the sum alone hides a slow misfit."""
+        found = hypothesis.fit
+        return excess(found) < _SEEN * np.sqrt(2.0 * found.count) and self._gate(hypothesis).passed
 
     def _kept(self, found: Fit) -> Hypothesis:
         """A fit as a hypothesis of the table."""
@@ -146,7 +153,7 @@ class CandidateFits:
     def _from_its_like(self, one: Hypothesis) -> Hypothesis:
         """The best of the forms that share scales with this single form, begun where it ended."""
         best, (plain,) = one, one.forms
-        if one.score < self.base.score + WORTH or excess(one.fit) < 0.5 * np.sqrt(2.0 * one.fit.count):
+        if one.score < self.base.score + WORTH or excess(one.fit) < _SEEN * np.sqrt(2.0 * one.fit.count):
             return one
         scales = {p.name for p in plain.parameters} - {plain.amplitude}
         for form in one.fit.model.problem.forms:
@@ -166,7 +173,7 @@ class CandidateFits:
         plain = list(hypothesis.forms) if hypothesis.score > self._most - BEHIND else []
         while plain:
             form, start = plain.pop(0), best
-            if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
+            if self._leaves_nothing(start):
                 break
             for finer in shapes.get(form.id, ()):
                 made = self._kept(self._fitted_bend(start.fit, form, finer))
@@ -211,7 +218,7 @@ class CandidateFits:
         best = max([self._bent(one) for one in (hypothesis, *self._siblings(hypothesis))], key=lambda h: h.score)
         for _ in range(2):
             start = best
-            if excess(start.fit) < 0.5 * np.sqrt(2.0 * start.fit.count):
+            if self._leaves_nothing(start):
                 break
             taken = {p.name for form in start.forms for p in form.parameters}
             others = [

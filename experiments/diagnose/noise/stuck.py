@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from experiments.check.words import row_noise
 from experiments.grains.spells import spells
 
-__all__ = ["Clipped", "clipped", "clipped_wheel", "cut_rows", "stuck_rows"]
+__all__ = ["Clipped", "clipped", "clipped_wheel", "cut_rows", "stuck_rows", "unsigned_rows"]
 
 _LONG = 12  # equal readings in a row that noise does not make
 _USUAL = 0.05  # share of equal neighbours elsewhere up to which a run is odd: coarse or held readings repeat always
@@ -17,6 +18,10 @@ _AT_THE_END, _IN_A_ROW = 8, 4  # readings at the end of a channel's range, and i
 _NEXT = 2  # readings at the value next to that: with more, it is a coarse channel that turns there
 _BESIDE, _SLIGHT = 7, 6.0  # rows on either side of a zero, and standard deviations, within which readings belong to it
 _NOISY = 0.2  # share of the stated noise that a wheel's speed must have below where it clips
+_UNSIGNED = 20  # readings near zero that decide on a sign: the chance that noise makes none of these negative is 1e-6
+_NEAR = 2.5  # standard deviations below which a reading is near zero: above it the lost sign changes less than 0.01
+_SPREAD = 0.3  # standard deviations by which readings near zero differ from it and each other; of sizes 0.8 and 0.6
+_ROWS = 9  # whose median decides whether the value is near zero
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,21 @@ def cut_rows(recordings: Sequence[NDArray[np.float64]], std: float) -> list[NDAr
         cut = np.convolve((values == 0).astype(float), np.ones(2 * _BESIDE + 1), mode="same") > 0.5
         found.append(np.flatnonzero(cut & (values < _SLIGHT * std)))
     return found
+
+
+def unsigned_rows(recordings: Sequence[NDArray[np.float64]], std: float) -> list[NDArray[np.int64]]:
+    """Rows, recording by recording, at which one sensor without a sign is near zero: it reads |value + noise|, so that
+    the noise `std` alone makes a reading of 0.8 std at rest. [n], NaN in gaps -> [m].
+
+    None where a reading is negative, where too few are near zero, or where these do not look like sizes of noise."""
+    known = [np.flatnonzero(np.isfinite(values)) for values in recordings]
+    own = [values[rows] / std for values, rows in zip(recordings, known, strict=True)]
+    near = [median_filter(one, _ROWS, mode="nearest") < _NEAR if len(one) else one > 0 for one in own]
+    sizes = np.concatenate([one[rows] for one, rows in zip(own, near, strict=True)]) if own else np.zeros(0)
+    negative = any(bool((one < 0).any()) for one in own)
+    if negative or len(sizes) < _UNSIGNED or min(float(sizes.mean()), float(sizes.std())) < _SPREAD:
+        return [rows[:0] for rows in known]
+    return [rows[mine] for rows, mine in zip(known, near, strict=True)]
 
 
 def _repeats(known: NDArray[np.float64]) -> float:

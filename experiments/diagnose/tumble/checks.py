@@ -14,7 +14,7 @@ from scipy.ndimage import median_filter
 
 from experiments.check.tumbles import find_lag, pieces
 from experiments.diagnose.fit.problem import Finding
-from experiments.diagnose.noise.stuck import clipped, clipped_wheel, stuck_rows
+from experiments.diagnose.noise.stuck import clipped, clipped_wheel, stuck_rows, unsigned_rows
 
 from .data import CHANNELS, TrialData, TumbleData
 
@@ -79,9 +79,32 @@ def checked(data: TumbleData) -> tuple[TumbleData, list[Finding]]:
                 _jumps(trial, name, mine, keep, findings)
         camera = trial.of("x") | trial.of("y") | trial.of("theta")  # a marker lost for one is lost for all three
         keep &= ~(camera & np.isin(trial.time, trial.time[camera & ~keep]))
-        kept = {field: getattr(trial, field)[keep] for field in ("time", "value", "std", "channel")}
-        trials.append(trial if keep.all() else replace(trial, **kept))
-    return replace(data, trials=tuple(trials)), findings
+        trials.append(trial if keep.all() else _only(trial, keep))
+    kept, found = _unsigned(trials)
+    return replace(data, trials=kept), findings + found
+
+
+def _unsigned(trials: Sequence[TrialData]) -> tuple[tuple[TrialData, ...], list[Finding]]:
+    """Without readings of a wheel near rest, where its sensor gives no sign."""
+    wheels = [np.flatnonzero(trial.of("wheel")) for trial in trials]
+    std = next((float(t.std[mine[0]]) for t, mine in zip(trials, wheels, strict=True) if len(mine)), 1.0)
+    rows = unsigned_rows([trial.value[mine] for trial, mine in zip(trials, wheels, strict=True)], std)
+    kept, findings = [], []
+    for trial, mine, gone in zip(trials, wheels, rows, strict=True):
+        keep = np.ones(len(trial.time), dtype=bool)
+        keep[mine[gone]] = False
+        kept.append(trial if keep.all() else _only(trial, keep))
+        if len(gone):
+            what = (
+                "the wheel's sensor gives no sign, so that at rest it reads the size of its noise: set aside near zero"
+            )
+            findings.append(aside(trial, "wheel", trial.time[mine[gone]], what))
+    return tuple(kept), findings
+
+
+def _only(trial: TrialData, keep: NDArray[np.bool_]) -> TrialData:
+    """The trial with these samples only."""
+    return replace(trial, **{field: getattr(trial, field)[keep] for field in ("time", "value", "std", "channel")})
 
 
 def _jumps(
