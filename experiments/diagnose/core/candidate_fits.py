@@ -56,7 +56,7 @@ class CandidateFits:
         other = self._recoloured(hypothesis.fit)
         return verdict if other is hypothesis.fit else open_gate(other, seed=self.seed)[1]
 
-    def _leaves_nothing(self, hypothesis: Hypothesis) -> bool:
+    def leaves_nothing(self, hypothesis: Hypothesis) -> bool:
         """Whether another shape has nothing to explain: neither in the sum over all samples nor by the gate. Where the
         noise is less than stated, the sum alone hides a slow misfit."""
         found = hypothesis.fit
@@ -173,7 +173,7 @@ class CandidateFits:
         plain = list(hypothesis.forms) if hypothesis.score > self._most - BEHIND else []
         while plain:
             form, start = plain.pop(0), best
-            if self._leaves_nothing(start):
+            if self.leaves_nothing(start):
                 break
             for finer in shapes.get(form.id, ()):
                 made = self._kept(self._fitted_bend(start.fit, form, finer))
@@ -218,7 +218,7 @@ class CandidateFits:
         best = max([self._bent(one) for one in (hypothesis, *self._siblings(hypothesis))], key=lambda h: h.score)
         for _ in range(2):
             start = best
-            if self._leaves_nothing(start):
+            if self.leaves_nothing(start):
                 break
             taken = {p.name for form in start.forms for p in form.parameters}
             others = [

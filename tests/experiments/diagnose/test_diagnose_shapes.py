@@ -17,9 +17,10 @@ from penetration_campaigns import (
 )  # fmt: skip
 
 from experiments.campaign import Recording
+from experiments.diagnose.core.candidate_fits import CandidateFits
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.core.renoised import whitened_fit
-from experiments.diagnose.fit.evidence import best_starts
+from experiments.diagnose.fit.evidence import Hypothesis, best_starts
 from experiments.diagnose.fit.fitting import Model, Whitener
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.noise.replicates import split_trials
@@ -155,6 +156,22 @@ def test_a_drag_that_grows_until_the_tip_is_in_has_a_corner_there():
     drag = (force - STIFFNESS * depth - DAMPING * speed) / (1e4 * speed**2)
     away = np.abs(depth - 6e-3) > 2e-3
     assert drag[away] == pytest.approx(np.minimum(1.0, depth / 6e-3)[away], abs=0.015)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.4])
+def test_a_slow_misfit_shows_where_the_noise_is_less_than_stated(size):
+    """Noise of 0.9 of what is stated leaves 0.81 a sample; a wave of 0.4 of it over depth adds 0.08: less than 1."""
+
+    def wavy(z, v, top=0.0):
+        return STIFFNESS * z + DAMPING * max(v, 0.0) + size * FORCE_STD * math.sin(1e3 * z)
+
+    trials = [(f"{k:02d}", "driven", speed, driven_trial(wavy, speed=speed, seed=90 + k, force_std=0.9 * FORCE_STD))
+              for k, speed in enumerate((0.01, 0.03, 0.06, 0.03))]  # fmt: skip
+    problem = make_problem(campaign_of(trials))
+    base = whitened_fit(Model(problem, Whitener.white(problem), tuple(t.id for t in problem.trials)))
+    assert base.chi_square < base.count
+    fits = CandidateFits(base, tell=lambda what, done: None)
+    assert fits.leaves_nothing(Hypothesis.of(base)) == (not size)
 
 
 def test_what_is_bent_may_be_bent_once_more_each_way_once():

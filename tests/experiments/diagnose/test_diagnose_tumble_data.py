@@ -145,6 +145,30 @@ def test_a_channel_that_clips_is_said_but_not_a_wheel_that_turns_evenly_without_
         assert told[0].set_aside and rest.max() < highest and len(rest) > 0.5 * len(rows)
 
 
+@pytest.mark.parametrize("sensor", ["no sign", "sign", "silent at rest"])
+def test_a_wheel_without_a_sign_is_not_heard_at_rest(sensor):
+    """|noise| of a wheel at rest is 0.8 std on the mean, not 0: such readings are left out, and no other sensor's.
+
+    A motor's wheel stands until t = 0; a sensor with a dead band reads exactly 0 there."""
+    data = tumble_data(campaign(seed=3, conditions=CONDITIONS[:2]))
+    trials = []
+    for trial in data.trials:
+        value, wheel = trial.value.copy(), trial.of("wheel")
+        value[wheel] = np.abs(value[wheel]) if sensor != "sign" else value[wheel]
+        if sensor == "silent at rest":
+            value[wheel & (trial.time < 0)] = 0.0
+        trials.append(replace(trial, value=value))
+    clean, findings = checked(replace(data, trials=tuple(trials)))
+    said = [finding for finding in findings if finding.channel == "wheel" and finding.set_aside]
+    assert len(said) == (len(trials) if sensor == "no sign" else 0)
+    for before, after in zip(trials, clean.trials, strict=True):
+        lost = before.of("wheel").sum() - after.of("wheel").sum()
+        assert not lost if sensor != "no sign" else lost > 20
+        if lost:
+            assert after.time[after.of("wheel")].min() >= 0
+            assert lost < (before.time[before.of("wheel")] < 0.1).sum()
+
+
 @pytest.mark.parametrize("share", [0.3, 0.7])
 def test_the_first_share_of_a_motion_is_what_the_whole_motion_begins_with(share):
     """What is looked at in part is simulated in part: camera's zero put aside, it reads the same up to there."""
