@@ -149,7 +149,8 @@ def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
     Raises ValueError, naming it, for what LAMMPS cannot have.
     """
     parts = [shapes] if isinstance(shapes, Shape) else list(shapes)
-    if len(parts) == 1 or not any(isinstance(part, Cylinder | Cone) for part in parts):
+    straight = all(isinstance(part, Ball | Cylinder | Cone) for part in parts)
+    if len(parts) == 1 or not straight or all(isinstance(part, Ball) for part in parts):
         return [piece for part in parts for piece in _alone(part)]
     ordered = sorted((_known(part) for part in parts), key=_bottom)
     seams = [_seam(below, above) for below, above in pairwise(ordered)]
@@ -157,15 +158,11 @@ def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
     return [Piece(part, ends[k], ends[k + 1]) for k, part in enumerate(ordered)]
 
 
-def check_plane(shapes: Sequence[Shape], turns: Vector) -> None:
-    """Raise ValueError for a body of these shapes that LAMMPS cannot have, OutOfPlaneError for one that turns as it
-    cannot; ``turns``: its quaternions on the way, shape [n, 4]."""
-    first = to_matrix(turns[0])
+def check_plane(shapes: Sequence[Shape], turn: Vector) -> None:
+    """Raise ValueError for a body of these shapes that LAMMPS cannot have, OutOfPlaneError for one that it cannot have
+    in this turn, a unit quaternion."""
     for piece in pieces_of(shapes):
-        piece.seat(first)
-    sides = np.array([to_matrix(turn) @ first[1] for turn in turns])  # where the side that was along y first is
-    if float(np.hypot(sides[:, 0], sides[:, 2]).max()) > _IN_PLANE:
-        raise OutOfPlaneError
+        piece.seat(to_matrix(turn))
 
 
 def _alone(part: Shape) -> list[Piece]:

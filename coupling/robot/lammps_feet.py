@@ -7,16 +7,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coupling.lammps import LammpsGround, OutOfPlaneError, check_plane
-from coupling.poses import Vector
 from dem import Bed
 from rigid.ground.reaction import Facts, Reaction, Turned
 
 from .bed_feet import BedFeet, Surface
+from .body import MujocoRobot
 from .distances import distances
-from .feet import Foot
 from .models import LostRobotError
 
 __all__ = ["LammpsFeet", "refuse_in_lammps"]
+
+STILL = 1e-9  # Turning about another axis than y over that of a joint [1]
 
 
 class LammpsFeet(BedFeet, LammpsGround):
@@ -72,17 +73,24 @@ class LammpsFeet(BedFeet, LammpsGround):
         return [(body, partial(distances, self._ruler, shape)) for body, shape in self._shapes]
 
 
-def refuse_in_lammps(feet: list[Foot], turns: Vector) -> None:
-    """Raise ValueError, naming it, for a geom that LAMMPS has no region for, and a foot that leaves the plane.
-
-    ``turns``: quaternions of the feet on their way, shape (row, foot, 4).
-    """
-    for k, foot in enumerate(feet):
+def refuse_in_lammps(robot: MujocoRobot) -> None:
+    """Raise ValueError, naming it, for a geom that LAMMPS has no region for, and a foot that can leave the plane."""
+    for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
+        out_of_plane = np.abs(robot.jacobian(foot.body)[1][[0, 2]]).max(axis=0) > STILL
+        if out_of_plane.any():
+            joint = robot.model.joint(int(robot.model.dof_jntid[np.argmax(out_of_plane)]))
+            raise ValueError(
+                f"feet: the joint {joint.name or joint.id!r} can turn {foot.name!r} out of the plane of x and z; in "
+                f"LAMMPS a foot turns about y alone: ground = 'bed' takes this robot"
+            )
         for part in foot.parts:
             try:
-                check_plane(part.shapes, turns[:, k])
-            except OutOfPlaneError as error:
-                raise ValueError(f"feet: {part.name!r}: {error}") from None
+                check_plane(part.shapes, turn)
+            except OutOfPlaneError:
+                raise ValueError(
+                    f"feet: {part.name!r} stands askew: in LAMMPS an axis of it lies in the plane of x and z, or along "
+                    f"y; ground = 'bed' takes it"
+                ) from None
             except ValueError:
                 raise ValueError(
                     f"feet: {part.name!r} is of the kind {part.kind}, for which LAMMPS has no region: sphere, capsule, "

@@ -185,6 +185,8 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
                 across, most = self.widths[foot.name] / s.grain, self.widths[foot.name] / FEWEST_ACROSS
                 raise ValueError(say("small_foot", s=s, name=foot.name, width=self.widths[foot.name], across=across,
                                      fewest=FEWEST_ACROSS, most=most))  # fmt: skip
+        if s.ground == "lammps":
+            refuse_in_lammps(self._robot)
         if self._robot.clearance < s.grain * (1 - 1e-9):
             raise ValueError(say("low_start", s=s, clearance=self._robot.clearance))
         if not self.gravity > 0:
@@ -193,9 +195,6 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             super().check()
         except RuntimeError as error:
             raise ValueError(say("forecast_fails", error=error)) from error
-        if s.ground == "lammps":
-            turns = self.forecast.run.feet[:, :, 3:7]
-            refuse_in_lammps(self._robot.feet, turns[np.linspace(0, len(turns) - 1, min(SEEN, len(turns))).astype(int)])
         self.check_exchange()
 
     def check_extent(self) -> None:

@@ -105,7 +105,7 @@ def test_a_spike_is_a_ball_below_its_middle_and_a_cylinder_above():
     [
         ([Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])], "Mesh"),
         ([Ball(radius=0.006), Cylinder(bottom=0.0, top=0.06, radius=0.004)], "as thick as"),
-        ([Box(size=(1, 1, 1)), Cylinder(bottom=0.0, top=0.06, radius=0.004)], "several pieces"),
+        ([Ball(radius=0.006), Ball((0, 0, 1), 0.006), Cylinder(0.0, 0.06, 0.006)], "several pieces"),
     ],
 )
 def test_shapes_without_a_counterpart_are_refused_by_name(shapes, named):

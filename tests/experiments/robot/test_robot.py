@@ -87,24 +87,25 @@ def test_a_bed_that_does_not_suit_the_robot_is_refused_before_any_work(given, sa
         robot.check(RobotSettings(**ON_BED | given))
 
 
-FREE = """<mujoco><worldbody><body name="foot" pos="0 0 0.1" quat="{quat}"><freejoint/>
-  <geom name="foot" type="{kind}" size="{size}" mass="1"/></body></worldbody>
-  <keyframe><key name="thrown" qpos="0 0 0.1 {quat}" qvel="0 0 0 {spin} 0 0"/></keyframe></mujoco>"""
+RAIL = """<mujoco><worldbody><body name="foot" pos="0 0 0.1" quat="{quat}">{joint}
+  <geom name="foot" type="{kind}" size="0.04 0.04 0.04" mass="1"/></body></worldbody></mujoco>"""
+UP = '<joint name="up" type="slide" axis="0 0 1"/>'
 
 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"kind": "ellipsoid", "size": "0.03 0.04 0.03"}, r"'foot' is of the kind ellipsoid, .* or ground = 'bed'"),
-        ({"spin": 1}, "'foot': this body turns out of the plane of motion"),
-        ({"quat": "0.9 0.2 0 0"}, "'foot': this body turns out of the plane of motion"),
+        ({"kind": "ellipsoid"}, "'foot' is of the kind ellipsoid, .* or ground = 'bed'"),
+        ({"joint": UP + '<joint name="yaw" axis="0 0 1"/>'}, "the joint 'yaw' can turn 'foot' out of the plane"),
+        ({"joint": '<freejoint name="root"/>'}, "the joint 'root' can turn 'foot' out of the plane"),
+        ({"quat": "0.9 0.2 0.1 0"}, "'foot' stands askew"),
     ],
 )
 def test_feet_that_lammps_cannot_move_are_refused_before_any_work(given, said, tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.robot.on_grains.check_lammps", lambda *_: None)
-    file = tmp_path / "free.xml"
-    file.write_text(FREE.format(**{"kind": "box", "size": "0.04 0.04 0.04", "quat": "1 0 0 0", "spin": 0} | given))
-    own = {"model": str(file), "ground": "lammps", "keyframe": "thrown", "duration": 0.05, "bed_size": (0.2, 0.2, 0.3)}
+    file = tmp_path / "rail.xml"
+    file.write_text(RAIL.format(**{"kind": "box", "quat": "1 0 0 0", "joint": UP} | given))
+    own = {"model": str(file), "ground": "lammps", "duration": 0.05, "height": None}
     with pytest.raises(ValueError, match=said):
         robot.check(RobotSettings(**ON_BED | own))
 
