@@ -2,7 +2,7 @@
 
 `coupling.robot.FootForces` is called as MuJoCo calls it, with every foot in contact: robots of one foot and of six. A
 foot has one point in contact (ball, ellipsoid, capsule on its end), two (capsule and cylinder that lie), 4 of 8 (box)
-or 8 of 16 (cylinder on its end). It goes in and slides. Several rounds by processor time; the median counts. For quick
+or 8 (cylinder on its end, mesh). It goes in and slides. Several rounds by processor time; the median counts. For quick
 trials, in the environment: HEDGEBED_BENCH_CALLS, HEDGEBED_BENCH_ROUNDS.
 """
 
@@ -33,14 +33,21 @@ SHAPES = {
     "capsule on its end": 'type="capsule" size="0.005 0.005"',
     "capsule that lies": 'type="capsule" size="0.01 0.01" euler="90 0 0"',
     "ellipsoid": 'type="ellipsoid" size="0.02 0.015 0.01"',
+    "mesh with a round sole": 'type="mesh" mesh="sole"',
 }
+_CORNERS = 32  # Of the round sole
 _BODY = '<body pos="{x} 0 0.0099"><freejoint/><geom name="foot_{k}" {shape} mass="0.1"/></body>'
 
 
 def _robot(shape: str, count: int) -> tuple[Any, Any]:
     """Model and data of `count` feet of a shape, 0.1 mm deep, that go in and slide: all terms are computed."""
     bodies = "".join(_BODY.format(x=0.1 * k, k=k, shape=SHAPES[shape]) for k in range(count))
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    angles = 2 * np.pi / _CORNERS * np.arange(_CORNERS)
+    ring = 0.01 * np.column_stack([np.cos(angles), np.sin(angles), np.ones(_CORNERS)])
+    corners = " ".join(f"{x:.9g}" for x in np.concatenate([ring, ring * (1, 1, -1)]).ravel())
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><asset><mesh name="sole" vertex="{corners}"/></asset><worldbody>{bodies}</worldbody></mujoco>'
+    )
     data = mujoco.MjData(model)
     data.qvel[:] = np.tile([0.1, 0.02, -0.1, 0.0, 0.0, 0.0], count)
     mujoco.mj_forward(model, data)

@@ -25,7 +25,7 @@ from rigid.spatial.quaternions import to_matrix
 __all__ = ["Foot", "Part", "find_feet", "mesh_of", "refuse_missing"]
 
 ROUND = 32  # Segments around of the picture of a round geom
-RIM = 8  # Points on the rim of a cylinder that stands on its end
+RIM = 8  # Points on the rim of a cylinder that stands on its end, and most on the face on which a mesh stands
 UPRIGHT = math.sqrt(0.5)  # Cosine between axis and vertical from which on a cylinder or capsule stands on its end
 FINE = 3  # Subdivisions of the ball that stands for an ellipsoid among grains: 1280 triangles, 0.3 % too small
 
@@ -251,23 +251,29 @@ def mesh_of(model: Any, k: int) -> tuple[Vector, Faces]:
 
 
 def _hull_points(vertices: Vector, up: Vector) -> tuple[Vector, float]:
-    """Vertices of the convex hull [m], at most `HULL`, each as far as can be from those before, shape (n, 3).
+    """Vertices of the convex hull [m], at most `HULL`, shape (n, 3), and the share of the law that each has.
 
-    And the share of the law that each has: it stands on those of the face that looks down most, ``up`` in its axes.
+    It stands on those of the face that looks down most, at most `RIM`; ``up``: in its axes.
     """
     from scipy.spatial import ConvexHull
 
-    points = np.asarray(vertices[ConvexHull(vertices).vertices])
-    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
-    apart = np.full(len(points), np.inf)
-    for _ in range(min(HULL, len(points)) - 1):
-        apart = np.minimum(apart, np.linalg.norm(points - points[chosen[-1]], axis=1))
-        chosen.append(int(np.argmax(apart)))
-    points = points[sorted(chosen)]
+    hull = np.asarray(vertices[ConvexHull(vertices).vertices])
+    points = hull[_apart(hull, HULL)]
     planes = ConvexHull(points).equations
     *normal, offset = planes[np.argmin(planes[:, :3] @ up)]
-    below = np.abs(points @ normal + offset) <= LEVEL * float(np.ptp(points, axis=0).max())
-    return points, 1 / int(below.sum())
+    face = np.flatnonzero(np.abs(points @ normal + offset) <= LEVEL * float(np.ptp(points, axis=0).max()))
+    stands = face[_apart(points[face], RIM)]
+    return np.delete(points, np.setdiff1d(face, stands), axis=0), 1 / len(stands)
+
+
+def _apart(points: Vector, most: int) -> NDArray[np.int64]:
+    """Numbers of at most so many points, each as far from those before as can be, in their order."""
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    apart = np.full(len(points), np.inf)
+    for _ in range(min(most, len(points)) - 1):
+        apart = np.minimum(apart, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(apart)))
+    return np.array(sorted(chosen))
 
 
 def _closed(name: str, vertices: Vector, faces: Faces) -> tuple[Vector, Faces, str]:

@@ -158,6 +158,16 @@ def test_a_fine_mesh_of_a_ball_stands_on_at_most_64_points_that_are_spread_over_
         assert 0 <= foot.lowest(matrix)[:, 2].min() - foot.bottom(matrix) < 0.05 * (1 - np.cos(0.4))
 
 
+def test_a_mesh_with_a_round_sole_stands_on_eight_points_of_its_rim():
+    angles = 2 * np.pi / 32 * np.arange(32)
+    rim = np.column_stack([np.cos(angles), np.sin(angles), np.ones(32)])
+    (foot,) = MujocoRobot(of_mesh(0.03 * np.concatenate([rim, rim * (1, 1, -1)]), 0.1), "foot").feet
+    below = foot.centres[foot.centres[:, 2] < 0]
+    assert foot.parts[0].share == 1 / 8 and len(below) == 8 and len(foot.centres) == 8 + 32
+    turns = np.sort(np.arctan2(below[:, 1], below[:, 0]))
+    assert np.diff(turns).max() < 2 * 2 * np.pi / 8
+
+
 def test_a_site_has_no_surface_for_grains():
     with pytest.raises(ValueError, match="'mark' is a site"):
         BedFeet(NoBed(), made(["mark"]))
