@@ -14,9 +14,9 @@ go through it. E* and G* are the effective moduli, a the contact radius, m* the 
 | rolling friction | `rolling sds`: its spring is constant, 8 G* a at `OVERLAP`; its bound is the same |
 | twisting | `twisting marshall`: spring and dashpot are the same; its bound is 2/3 mu a F_n, ours 3 pi / 16 mu a F_n |
 
-The polynomial of `damping tsuji` is in LAMMPS' manual (pair_style granular). LAMMPS before the end of 2022 puts the
-number of a wall through it at every setup, in place of what it was (`FixWallGran::init`): a second setup changes the
-dashpot of floor and bodies. `LammpsBed` measures whether it does, and keeps the number of setups known.
+The polynomial of `damping tsuji` is in LAMMPS' manual (pair_style granular). LAMMPS of 2021, but not that of 2025, puts
+the number of a wall through it at every setup, in place of what it was (`FixWallGran::init`): a second setup changes
+the dashpot of floor and bodies. `LammpsBed` measures whether it does, and keeps the number of setups known.
 """
 
 import math
@@ -49,7 +49,7 @@ TANGENTIAL = {"displacement": "mindlin", "rescaled": "mindlin_rescale/force"}
 """LAMMPS' names of our springs (`Material.tangential`)."""
 OVERLAP = 0.01
 """Overlap of the contact whose rolling spring all contacts have, over a diameter [1]. A spike in 343 grains met a force
-that was 0.2 % below that of springs which follow each contact; with springs of contacts at rest, 5 % below."""
+that was 0.2 % above that of springs which follow each contact."""
 _TRIAL = "hertz/material 1 0.9 0 tangential linear_nohistory 0 0 damping tsuji"
 WALL_TRIAL = (
     "region trial block 0 2 0 2 0 2 units box", "create_box 1 trial", "create_atoms 1 single 1 1 0.45 units box",

@@ -12,6 +12,7 @@ import argparse
 import csv
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,9 @@ parser.add_argument("--radius", type=float, default=0.006, help="of the spike [m
 parser.add_argument("--speed", type=float, default=0.2, help="of the spike [m/s]")
 parser.add_argument("--parts", type=int, default=20, help="means of the force, each over 10 time steps")
 parser.add_argument("--finer", type=int, nargs="+", default=(1,), help="steps in the time of one, here and in LAMMPS")
+parser.add_argument(
+    "--change", nargs="+", default=(), metavar="KEY=NUMBER", help="of the material, after the preparation"
+)
 parser.add_argument("--alone", action="store_true", help="LAMMPS alone")
 parser.add_argument("--out", type=Path, help="a CSV of the forces")
 
@@ -59,13 +63,14 @@ def push(bed, start, asked, pids, finer):
 def main():
     asked = parser.parse_args()
     piece = Bed.prepare("sand", size=tuple(asked.size), grain=asked.grain, gravity=9.81, seed=1, threads=1)
+    stuff = replace(piece.material, **{key: float(number) for key, number in (one.split("=") for one in asked.change)})
     grains = piece.repeated(asked.copies).grains()
     size = (asked.copies * asked.size[0], *asked.size[1:])
 
     def fresh(finer):
         """The bed without the history of its contacts, which LAMMPS cannot take over."""
         return Bed.from_grains(
-            piece.material, positions=grains.position, radii=grains.radius, velocities=grains.velocity,
+            stuff, positions=grains.position, radii=grains.radius, velocities=grains.velocity,
             spins=grains.spin, size=size, height=0.2, time_step=piece.time_step / finer, threads=1,
         )  # fmt: skip
 
@@ -90,7 +95,11 @@ def main():
             bed.close()
             if own in columns:
                 so_far = np.cumsum(columns[name][:, 2]) / np.cumsum(columns[own][:, 2])
-                print("  of the bed's mean force so far, after each part:", *(f"{v:.4f}" for v in so_far))
+                print(
+                    "  over the bed's mean force, up to the end of each part:",
+                    *(f"{v:.4f}" for v in so_far),
+                    flush=True,
+                )
     for name, forces in columns.items():
         print(f"{name}: mean force {forces[:, 2].mean():.5g} N; {1e9 * costs[name]:.4g} ns of processor a grain-step")
     if asked.out is not None:
