@@ -5,6 +5,7 @@ that follow the size of the bed, the stiffness of its grains, the prepared bed, 
 on the spring-damper is computed first: its `Forecast` says how far and how deep the bed must reach.
 """
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -157,7 +158,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         self.check_extent()
         least = forecast.deepest + 2 * spike
         if s.bed_size[2] < least:
-            raise ValueError(say("too_shallow", depth=s.bed_size[2], f=forecast, least=least))
+            raise ValueError(say("too_shallow", depth=s.bed_size[2], f=forecast, least=math.ceil(1e3 * least) / 1e3))
         self.check_layout()
         if s.grain > spike:
             raise ValueError(say("larger_than_spike", grain=s.grain, spike=spike))

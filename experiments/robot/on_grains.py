@@ -201,7 +201,8 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         s, forecast = self.settings, self.forecast
         least = forecast.deepest + 2 * self.spike_diameter
         if s.bed_size[2] < least:
-            raise ValueError(say("too_shallow", s=s, f=forecast, width=self.spike_diameter, least=least))
+            wanted = math.ceil(1e3 * least) / 1e3
+            raise ValueError(say("too_shallow", s=s, f=forecast, width=self.spike_diameter, least=wanted))
         for axis, (name, low, high) in enumerate(zip("xy", forecast.low, forecast.high, strict=True)):
             need = high - low + 2 * s.grain
             if s.bed_size[axis] < need:

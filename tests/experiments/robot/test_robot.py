@@ -1,6 +1,7 @@
 """`hedgebed mujoco`: refusals by name, a run on a law and its report, a small bed stopped and taken up."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -108,6 +109,16 @@ def test_feet_that_lammps_cannot_move_are_refused_before_any_work(given, said, t
     own = {"model": str(file), "ground": "lammps", "duration": 0.05, "height": None}
     with pytest.raises(ValueError, match=said):
         robot.check(RobotSettings(**ON_BED | own))
+
+
+def test_the_depth_of_a_bed_that_a_refusal_names_is_accepted():
+    def extent(depth):
+        settings = RobotSettings(**ON_BED | {"bed_size": (0.2, 0.2, depth)})
+        return RobotOnBed(settings, plan_robot(settings))
+
+    with pytest.raises(ValueError, match="too shallow") as refused:
+        extent(0.1).check_extent()
+    extent(float(re.findall(r"([0-9.]+) m is accepted", str(refused.value))[0])).check_extent()
 
 
 def test_k_of_sand_goes_with_gravity_and_c_with_its_root_where_that_is_asked_for_and_a_warning_names_it():
