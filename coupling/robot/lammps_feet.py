@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from coupling.lammps import LammpsGround, OutOfPlaneError, check_plane
 from dem import Bed
-from rigid.ground.reaction import Facts, Reaction, Turned
+from rigid.ground.reaction import Reaction, Turned
 
 from .bed_feet import BedFeet, Surface
 from .body import MujocoRobot
@@ -46,10 +46,6 @@ class LammpsFeet(BedFeet, LammpsGround):
 
     def __repr__(self) -> str:
         return f"LammpsFeet({self.bed!r} under {', '.join(foot.name for foot in self.feet)})"
-
-    def describe(self) -> Facts:
-        """As `LammpsGround.describe`."""
-        return LammpsGround.describe(self)
 
     def step(
         self, position: ArrayLike, velocity: ArrayLike, dt: float, turn: Turned = None, spin: Turned = None
