@@ -13,7 +13,7 @@ settings lead to the same runs on every machine.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from experiments.converge.costs import core_hours
 from experiments.converge.design import BASE, Member, Variant
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
-from experiments.pool.together import Where, run_all, whole_folder
+from experiments.pool.together import Planned, Where, run_all, whole_folder
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.types import Json
@@ -30,7 +30,7 @@ from experiments.runs.types import Json
 from .cells import FASTER, Cell, cells_of
 from .data import Data
 from .fit import Estimated, LawFit, fit_law, interval
-from .further import cost_of_further, make_further
+from .further import FurtherRuns, cost_of_further, further_runs
 from .laws import CANDIDATES, Candidate
 from .reading import read_folders
 from .settings import LawFitSettings, say
@@ -143,7 +143,7 @@ def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress
     home = Path(settings.members) if settings.members else folder.path / "members"
     growing = [_Growing(cell, _seeds(settings)) for cell in cells_of(settings)]
     budget, spent, designed = settings.budget or 0.0, 0.0, Designed()
-    certain = _certain([one.cell for one in growing], _seeds(settings), budget)
+    certain = _certain([one.cell for one in growing], _seeds(settings), budget, home)
     while going := [one for one in growing if not one.ended]:
         one = max(going, key=lambda one: one.sure)  # the first of those that are alike
         why, todo = one.next_step(settings.tolerance)
@@ -154,10 +154,7 @@ def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress
             designed.notes.append(_of_cell(one, growing, say("spent", **numbers)))
             break
         progress.message(_of_cell(one, growing, why))
-        _make(todo, certain, home, Where.of(settings), progress)
-        for member in todo:
-            if member.variant.what == BASE:
-                _make_further(one.cell, member, home / member.folder, progress)
+        _make([_planned(one.cell, member, home) for member in todo], certain, Where.of(settings), progress)
         spent += cost
         one.take(todo, home, settings)
         step: Json = {"cell": one.cell.name, "why": why, "runs": [path.name for path in one.paths[-len(todo) :]]}
@@ -184,37 +181,38 @@ def _of_cell(one: _Growing, growing: Sequence[_Growing], text: str) -> str:
     return f"{one.cell.name}: {text}" if len(growing) > 1 else text
 
 
-def _make_further(cell: Cell, member: Member, path: Path, progress: Progress) -> None:
-    try:
-        make_further(cell, member.seed, path, progress)
-    except RuntimeError as error:
-        raise RuntimeError(say("member_failed", name=path.name, reason=error)) from error
+def _planned(cell: Cell, member: Member, home: Path) -> Planned:
+    """A member as a run of a list, with the further runs in its bed."""
+    plain, runs = member.planned(home), tuple(further_runs(cell)) if member.variant.what == BASE else ()
+    if not runs:
+        return plain
+    cost = plain.cost + cost_of_further(cell)
+    after = FurtherRuns(runs, share=1.0 - plain.cost / cost)
+    return replace(plain, task=replace(plain.task, after=after), cost=cost)
 
 
-def _certain(cells: Sequence[Cell], seeds: Sequence[int], budget: float) -> list[Member]:
+def _certain(cells: Sequence[Cell], seeds: Sequence[int], budget: float, home: Path) -> list[Planned]:
     """Beds that are needed in any case: the first two of each cell, or `LEAST_BEDS` of each if the budget is sufficient
     for these in all cells, each with the faster drive, which is decided later.
     """
     first = seeds[:LEAST_BEDS]
     most = [_cost(cell, [_member(cell, seed, faster=faster) for seed in first for faster in (False, True)])
             for cell in cells]  # fmt: skip
-    return [_member(cell, seed) for cell in cells for seed in (first if sum(most) <= budget else seeds[:2])]
+    first = first if sum(most) <= budget else seeds[:2]
+    return [_planned(cell, _member(cell, seed), home) for cell in cells for seed in first]
 
 
-def _make(todo: Sequence[Member], certain: Sequence[Member], home: Path, where: Where, progress: Progress) -> None:
+def _make(todo: Sequence[Planned], certain: Sequence[Planned], where: Where, progress: Progress) -> None:
     """Compute the runs of `todo` that are not done, and those of `certain` if several processes are available.
 
     If runs of `todo` fail, the others are finished first; then RuntimeError names the first that failed.
     """
-    planned = [member.planned(home) for member in todo]
-    more = [member.planned(home) for member in certain]
-    if where.scheduler is None and where.processes([one.cost for one in (*planned, *more)]) == 1:
-        more = []
-    outcomes = run_all([*planned, *more], where=where, progress=progress)
-    for one in planned:
+    alone = where.scheduler is None and where.processes([one.cost for one in (*todo, *certain)]) == 1
+    outcomes = run_all([*todo, *([] if alone else certain)], where=where, progress=progress)
+    for one in todo:
         if fault := outcomes[one.task.name].fault:
             raise RuntimeError(say("member_failed", name=one.task.name, reason=fault))
-        whole_folder(one.task, "series")
+        whole_folder(one.task, "series", *(one.task.after.files if one.task.after is not None else ()))
 
 
 def sure_enough(sure: float, beds: int, tolerance: float, *, least: int = LEAST_BEDS) -> bool:

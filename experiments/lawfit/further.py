@@ -4,12 +4,13 @@ Each is kept as a series and a note in the folder of that member and used again 
 stopped, it starts again from its beginning.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from pydantic import BaseModel
 
 from coupling import BedGround
 from coupling.guided import Leg, guide
@@ -17,7 +18,7 @@ from experiments.converge.costs import CORE_STEP
 from experiments.penetrate import beds
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import Unit, expected_time, make_run, make_spike
-from experiments.runs.folder import RunFolder, holding
+from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.types import Json
 
@@ -26,7 +27,7 @@ from .data import Array, Data, Drag, Placement, Unloading
 from .fit import mean_of
 from .settings import say
 
-__all__ = ["Further", "cost_of_further", "further_rows", "further_runs", "make_further", "read_further"]
+__all__ = ["Further", "FurtherRuns", "cost_of_further", "further_rows", "further_runs", "read_further"]
 
 RAISED = 0.05
 """How far a tip is raised where it is unloaded, and driven on after it, over its diameter [1]."""
@@ -78,34 +79,54 @@ def _legs(base: PenetrateSettings, one: Further, speed: float) -> list[Leg]:
     return [Leg(speed, down=one.value), Leg(slow, down=-raised), Leg(slow, down=raised), Leg(speed, down=raised)]
 
 
-def make_further(cell: Cell, seed: int, path: Path, progress: Progress) -> None:
-    """Make the missing runs in the bed of the member `path`. Raises RuntimeError if one fails."""
-    todo = [one for one in further_runs(cell) if not RunFolder.open(path).is_done(one.id)]
-    if not todo:
-        return
-    base = cell.base.model_copy(update={"seeds": (seed,)})
-    with holding(path, waiting=progress.message):
-        folder = RunFolder.open(path)
-        bed = beds.prepare_bed(base, seed, beds.choose_softness(base).young, progress)
-        bed.overlap_limit = beds.overlap_bound(base)
-        spike = make_spike(base)
+@dataclass(frozen=True)
+class FurtherRuns:
+    """The further runs of one bed, as what comes after the run of its member (`experiments.pool.tasks.After`)."""
+
+    runs: tuple[Further, ...]
+    share: float  # Of the cost of member and further runs [1]
+
+    @property
+    def files(self) -> list[str]:
+        """Their series, below the folder of the member."""
+        return [f"series/{one.id}.csv" for one in self.runs]
+
+    def missing(self, path: Path) -> bool:
+        """Whether one of them is not yet in the folder of the member."""
+        return bool(self._todo(path))
+
+    def _todo(self, path: Path) -> list[Further]:
+        try:
+            folder = RunFolder.open(path)
+        except (OSError, ValueError):
+            return list(self.runs)
+        return [one for one in self.runs if not folder.is_done(one.id)]
+
+    def make(self, settings: BaseModel, path: Path, tell: Callable[[float], None], progress: Progress) -> None:
+        """Make the missing runs in the bed of the member. Raises RuntimeError if one fails."""
+        assert isinstance(settings, PenetrateSettings)
+        folder, todo, seed = RunFolder.open(path), self._todo(path), settings.seeds[0]
+        bed = beds.prepare_bed(settings, seed, beds.choose_softness(settings).young, progress)
+        bed.overlap_limit = beds.overlap_bound(settings)
+        spike = make_spike(settings)
         ground = BedGround(bed, spike)
         start = ground.state()
-        for one in todo:
+        for number, one in enumerate(todo):
             ground.restore(start)
             bed.max_overlap = 0.0
             progress.stage(f"{path.name}: {one.kind} at {one.value:g}", total=1.0)
             if one.kind == "placement":
-                under = base.model_copy(update={"load": one.value})
-                run = make_run(under, Unit(seed, "set_down", base.lowering_speed), ground).run()
+                under = settings.model_copy(update={"load": one.value})
+                run = make_run(under, Unit(seed, "set_down", settings.lowering_speed), ground).run()
                 folder.write_series(one.id, run.columns())
                 found: Json = {"load": one.value, "depth": run.resting_depth}
             else:
-                legs = _legs(base, one, min(base.speeds))
-                columns = guide(spike, ground, legs, substeps=base.substeps, on_step=progress.update)
+                legs = _legs(settings, one, min(settings.speeds))
+                columns = guide(spike, ground, legs, substeps=settings.substeps, on_step=progress.update)
                 folder.write_series(one.id, columns)
                 found = _dragged(columns, one.value) if one.kind == "drag" else _unloaded(columns, one.value)
             folder.mark_done(one.id, found)
+            tell((number + 1) / len(todo))
 
 
 def _unloaded(columns: dict[str, Array], depth: float) -> Json:

@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -24,7 +24,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.registry import Experiment, find_experiment
 from experiments.runs.whole_runs import keeping_status, without_reports
 
-__all__ = ["Outcome", "Task", "Tell", "carry_out", "code_of", "done_before", "name_of", "received", "task_of"]
+__all__ = ["After", "Outcome", "Task", "Tell", "carry_out", "code_of", "done_before", "name_of", "received", "task_of"]
 
 Settings = TypeVar("Settings", bound=BaseModel)
 Tell = Callable[[float], None]
@@ -39,6 +39,24 @@ _NAMING = (".toml", ".xml", ".urdf")  # files that may name others, in quotes
 _QUOTED = re.compile(r"""\"([^"\n]{1,255})"|'([^'\n]{1,255})'""")
 
 
+class After(Protocol):
+    """What belongs to a task beyond its run: made in the folder of the finished run by whoever makes that."""
+
+    @property
+    def share(self) -> float:
+        """Its share of the cost of the task, 0 to 1."""
+
+    @property
+    def files(self) -> Sequence[str]:
+        """Files that it leaves in the run folder."""
+
+    def missing(self, path: Path) -> bool:
+        """Whether any of it is not yet in the run folder `path`."""
+
+    def make(self, settings: BaseModel, path: Path, tell: Tell, progress: Progress) -> None:
+        """Make what is missing; `settings`: of the run. The process has the folder for itself."""
+
+
 @dataclass(frozen=True)
 class Task:
     """One run: the experiment's name, its settings, its folder below `home`, and the code it is meant for."""
@@ -49,6 +67,7 @@ class Task:
     home: str
     code: str
     reports: bool = False
+    after: After | None = None
 
     @property
     def path(self) -> Path:
@@ -58,7 +77,8 @@ class Task:
     @property
     def key(self) -> str:
         """The name and a digest of all the rest: two tasks have one key only where one outcome does for both."""
-        given = [self.home, self.experiment, self.settings.model_dump(mode="json"), self.code, self.reports]
+        settings = self.settings.model_dump(mode="json")
+        given = [self.home, self.experiment, settings, self.code, self.reports, repr(self.after)]
         return f"{self.name}-{hashlib.sha256(json.dumps(given, sort_keys=True).encode()).hexdigest()}"
 
     def on_threads(self, threads: int) -> "Task":
@@ -120,6 +140,13 @@ def code_of(experiment: Experiment) -> str:
 
 def done_before(task: Task) -> Outcome | None:
     """The outcome of a task whose folder is done; None where it is not, or where its result cannot be read."""
+    if task.after is not None and task.after.missing(task.path):
+        return None
+    return _run_before(task)
+
+
+def _run_before(task: Task) -> Outcome | None:
+    """The outcome of the run of a task, with or without what comes after it."""
     try:
         folder = RunFolder.open(task.path)
         if folder.status != "done":
@@ -144,12 +171,23 @@ def carry_out(task: Task, tell: Tell, shown: Progress | None = None) -> Outcome:
                 "the code here is not that of the command: install the same version of hedgebed everywhere"
             )
         with holding(task.path, waiting=waiting):
-            return done_before(task) or _compute(task, _folder_of(task), _Told(tell, shown))
+            return _with_after(task, tell, shown)
     except Exception as error:
         if task.path.is_dir():
             with suppress(OSError):
                 write_text(task.path / "traceback.txt", traceback.format_exc())
         return Outcome(task.name, fault=" ".join(f"{type(error).__name__}: {error}".split()))
+
+
+def _with_after(task: Task, tell: Tell, shown: Progress | None) -> Outcome:
+    """The run and what comes after it; what is there is read."""
+    own = 1.0 if task.after is None else 1.0 - task.after.share
+    told = _Told(lambda share: tell(own * share), shown)
+    outcome = _run_before(task) or _compute(task, _folder_of(task), told)
+    if task.after is not None and task.after.missing(task.path):
+        silent = _Told(lambda share: None, shown)
+        task.after.make(task.settings, task.path, lambda share: tell(own + (1.0 - own) * share), silent)
+    return outcome
 
 
 def _folder_of(task: Task) -> RunFolder:
@@ -172,7 +210,7 @@ def _compute(task: Task, folder: RunFolder, progress: Progress) -> Outcome:
             experiment.run(task.settings, folder.path, progress=progress)
         else:
             experiment.resume(folder.path, progress=progress)
-    outcome = done_before(task)
+    outcome = _run_before(task)
     if outcome is None:
         raise RuntimeError(f"{task.path / 'result.json'} is not there after the run")
     return outcome

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -82,6 +83,36 @@ def test_runs_come_in_their_order_each_once_and_what_is_done_comes_first(tmp_pat
     assert {name: one.result for name, one in again.items()} == {name: one.result for name, one in outcomes.items()}
 
 
+@dataclass(frozen=True)
+class Twice:
+    """The torque of the run, doubled, in a file of its folder."""
+
+    share: float = 0.25
+    files: tuple[str, ...] = ("twice",)
+
+    def missing(self, path):
+        return not (path / "twice").exists()
+
+    def make(self, settings, path, tell, progress):
+        (path / "twice").write_text(str(2 * settings.torque))
+        tell(1.0)
+
+
+def test_what_belongs_to_a_run_is_made_in_its_folder_and_once(tmp_path):
+    planned = [replace(one, task=replace(one.task, after=Twice())) for one in tumbles(tmp_path, [0.2, 0.15])]
+    plain, first = planned[1].task.path, planned[0].task
+    run_all(tumbles(tmp_path, [0.15]), where=Where(workers=1), progress=Progress())
+    made = (plain / "result.json").stat().st_mtime_ns
+    assert [tasks.done_before(one.task) for one in planned] == [None, None]
+    shares = []
+    assert not tasks.carry_out(first, shares.append).fault
+    assert shares == sorted(shares) and shares[-2:] == [0.75, 1.0]
+    outcomes = run_all(planned, where=Where(workers=1), progress=Progress())
+    assert not any(one.fault for one in outcomes.values())
+    assert [(one.task.path / "twice").read_text() for one in planned] == ["0.4", "0.3"]
+    assert (plain / "result.json").stat().st_mtime_ns == made and all(tasks.done_before(one.task) for one in planned)
+
+
 def test_a_file_that_is_only_on_the_disk_of_a_worker_is_named(tmp_path):
     """The numbers arrive; a series does not."""
     (one,) = tumbles(tmp_path / "there", [0.2])
@@ -107,13 +138,14 @@ def test_a_member_of_converge_and_calibrate_is_named_by_all_code_that_computes_i
     assert not set(names()) & set(first)
 
 
-def test_beds_of_calibrate_are_computed_together_only_where_the_budget_reaches_them_in_any_case():
+def test_beds_of_calibrate_are_computed_together_only_where_the_budget_reaches_them_in_any_case(tmp_path):
     """Also where each bed gets the faster drive, which is decided after the first two."""
     (cell,), seeds = cells_of(lawfit.Settings(budget=1e9)), list(range(1, 8))
     whole = _cost(cell, [_member(cell, seed, faster=faster) for seed in seeds[:LEAST_BEDS] for faster in (False, True)])
     for budget, count in ((1.001 * whole, LEAST_BEDS), (0.999 * whole, 2)):
-        assert [member.seed for member in _certain([cell], seeds, budget)] == seeds[:count]
-        assert [member.seed for member in _certain([cell, cell], seeds, 2 * budget)] == 2 * seeds[:count]
+        for cells in ([cell], [cell, cell]):
+            planned = _certain(cells, seeds, len(cells) * budget, tmp_path)
+            assert [one.task.settings.seeds for one in planned] == len(cells) * [(seed,) for seed in seeds[:count]]
 
 
 def command(*tokens, log):
@@ -142,6 +174,42 @@ def test_ctrl_c_ends_processes_and_command_in_words_and_resume_makes_the_same_ta
     assert main([*tokens, "--workers", "1", "--out", str(tmp_path / "one"), "--quiet"]) == 0
     assert command("resume", out, log=log).wait(timeout=120) == 0, log.read_text()
     assert (out / "table.csv").read_bytes() == (tmp_path / "one" / "table.csv").read_bytes()
+
+
+@pytest.mark.slow
+def test_further_runs_of_calibrate_come_out_the_same_in_two_processes(tmp_path):
+    """Placement and drag in two beds: in the folders of their members, to the bit."""
+    pytest.importorskip("distributed")
+    case = tmp_path / "case.toml"
+    case.write_text("""
+bed_size = [0.03, 0.03, 0.0254]
+tip_diameter = 0.0075
+shaft_length = 0.03
+allow_coarse = true
+grain = 0.004
+depth = 0.006
+load = 0.1
+young = 2e7
+rest_time = 0.01
+threads = 1
+frame_count = 0
+budget = 3600.0
+seeds = [1, 2]
+most_beds = 2
+speeds = [0.2, 0.4]
+hold = 0.0
+drop_speeds = []
+laws = ["spring-damper"]
+loads = [0.05]
+drag_depths = [0.004]
+""")
+    found = []
+    for workers in ("1", "2"):
+        out, log = tmp_path / workers, tmp_path / f"log{workers}"
+        made = command("calibrate", case, "--out", out, "--workers", workers, log=log).wait(timeout=900)
+        assert made == 0, log.read_text()
+        found.append({path.parts[-3:]: path.read_bytes() for path in out.glob("members/*/series/further-*.csv")})
+    assert len(found[0]) == 4 and found[0] == found[1]
 
 
 @pytest.mark.slow
