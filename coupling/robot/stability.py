@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling.poses import Vector
 
@@ -96,7 +97,7 @@ class ExchangeLoad:
             mass = float(damping[own].sum()) / by_damping if by_damping > 0 else 1.0  # 1: whatever it is
         return Load(robot.feet[worst].name, mass, by_stiffness * mass, by_damping * mass)
 
-    def _points(self) -> tuple[Vector, Vector, Vector, Vector]:
+    def _points(self) -> tuple[Vector, Vector, Vector, NDArray[np.intp]]:
         """Arms about the origins of the feet [m], stiffness [N/m], damping [N s/m] and foot of each point."""
         found: list[tuple[Vector, float, float, int]] = []
         for k, foot in enumerate(self.robot.feet):
@@ -106,8 +107,8 @@ class ExchangeLoad:
             for arms, stiffness, damping in parts:
                 if float(arms[:, 2].min()) <= bottom + TOGETHER * foot.reach:
                     found += [(arm, stiffness, damping, k) for arm in arms]
-        arms, strengths, dampings, owners = (np.array(column) for column in zip(*found, strict=True))
-        return arms, np.maximum(strengths, 0.0), np.maximum(dampings, 0.0), owners
+        arms, strengths, dampings, owners = zip(*found, strict=True)
+        return np.array(arms), np.maximum(strengths, 0.0), np.maximum(dampings, 0.0), np.array(owners, dtype=np.intp)
 
     def _on_law(self, k: int, foot: Any, matrix: Vector) -> list[tuple[Vector, float, float]]:
         """Of each part: the arms of the points on which it stands, stiffness and damping of one point."""

@@ -46,7 +46,7 @@ def setting(
     return Drop(GRAIN, ball, density, size, gravity, seed, at, speed, longest)  # type: ignore[arg-type]
 
 
-def power_of(x: Sequence[float], y: Sequence[float]) -> float:
+def power_of(x: Sequence[float], y: Sequence[float] | np.ndarray) -> float:
     """b of the least squares y = a x^b in logarithms [1]."""
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
