@@ -107,8 +107,8 @@ class ExchangeLoad:
             for arms, stiffness, damping in parts:
                 if float(arms[:, 2].min()) <= bottom + TOGETHER * foot.reach:
                     found += [(arm, stiffness, damping, k) for arm in arms]
-        arms, strengths, dampings, owners = zip(*found, strict=True)
-        return np.array(arms), np.maximum(strengths, 0.0), np.maximum(dampings, 0.0), np.array(owners, dtype=np.intp)
+        at, strengths, dampings, owners = zip(*found, strict=True)
+        return np.array(at), np.maximum(strengths, 0.0), np.maximum(dampings, 0.0), np.array(owners, dtype=np.intp)
 
     def _on_law(self, k: int, foot: Any, matrix: Vector) -> list[tuple[Vector, float, float]]:
         """Of each part: the arms of the points on which it stands, stiffness and damping of one point."""
