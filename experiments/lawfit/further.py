@@ -18,7 +18,7 @@ from experiments.converge.costs import CORE_STEP
 from experiments.penetrate import beds
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import Unit, expected_time, make_run, make_spike
-from experiments.runs.folder import RunFolder
+from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.types import Json
 
@@ -118,13 +118,13 @@ class FurtherRuns:
             if one.kind == "placement":
                 under = settings.model_copy(update={"load": one.value})
                 run = make_run(under, Unit(seed, "set_down", settings.lowering_speed), ground).run()
-                folder.write_series(one.id, run.columns())
+                columns = run.columns()
                 found: Json = {"load": one.value, "depth": run.resting_depth}
             else:
                 legs = _legs(settings, one, min(settings.speeds))
                 columns = guide(spike, ground, legs, substeps=settings.substeps, on_step=progress.update)
-                folder.write_series(one.id, columns)
                 found = _dragged(columns, one.value) if one.kind == "drag" else _unloaded(columns, one.value)
+            write_series(path / "series" / f"{one.id}.csv", columns)  # the member's other digests stay
             folder.mark_done(one.id, found)
             tell((number + 1) / len(todo))
 

@@ -185,8 +185,9 @@ def _with_after(task: Task, tell: Tell, shown: Progress | None) -> Outcome:
     told = _Told(lambda share: tell(own * share), shown)
     outcome = _run_before(task) or _compute(task, _folder_of(task), told)
     if task.after is not None and task.after.missing(task.path):
-        silent = _Told(lambda share: None, shown)
+        silent, folder = _Told(lambda share: None, shown), RunFolder.open(task.path)
         task.after.make(task.settings, task.path, lambda share: tell(own + (1.0 - own) * share), silent)
+        folder.set_status("done")  # with the digests of what was added
     return outcome
 
 

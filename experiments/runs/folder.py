@@ -10,10 +10,12 @@ lock                      the process that is writing the folder; the system fre
 result.json               the numbers a person would quote
 series/<id>.csv           time series, the unit of each column in its name
 checkpoint/<name>.npz     arrays to carry on from; <name>.npz.before: those of the checkpoint before
-checkpoint/<name>.done.json    says that a piece of the work is finished
+checkpoint/<name>.done.json    says that a piece of the work is finished; with digests of itself and of its series
 ```
 """
 
+import hashlib
+import json
 import os
 import re
 import sys
@@ -57,9 +59,19 @@ RUN_FORMAT = "hedgebed-run/2"
 RUN_FORMATS = ("hedgebed-run/1", RUN_FORMAT)  # what can be read; the first has materials and surfaces by other names
 _NAMED = ("material", "surface", "surfaces")
 _NAMES = "names-of-all"  # in a checkpoint: a zip file whose list is cut off is read as a shorter one
+_DONE = "hedgebed-done/1"
 _BEFORE = ".before"  # ends the name of the checkpoint before the last
 _POLL = 0.2  # Between two looks whether a folder is free [s]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
+
+
+_TOLD: set[str] = set()
+"""Damage that was told: a folder is looked at more than once."""
+
+
+def _digest_of_data(data: Any) -> str:
+    """The digest of what JSON gives back."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 def settings_toml(command: str, settings: BaseModel, version: str, code: str = "") -> str:
@@ -404,16 +416,51 @@ class RunFolder:
         return self.path / "checkpoint" / f"{_checked(name)}.npz{before}"
 
     def mark_done(self, name: str, data: Any = None) -> None:
-        """Say that the piece of work `name` is finished, with what a resumed run wants to know of it (JSON)."""
-        write_json(self.path / "checkpoint" / f"{_checked(name)}.done.json", data)
+        """Say that the piece of work `name` is finished, with what a resumed run wants to know of it (JSON).
+
+        A series of that name belongs to it and has been written before.
+        """
+        series = self._series(name)
+        digests = {"data": _digest_of_data(plain(data)), "series": digest_of(series) if series.exists() else None}
+        write_json(self._mark(name), {"format": _DONE, "data": data, "digests": digests})
 
     def is_done(self, name: str) -> bool:
-        """Whether `mark_done(name)` has been called, in this process or an earlier one."""
-        return (self.path / "checkpoint" / f"{_checked(name)}.done.json").exists()
+        """Whether `mark_done(name)` has been called, in this process or an earlier one.
+
+        Where the mark or its series is damaged, that is told on stderr, and the piece of work is not done.
+        """
+        if not self._mark(name).exists():
+            return False
+        try:
+            self.done_data(name)
+        except ValueError as error:
+            if (said := f"{error}: this piece of the work is done again") not in _TOLD:
+                _TOLD.add(said)
+                print(f"hedgebed: {said}", file=sys.stderr, flush=True)
+            return False
+        return True
 
     def done_data(self, name: str) -> Any:
-        """What `mark_done(name, data)` was given."""
-        return read_json(self.path / "checkpoint" / f"{_checked(name)}.done.json")
+        """What `mark_done(name, data)` was given; marks of earlier versions have no digests.
+
+        Raises ValueError, naming the file, where it or its series is damaged.
+        """
+        mark, series = self._mark(name), self._series(name)
+        kept = read_json(mark)
+        if not isinstance(kept, dict) or kept.get("format") != _DONE:
+            return kept
+        digests = kept.get("digests")
+        if not isinstance(digests, dict) or digests.get("data") != _digest_of_data(kept.get("data")):
+            raise ValueError(f"{mark}: is not as the run wrote it: its digest differs")
+        if (wanted := digests.get("series")) is not None and (not series.exists() or digest_of(series) != wanted):
+            raise ValueError(f"{series}: is not as the run wrote it: its digest differs from that in {mark.name}")
+        return kept.get("data")
+
+    def _mark(self, name: str) -> Path:
+        return self.path / "checkpoint" / f"{_checked(name)}.done.json"
+
+    def _series(self, name: str) -> Path:
+        return self.path / "series" / f"{_checked(name)}.csv"
 
     @property
     def has_work(self) -> bool:

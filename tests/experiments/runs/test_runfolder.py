@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -255,6 +256,35 @@ def test_marks_of_finished_work(folder):
     assert folder.done_data("seed-1") == {"stiffness": 2.5}
     assert not folder.is_done("seed-2")
     assert folder.has_work
+
+
+@pytest.mark.parametrize("what", ["a digit of the mark", "the end of the mark", "a digit of the series", "the series"])
+def test_finished_work_that_is_damaged_is_named_and_not_done(folder, what, capsys):
+    folder.write_series("seed-1", {"t_s": [0.0, 1.0], "force_N": [0.5, 0.25]})
+    folder.mark_done("seed-1", {"stiffness": 2.5, "depth": None, "steps": 7})
+    mark, series = folder.path / "checkpoint" / "seed-1.done.json", folder.path / "series" / "seed-1.csv"
+    assert folder.is_done("seed-1") and capsys.readouterr().err == ""
+    if what == "a digit of the mark":
+        mark.write_text(mark.read_text().replace("2.5", "22.5"))
+    elif what == "the end of the mark":
+        mark.write_text(mark.read_text()[:40])
+    elif what == "a digit of the series":
+        series.write_text(series.read_text().replace("0.25", "9.25"))
+    else:
+        series.unlink()
+    damaged = mark if "mark" in what else series
+    assert not folder.is_done("seed-1") and str(damaged) in capsys.readouterr().err
+    with pytest.raises(ValueError, match=re.escape(str(damaged))):
+        folder.done_data("seed-1")
+    folder.write_series("seed-1", {"t_s": [0.0, 1.0], "force_N": [0.5, 0.25]})
+    folder.mark_done("seed-1", {"stiffness": 2.5})
+    assert folder.is_done("seed-1") and folder.done_data("seed-1") == {"stiffness": 2.5}
+
+
+def test_marks_of_earlier_versions_are_read(folder):
+    folder.mark_done("seed-1")
+    (folder.path / "checkpoint" / "seed-1.done.json").write_text('{"stiffness": 2.5}')
+    assert folder.is_done("seed-1") and folder.done_data("seed-1") == {"stiffness": 2.5}
 
 
 @pytest.mark.parametrize("name", ["", "../x", "a/b", ".hidden", "a b"])
