@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
 
-from vis.diagnose.figures import Channel, read_channel, worst
+from vis.diagnose.figures import Channel, draw_trajectories, read_channel, source_of, worst
 from vis.diagnose.report import write_diagnosis_report
 from vis.page.plots import line_handles, line_styles
 
@@ -65,6 +66,30 @@ def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left
         assert part in page or part.replace("&#39;", "'") in page
     channel = read_channel(tmp_path / "series" / "a.force.csv")
     assert channel.scatter is not None and set(channel.scatter) == {0.2}
+
+
+@pytest.mark.parametrize(
+    ("notes", "source"),
+    [
+        ('[notes]\n"made_by" = "hedgebed 0.1.0 penetrate, grains of 2.4 mm"\n', "simulated on grains"),
+        ('[notes]\n"made_by" = "hedgebed 0.1.0 tumble on a bed of sand"\n', "simulated on grains"),
+        ('[notes]\n"made_by" = "hedgebed 0.1.0 tumble on the spring-damper of sand"\n', "simulated"),
+        ('[notes]\n"made_by" = "hedgebed 0.1.0 campaign"\n', "simulated"),
+        ('[notes]\n"made_by" = "the rig in hall 3, on a bed of sand"\n', "measured"),
+        ('format = "hedgehog-model/1"\n', "measured"),
+        (None, "recorded"),
+    ],
+)
+def test_a_legend_says_measured_only_of_trials_that_hedgebed_did_not_make(tmp_path, notes, source):
+    write_folder(tmp_path, trials={"a": 3.0})
+    if notes is not None:
+        (tmp_path / "model.toml").write_text(notes)
+    assert source_of(tmp_path) == source
+    channel = read_channel(tmp_path / "series" / "a.force.csv")
+    drawing = draw_trajectories([channel], set(), ("base", "best"), source)
+    (legend,) = drawing.legends
+    assert legend.get_texts()[0].get_text() == source
+    assert f"trials, {source};" in write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
 
 
 def test_the_worst_channels_are_drawn_and_held_out_ones_among_them(tmp_path):

@@ -11,6 +11,7 @@ from vis import write_report
 from vis.page.answer import write_page
 from vis.page.folder import read_columns
 from vis.page.page import Page, Section, figure, table, text
+from vis.page.report import Report
 from vis.page.states import state_runs
 from vis.tumble.report import write_tumble_report
 
@@ -65,6 +66,18 @@ def test_the_report_of_a_tumble_has_its_figures_numbers_and_warnings(folder):
     ):
         assert words in page, words
     assert "https://" not in page and "<script" not in page
+
+
+def test_the_picture_of_the_path_has_the_title_of_the_result(folder, monkeypatch):
+    titles, draw = {}, Report.draw
+
+    def keep(report, key, drawing, **values):
+        titles[key] = drawing.axes[0].get_title(loc="left")
+        return draw(report, key, drawing, **values)
+
+    monkeypatch.setattr(Report, "draw", keep)
+    write_tumble_report(folder)
+    assert titles["trajectory"] == json.loads((folder / "result.json").read_text())["title"]
 
 
 def test_the_animation_lasts_as_long_as_the_tumble(folder):

@@ -12,6 +12,7 @@ from vis.page.answer import write_page
 from vis.page.page import Page, Section
 from vis.pictures.canvas import colour_values
 from vis.pictures.frames import FrameWriter, read_frames
+from vis.view.curves import of_tumble
 from vis.view.packing import Codes, pack, unpack
 from vis.view.page import IN_REPORT, report_scene, write_view
 from vis.view.scene import Limits, make_scene
@@ -110,6 +111,16 @@ def test_peaks_of_a_curve_survive_its_thinning(page):
     assert (bed["name"], law["name"], law["dashed"]) == ("bed", "spring-damper", True)
     table = np.genfromtxt(page.parent / "series" / f"{scenes[0]['id']}.csv", delimiter=",", skip_header=1)
     assert max(bed["y"]) == pytest.approx(table[:, 3].max(), rel=1e-3)
+
+
+def test_a_force_that_is_a_running_mean_says_so_in_its_label(tmp_path):
+    (tmp_path / "series").mkdir()
+    rows = [f"{1e-3 * k},{100.0 if k == 50 else 0.0},1.0" for k in range(101)]
+    (tmp_path / "series" / "feet.csv").write_text("\n".join(["t_s,normal_1_N,normal_2_N", *rows]) + "\n")
+    still = {name: np.zeros(101) for name in ("theta_rad", "y_m", "vx_m_s", "vy_m_s")}
+    *others, force = of_tumble(tmp_path, {"t_s": 1e-3 * np.arange(101)} | still, "bed")
+    assert max(force["lines"][0]["y"]) == pytest.approx(100.0 / 5 + 1.0)
+    assert "over 5 ms" in force["label"] and not any("mean" in panel["label"] for panel in others)
 
 
 def test_a_small_scene_keeps_the_grains_at_every_face_and_says_so(make_run, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +22,9 @@ from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
 
-__all__ = ["Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "worst"]
+__all__ = [
+    "Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "source_of", "worst",
+]  # fmt: skip
 
 labels = Sentences(__package__, "labels.toml")
 _MOST_ROWS = 6
@@ -90,6 +93,21 @@ def read_channel(path: Path) -> Channel:
                    columns.get("phase", np.full(len(none), "")), columns.get("scatter"))  # fmt: skip
 
 
+def source_of(folder: Path) -> str:
+    """How the trials of a diagnosis came about: "simulated on grains", "simulated" or "measured".
+
+    hedgebed signs the campaigns that it makes: `made_by` in the notes of campaign.toml, which model.toml repeats. A
+    campaign without its signature counts as measured; without model.toml the word is "recorded".
+    """
+    path = folder / "model.toml"
+    if not path.exists():
+        return "recorded"
+    made_by = str(tomllib.loads(path.read_text(encoding="utf-8")).get("notes", {}).get("made_by", ""))
+    if not made_by.startswith("hedgebed "):
+        return "measured"
+    return "simulated on grains" if " penetrate, grains" in made_by or " on a bed of " in made_by else "simulated"
+
+
 def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
     """At most six channels in which the base model fails most, two of them held out where some are.
 
@@ -113,10 +131,13 @@ def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
 # Measured, before, after ----------------------------------------------------------------------------------------------
 
 
-def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple[str, str]) -> Figure | None:
+def draw_trajectories(
+    channels: Sequence[Channel], held: set[str], labels: tuple[str, str], source: str
+) -> Figure | None:
     """A row a channel: recorded and both models on the left, residuals over the noise on the right.
 
-    `labels`: what the models before and after are called; an empty one is not drawn.
+    `labels`: what the models before and after are called; an empty one is not drawn. `source`: what the dots are
+    called, see `source_of`.
     """
     if not channels:
         return None
@@ -145,7 +166,7 @@ def draw_trajectories(channels: Sequence[Channel], held: set[str], labels: tuple
         left.set_title(f"trial {c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
         left.set_ylabel(f"{what.split(',')[0]} [{unit}]", fontsize=8.5)
         right.set_ylabel("left over [std]", fontsize=8.5)
-    handles: list[Any] = [handle("recorded", INK, ls="", marker=".")]
+    handles: list[Any] = [handle(source, INK, ls="", marker=".")]
     handles += [handle(label, colour, ls=dash) for _, colour, dash, label in models]
     handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
     if any(c.scatter is not None for c in channels):

@@ -6,7 +6,15 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from vis.diagnose.figures import draw_evidence, draw_latent, draw_phases, draw_trajectories, read_channel, worst
+from vis.diagnose.figures import (
+    draw_evidence,
+    draw_latent,
+    draw_phases,
+    draw_trajectories,
+    read_channel,
+    source_of,
+    worst,
+)
 from vis.page.numbers import plain, short
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.report import Report, Result, again, report_of, unit_text
@@ -58,14 +66,17 @@ def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
     """Each of the figures that has something to show."""
     channels = [read_channel(path) for path in sorted((report.folder / "series").glob("*.csv"))]
     held, labels = set(diagnosis["gap"]["held_out_trials"]), _labels(diagnosis)
+    source = source_of(report.folder)
     shown = worst([channel for channel in channels if len(channel.time)], held)
     drawings = {
-        "trajectories": draw_trajectories(shown, held, labels),
+        "trajectories": draw_trajectories(shown, held, labels, source),
         "residuals": draw_phases(diagnosis.get("by_phase", []), labels),
         "evidence": draw_evidence(diagnosis),
         "latent": draw_latent(report.folder, diagnosis, channels),
     }
-    return {key: [] if drawing is None else [report.draw(key, drawing)] for key, drawing in drawings.items()}
+    return {
+        key: [] if drawing is None else [report.draw(key, drawing, source=source)] for key, drawing in drawings.items()
+    }
 
 
 def _labels(diagnosis: Result) -> tuple[str, str]:

@@ -115,6 +115,7 @@ def figure_5(paper: PaperRun) -> Block | None:
         gap = max(gap, float(np.hypot(x[:shared] - fixed[0][:shared], y[:shared] - fixed[1][:shared]).max()))
     axis.plot(0, 0, "o", color=INK, ms=4)
     axis.set(
+        title=f"steel, {rig:g} g",
         aspect="equal",
         xlim=(-2.0, 1.25e3 * _SHOWN),
         ylim=(-1.0, 1.02e3 * _SHOWN),

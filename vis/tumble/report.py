@@ -119,7 +119,10 @@ def _degrees(result: Result, name: str) -> str:
 
 def _trajectory(report: Report, numbers: Columns, states: States) -> Block:
     far = max(float(np.ptp(numbers["x_m"])), float(np.ptp(numbers["y_m"])))
-    drawing, (path, rates) = panels(2, 3.5, widths=(1.25, 1.0), right=0.925)
+    height = 3.8
+    drawing, (path, rates) = panels(2, height, widths=(1.25, 1.0), right=0.925)
+    drawing.subplots_adjust(top=1 - 0.65 / height)  # the title stands between the legend and the powers of ten
+    path.set_title(report.result["title"], fontsize=8.5, pad=14)
     label = _draw_path(path, numbers, states, far, _value(report.result, "trajectory_angle"))
     more = (handle(label, INK, lw=1.0, ls=(0, (4, 3))),) if label else ()
     speed = np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])

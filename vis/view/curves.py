@@ -1,4 +1,6 @@
-"""Curves beside a scene: which columns of a run's series are drawn over time, thinned to what a page can show."""
+"""Curves beside a scene: which columns of a run's series are drawn over time, thinned to what a page can show.
+
+Forces of grains on a platform or robot are running means, and the label says over how long."""
 
 from __future__ import annotations
 
@@ -46,11 +48,13 @@ MOST_LINES = 10
 _BINS = 300
 """A line keeps the least and the largest value of each of so many parts of its time."""
 _SMOOTH = 5e-3
-"""Forces on a platform are means over this [s], as in its report."""
+"""Forces on a platform or robot are means over this [s], as in its report."""
+_MEAN = f"mean over {1e3 * _SMOOTH:g} ms"
+"""In the label of each panel of such a mean."""
 
 
 def line(name: str, time: Array, values: Array, *, colour: str = BED, dashed: bool = False) -> Line:
-    """A line of at most `2 * _BINS` points; what is not finite is left out. Peaks are kept."""
+    """A line of at most `2 * _BINS` points; what is not finite is left out. Peaks of `values` are kept."""
     known = np.isfinite(time) & np.isfinite(values)
     time, values = np.asarray(time, dtype=float)[known], np.asarray(values, dtype=float)[known]
     if len(time) > 2 * _BINS:
@@ -128,7 +132,7 @@ def of_space(folder: Path, series: Mapping[str, Array]) -> list[Panel]:
     if motion.exists():
         columns, _ = read_columns(motion)
         (mean,) = mean_over(_SMOOTH, columns["t_s"], [columns["fz_N"]])
-        force = panel("vertical force of the ground [N]", line("", columns["t_s"], mean))
+        force = panel(f"vertical force of the ground, {_MEAN} [N]", line("", columns["t_s"], mean))
     return [
         *turn,
         *panel("height of the centre of mass [mm]", line("", time, 1e3 * series["z_m"])),
@@ -161,7 +165,7 @@ def of_robot(folder: Path) -> list[Panel]:
     moved, driven = joint_columns(joints)
     return [
         *panel("way of the centre of mass [mm]", *ways),
-        *panel("force of the ground [N]", *forces),
+        *panel(f"force of the ground, {_MEAN} [N]", *forces),
         *_many("depth of the feet [mm]", feet, depths, "_depth_m", 1e3),
         *panel("feet that touch", line("", time, motion["touching"], colour=INK)),
         *_many("joints [rad, m]", joints, moved),
@@ -209,4 +213,4 @@ def _load(folder: Path) -> list[Panel]:
     feet, _ = read_columns(path)
     total = np.sum([values for name, values in feet.items() if name.startswith("normal_")], axis=0)
     (mean,) = mean_over(_SMOOTH, feet["t_s"], [total])
-    return panel("force of the ground, normal [N]", line("bed of grains", feet["t_s"], mean))
+    return panel(f"force of the ground, normal, {_MEAN} [N]", line("bed of grains", feet["t_s"], mean))
