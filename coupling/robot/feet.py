@@ -112,7 +112,7 @@ def find_feet(model: Any, data: Any, names: Sequence[str]) -> list[Foot]:
 
     ``data`` has the robot where it starts: a cylinder or capsule whose axis is within 45 degrees of the vertical there
     stands on its end, and lies otherwise. Raises ValueError, naming the geom, for none of that name, one that does not
-    move, and one of a kind that no foot can be.
+    move, one of a kind that no foot can be, and a name given twice.
     """
     mujoco = refuse_missing()
     kinds = {"geom": mujoco.mjtObj.mjOBJ_GEOM, "site": mujoco.mjtObj.mjOBJ_SITE}
@@ -124,7 +124,9 @@ def find_feet(model: Any, data: Any, names: Sequence[str]) -> list[Foot]:
         if (name := mujoco.mj_id2name(model, kind, k))
     }
     wanted: dict[str, None] = {}
-    for name in names:
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise ValueError(f"feet contains {name!r} twice: give each name once")
         found = [name] if name in known else fnmatch.filter(known, name)
         if not found:
             raise ValueError(_no_such(name, known, model.ngeom))

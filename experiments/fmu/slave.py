@@ -5,6 +5,7 @@ All FMUs of one process share one Python, so that everything of an instance is i
 
 import io
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -222,8 +223,9 @@ class PlatformSlave(Fmi3Slave):
             asked.pop(name, None)
             if isinstance(value, str | bool) or name in SIGNED or not value < 0:
                 asked[name] = value
-        free = float(self._values["gravity"]) >= 0
-        asked.pop("rig" if free else "gravity", None)
+        other = "gravity" if float(self._values["gravity"]) < 0 else "rig"
+        if not math.isnan(float(self._values[other])):  # NaN is left in, to be refused by name
+            asked.pop(other, None)
         return asked
 
     def _resolved(self, settings: Values) -> Values:

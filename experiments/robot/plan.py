@@ -19,6 +19,7 @@ from dem.grains.materials import material
 from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import Surface, find_surface
+from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
 from rigid.platform.rig import STANDARD_GRAVITY
 from rigid.spatial.quaternions import to_matrix
@@ -30,6 +31,7 @@ __all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "t
 
 LAW_STEP = 4e-5  # Of a surface law [s], ten of which make an exchange by default
 SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
+SPIKE = 0.012  # Diameter of the spike that the defaults of the other laws are of [m] (rigid.ground.laws)
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MODEL, CONTROLLER = "model.mjb", "controller.py"  # Copies in the run folder
 
@@ -63,7 +65,7 @@ class RobotPlan:
         elif law == "spring-damper":
             parameters, scales = {key: value[key] for key in ("stiffness", "damping")}, self.scales
         else:
-            parameters, scales = dict(_assignment(text) for text in s.ground_parameters), {}
+            parameters, scales = _parameters(s, value["gravity"]), {}
         return LawFeet(
             robot.feet, law=law, parameters=parameters, mu_s=value["mu_s"], mu_d=value["mu_d"], time_step=LAW_STEP,
             scales=scales,
@@ -140,20 +142,22 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
         warnings.append(say("hangs"))
     if robot.floors:
         warnings.append(say("floors_off", floors=", ".join(robot.floors)))
+    of_surface = settings.on_grains or settings.ground == "spring-damper"
     scales = {}
     for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
         for part in foot.parts:
             tip = None if settings.stiffness is not None or not surface.granular else surface.spike
-            tip = fitted.foot.diameter if fitted is not None else tip
+            tip = fitted.foot.diameter if fitted is not None else tip if of_surface else SPIKE
             scales[part.name] = _scale(part, to_matrix(turn), tip)
     largest = max(scales.values())
     if fitted is not None:
         warnings += [say("fitted", file=fitted, most=largest)] if largest != 1.0 else []
         warnings += [say("beyond_range", sentence=said, file=fitted) for said in _beyond_gravity(fitted, robot.gravity)]
-    if settings.on_grains or settings.ground == "spring-damper":
-        warnings += _settle_law(settings, surface, robot.gravity, largest, numbers)
+    else:
+        settle = _settle_law if of_surface else _settle_other_law
+        warnings += settle(settings, surface, robot.gravity, largest, numbers)
     _settle_friction(settings, surface, numbers)
-    if surface.guess:
+    if surface.guess and of_surface:
         warnings.append(say("guess", surface=surface))
     numbers["weight"] = Number(max(robot.mass * robot.gravity, 1e-9), "N", "mass times gravity")
     return RobotPlan(
@@ -197,6 +201,31 @@ def _settle_law(
     return [say(key, stiffness=stiffness, scaled=share * stiffness, gravity=gravity, surface=surface.name)]
 
 
+def _settle_other_law(
+    settings: RobotSettings, surface: Surface, gravity: float, largest: float, numbers: dict[str, Number]
+) -> list[str]:
+    """Settle the parameters of a law other than the spring-damper, and warn of those that are the law's defaults.
+
+    ``largest``: area of the largest foot over that of the spike that the defaults are of [1]. Raises ValueError for a
+    parameter there is not, or out of bounds.
+    """
+    law, own = find_law(settings.ground), _parameters(settings, gravity)
+    values = law.values(own)
+    given = dict(_assignment(text) for text in settings.ground_parameters)
+    for parameter in law.parameters:
+        name, origin = parameter.name, "given" if parameter.name in given else f"default of {law.name}, of one spike"
+        if name != "gravity":
+            numbers[name] = Number(values[name], parameter.unit, origin)
+        elif name in given:
+            numbers["ground_gravity"] = Number(values[name], parameter.unit, origin)
+    left = [name for name in values if name not in own]
+    if not left:
+        return []
+    times = f" (up to {largest:.3g} times its area)" if largest > 1 else ""
+    more = times if "gravity" in own else f"{times}, nor gravity"
+    return [say("law_defaults", names=", ".join(left), law=law, spike=1e3 * SPIKE, surface=surface, more=more)]
+
+
 def _settle_friction(settings: RobotSettings, surface: Surface, numbers: dict[str, Number]) -> None:
     own = f"surface {surface.name}"
     mu_s = surface.mu_s if settings.mu_s is None else settings.mu_s
@@ -224,6 +253,13 @@ def _scale(part: Part, matrix: Any, tip: float | None) -> float:
 def width_of(part: Part, matrix: Any) -> float:
     """The smaller of a part's two extents from above [m], turned by `matrix`."""
     return float(np.ptp(part.vertices @ matrix.T, axis=0)[:2].min())
+
+
+def _parameters(settings: RobotSettings, gravity: float) -> dict[str, float]:
+    """What the other law is given: the ground_parameters, and the gravity [m/s2] of the run where it takes one."""
+    takes = any(parameter.name == "gravity" for parameter in find_law(settings.ground).parameters)
+    given = dict(_assignment(text) for text in settings.ground_parameters)
+    return ({"gravity": gravity} if takes else {}) | given
 
 
 def _assignment(text: str) -> tuple[str, float]:

@@ -137,9 +137,7 @@ def conclude(
     """The result, its series written. On grains `beside` is the robot on the spring-damper."""
     write_series_of(run, folder)
     robot = run.robot
-    where = " in LAMMPS" if settings.ground == "lammps" else ""
-    what = f"a bed of {plan.surface.name}{where}" if settings.on_grains else f"{plan.surface.name} ({plan.law})"
-    title = say("title", name=robot.name, what=what, gravity=robot.gravity)
+    title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
     warnings: list[str | None] = [
         *plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master),
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
@@ -176,6 +174,15 @@ def conclude(
         ]
     result["warnings"] = [warning for warning in warnings if warning]
     return Result.make("mujoco", **result)
+
+
+def _ground_named(plan: RobotPlan) -> str:
+    """The ground, in words; with the material only where the law is of it."""
+    if plan.settings.on_grains:
+        return f"a bed of {plan.surface.name}{' in LAMMPS' if plan.settings.ground == 'lammps' else ''}"
+    if plan.fitted is not None:
+        return f"{plan.fitted.material} ({plan.law})"
+    return f"{plan.surface.name} ({plan.law})" if plan.law == "spring-damper" else say("other_law", law=plan.law)
 
 
 def _beyond(plan: RobotPlan, run: RobotRun) -> list[str]:

@@ -43,6 +43,7 @@ def test_geoms_of_one_body_make_one_foot_and_a_pattern_names_several():
         (["step"], "'step' does not move"),
         (["ground"], "'ground' does not move"),
         ([], "feet is empty"),
+        (["left_heel", "left_toe", "left_heel"], "feet contains 'left_heel' twice"),
         (["nose_*"], "no geom or site 'nose_[*]'"),
     ],
 )

@@ -1,5 +1,6 @@
 """`hedgebed fmu`: the FMU in fmpy, an importer that is not ours, against the runs of `hedgebed tumble`."""
 
+import math
 import sys
 import zipfile
 from xml.etree import ElementTree
@@ -233,6 +234,9 @@ def test_in_flight_the_torques_act_where_that_is_asked_for(instance):
         ({"theta_start": 0.1}, "needs height"),
         ({"stiffness": 1e12}, "longest_step"),
         ({"mu_s": 0.1, "mu_d": 0.3}, "mu_d"),
+        ({"gravity": math.nan}, "gravity"),
+        ({"rig": math.nan}, "rig"),
+        ({"gravity": 1.0, "rig": math.nan}, "rig"),
     ],
 )
 def test_a_parameter_that_cannot_be_is_refused_by_name(fmu, tmp_path, start, said):

@@ -16,6 +16,7 @@ from experiments.robot.plan import keep_files, plan_robot
 from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
 from experiments.runs.folder import RunFolder, read_series
+from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
 from vis.page.folder import read_columns
 from vis.view.page import report_scene
@@ -169,6 +170,47 @@ def test_a_gravity_beyond_the_range_of_a_ground_file_is_told_before_the_run(tmp_
         for gravity in (9.81, 9.81e-3)
     ]
     assert not told[0] and "gravity = 0.00981" in told[1][0]
+
+
+@pytest.mark.parametrize("law", ["hunt-crossley", "power", "katsuragi-durian", "bekker", "rft"])
+def test_a_law_whose_parameters_do_not_follow_from_the_surface_says_so_and_its_title_names_none(law, tmp_path):
+    """The foot of the hopper has 60 mm, 25 times the area of the spike of 12 mm that the defaults are of."""
+    settings = RobotSettings(**HOPPER, ground=law, surface="jsc1a", duration=0.01)
+    plan = plan_robot(settings)
+    (said,) = [said for said in plan.warnings if "ground_parameters" in said]
+    assert all(word in said for word in ("12 mm", "'jsc1a'", "ground.toml"))
+    assert float(re.findall(r"up to ([0-9.]+) times", said)[0]) == pytest.approx(25, rel=0.02)
+    assert ("nor gravity" in said) == (law != "rft") and not [said for said in plan.warnings if "a guess" in said]
+    made = RobotFollowed(settings, plan).run_on_law()
+    made.run()
+    title = conclude(settings, plan, made, tmp_path)["title"]
+    assert law in title and "jsc1a" not in title and "sand" not in title
+
+
+def test_a_law_with_all_its_parameters_given_has_no_warning_of_defaults():
+    given = ("stiffness=4000", "damping=9", "exponent=1.2")
+    told = [plan_robot(RobotSettings(**HOPPER, ground="power", ground_parameters=some)) for some in (given, given[:2])]
+    assert [number.value for number in map(told[0].numbers.get, ("stiffness", "damping", "exponent"))] == [4000, 9, 1.2]
+    assert not [said for said in told[0].warnings if "defaults" in said]
+    (left,) = [said for said in told[1].warnings if "defaults" in said]
+    assert "exponent" in left and "stiffness" not in left and "damping" not in left
+    with pytest.raises(ValueError, match="stiffnes "):
+        plan_robot(RobotSettings(**HOPPER, ground="power", ground_parameters=("stiffnes=1",)))
+
+
+def test_gravity_of_the_run_goes_into_a_law_that_takes_it_unless_it_is_given():
+    """The stress of resistive force theory is in proportion to gravity."""
+
+    def stress(gravity, *given):
+        plan = plan_robot(RobotSettings(**HOPPER, ground="rft", gravity=gravity, ground_parameters=given))
+        law = plan.law_feet(plan.robot()).grounds[0][0]
+        return find_law("rft").numbers(law.parameters)[0], plan.numbers
+
+    (low, _), (high, _), (own, numbers) = stress(1.0), stress(4.0), stress(1.0, "gravity=4")
+    assert high == pytest.approx(4 * low) and own == high
+    assert numbers["gravity"].value == 1.0 and numbers["ground_gravity"].value == 4.0
+    with pytest.raises(ValueError, match=r"rft\.gravity"):
+        stress(0.0)
 
 
 def test_a_model_that_an_option_took_as_one_of_its_words_is_found(capsys):
