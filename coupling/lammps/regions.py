@@ -24,13 +24,17 @@ from rigid.spatial.quaternions import multiply, to_matrix
 
 from .words import digits
 
-__all__ = ["MovingBody", "OutOfPlaneError", "Piece", "check_plane", "pieces_of"]
+__all__ = ["MovingBody", "OutOfPlaneError", "Piece", "check_plane", "check_thickness", "pieces_of"]
 
 Vector = np.ndarray
 _IN_PLANE = 1e-6  # How far from the plane of motion, or from its normal, an axis may be [rad]
 _JUMP, _ARM = 1e-9, 0.1  # A larger change of place [m], or over this arm [m] of angle, is no motion
 _SIDES = 16  # Of the polygon around a circle
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
+_NO_POINT = (
+    "LAMMPS gives no right force on a cone where it is thinner than a grain; a Ball as tip, a wider end, or the ground "
+    "`bed` would do"
+)
 
 
 class OutOfPlaneError(ValueError):
@@ -158,6 +162,21 @@ def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
     return [Piece(part, ends[k], ends[k + 1]) for k, part in enumerate(ordered)]
 
 
+def check_thickness(pieces: Sequence[Piece], grain_radius: float) -> None:
+    """Raise ValueError for a cone with an end thinner than the largest grain, of radius ``grain_radius`` [m].
+
+    LAMMPS' `region cone` gives its side the curvature radius -2 r, as seen from inside. A grain of radius R outside so
+    gets R* = 2 r R / (2 r - R), which is infinite at 2 r = R and negative below: the force is then not a number. From
+    r = R on R* is at most twice R, and our bed's is R.
+    """
+    for piece in pieces:
+        shape = piece.shape
+        if isinstance(shape, Cone) and (thin := min(shape.bottom_radius, shape.top_radius)) < grain_radius:
+            raise ValueError(
+                f"{shape} is {thin:g} m in radius at one end, the largest grain {grain_radius:g} m: {_NO_POINT}"
+            )
+
+
 def check_plane(shapes: Sequence[Shape], turn: Vector) -> None:
     """Raise ValueError for a body of these shapes that LAMMPS cannot have, OutOfPlaneError for one that it cannot have
     in this turn, a unit quaternion."""
@@ -187,7 +206,9 @@ def _upright(axis: Vector) -> Vector:
 
 
 def _known(part: Shape) -> Ball | Cylinder | Cone | Box:
-    """The shape. Raises ValueError for one that LAMMPS has no region for."""
+    """The shape. Raises ValueError for one that LAMMPS has no region for, and for a pointed cone."""
+    if isinstance(part, Cone) and min(part.bottom_radius, part.top_radius) == 0:
+        raise ValueError(f"{part} ends in a point: {_NO_POINT}")
     if isinstance(part, Ball | Cylinder | Cone | Box):
         return part
     raise ValueError(

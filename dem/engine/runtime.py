@@ -12,7 +12,7 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Runtime", "free_memory", "generation", "refuse_memory", "start"]
+__all__ = ["Runtime", "free_memory", "generation", "refuse_memory", "start", "usable_cores"]
 
 ARCHITECTURES = ("cpu", "cuda")
 PRECISIONS = ("float64", "float32")
@@ -77,7 +77,7 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
     if precision not in PRECISIONS:
         raise ValueError(f"precision = {precision!r} is unknown; use one of {', '.join(PRECISIONS)}")
     if threads is None:
-        threads = len(_cores())
+        threads = len(usable_cores())
     if threads < 1:
         raise ValueError(f"threads = {threads} must be at least 1")
     wanted = Runtime(arch, threads if arch == "cpu" else 1, precision)
@@ -110,7 +110,7 @@ def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "fl
     return wanted
 
 
-def _cores() -> list[int]:
+def usable_cores() -> list[int]:
     """The cores that this process may run on; all, where the system does not restrict them."""
     try:
         return sorted(os.sched_getaffinity(0))
@@ -132,7 +132,7 @@ def _keep_apart(workers: list[int]) -> None:
     A launch is some milliseconds. Left to itself Linux may wake two workers on one core, and moves one of them only at
     the next tick, 4 ms later; and a worker that stays where it is has its chunks in that core's cache.
     """
-    cores = _cores()
+    cores = usable_cores()
     if len(workers) < 2 or len(workers) != len(cores):
         return
     for worker, core in zip(workers, cores, strict=True):

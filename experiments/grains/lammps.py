@@ -26,6 +26,8 @@ def lammps_fault(settings: Any) -> str | None:
     for key, value in wanted.items():
         if given.get(key, value) != value:
             return say("not_in_lammps", key=key, value=given[key], use=value, why=say(f"lammps_{key}"))
+    if given.get("tip") == "cone":
+        return say("cone_in_lammps")
     shaft = given.get("shaft_diameter")
     if shaft is not None and shaft != given["tip_diameter"]:
         return say("shaft_in_lammps", s=settings)
@@ -33,7 +35,7 @@ def lammps_fault(settings: Any) -> str | None:
 
 
 def check_lammps(settings: Any) -> None:
-    """Raise ValueError, naming what to install, if grains are to be in LAMMPS and it does not start on `ranks`."""
+    """Raise ValueError if grains are to be in LAMMPS and it does not start on `ranks`, or these are too many."""
     from coupling.lammps import LammpsMissingError, check_ranks
 
     if settings.ground == "lammps":

@@ -113,10 +113,10 @@ def _outcome(name: str, future: Any, scheduler: str | None) -> Outcome:
 def _client(distributed: Any, scheduler: str | None, workers: int) -> Iterator[Any]:
     """A client of the cluster, or of processes here that end with it."""
     if scheduler is None:
-        with (
+        with (  # without a dashboard the scheduler still serves HTTP, on port 8787 unless told 0, any free one
             distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, memory_limit=0, dashboard_address=None,
-                silence_logs=logging.CRITICAL, preload=[__name__],
+                n_workers=workers, threads_per_worker=1, memory_limit=0, dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL, preload=[__name__],
             ) as cluster,
             distributed.Client(cluster) as client,
         ):  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 
 from coupling.lammps import LammpsMissingError, process
 from coupling.lammps.law import OVERLAP, MeanContact, dashpot_input, law_words, spring_energy, spring_force
-from coupling.lammps.regions import MovingBody, OutOfPlaneError, pieces_of
+from coupling.lammps.regions import MovingBody, OutOfPlaneError, check_thickness, pieces_of
 from dem import Ball, Cone, Cylinder, Material, Mesh
 from dem.contact.law import pair_row
 from dem.grains.materials import Facing
@@ -96,7 +96,7 @@ def test_a_spike_is_a_ball_below_its_middle_and_a_cylinder_above():
     assert isinstance(ball.shape, Ball)
     assert (ball.begin, ball.end) == (-math.inf, 0.006)
     assert (shaft.begin, shaft.end) == (0.006, math.inf)
-    cone, shaft = pieces_of([Cone(0.0, 0.01, 0.0, 0.004), Cylinder(0.01, 0.06, 0.004)])
+    cone, shaft = pieces_of([Cone(0.0, 0.01, 0.001, 0.004), Cylinder(0.01, 0.06, 0.004)])
     assert cone.end == shaft.begin == 0.01
 
 
@@ -104,6 +104,9 @@ def test_a_spike_is_a_ball_below_its_middle_and_a_cylinder_above():
     ("shapes", "named"),
     [
         ([Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])], "Mesh"),
+        ([Cone(0.0, 0.01, 0.0, 0.004)], r"bottom_radius=0\.0.* point"),
+        ([Cone(0.0, 0.01, 0.0, 0.004), Cylinder(0.01, 0.06, 0.004)], "point"),
+        ([Placed(Cone(0.0, 0.01, 0.004, 0.0), position=(0.0, 0.0, 0.01))], r"top_radius=0\.0.* point"),
         ([Ball(radius=0.006), Cylinder(bottom=0.0, top=0.06, radius=0.004)], "as thick as"),
         ([Ball(radius=0.006), Ball((0, 0, 1), 0.006), Cylinder(0.0, 0.06, 0.006)], "several pieces"),
     ],
@@ -111,6 +114,12 @@ def test_a_spike_is_a_ball_below_its_middle_and_a_cylinder_above():
 def test_shapes_without_a_counterpart_are_refused_by_name(shapes, named):
     with pytest.raises(ValueError, match=named):
         pieces_of(shapes)
+
+
+def test_a_cone_with_an_end_thinner_than_the_largest_grain_is_refused():
+    check_thickness(pieces_of(Cone(0.0, 0.01, 0.0015, 0.004)), grain_radius=0.0015)
+    with pytest.raises(ValueError, match=r"1e-06 m .* 0\.0015 m"):
+        check_thickness(pieces_of(Cone(0.0, 0.01, 1e-6, 0.004)), grain_radius=0.0015)
 
 
 def test_a_capsule_is_two_balls_and_a_cylinder_and_grains_belong_to_the_one_beside_them():
@@ -235,3 +244,12 @@ def test_a_program_that_does_not_end_is_named():
 def test_a_number_of_ranks_that_cannot_be_is_refused(ranks):
     with pytest.raises(ValueError, match="ranks"):
         process.Lammps(ranks)
+
+
+def test_more_ranks_than_a_few_on_each_core_are_refused_before_any_is_started(monkeypatch):
+    monkeypatch.setattr(process, "usable_cores", lambda: [0, 1])
+    monkeypatch.setattr(process, "find_lammps", lambda: pytest.fail("LAMMPS was looked for"))
+    with pytest.raises(ValueError, match=r"ranks = 9 on 2 cores: at most 8\b"):
+        process.check_ranks.__wrapped__(9)
+    with pytest.raises(pytest.fail.Exception, match="looked for"):
+        process.check_ranks.__wrapped__(8)

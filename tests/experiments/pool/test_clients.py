@@ -1,7 +1,10 @@
 """Two commands on one scheduler: each has its own results, and Ctrl-C in one leaves the runs of the other."""
 
+import socket
 import threading
 import time
+import warnings
+from contextlib import suppress
 
 import pytest
 
@@ -90,3 +93,15 @@ def test_ctrl_c_in_one_command_takes_back_only_what_has_not_begun_and_the_other_
         ("shared", "done", ""), ("slow", "done", ""),
     ]  # fmt: skip
     assert carried == ["quick", "slow", "shared"]
+
+
+def test_processes_here_leave_the_port_of_dask_s_dashboard_alone():
+    """With the port taken nothing is said, and the scheduler listens on this machine alone."""
+    with socket.socket() as taken, warnings.catch_warnings():
+        with suppress(OSError):  # then another has it, which is as good
+            taken.bind(("", 8787))
+            taken.listen()
+        warnings.simplefilter("error", UserWarning)
+        with workers._client(distributed, None, 1) as client:
+            services = client.scheduler_info()["services"]
+    assert services.get("dashboard") != 8787

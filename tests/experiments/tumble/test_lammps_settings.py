@@ -28,6 +28,7 @@ TUMBLE, PENETRATE = {"ground": "lammps", "surface": "sand"}, {"ground": "lammps"
         (TumbleSettings, {"ground": "lamps", "surface": "sand"}, "lammps"),
         (PenetrateSettings, PENETRATE | {"precision": "float32"}, "precision = 'float32'"),
         (PenetrateSettings, PENETRATE | {"shaft_diameter": 0.008}, r"shaft_diameter = 0\.008 m .* 0\.012 m"),
+        (PenetrateSettings, PENETRATE | {"tip": "cone"}, "tip = 'cone' .*'flat'.*ground = 'bed'"),
         (PenetrateSettings, {"ranks": 2}, r"ranks = 2 .*ground = 'bed'"),
     ],
 )
