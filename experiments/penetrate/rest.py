@@ -23,7 +23,7 @@ from .units import Unit
 
 __all__ = ["answer", "made_units"]
 
-_BESIDE = "jsc-1a-loose-heights"
+_BESIDE = "jsc-1a-loose-cut"
 """The material to try where grains without cohesion do not bear."""
 
 

@@ -23,7 +23,7 @@ __all__ = ["STANDARD_GRAVITY", "PenetrateSettings"]
 
 say = Sentences(__package__)
 
-_MATERIALS = "sand, sand-weak, jsc-1a-loose-heights, another that ships (docs/materials.md), or a material.toml"
+_MATERIALS = "sand, sand-weak, jsc-1a-loose-cut, another that ships (docs/materials.md), or a material.toml"
 _SOFTENED = "Young's modulus of the grains [Pa]; if not given, as soft as max_overlap allows."
 _STEP = "Time step of the grains [s]; a share of the contact time if not given."
 GrainMaterial = Annotated[str, Field(description=f"Grain material: {_MATERIALS}.")]
