@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from experiments.paper.transitions import slip_before_hop
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
 from rigid.planar.simulate import simulate
+from vis.paper.figures import figure_5
 
 RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
 
@@ -343,6 +345,15 @@ def test_the_report_shows_the_figures_there_are_trials_for(small):
         assert words in page
     assert not (small / "figures" / "figure5.png").exists()  # that one is of steel
     assert "http://" not in page and "https://" not in page
+
+
+def test_the_picture_of_figure_5_names_surface_and_gravity():
+    path = {"x_m": np.linspace(0.0, 0.02, 9), "y_m": np.linspace(0.18, 0.2, 9)}
+    paper = SimpleNamespace(
+        surfaces=["steel"], rigs=[0.0085, 0.015], torques=[0.22], colour=lambda torque: "k", case=lambda *of: {},
+        rows=lambda case: (path, np.array(["slip"] * 9)), handles=list, draw=lambda key, drawing, **values: drawing,
+    )  # fmt: skip
+    assert figure_5(paper).axes[0].get_title() == "steel, 0.0085 g"
 
 
 def test_the_friction_that_a_rigid_pivot_asks_for_solves_newtons_equations():
