@@ -63,8 +63,10 @@ def _each_implausible(campaign: Campaign) -> list[Finding]:
             assert isinstance(trial, TumbleTrial)
             odd = list(tumble_oddities(campaign, tables, trial))
         found += [
-            Finding(trial=trial.id, channel=channel, what=f"trial {trial.id}: {what}", doubt=True)
-            for channel, what in odd
+            Finding(
+                trial=trial.id, channel=channel, what=f"trial {trial.id}: {what}", doubt=True, maybe_effect=maybe_effect
+            )
+            for channel, what, maybe_effect in odd
         ]
     if not any(finding.channel == "depth" for finding in found):  # in mm, or counted upwards, it begins anywhere
         found += [

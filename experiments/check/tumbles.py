@@ -17,11 +17,13 @@ from scipy.ndimage import median_filter
 from experiments.campaign import Campaign, Recording, TumbleCampaign
 from experiments.campaign.tables import TumbleTrial
 from rigid.platform.rig import STANDARD_GRAVITY
+from rigid.terms import EFFECTS
 
 from .words import OFF, ZERO, Array, Odd, oddity, say, times, unit_words
 
 __all__ = ["Lag", "find_lag", "pieces", "tumble_oddities"]
 
+_OF_THE_TORQUE = tuple(id for id, effect in EFFECTS.items() if effect.on_torque_alone)
 _LATE = 0.03  # seconds of a lag between clocks or of a late beginning that are reported; `diagnose` finds smaller lags
 _SIGMAS = 4.0
 _LEAST = 0.2  # share of the weight within which counterweight and gravity may differ: both are rounded
@@ -163,7 +165,7 @@ def _at_rest(tables: TumbleCampaign, trial: TumbleTrial, imu: Recording) -> Iter
     if len(up) < 2 or gravity < 20 * sensor.std[2]:
         return
     there = float(np.median(up))
-    words = unit_words(there / gravity)
+    words = unit_words(there / gravity, is_acceleration=True)
     if words is None and abs(there - gravity) > 0.2 * gravity:
         words = "which axis is up, and is gravity in it?"
     if words is not None:
@@ -192,16 +194,26 @@ def _wheel(tables: TumbleCampaign, trial: TumbleTrial, wheel: Recording) -> Iter
         return
     slope = float(np.polyfit(wheel.time[rows], speed[rows], 1)[0])
     words = unit_words(slope / expected)
-    if words is None and not 0.6 < slope / expected < 1.6:
-        late = _onset(wheel.time, speed, trial.wheel_speed_0, expected, sensor.std[0])
-        if late is not None:
-            yield Odd("wheel", f"the wheel's speed begins to change at {late:.3g} s; t = 0 is when the torque starts")
-            return
-        words = "the torque or the wheel's inertia is another"
-        if abs(slope / expected * 1e3 - 1) < 0.15:
-            words = f"torque = {trial.torque:g} looks like mN m: {1e-3 * trial.torque:g} N m would fit"
-    if words is not None:
+    if words is None and 0.6 < slope / expected < 1.6:
+        return
+    if abs(slope / expected * 1e3 - 1) < 0.15:
+        words = f"torque = {trial.torque:g} looks like mN m: {1e-3 * trial.torque:g} N m would fit"
         yield oddity("wheel", "wheel_changes", slope=slope, expected=expected, words=words)
+        return
+    late = None
+    if words is None:
+        late = _onset(wheel.time, speed, trial.wheel_speed_0, expected, sensor.std[0])
+        words = "the torque or the wheel's inertia is another"
+    by_torque = 0 < slope / expected < 1  # an effect of the torque is a factor from 0 to 1 on it
+    if late is not None:
+        words = "t = 0 is when the torque starts"
+    if by_torque:
+        words = say("fault_or_effect", words=words, effects=", ".join(_OF_THE_TORQUE))
+    odd = (
+        oddity("wheel", "wheel_changes", slope=slope, expected=expected, words=words) if late is None
+        else Odd("wheel", f"the wheel's speed begins to change at {late:.3g} s; {words}")
+    )  # fmt: skip
+    yield odd._replace(maybe_effect=by_torque)
 
 
 def _onset(time: Array, speed: Array, start: float, slope: float, std: float) -> float | None:

@@ -26,8 +26,8 @@ _RATIOS = {
     math.pi / 180: "it looks like radians under a heading in degrees",
     30 / math.pi: "it looks like revolutions per minute under a heading in rad_s",
     1e3: "it looks like thousandths under a heading without them",
-    1 / STANDARD_GRAVITY: "it looks like units of g under a heading in m_s2",
 }
+_RATIOS_OF_ACCELERATION = _RATIOS | {1 / STANDARD_GRAVITY: "it looks like units of g under a heading in m_s2"}
 
 _LENGTHS = {1e3: "mm", 100.0: "cm", 1 / 0.0254: "inches"}
 _TURNED = {180 / math.pi: "degrees"}
@@ -58,6 +58,8 @@ class Finding:
     set_aside: bool = False
     doubt: bool = False
     """Whether a person has to put it right before a name can be trusted: a unit, a sign, a zero, a clock."""
+    maybe_effect: bool = False
+    """Whether an effect of the library does the same, so that it need not be a fault of the file."""
 
 
 class Odd(NamedTuple):
@@ -65,6 +67,7 @@ class Odd(NamedTuple):
 
     channel: str
     what: str
+    maybe_effect: bool = False  # as of a `Finding`
 
 
 def oddity(channel: str, key: str, /, **values: object) -> Odd:
@@ -72,9 +75,10 @@ def oddity(channel: str, key: str, /, **values: object) -> Odd:
     return Odd(channel, say(key, **values))
 
 
-def unit_words(ratio: float) -> str | None:
-    """What a ratio of measured over expected means; None for one that means nothing."""
-    return next((words for known, words in _RATIOS.items() if abs(ratio / known - 1) < _NEAR), None)
+def unit_words(ratio: float, *, is_acceleration: bool = False) -> str | None:
+    """What a ratio of measured over expected means; None for one that means nothing. Only accelerations are in g."""
+    known_ratios = _RATIOS_OF_ACCELERATION if is_acceleration else _RATIOS
+    return next((words for known, words in known_ratios.items() if abs(ratio / known - 1) < _NEAR), None)
 
 
 def times(ratio: float) -> str:

@@ -283,7 +283,8 @@ def draw_evidence(diagnosis: Result) -> Figure | None:
     return drawing
 
 
-_KINDS = {"named": BED, "with confidence": BED, "most likely, without confidence": "#7fb8d9",
+_WORSE = "fits best, but predicts held-out trials worse than the base model"
+_KINDS = {"named": BED, "with confidence": BED, "most likely, without confidence": "#7fb8d9", _WORSE: "#d9b87f",
           "cannot be distinguished from it": MODEL, "other": "#b5b5b5"}  # fmt: skip
 """What a candidate is -> its colour."""
 
@@ -335,6 +336,9 @@ def _leading_names(diagnosis: Result, score: Mapping[tuple[str, ...], float]) ->
 def _kind(name: tuple[str, ...], leading: tuple[str, ...], diagnosis: Result) -> str:
     if diagnosis["verdict"] == "unknown":
         certain = {effect["id"] for effect in diagnosis["effects"]}
+        before, after = (diagnosis["gap"][stage]["held_out"] for stage in ("before", "after"))
+        if before is not None and after is not None and after > before:
+            return _WORSE if name == leading else "other"
         if certain and set(name) == certain:
             return "with confidence"
         return "most likely, without confidence" if name == leading else "other"

@@ -1,7 +1,8 @@
 """What to do next where something unknown is missing: repeat the worst trial, or, where it has replicates, follow up
 what the missing force correlates with.
 
-What is left of one replicate and comes back in the others is in the body or its ground; the rest is each trial's own.
+What is left of one replicate and comes back in the others is in the body or its ground; the rest differs
+from trial to trial, by its cause or because the fit found a wrong branch.
 """
 
 import math
@@ -58,7 +59,7 @@ def after_unknown(
     alone = say("own_to_a_trial", follow_t_s=say("follow_t_s"))
     if not beside:
         return say("no_repeat", measured=measured, alone=alone)
-    return say("no_repeat_beside", names=" and ".join(beside), measured=measured, whole=problem.whole, alone=alone)
+    return say("no_repeat_beside", names=" and ".join(beside), measured=measured, alone=alone)
 
 
 def _follow(worst: Sequence[Place], shares: Mapping[str, float]) -> str:

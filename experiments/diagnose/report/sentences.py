@@ -14,7 +14,7 @@ from vis.page.sentences import Sentences
 __all__ = [
     "candidate_rows", "findings_in_words", "remark_sentences", "say", "setting_words", "shares_words",
     "size_sentences", "small_names", "sure_sentences", "told_tables", "unnamed_sentence",
-    "where_sentences", "worse_sentences",
+    "where_sentences", "worse_sentences", "worsens_held_out",
 ]  # fmt: skip
 
 say = Sentences(__package__)
@@ -326,6 +326,14 @@ def unnamed_sentence(diagnosis: Row) -> list[str]:
     return [say("most_evidence", names=names, more=row["score"] - own["score"], own=ours, what=what, row=row)]
 
 
+def worsens_held_out(diagnosis: Row) -> bool:
+    """Whether the best model of an unknown predicts held-out trials worse than the base model: then no name leads."""
+    if diagnosis["verdict"] != "unknown":
+        return False
+    before, after = (diagnosis.get("gap", {}).get(stage, {}).get("held_out") for stage in ("before", "after"))
+    return before is not None and after is not None and after > before
+
+
 def _named(diagnosis: Row) -> tuple[str, ...]:
     """The effects that are named, or of an unknown the best model's, in order."""
     names = tuple(effect["id"] for effect in diagnosis.get("effects", ()))
@@ -351,6 +359,8 @@ def _written(row: Row, alone: Mapping[str, float], named: Sequence[str]) -> str:
 
 def _note(diagnosis: Row, names: frozenset[str], best: Mapping[frozenset[str], Row], named: frozenset[str]) -> str:
     """How a candidate relates to the one that is named; of one that is likelier, why it is not named."""
+    if names == named and worsens_held_out(diagnosis):
+        return "predicts held-out trials worse than the base model"
     if names == named:
         return {"named": "named", "ambiguous": "named, or another"}.get(diagnosis["verdict"], "leads")
     if not named or named not in best:

@@ -18,6 +18,7 @@ from .sentences import (
     sure_sentences,
     unnamed_sentence,
     worse_sentences,
+    worsens_held_out,
 )
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
@@ -55,6 +56,8 @@ def title_words(diagnosis: Mapping[str, Any]) -> str:
         return f"Missing: {names}"
     if diagnosis["verdict"] == "ambiguous":
         return f"Missing: {names}, or {' or '.join(diagnosis['alternatives'])}: these trials cannot distinguish them"
+    if worsens_held_out(diagnosis):
+        return "Unknown: something is missing; no effect of the library, as it was fitted here, explains it"
     if names:
         return f"Unknown: {names} with confidence, and something else that no effect of the library explains"
     likeliest = _likeliest(diagnosis)
@@ -95,11 +98,14 @@ def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
 
 def _doubts(diagnosis: Mapping[str, Any]) -> list[str]:
     """Faults of the recordings that may be all there is behind an effect."""
-    found = [finding["what"] for finding in diagnosis.get("findings", []) if finding.get("doubt")]
+    doubts = [finding for finding in diagnosis.get("findings", []) if finding.get("doubt")]
+    doubts.sort(key=lambda finding: finding.get("maybe_effect", False))  # sure faults first
+    found = [finding["what"] for finding in doubts]
     if not found or (diagnosis["verdict"] == "none" and diagnosis["gap"]["after"]["fit"] <= SMALL):
         return []
     more = f" (and {len(found) - 1} more, see the warnings)" if len(found) > 1 else ""
-    return [f"Correct this first, because it may be the whole cause: {found[0]}{more}."]
+    ask = "Check this" if doubts[0].get("maybe_effect") else "Correct this first"
+    return [f"{ask}, because it may be the whole cause: {found[0]}{more}."]
 
 
 def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -153,6 +159,9 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
     certain = leading["certain"]
     others = [name for name in leading["effects"] if name not in certain]
     sentences = [words for name in leading["effects"] if (words := meaning(name))]
+    if worsens_held_out(diagnosis):
+        gaps = [numeral(diagnosis["gap"][stage]["held_out"]) for stage in ("before", "after")]
+        return [say("worse_held_out", names=" + ".join(leading["effects"]), before=gaps[0], after=gaps[1])]
     sure = f"With confidence: {' and '.join(certain)}" if certain else ""
     maybe = f"{'most' if certain else 'Most'} likely, but without confidence: {' and '.join(others)}" if others else ""
     row = next((r for r in diagnosis["evidence"] if sorted(r["effects"]) == sorted(leading["effects"])), None)

@@ -12,6 +12,7 @@ from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial,
 
 from experiments.campaign import Campaign, Recording, TumbleCampaign, read_campaign
 from experiments.campaign.files import TEMPLATES, new_campaign
+from experiments.check import find_implausible
 from experiments.check.pushes import depth_zeros
 from experiments.diagnose.inspection import find_faults, unnamed_files
 from experiments.diagnose.noise.stuck import clipped
@@ -135,6 +136,38 @@ def test_a_number_of_a_push_in_other_units_is_said(table, change, said):
     tables = campaign.tables.model_copy(update={table: getattr(campaign.tables, table).model_copy(update=change)})
     told = [finding.what for finding in find_faults(replace(campaign, tables=tables))]
     assert any(said in what for what in told), told
+
+
+@pytest.mark.parametrize(
+    ("slope", "maybe"), [(-594.0, True), (-580.0, True), (-510.0, True), (-87.3, True), (-5.0, False), (594.0, False)]
+)
+def test_a_wheel_that_changes_too_slowly_is_a_fault_or_an_effect_of_the_torque_and_never_in_g(slope, maybe):
+    """A brake of 6 N m whose torque took 0.12 s to come up was said to be in units of g, and to be corrected first.
+    -580 and -510 rad/s2 are 1 / 8.6 and 1 / 9.8 of -5000, -5 a torque in mN m; a factor on the torque turns no sign."""
+    campaign = read_campaign(TEMPLATES / "template-tumble")
+    (first, *_), tables = campaign.tables.trial, campaign.tables
+    brake = first.model_copy(update={"actuator": "brake", "torque": 6.0, "wheel_speed_0": 300.0})
+    time = np.arange(0.0, 0.2, 1e-3)
+    recordings = {("001", "wheel"): Recording({"t_s": time, "omega_rad_s": 300.0 + slope * time})}
+    only = replace(campaign, tables=tables.model_copy(update={"trial": (brake,)}), recordings=recordings)
+    (said,) = [finding for finding in find_implausible(only) if finding.channel == "wheel"]
+    assert f"{slope:g} rad/s2" in said.what and "= -5000" in said.what
+    assert said.doubt and said.maybe_effect == maybe
+    assert ("torque-rise" in said.what and "torque-fade" in said.what) == maybe
+    assert "units of g" not in said.what and "m_s2" not in said.what
+
+
+def test_a_torque_that_comes_up_in_0_12_s_is_a_possible_effect():
+    """Wheel speed under M (1 - exp(-t / r)): w0 - M / I (t - r (1 - exp(-t / r)))."""
+    campaign = read_campaign(TEMPLATES / "template-tumble")
+    brake = campaign.tables.trial[0].model_copy(update={"actuator": "brake", "torque": 6.0, "wheel_speed_0": 300.0})
+    time, rise = np.arange(0.0, 0.2, 1e-3), 0.12
+    speed = np.maximum(300.0 - 5000.0 * (time - rise * (1 - np.exp(-time / rise))), 0.0)
+    recordings = {("001", "wheel"): Recording({"t_s": time, "omega_rad_s": speed})}
+    only = replace(campaign, tables=campaign.tables.model_copy(update={"trial": (brake,)}), recordings=recordings)
+    (said,) = [finding for finding in find_implausible(only) if finding.channel == "wheel"]
+    assert said.maybe_effect and "torque-rise" in said.what
+    golden("campaign/slow_wheel", said.what)
 
 
 def test_nothing_is_wrong_with_the_templates():

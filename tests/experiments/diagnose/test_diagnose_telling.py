@@ -10,6 +10,7 @@ from golden import golden
 
 from experiments.diagnose.core.effect_texts import confirmation
 from experiments.diagnose.core.next_steps import _follow
+from experiments.diagnose.core.next_steps import say as next_step
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.localise import Place
 from experiments.diagnose.noise.colour import Colour, together
@@ -25,6 +26,7 @@ from experiments.diagnose.report.sentences import (
     worse_sentences,
 )
 from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
+from vis.diagnose.figures import _kind
 
 
 def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():
@@ -230,6 +232,39 @@ def test_where_nothing_is_certain_the_candidates_are_said_with_what_each_would_c
     assert "90 %, adhesion 50 %" in " ".join(none)
     title = title_words(unknown(effects=[], leading=leading))
     golden("diagnose/telling_nothing_certain", {"title": title, "likely": likely, "not even that": none})
+
+
+@pytest.mark.parametrize("certain", [[], ["adhesion"]])
+def test_no_name_leads_that_predicts_held_out_trials_worse_than_the_base_model(certain):
+    """A fit of the right name at a wrong branch: 4.5 to 509 held out, and it was called the most likely."""
+    gap = {"before": {"fit": 4.0, "held_out": 4.5}, "after": {"fit": 2.0, "held_out": 509.0}}
+    leading = {"effects": ["adhesion"], "certain": certain, "nearest": None}
+    said = unknown(effects=[{"id": name} for name in certain], leading=leading, gap=gap)
+    better = said | {"gap": gap | {"after": {"fit": 2.0, "held_out": 4.4}}}
+    title, lines = title_words(said), summary_sentences(said)
+    assert "adhesion" not in title and "likely" not in " ".join(lines) and "confidence" not in " ".join(lines)
+    assert "4.5 to 509" in lines[0]
+    assert "leads" not in [row["note"] for row in candidate_rows(said)]
+    colours = [_kind(("adhesion",), ("adhesion",), one) for one in (said, better)]
+    assert colours[0].startswith("fits best") and not colours[1].startswith("fits best")
+    assert "adhesion" in title_words(better) and "leads" in [row["note"] for row in candidate_rows(better)]
+    golden("diagnose/telling_worse_held_out", {"title": title, "summary": lines})
+
+
+def test_what_an_effect_may_do_as_well_is_to_be_checked_and_what_is_surely_wrong_corrected():
+    slow = {"what": "the wheel is slow", "doubt": True, "maybe_effect": True}
+    turned = {"what": "the sign is reversed", "doubt": True, "maybe_effect": False}
+    (check, *_), (correct, *_) = (summary_sentences(unknown(findings=f)) for f in ([slow], [slow, turned]))
+    assert check.startswith("Check this") and slow["what"] in check
+    assert correct.startswith("Correct this first") and turned["what"] in correct and "1 more" in correct
+
+
+def test_what_does_not_repeat_may_be_a_wrong_branch():
+    words = {"measured": "7 % repeats", "alone": "Write it down."}
+    beside = next_step("no_repeat_beside", names="ploughing", **words)
+    for said in (beside, next_step("no_repeat", **words)):
+        assert "wrong branch" in said and "no second effect" not in said and "belongs" not in said
+    golden("diagnose/telling_no_repeat", [beside, next_step("no_repeat", **words)])
 
 
 def test_the_gap_with_the_beds_own_share_is_said_beside_the_gap():
