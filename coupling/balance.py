@@ -175,17 +175,21 @@ class EnergyBalance:
         return np.asarray(np.sum(lost, axis=0) - self.dissipated) if lost else np.zeros(0)
 
     @property
-    def energy_residual(self) -> float:
-        """Largest energy that is not accounted for, over `energy_scale` [1].
+    def unaccounted(self) -> float:
+        """Largest energy that is not accounted for [J]: above 0 the run created it, below 0 it lost it.
 
         Of the body and the exchange (`balance`) and, on a bed, with what the grains hold and lost, each measured.
         """
         balance, gap = self.balance, self.balance_gap
-        worst = float(np.abs(balance).max())
         if gap.size:
             at = np.searchsorted(self.columns["time"], self.samples["time"])
-            worst = max(worst, float(np.abs(balance[at] + gap).max()))
-        return worst / self.energy_scale
+            balance = np.concatenate([balance, balance[at] + gap])
+        return float(balance[np.abs(balance).argmax()])
+
+    @property
+    def energy_residual(self) -> float:
+        """Size of `unaccounted` over `energy_scale` [1]."""
+        return abs(self.unaccounted) / self.energy_scale
 
     @property
     def balance_numbers(self) -> dict[str, tuple[float, str]]:

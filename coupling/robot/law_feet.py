@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from coupling.law_ground import LawPoints
 from coupling.poses import Pose, Twist, Vector, chord_share, matrices
 from rigid.ground.grounds import SpringDamper, SurfaceGround
+from rigid.ground.laws import find_law
 from rigid.ground.reaction import Contact, Facts, Reaction, Turned
 
 from .feet import Foot
@@ -69,6 +70,11 @@ class LawFeet(LawPoints):
     def name(self) -> str:
         """Name of the surface law."""
         return self.grounds[0][0].name
+
+    @property
+    def has_memory(self) -> bool:
+        """Whether the law remembers the deepest depth, so that it takes up most of the energy of a swing."""
+        return find_law(self.name).has_memory
 
     @property
     def time_step(self) -> float:

@@ -46,6 +46,16 @@ class Load:
         a, b = 0.25 * self.stiffness, self.damping
         return 2 * self.mass / (b + math.sqrt(b * b + 4 * a * self.mass))
 
+    def growth(self, macro_step: float, duration: float) -> float:
+        """Times that a swing on the contacts grows in `duration` [s] by explicit exchanges [1]; below 1 it dies out.
+
+        The feet stay in the ground: an upper bound for feet that leave it. The damping acts in half of a swing, as
+        the spring-damper has it: on its way in.
+        """
+        k, c = self.stiffness * macro_step**2 / self.mass, self.damping * macro_step / self.mass
+        rate = 0.5 * (math.log(_amplified(k, c)) + math.log(_amplified(k, 0.0)))
+        return math.exp(min(rate * duration / macro_step, 500.0))
+
 
 @dataclass(frozen=True)
 class ExpectedBed:
@@ -134,6 +144,17 @@ def _largest(softness: Vector, strengths: Vector) -> tuple[float, Vector]:
     roots = np.sqrt(strengths)
     values, vectors = np.linalg.eigh(roots[:, None] * (0.5 * (softness + softness.T)) * roots)
     return max(0.0, float(values[-1])), np.asarray(vectors[:, -1] ** 2)
+
+
+def _amplified(k: float, c: float) -> float:
+    """Factor by which one explicit exchange multiplies a swing: the spectral radius of the step of docs/coupling.md.
+
+    ``k``: K H^2 / m; ``c``: C H / m. The state is q / H, the rate v, and the last force, over m / H.
+    """
+    place, rate, last = np.eye(3)
+    held = rate + 0.5 * last
+    force = -k * (place + 0.5 * held) - c * held  # The law's mean over the held path
+    return float(np.abs(np.linalg.eigvals(np.array([place + held, rate + force, force]))).max())
 
 
 def _of_law(law: Any, load: float) -> tuple[float, float]:

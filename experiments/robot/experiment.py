@@ -7,6 +7,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.whole_runs import whole_run
 
+from .energy import growth_warning
 from .on_grains import RobotFollowed, RobotOnBed
 from .plan import keep_files, plan_robot, try_controller
 from .settings import RobotSettings, say
@@ -38,6 +39,8 @@ def _carry_out(settings: RobotSettings, folder: RunFolder, progress: Progress) -
         followed.announce(progress)
         progress.plan({followed.stage: settings.duration}, seconds={"report": 10.0})
         run: RobotRun = followed.run_on_law()
+        if warning := growth_warning(settings, run):
+            progress.message(f"warning: {warning}")
         return followed.finish(run, folder, progress)
 
 

@@ -21,6 +21,7 @@ from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
+from .energy import MOST_RESIDUAL, balance_warning
 from .plan import RobotPlan
 from .settings import RobotSettings
 
@@ -137,9 +138,11 @@ def conclude(
     """The result, its series written. On grains `beside` is the robot on the spring-damper."""
     write_series_of(run, folder)
     robot = run.robot
-    title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
+    title, sentences = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity), _sentences(run)
+    if run.energy_residual > MOST_RESIDUAL:
+        title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
     warnings: list[str | None] = [
-        *plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master),
+        *plan.warnings, balance_warning(settings, run), grains.unsettled_warning(run.master),
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
@@ -148,7 +151,7 @@ def conclude(
         warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]
     result: Json = {
         "title": title, "status": "done", "quantities": quantities_of(run),
-        "departures": {"sentences": _sentences(run)},
+        "departures": {"sentences": sentences},
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
         "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
         "duration": settings.duration,

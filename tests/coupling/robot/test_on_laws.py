@@ -10,6 +10,7 @@ from spatial_runs import EXAMPLES, LEG, ball, model_of, moving
 from coupling import LawGround, SpatialRun
 from coupling.poses import Wrench
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, RobotRun, load_model
+from coupling.robot.stability import Load
 from rigid.platform.actuation import TorqueHistory
 from rigid.platform.files import find_platform
 from rigid.spatial.quaternions import from_turn, to_matrix
@@ -172,6 +173,22 @@ def test_a_foot_too_light_for_the_explicit_exchange_is_refused_or_iterated():
     assert calm.load == pytest.approx(2e5 * step**2 / 4 / 0.01, rel=0.1) and calm.master.exchange.unsettled <= 3
     assert calm.energy_residual < 0.1 * wild.energy_residual
     assert float(calm.columns["fz"].mean()) == pytest.approx(float(fine.columns["fz"].mean()), rel=0.05)
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0])
+def test_a_swing_that_stays_in_the_ground_grows_as_the_load_says(damping):
+    """m = 1 kg rests on a spring and is pushed: the swing's height after 0.1 s, from the eigenvalues of the step."""
+    macro_step, duration = 1e-3, 0.1
+    load = Load("foot", 1.0, 2e5, damping)
+    robot = MujocoRobot(ball("sphere", "0.01", mass=1.0, height=0.01), "foot")
+    ground = LawFeet(robot.feet, parameters={"stiffness": load.stiffness, "damping": damping}, time_step=1e-4)
+    robot.data.qpos[2] -= 9.81 / load.stiffness
+    robot.data.qvel[2] = 1e-4
+    run = RobotRun(robot, ground, duration=duration, checked=False)
+    swing = np.abs(run.run()["z"] - (0.01 - 9.81 / load.stiffness))
+    period = round(2 * math.pi / math.sqrt(load.stiffness) / macro_step) + 1
+    grown = swing[-period:].max() / swing[:period].max()
+    assert grown == pytest.approx(load.growth(macro_step, duration - period * macro_step), rel=0.1)
 
 
 RING = """<mujoco><worldbody><body pos="0 0 .01"><freejoint/>

@@ -11,6 +11,7 @@ from tumble_runs import stop_at
 from coupling.lammps import LammpsMissingError, find_lammps
 from experiments.cli.main import main
 from experiments.robot import experiment as robot
+from experiments.robot.energy import MOST_RESIDUAL, growth_warning
 from experiments.robot.on_grains import RobotFollowed, RobotOnBed
 from experiments.robot.plan import keep_files, plan_robot
 from experiments.robot.result import conclude
@@ -287,6 +288,53 @@ def test_a_robot_that_the_world_holds_and_a_load_above_the_limit_are_told(tmp_pa
     assert warned == [False, True]
 
 
+BIPED = """<mujoco><worldbody><body pos="0 0 .32"><freejoint/><geom type="box" size=".08 .06 .05" mass="2"/>
+  <geom name="foot_l" size=".03" pos="0 .05 -.27" mass=".3"/>
+  <geom name="foot_r" size=".03" pos="0 -.05 -.27" mass=".3"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("given", "grows"), [({}, True), ({"substeps": 1}, False), ({"iterations": 20}, False), ({"damping": 2e3}, False)]
+)
+def test_a_start_on_contacts_that_create_energy_is_warned_of_with_what_would_do(tmp_path, given, grows):
+    biped = tmp_path / "biped.xml"
+    biped.write_text(BIPED)
+    on_springs = {"model": str(biped), "feet": ("foot_*",), "stiffness": 1e7, "damping": 0.0, "duration": 0.2}
+    settings = RobotSettings(**on_springs | given)
+    run = RobotFollowed(settings, plan_robot(settings)).run_on_law()
+    assert run.load < 1
+    warning = growth_warning(settings, run) or ""
+    assert all((named in warning) == grows for named in ("--iterations 20", "--substeps 1"))
+
+
+def test_a_run_whose_exchange_created_energy_says_so_in_title_and_warnings_and_iterated_it_does_not(tmp_path):
+    biped = tmp_path / "biped.xml"
+    biped.write_text(BIPED)
+    on_springs = {"model": str(biped), "feet": ("foot_*",), "stiffness": 1e7, "damping": 0.0, "duration": 0.2}
+    results = []
+    for name, iterations in (("explicit", 1), ("iterated", 20)):
+        settings = RobotSettings(**on_springs, iterations=iterations, frame_count=0)
+        plan = plan_robot(settings)
+        run = RobotFollowed(settings, plan).run_on_law()
+        run.run()
+        results.append(conclude(settings, plan, run, tmp_path / name))
+        assert (run.unaccounted > 0.1 * run.energy_scale) == (iterations == 1)
+    wild, calm = results
+    assert wild.quantities["energy_residual"].value > MOST_RESIDUAL > 1e-6 > calm.quantities["energy_residual"].value
+    for result, expected in ((wild, True), (calm, False)):
+        assert any("--iterations 20" in said for said in result.warnings) == expected
+        assert ("not valid" in result.title) == expected
+
+
+@pytest.mark.parametrize("surface", ["sand", "sand-weak", "jsc1a", "brick", "steel"])
+def test_the_robots_that_ship_start_without_a_warning_of_energy(surface):
+    wheel = {"model": "wheel", "feet": ("wheel", "grouser_*"), "keyframe": "drive"}
+    hedgehog = {"model": "hedgehog", "feet": ("tip_*",), "keyframe": "tumble", "substeps": 40, "duration": 15}
+    for given in (HOPPER, wheel, hedgehog):
+        settings = RobotSettings(**given, surface=surface)
+        assert growth_warning(settings, RobotFollowed(settings, plan_robot(settings)).run_on_law()) is None
+
+
 def test_threads_on_a_law_are_taken_with_a_message_as_in_a_tumble(tmp_path, capsys):
     foot = ["hopper", "--feet", "foot", "--duration", "0.02", "--frame-count", "0"]
     assert main(["mujoco", *foot, "--threads", "1", "--out", str(tmp_path / "run")]) == 0
@@ -305,6 +353,7 @@ def test_a_run_on_a_law_leaves_its_series_and_numbers(tmp_path):
     assert np.ptp(joints["knee_m"]) > 0.01 and joints["push_control"].min() == -60.0
     quantities = result.quantities
     assert quantities["energy_residual"].value < 5e-3 and quantities["flights"].value == 1
+    assert not any("energy" in said for said in result.warnings)
     assert quantities["sinkage_largest"].value == pytest.approx(float(motion["sinkage_m"].max()))
     # K of the foot: that of a spike times the area of 60 mm over that of 12 mm, as its picture of 32 sides has it.
     plan = plan_robot(settings)
