@@ -15,6 +15,7 @@ from experiments.platform.ground_file import SPIKES_PER_ROW, fitted_ground
 from experiments.platform.numbers import PlatformNumbers, platform_numbers
 from experiments.platform.settled import check_spike_length
 from experiments.runs.types import Json
+from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
 from rigid.model.trial import Effect, Ground, Trial
 from rigid.platform.rig import STANDARD_GRAVITY, Rig
@@ -101,7 +102,7 @@ def plan_tumble(
     numbers.settle_limits(platform, in_model=model is not None)
     warnings += numbers.check_actuation(settings.actuator, platform)
     warnings += numbers.check_body(platform) if model is None else []
-    ground = _ground(settings, fitted)
+    ground = _ground(settings, fitted, numbers["gravity"].value)
     if ground is None:
         diameter = platform.spike_diameter if spikes is None else spikes.diameter
         whose = f"platform {platform.name}" if spikes is None else "this run"
@@ -121,7 +122,7 @@ def plan_tumble(
             unit = next(parameter.unit for parameter in ground.law.parameters if parameter.name == name)
             origin = "given" if name in ground.parameters else f"default of {ground.name}, of one spike"
             origin = "ground file, of one spike" if fitted is not None else origin
-            numbers[name] = settled.Number(value, unit, origin)
+            numbers["ground_gravity" if name == "gravity" else name] = settled.Number(value, unit, origin)
     rows = f"rows of platform {platform.name}" if model is None else "model"
     numbers["spike_count"] = settled.Number(trial.spike_count, "1", rows)
     warnings += _rig_warnings(trial)
@@ -197,14 +198,19 @@ def _rig_warnings(trial: Trial) -> list[str]:
     return [say("weight_off", trial=trial, hung=hung)]
 
 
-def _ground(settings: TumbleSettings, fitted: GroundFile | None) -> Ground | None:
-    """The named law, or that of a file; None for the spring-damper of K and C."""
+def _ground(settings: TumbleSettings, fitted: GroundFile | None, gravity: float) -> Ground | None:
+    """The named law, or that of a file; None for the spring-damper of K and C.
+
+    A law with a gravity of the grains has that of the place [m/s2], in the rig that of the laboratory, unless given.
+    """
     if (settings.ground if fitted is None else fitted.law) == "spring-damper":
         return None
     if fitted is not None:
         return Ground(name=fitted.law, parameters=fitted.values, spikes_per_row=SPIKES_PER_ROW)
     parameters = dict(_assignment("ground_parameters", text) for text in settings.ground_parameters)
     try:
+        if gravity > 0 and any(one.name == "gravity" for one in find_law(settings.ground).parameters):
+            parameters.setdefault("gravity", gravity)
         return Ground(name=settings.ground, parameters=parameters, spikes_per_row=SPIKES_PER_ROW)
     except ValueError as error:
         raise ValueError(f"ground = {settings.ground!r}: {error}") from None

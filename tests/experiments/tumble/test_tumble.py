@@ -376,6 +376,17 @@ def test_the_sand_is_twice_its_spike_extrapolated_to_real_grains_and_takes_its_g
     assert sand.grains == "sand" and find_surface("sand-weak").grains == "sand-weak"
 
 
+@pytest.mark.parametrize(
+    ("given", "gravity"),
+    [({"gravity": 1.0}, 1.0), ({"rig": 0.0085}, 9.80665), ({"gravity": 1.0, "ground_parameters": ("gravity=3",)}, 3.0)],
+)
+def test_a_law_whose_grains_have_weight_takes_the_gravity_of_the_place(given, gravity):
+    """In the rig the grains are at 1 g."""
+    plan = plan_tumble(TumbleSettings(ground="rft", **given))
+    assert plan.trial.ground.parameters["gravity"] == gravity == plan.numbers["ground_gravity"].value
+    assert plan.numbers["gravity"].value == plan.trial.gravity == given.get("gravity", 9.80665)
+
+
 def test_another_law_takes_its_parameters_of_one_spike():
     given = ("dissipation=0.1", "exponent=1.4")
     plan = plan_tumble(TumbleSettings(ground="hunt-crossley", ground_parameters=given))
