@@ -48,6 +48,11 @@ class Further:
         """Its name in the folder."""
         return f"{_NOTE}{self.kind}-{self.value:g}"
 
+    @property
+    def file(self) -> str:
+        """Its series, below that folder."""
+        return f"series/{self.id}.csv"
+
 
 def further_runs(cell: Cell) -> list[Further]:
     """The further runs of each bed of a cell, without the load of the member itself."""
@@ -89,7 +94,7 @@ class FurtherRuns:
     @property
     def files(self) -> list[str]:
         """Their series, below the folder of the member."""
-        return [f"series/{one.id}.csv" for one in self.runs]
+        return [one.file for one in self.runs]
 
     def missing(self, path: Path) -> bool:
         """Whether one of them is not yet in the folder of the member."""
@@ -124,7 +129,7 @@ class FurtherRuns:
                 legs = _legs(settings, one, min(settings.speeds))
                 columns = guide(spike, ground, legs, substeps=settings.substeps, on_step=progress.update)
                 found = _dragged(columns, one.value) if one.kind == "drag" else _unloaded(columns, one.value)
-            write_series(path / "series" / f"{one.id}.csv", columns)  # the member's other digests stay
+            write_series(path / one.file, columns)  # the member's other digests stay
             folder.mark_done(one.id, found)
             tell((number + 1) / len(todo))
 

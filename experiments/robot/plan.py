@@ -65,7 +65,7 @@ class RobotPlan:
         elif law == "spring-damper":
             parameters, scales = {key: value[key] for key in ("stiffness", "damping")}, self.scales
         else:
-            parameters, scales = _parameters(s, value["gravity"]), {}
+            parameters, scales = find_law(law).in_gravity(value["gravity"], _given(s)), {}
         return LawFeet(
             robot.feet, law=law, parameters=parameters, mu_s=value["mu_s"], mu_d=value["mu_d"], time_step=LAW_STEP,
             scales=scales,
@@ -209,9 +209,9 @@ def _settle_other_law(
     ``largest``: area of the largest foot over that of the spike that the defaults are of [1]. Raises ValueError for a
     parameter there is not, or out of bounds.
     """
-    law, own = find_law(settings.ground), _parameters(settings, gravity)
+    law, given = find_law(settings.ground), _given(settings)
+    own = law.in_gravity(gravity, given)
     values = law.values(own)
-    given = dict(_assignment(text) for text in settings.ground_parameters)
     for parameter in law.parameters:
         name, origin = parameter.name, "given" if parameter.name in given else f"default of {law.name}, of one spike"
         if name != "gravity":
@@ -255,11 +255,9 @@ def width_of(part: Part, matrix: Any) -> float:
     return float(np.ptp(part.vertices @ matrix.T, axis=0)[:2].min())
 
 
-def _parameters(settings: RobotSettings, gravity: float) -> dict[str, float]:
-    """What the other law is given: the ground_parameters, and the gravity [m/s2] of the run where it takes one."""
-    takes = any(parameter.name == "gravity" for parameter in find_law(settings.ground).parameters)
-    given = dict(_assignment(text) for text in settings.ground_parameters)
-    return ({"gravity": gravity} if takes else {}) | given
+def _given(settings: RobotSettings) -> dict[str, float]:
+    """The ground_parameters."""
+    return dict(_assignment(text) for text in settings.ground_parameters)
 
 
 def _assignment(text: str) -> tuple[str, float]:

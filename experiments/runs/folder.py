@@ -350,14 +350,14 @@ class RunFolder:
 
     def write_series(self, name: str, columns: Mapping[str, Any]) -> str:
         """Write series/<name>.csv (see `write_series`); return its path relative to the folder."""
-        relative = f"series/{_checked(name)}.csv"
+        path = self._series(name)
         self._forget_digests()
-        write_series(self.path / relative, columns)
-        return relative
+        write_series(path, columns)
+        return path.relative_to(self.path).as_posix()
 
     def read_series(self, name: str) -> dict[str, np.ndarray]:
         """The columns of series/<name>.csv."""
-        return read_series(self.path / "series" / f"{_checked(name)}.csv")
+        return read_series(self._series(name))
 
     def _kept_digests(self) -> dict[str, str]:
         """That of run.toml as it was when the run began."""

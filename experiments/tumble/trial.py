@@ -209,8 +209,7 @@ def _ground(settings: TumbleSettings, fitted: GroundFile | None, gravity: float)
         return Ground(name=fitted.law, parameters=fitted.values, spikes_per_row=SPIKES_PER_ROW)
     parameters = dict(_assignment("ground_parameters", text) for text in settings.ground_parameters)
     try:
-        if gravity > 0 and any(one.name == "gravity" for one in find_law(settings.ground).parameters):
-            parameters.setdefault("gravity", gravity)
+        parameters = find_law(settings.ground).in_gravity(gravity, parameters)
         return Ground(name=settings.ground, parameters=parameters, spikes_per_row=SPIKES_PER_ROW)
     except ValueError as error:
         raise ValueError(f"ground = {settings.ground!r}: {error}") from None

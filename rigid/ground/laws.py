@@ -65,6 +65,11 @@ class SurfaceLaw:
             raise ValueError(f"{unknown[0]} is no parameter of {self.name}: there is {', '.join(known)}")
         return check_parameters(self.parameters, given, self.name)
 
+    def in_gravity(self, gravity: float, given: Mapping[str, float]) -> dict[str, float]:
+        """`given`, with this gravity of the grains [m/s2] where the law has one and it is not given."""
+        takes = any(parameter.name == "gravity" for parameter in self.parameters)
+        return ({"gravity": gravity} if takes else {}) | dict(given)
+
     def numbers(self, given: Mapping[str, float], *, count: float = 1.0) -> tuple[float, ...]:
         """p of the functions for these parameters, of `count` spikes side by side. Raises ValueError as `values`."""
         values = self.values(given)

@@ -14,23 +14,12 @@ import time
 from pathlib import Path
 
 import pytest
+from small_cases import CALIBRATE, GRAINS
 
 from experiments.campaign.files import new_campaign
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = os.environ.get("HEDGEBED_KILLED_KEPT")
-GRAINS = """
-bed_size = [0.03, 0.03, 0.0254]
-tip_diameter = 0.0075
-shaft_length = 0.03
-allow_coarse = true
-depth = 0.006
-load = 0.1
-rest_time = 0.01
-checkpoint_interval = 0.5
-frame_count = 0
-threads = 1
-"""
 CASES = {
     "penetrate": GRAINS + """
 grain = 0.0024
@@ -41,18 +30,7 @@ mass = 0.05
 drop_speeds = [0.1]
 after_stop = 0.01
 """,
-    "calibrate": GRAINS + """
-budget = 3600.0
-grain = 0.004
-seeds = [1, 2]
-most_beds = 2
-speeds = [0.2, 0.4]
-hold = 0.0
-drop_speeds = []
-young = 2e7
-laws = ["spring-damper"]
-workers = 1
-""",
+    "calibrate": CALIBRATE,
     "tumble": """
 surface = "sand-weak"
 ground = "bed"

@@ -1,8 +1,8 @@
 """Many grains: what the verification suite (test_suite.py) does not hold of the books."""
 
-import cloud
 import numpy as np
 
+from experiments.validate.base import cloud
 from experiments.validate.contacts.balances import ROUGH, cluster, hertz_energy
 
 

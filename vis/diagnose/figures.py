@@ -17,6 +17,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from rigid.series import read_series
+from vis.diagnose.held_out import worsens_held_out
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Result
 from vis.page.sentences import Sentences
@@ -336,8 +337,7 @@ def _leading_names(diagnosis: Result, score: Mapping[tuple[str, ...], float]) ->
 def _kind(name: tuple[str, ...], leading: tuple[str, ...], diagnosis: Result) -> str:
     if diagnosis["verdict"] == "unknown":
         certain = {effect["id"] for effect in diagnosis["effects"]}
-        before, after = (diagnosis["gap"][stage]["held_out"] for stage in ("before", "after"))
-        if before is not None and after is not None and after > before:
+        if worsens_held_out(diagnosis):
             return _WORSE if name == leading else "other"
         if certain and set(name) == certain:
             return "with confidence"

@@ -59,8 +59,7 @@ class CandidateFits:
     def leaves_nothing(self, hypothesis: Hypothesis) -> bool:
         """Whether another shape has nothing to explain: neither in the sum over all samples nor by the gate. Where the
         noise is less than stated, the sum alone hides a slow misfit."""
-        found = hypothesis.fit
-        return excess(found) < _SEEN * np.sqrt(2.0 * found.count) and self._gate(hypothesis).passed
+        return _sums_to_little(hypothesis.fit) and self._gate(hypothesis).passed
 
     def _kept(self, found: Fit) -> Hypothesis:
         """A fit as a hypothesis of the table."""
@@ -153,7 +152,7 @@ class CandidateFits:
     def _from_its_like(self, one: Hypothesis) -> Hypothesis:
         """The best of the forms that share scales with this single form, begun where it ended."""
         best, (plain,) = one, one.forms
-        if one.score < self.base.score + WORTH or excess(one.fit) < _SEEN * np.sqrt(2.0 * one.fit.count):
+        if one.score < self.base.score + WORTH or _sums_to_little(one.fit):
             return one
         scales = {p.name for p in plain.parameters} - {plain.amplitude}
         for form in one.fit.model.problem.forms:
@@ -268,3 +267,8 @@ class CandidateFits:
         """Forms of an effect, the one that did best alone first."""
         alone = [h for h in self.table if len(h.forms) == 1 and h.effects == (effect,)]
         return [h.forms[0] for h in sorted(alone, key=lambda h: -h.score)]
+
+
+def _sums_to_little(found: Fit) -> bool:
+    """Whether chi-square over all samples leaves too little for another shape."""
+    return bool(excess(found) < _SEEN * np.sqrt(2.0 * found.count))

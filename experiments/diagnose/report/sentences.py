@@ -9,12 +9,13 @@ from typing import Any
 from experiments.diagnose.core.effect_texts import meaning
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Finding
+from vis.diagnose.held_out import worsens_held_out
 from vis.page.sentences import Sentences
 
 __all__ = [
     "candidate_rows", "findings_in_words", "remark_sentences", "say", "setting_words", "shares_words",
     "size_sentences", "small_names", "sure_sentences", "told_tables", "unnamed_sentence",
-    "where_sentences", "worse_sentences", "worsens_held_out",
+    "where_sentences", "worse_sentences",
 ]  # fmt: skip
 
 say = Sentences(__package__)
@@ -324,14 +325,6 @@ def unnamed_sentence(diagnosis: Row) -> list[str]:
     what = "is not named" if diagnosis["effects"] else "does not lead"
     names, ours = (" + ".join(one["effects"]) for one in (row, own))
     return [say("most_evidence", names=names, more=row["score"] - own["score"], own=ours, what=what, row=row)]
-
-
-def worsens_held_out(diagnosis: Row) -> bool:
-    """Whether the best model of an unknown predicts held-out trials worse than the base model: then no name leads."""
-    if diagnosis["verdict"] != "unknown":
-        return False
-    before, after = (diagnosis.get("gap", {}).get(stage, {}).get("held_out") for stage in ("before", "after"))
-    return before is not None and after is not None and after > before
 
 
 def _named(diagnosis: Row) -> tuple[str, ...]:

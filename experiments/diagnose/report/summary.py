@@ -8,6 +8,7 @@ from experiments.diagnose.core.effect_texts import meaning
 from experiments.diagnose.fit.evidence import SMALL
 from experiments.diagnose.fit.gaps import numeral, size_words
 from experiments.diagnose.noise.spectrum import line_sentence
+from vis.diagnose.held_out import worsens_held_out
 
 from .sentences import (
     remark_sentences,
@@ -18,7 +19,6 @@ from .sentences import (
     sure_sentences,
     unnamed_sentence,
     worse_sentences,
-    worsens_held_out,
 )
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
@@ -156,12 +156,12 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
             return ["No effect of the library could be tried."]
         listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_SHOWN])
         return [f"No effect of the library explains the misfit. Of the misfit beyond the noise, {listed}."]
+    if worsens_held_out(diagnosis):
+        gaps = {stage: numeral(diagnosis["gap"][stage]["held_out"]) for stage in ("before", "after")}
+        return [say("worse_held_out", names=" + ".join(leading["effects"]), **gaps)]
     certain = leading["certain"]
     others = [name for name in leading["effects"] if name not in certain]
     sentences = [words for name in leading["effects"] if (words := meaning(name))]
-    if worsens_held_out(diagnosis):
-        gaps = [numeral(diagnosis["gap"][stage]["held_out"]) for stage in ("before", "after")]
-        return [say("worse_held_out", names=" + ".join(leading["effects"]), before=gaps[0], after=gaps[1])]
     sure = f"With confidence: {' and '.join(certain)}" if certain else ""
     maybe = f"{'most' if certain else 'Most'} likely, but without confidence: {' and '.join(others)}" if others else ""
     row = next((r for r in diagnosis["evidence"] if sorted(r["effects"]) == sorted(leading["effects"])), None)

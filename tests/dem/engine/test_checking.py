@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import cloud
 import falling_bed
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ import dem.engine.checking
 import dem.engine.engine
 from dem import BedFailure
 from dem.engine.lists import INDEX_BITS, INDEX_MASK
+from experiments.validate.base import cloud
 
 CHUNKS = pytest.mark.cpu_only("chunks")
 

@@ -3,10 +3,10 @@
 Of a bed whose grains sleep `test_sleep` shows it.
 """
 
-import cloud
 import pytest
 
 from dem import Sleep
+from experiments.validate.base import cloud
 
 
 def made(layout, engines):

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import cloud
 import falling_bed
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from naive_bed import NaiveBed
 import dem.engine.engine
 from dem import Bed, BedFailure
 from dem.contact.law import damping_factor
+from experiments.validate.base import cloud
 
 STEPS = 30
 LAYOUTS = [

@@ -2,11 +2,11 @@
 
 import dataclasses
 
-import cloud
 import numpy as np
 import pytest
 
 import dem
+from experiments.validate.base import cloud
 
 
 def test_grains_are_a_frozen_dataclass_that_still_answers_by_name():

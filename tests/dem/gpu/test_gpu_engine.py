@@ -3,7 +3,6 @@
 Against a plain double loop, and with all lists checked, the tests of lists have it.
 """
 
-import cloud
 import falling_bed
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ import pytest
 import dem.engine.engine
 import dem.gpu.steps
 from dem import Bed
+from experiments.validate.base import cloud
 
 pytestmark = pytest.mark.cpu_only("a CPU's engine to compare with")
 GPU = {"gpu": True, "neighbours_per_grain": 30}

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+from small_cases import CALIBRATE
 
 from experiments import lawfit
 from experiments.cli.main import main
@@ -181,28 +182,7 @@ def test_further_runs_of_calibrate_come_out_the_same_in_two_processes(tmp_path):
     """Placement and drag in two beds: in the folders of their members, to the bit."""
     pytest.importorskip("distributed")
     case = tmp_path / "case.toml"
-    case.write_text("""
-bed_size = [0.03, 0.03, 0.0254]
-tip_diameter = 0.0075
-shaft_length = 0.03
-allow_coarse = true
-grain = 0.004
-depth = 0.006
-load = 0.1
-young = 2e7
-rest_time = 0.01
-threads = 1
-frame_count = 0
-budget = 3600.0
-seeds = [1, 2]
-most_beds = 2
-speeds = [0.2, 0.4]
-hold = 0.0
-drop_speeds = []
-laws = ["spring-damper"]
-loads = [0.05]
-drag_depths = [0.004]
-""")
+    case.write_text(f"{CALIBRATE}loads = [0.05]\ndrag_depths = [0.004]\n")
     found = []
     for workers in ("1", "2"):
         out, log = tmp_path / workers, tmp_path / f"log{workers}"
