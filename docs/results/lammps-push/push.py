@@ -3,6 +3,7 @@
     python docs/results/lammps-push/push.py                      # 1,400 grains, one rank; 10 s
     python docs/results/lammps-push/push.py --size 0.06 0.12 0.05 --copies 7 --ranks 2 --parts 40 --out push.csv
 
+`--seeds 1 2 3` pushes into that many beds, one after the other; with `--out` each bed's forces are written as it ends.
 `--finer 2 4` repeats all runs with steps that are so many times shorter, from the same grains, over the same time.
 
 LAMMPS and mpiexec must be there: `hedgebed doctor` says how to install them.
@@ -26,12 +27,15 @@ parser.add_argument("--grain", type=float, default=0.003, help="mean diameter [m
 parser.add_argument("--copies", type=int, default=1, help="how often the prepared bed is laid end to end [1]")
 parser.add_argument("--ranks", type=int, nargs="+", default=(1,), help="each is a run of its own in LAMMPS")
 parser.add_argument("--radius", type=float, default=0.006, help="of the spike [m]")
+parser.add_argument("--seeds", type=int, nargs="+", default=(1,), help="of the prepared beds")
 parser.add_argument("--speed", type=float, default=0.2, help="of the spike [m/s]")
-parser.add_argument("--parts", type=int, default=20, help="means of the force, each over 10 time steps")
+parser.add_argument("--parts", type=int, default=20, help="means of the force, each over --steps")
+parser.add_argument("--steps", type=int, default=10, help="time steps of a part")
 parser.add_argument("--finer", type=int, nargs="+", default=(1,), help="steps in the time of one, here and in LAMMPS")
 parser.add_argument(
     "--change", nargs="+", default=(), metavar="KEY=NUMBER", help="of the material, after the preparation"
 )
+parser.add_argument("--threads", type=int, default=1, help="of our bed")
 parser.add_argument("--alone", action="store_true", help="LAMMPS alone")
 parser.add_argument("--out", type=Path, help="a CSV of the forces")
 
@@ -46,23 +50,23 @@ def processor_time(pids):
 
 
 def push(bed, start, asked, pids, finer):
-    """Mean force and moment on the spike in each part, shape [parts, 6]; processor time a grain-step [s]."""
-    steps = 10 * finer
+    """Mean force and moment on the spike in each part, shape [parts, 6]; processor and wall time a grain-step [s]."""
+    steps = asked.steps * finer
     shapes = [Ball(radius=asked.radius), Cylinder(bottom=0.0, top=0.06, radius=asked.radius)]
     body = bed.add_body(shapes, position=start)
     bed.move_body(body, velocity=(0.0, 0.0, -asked.speed))
     bed.advance(steps)  # compiles here, sets up there
-    found, began = [bed.reactions()[body].copy()], processor_time(pids)
+    found, began, clock = [bed.reactions()[body].copy()], processor_time(pids), time.perf_counter()
     for _ in range(asked.parts - 1):
         bed.advance(steps)
         found.append(bed.reactions()[body].copy())
-    cost = (processor_time(pids) - began) / (bed.grain_count * steps * max(1, asked.parts - 1))
-    return np.array(found), cost
+    work = bed.grain_count * steps * max(1, asked.parts - 1)
+    return np.array(found), ((processor_time(pids) - began) / work, (time.perf_counter() - clock) / work)
 
 
-def main():
-    asked = parser.parse_args()
-    piece = Bed.prepare("sand", size=tuple(asked.size), grain=asked.grain, gravity=9.81, seed=1, threads=1)
+def push_all(asked, seed):
+    """Forces and costs by name of the pushes into the bed of this seed, as `push` has them; its time step [s]."""
+    piece = Bed.prepare("sand", size=tuple(asked.size), grain=asked.grain, gravity=9.81, seed=seed, threads=1)
     stuff = replace(piece.material, **{key: float(number) for key, number in (one.split("=") for one in asked.change)})
     grains = piece.repeated(asked.copies).grains()
     size = (asked.copies * asked.size[0], *asked.size[1:])
@@ -71,7 +75,7 @@ def main():
         """The bed without the history of its contacts, which LAMMPS cannot take over."""
         return Bed.from_grains(
             stuff, positions=grains.position, radii=grains.radius, velocities=grains.velocity,
-            spins=grains.spin, size=size, height=0.2, time_step=piece.time_step / finer, threads=1,
+            spins=grains.spin, size=size, height=0.2, time_step=piece.time_step / finer, threads=asked.threads,
         )  # fmt: skip
 
     x, y = 0.5 * size[0], 0.5 * size[1]
@@ -79,9 +83,8 @@ def main():
     near = away < asked.radius + grains.radius
     reach = np.sqrt((asked.radius + grains.radius[near]) ** 2 - away[near] ** 2)
     start = (x, y, float((grains.position[near, 2] + reach).max()))
-    print(f"{len(grains.id)} grains, steps of {piece.time_step:.4g} s")
+    print(f"seed {seed}: {len(grains.id)} grains, steps of {piece.time_step:.4g} s")
     columns, costs = {}, {}
-    moments = 10 * piece.time_step * (np.arange(asked.parts) + 0.5)
     for finer in asked.finer:
         suffix = "" if finer == 1 else f", steps / {finer}"
         own = f"bed{suffix}"
@@ -101,15 +104,33 @@ def main():
                     flush=True,
                 )
     for name, forces in columns.items():
-        print(f"{name}: mean force {forces[:, 2].mean():.5g} N; {1e9 * costs[name]:.4g} ns of processor a grain-step")
-    if asked.out is not None:
-        with asked.out.open("w", newline="") as file:
-            table = csv.writer(file)
-            table.writerow(["time_s", *(f"{axis} {name} [N]" for name in columns for axis in ("fx", "fy", "fz"))])
-            for k, moment in enumerate(moments):
-                table.writerow(
-                    [f"{v:.8g}" for v in (moment, *(f for forces in columns.values() for f in forces[k, :3]))]
-                )
+        processor, wall = costs[name]
+        print(
+            f"{name}: mean force {forces[:, 2].mean():.5g} N; a grain-step takes {1e9 * processor:.4g} ns "
+            f"of processor time, {1e9 * wall:.4g} ns of wall time", flush=True,
+        )  # fmt: skip
+    return columns, piece.time_step
+
+
+def written(path, asked, columns, time_step):
+    """Write the forces of a bed as CSV."""
+    moments = asked.steps * time_step * (np.arange(asked.parts) + 0.5)
+    with path.open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["time_s", *(f"{axis} {name} [N]" for name in columns for axis in ("fx", "fy", "fz"))])
+        for k, moment in enumerate(moments):
+            table.writerow([f"{v:.8g}" for v in (moment, *(f for forces in columns.values() for f in forces[k, :3]))])
+
+
+def main():
+    asked = parser.parse_args()
+    for seed in asked.seeds:
+        columns, time_step = push_all(asked, seed)
+        if asked.out is not None:
+            several = len(asked.seeds) > 1
+            written(
+                asked.out.with_stem(f"{asked.out.stem}-{seed}") if several else asked.out, asked, columns, time_step
+            )
 
 
 if __name__ == "__main__":
