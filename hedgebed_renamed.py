@@ -15,13 +15,16 @@ from types import ModuleType
 from typing import Any, TypeVar, cast
 
 __all__ = [
-    "BEFORE_RUN_2", "MOVED", "RENAMED", "material_of_today", "renamed", "renamed_keywords", "renamed_names",
+    "BEFORE_RUN_2", "BEFORE_RUN_3", "MOVED", "RENAMED", "material_of_today", "renamed", "renamed_keywords",
+    "renamed_names",
 ]  # fmt: skip
 
 _MATERIALS = {"sand-calibrated": "sand"}
 """Materials and surfaces: a name that is still taken -> the name of today."""
 BEFORE_RUN_2 = {"sand": "sand-weak"} | _MATERIALS
 """Names as runs and beds of before 2026-11-26 have them -> the names of today: `sand` was the weak one."""
+BEFORE_RUN_3 = {"jsc1a": "jsc1a-heights"}
+"""Surfaces as runs of the formats 1 and 2 have them -> the names of today: the grains of `jsc1a` were too cohesive."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 

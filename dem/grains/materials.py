@@ -243,12 +243,12 @@ CAVEATS = {
     "sand-weak": "its rolling friction is a guess: 24 to 25 degrees of triaxial friction, where fine sand has 30 to "
     "33; 'sand' has 30, and a spike meets twice the force in it",
     "jsc-1a-loose": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand seven times as high as "
-    "JSC-1A's; 'jsc-1a-loose-heights' is the one to take",
+    "JSC-1A's; 'jsc-1a-loose-cut' is the one to take",
     "jsc-1a-dense": "calibrated to a cohesion that is JSC-1A's at most: faces of it stand ten times as high as "
-    "JSC-1A's; 'jsc-1a-dense-heights' is the one to take",
+    "JSC-1A's; 'jsc-1a-dense-cut' is the one to take",
     "jsc-1a-loose-heights": "faces of it stand 2.7 times as high as JSC-1A's; those of 'jsc-1a-loose-cut' do not",
-    "jsc-1a-dense-heights": "faces of it stand 2.4 times as high as JSC-1A's, and it peaks at 52 degrees in ring "
-    "shear, where the vibrated powder, which is denser, has 60",
+    "jsc-1a-dense-heights": "faces of it stand 2.4 times as high as JSC-1A's, those of 'jsc-1a-dense-cut' do not; and "
+    "it peaks at 52 degrees in ring shear, where the vibrated powder, which is denser, has 60",
     "jsc-1a-dense-cut": "it peaks at 51 degrees in ring shear, where the vibrated powder, which is denser, has 60",
 }
 """What a user of a material that ships has to know of it, by name: where its bulk figures are not the real one's."""

@@ -51,7 +51,7 @@ UNITS = (
     Unit("J", kg=1, m=2, s=-2), Unit("s", s=1),
 )  # fmt: skip
 TEXTS = {
-    "surface": "Surface: steel, brick, sand, sand-weak or jsc1a",
+    "surface": "Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights",
     "platform": "Platform: hedgehog, cubli, mascot, minerva, or a TOML file",
 }
 NUMBERS = {

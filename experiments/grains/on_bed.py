@@ -29,6 +29,7 @@ from rigid.platform.rig import STANDARD_GRAVITY
 from . import say
 from .bed_progress import BedProgress
 from .following import Followed, Run
+from .recipes import recipe_of
 from .settings import GrainsSettings
 from .sizes import carried_height, expected_grain_count
 from .softening import Softening, check_young, run_limit, soften_material
@@ -72,7 +73,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     spike_diameter: float  # [m]
     reach: float  # From the centre to the farthest tip [m]
     repeats = 1  # How often the prepared bed is laid end to end [1]
-    stages: tuple[str, ...] | None = None  # How the bed is prepared; None: rained and levelled
+    given_stages: tuple[str, ...] | None = None  # Stages of the bed that are set; None: those of its material
 
     # What differs
 
@@ -133,6 +134,11 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
             known = ", ".join(name for name in surface_names() if find_surface(name).grains)
             raise ValueError(say("no_grains", surface=self.surface, known=known))
         return find_material(grains)
+
+    @property
+    def stages(self) -> tuple[str, ...] | None:
+        """How the bed is prepared: as set, else by the recipe of its material; None: rained and levelled."""
+        return self.given_stages or recipe_of(self.material).stages
 
     @property
     def grain_gravity(self) -> float:
@@ -237,5 +243,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     def carry_out(self, folder: RunFolder, progress: Progress) -> Result:
         """Prepare the bed and step the run in `folder`, from its checkpoint if there is one; returns the result."""
         self.announce(progress)
+        if self.given_stages is None and self.stages is not None:
+            progress.message(say("by_recipe", material=self.material, stages=" ".join(self.stages)))
         progress.plan({"bed": 1.0, self.stage: self.duration + 0.3}, seconds={"report": 10.0})  # with the placement
         return self.finish(self.stepper(self.bed(self.softening(), progress)), folder, progress)

@@ -112,8 +112,8 @@ class TumbleBedSettings(GrainsSettings):
     """Graded bed: depth of the fine region [m]; if not given, two spike diameters below the deepest expected tip, or
     the whole bed."""
     bed_stages: tuple[str, ...] | None = None
-    """Bed: stages of preparation, as for `hedgebed bed make --stages` (of cohesive grains: rain:dry compact:0.57 stick
-    level); rain and level if not given."""
+    """Bed: stages of preparation, as for `hedgebed bed make --stages`. If not given: rain and level; cohesive materials
+    use a recipe of their own (jsc1a: rain:dry compact:0.56 stick level)."""
     place: float = Field(0.0, allow_inf_nan=False)
     """Bed: place where the platform is set down, along the bed from its middle [m]. The bed is periodic; another place
     has other grains."""

@@ -8,13 +8,12 @@ from dem.grains.materials import Material
 from dem.grains.sizes import sizes_of
 from dem.prepare.prepare import prepare_as
 from dem.prepare.recipe import check_stages, parse_stage
-from experiments.platform.surfaces import Surface
 from experiments.runs.progress import Progress
 
 from . import say
 from .bed_progress import Stages
 
-__all__ = ["check_bed_stages", "packing_warning", "staged_bed"]
+__all__ = ["check_bed_stages", "staged_bed"]
 
 
 def check_bed_stages(
@@ -32,15 +31,6 @@ def check_bed_stages(
         raise ValueError(say("spoilt", stage=spoilt[0]))
     if plan[-1].name != "level":
         raise ValueError(say("not_level", stage=str(plan[-1])))
-
-
-def packing_warning(surface: Surface, material: Material, stages: Sequence[str] | None) -> str | None:
-    """Warning that a bed without `stages` will not have the packing of its calibration, and the stages that give it."""
-    if stages is not None or surface.packing is None:
-        return None
-    compact = f"compact:{surface.packing:g}"
-    would_do = f"rain {compact} level" if material.cohesion == "none" else f"rain:dry {compact} stick level"
-    return say("not_packed", surface=surface, stages=would_do)
 
 
 class _OneStage(Stages):

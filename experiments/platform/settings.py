@@ -19,7 +19,7 @@ class PlatformSettings(StrictSettings):
 
     # The surface
     surface: str | None = None
-    """Surface: steel, brick, sand, sand-weak or jsc1a; brick if not given."""
+    """Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; brick if not given."""
     stiffness: Positive | None = None
     """Stiffness K under a row of spikes [N/m]; that of the surface if not given (brick: 1.5e4)."""
     damping: NotNegative | None = None

@@ -42,7 +42,7 @@ class RobotSettings(GrainsSettings):
     duration: Positive = Field(2.0, le=3600, description="How long it is followed [s].")
 
     surface: str = "sand"
-    """Material: steel, brick, sand, sand-weak or jsc1a."""
+    """Material: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights."""
     ground: str = "spring-damper"
     """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, katsuragi-durian, bekker,
     rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or lammps (a bed whose grains

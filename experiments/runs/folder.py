@@ -31,7 +31,7 @@ from filelock import FileLock, Timeout
 from pydantic import BaseModel
 
 from dem.files.arrays import read_arrays
-from hedgebed_renamed import BEFORE_RUN_2
+from hedgebed_renamed import BEFORE_RUN_2, BEFORE_RUN_3
 from rigid.result import check_digests, digest_of, plain, read_json, read_result, toml_value, write_json, write_text
 from rigid.series import read_series, replacing, write_series
 from rigid.version import __version__
@@ -55,8 +55,10 @@ __all__ = [
 
 Status = Literal["running", "stopped", "failed", "done"]
 
-RUN_FORMAT = "hedgebed-run/2"
-RUN_FORMATS = ("hedgebed-run/1", RUN_FORMAT)  # what can be read; the first has materials and surfaces by other names
+RUN_FORMAT = "hedgebed-run/3"
+_NAMES_OF = {"hedgebed-run/1": BEFORE_RUN_2 | BEFORE_RUN_3, "hedgebed-run/2": BEFORE_RUN_3, RUN_FORMAT: {}}
+"""Format of a run.toml -> what it calls otherwise: name of a material or a surface in it -> name of today."""
+RUN_FORMATS = tuple(_NAMES_OF)  # what can be read
 _NAMED = ("material", "surface", "surfaces")
 _NAMES = "names-of-all"  # in a checkpoint: a zip file whose list is cut off is read as a shorter one
 _DONE = "hedgebed-done/1"
@@ -98,16 +100,17 @@ def settings_toml(command: str, settings: BaseModel, version: str, code: str = "
 def settings_in(table: Mapping[str, Any]) -> dict[str, Any]:
     """The settings in `table`, a run.toml read: name -> value, None for what is not set; materials by today's names."""
     found = {**dict.fromkeys(table.get("not_set", [])), **table["settings"]}
-    return _of_today(found) if table["format"] == RUN_FORMATS[0] else found
+    return _of_today(found, table["format"])
 
 
-def _of_today(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings or results of before 2026-11-26 with materials and surfaces by the names that they have since."""
+def _of_today(table: Mapping[str, Any], written_as: str) -> dict[str, Any]:
+    """Settings or results of a run of this format, with materials and surfaces by today's names."""
+    names = _NAMES_OF[written_as]
 
     def renamed(value: Any) -> Any:
         if isinstance(value, list):
             return [renamed(item) for item in value]
-        return BEFORE_RUN_2.get(value, value) if isinstance(value, str) else value
+        return names.get(value, value) if isinstance(value, str) else value
 
     return {key: renamed(value) if key in _NAMED else value for key, value in table.items()}
 
@@ -342,11 +345,9 @@ class RunFolder:
         return self.of_today(read_result(self.path / "result.json"))
 
     def of_today(self, result: dict[str, Any]) -> dict[str, Any]:
-        """A result of this run; where it is of before 2026-11-26, material and surface by the names since."""
-        if self.format != RUN_FORMATS[0]:
-            return result
-        bed = result.get("bed")
-        return _of_today(result) | ({"bed": _of_today(bed)} if isinstance(bed, dict) else {})
+        """A result of this run, with material and surface by today's names."""
+        bed, named = result.get("bed"), _of_today(result, self.format)
+        return named | ({"bed": _of_today(bed, self.format)} if isinstance(bed, dict) else {})
 
     def write_series(self, name: str, columns: Mapping[str, Any]) -> str:
         """Write series/<name>.csv (see `write_series`); return its path relative to the folder."""

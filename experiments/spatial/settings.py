@@ -26,7 +26,7 @@ class SpatialSettings(GrainsSettings):
 
     # The surface
     surface: str | None = None
-    """Surface: steel, brick, sand, sand-weak or jsc1a; brick if not given."""
+    """Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; brick if not given."""
     ground: Literal["spring-damper", "bed"] = "spring-damper"
     """Law of the force of the ground: spring-damper, or bed (of grains)."""
     stiffness: Positive | None = None

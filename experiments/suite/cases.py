@@ -116,7 +116,7 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
         computed = min(grains, AWAKE * settings.bed_size[1] / settings.grain**3)
     beside = steps / settings.substeps * MACRO_STEP
     prepared = grains / settings.bed_repeats
-    making = FALL_TIMES + TAP * _taps(settings)
+    making = FALL_TIMES + TAP * _taps(on_bed.stages)
     return Cost(
         grains=grains, time_step=step, bed_seconds=making * fall / step * prepared / _rate(prepared),
         run_seconds=_run_seconds(steps * computed, steps) + beside, grain_steps=steps * computed, steps=steps,
@@ -128,10 +128,10 @@ def _run_seconds(grain_steps: float, steps: float) -> float:
     return BOOK * grain_steps / _rate(grain_steps / steps)
 
 
-def _taps(settings: TumbleSettings) -> int:
+def _taps(words: Sequence[str] | None) -> int:
     from dem.prepare.recipe import parse_stage
 
-    stages = [parse_stage(stage) for stage in settings.bed_stages or ()]
+    stages = [parse_stage(stage) for stage in words or ()]
     wanted = [DENSEST if s.value is None else s.value for s in stages if s.name == "compact" and s.by == "tap"]
     return math.ceil(max(0.0, max(wanted, default=0.0) - POURED) / TAPPED)
 

@@ -21,10 +21,9 @@ from experiments.grains.graded import graded_under
 from experiments.grains.lammps import check_lammps, in_lammps
 from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
 from experiments.grains.softening import PUSHED, Softening, run_limit
-from experiments.grains.staged import check_bed_stages, packing_warning
+from experiments.grains.staged import check_bed_stages
 from experiments.platform.numbers import platform_numbers, tip_angles, tip_depth, torque_within_limit
 from experiments.platform.settled import check_lengths
-from experiments.platform.surfaces import find_surface
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.planar.simulate import simulate
@@ -78,7 +77,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         self.surface, self.gravity, self.counterweight = self.plan.surface, trial.gravity_sim, trial.counterweight
         self.weight = trial.weight
         self.spike_diameter, self.reach = spikes.diameter, trial.spike_length
-        self.repeats, self.stages = settings.bed_repeats, settings.bed_stages
+        self.repeats, self.given_stages = settings.bed_repeats, settings.bed_stages
         check_lengths(settings, self.reach, spike_diameter=spikes.diameter, spike_clear=spikes.clear)
 
     # The forecast
@@ -258,9 +257,8 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
             settings, plan, grains=self.grain_count(), softening=self.softening(), lowering_speed=self.lowering_speed
         ):
             progress.message(sentence)
-        unlike = packing_warning(find_surface(self.surface), self.material, settings.bed_stages)
         short = short_of_way(settings, plan, self.forecast.trajectory)
-        for warning in (*plan.warnings, unlike, short, self.may_leave(), self.whose_spikes()):
+        for warning in (*plan.warnings, short, self.may_leave(), self.whose_spikes()):
             if warning:
                 progress.message(f"warning: {warning}")
 

@@ -33,7 +33,7 @@ class TrialSettings(PlatformSettings):
 
     # The surface
     surface: str | None = None
-    """Surface: steel, brick, sand, sand-weak or jsc1a; if not given, that of the model, else brick."""
+    """Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; if not given, that of the model, else brick."""
     ground: str = Field(
         "spring-damper",
         description="Law of the force of the ground: "

@@ -123,23 +123,26 @@ def test_ensure_takes_up_the_same_run_and_refuses_another(folder):
 
 def test_open_refuses_another_format(folder):
     write_text(folder.path / "run.toml", 'format = "other"\n')
-    with pytest.raises(ValueError, match="hedgebed-run/2"):
+    with pytest.raises(ValueError, match="hedgebed-run/3"):
         RunFolder.open(folder.path)
 
 
 def test_a_run_of_before_keeps_its_material(tmp_path):
-    """`sand` of a run.toml of version 1 is what `sand-weak` is: settings, result, and the case that repeats it."""
+    """`sand` of a run.toml of version 1 is what `sand-weak` is, `jsc1a` of versions 1 and 2 what `jsc1a-heights` is:
+    in settings, result, and the case that repeats it."""
     text = 'format = "hedgebed-run/{}"\ncommand = "dig"\nnot_set = ["surface"]\n[settings]\nmaterial = "sand"\n'
-    text += 'surfaces = ["brick", "sand", "sand-calibrated"]\ntitle = "sand"\n'
-    was = {"surface": None, "material": "sand", "surfaces": ["brick", "sand", "sand-calibrated"], "title": "sand"}
-    today = was | {"material": "sand-weak", "surfaces": ["brick", "sand-weak", "sand"]}
-    for number, settings in ((1, today), (2, was)):
+    text += 'surfaces = ["brick", "sand", "sand-calibrated", "jsc1a"]\ntitle = "sand"\n'
+    names = ["brick", "sand", "sand-calibrated", "jsc1a"]
+    was = {"surface": None, "material": "sand", "surfaces": names, "title": "sand"}
+    second = was | {"surfaces": [*names[:3], "jsc1a-heights"]}
+    first = second | {"material": "sand-weak", "surfaces": ["brick", "sand-weak", "sand", "jsc1a-heights"]}
+    for number, settings in ((1, first), (2, second), (3, was)):
         write_text(tmp_path / "run.toml", text.format(number))
-        write_json(tmp_path / "result.json", {"surface": "sand", "bed": {"material": "sand"}, "title": "in sand"})
+        write_json(tmp_path / "result.json", {"surface": "jsc1a", "bed": {"material": "sand"}, "title": "in sand"})
         folder = RunFolder.open(tmp_path)
         assert folder.settings == settings == dict(read_case(tmp_path / "run.toml").values)
-        name = settings["material"]
-        assert folder.read_result() == {"surface": name, "bed": {"material": name}, "title": "in sand"}
+        surface, material = settings["surfaces"][3], settings["material"]
+        assert folder.read_result() == {"surface": surface, "bed": {"material": material}, "title": "in sand"}
 
 
 def test_a_case_whose_result_is_kept_has_the_material_of_that_result():

@@ -369,9 +369,8 @@ def test_a_tumble_on_grains_with_nothing_but_its_torque_given_stays_on_its_bed()
     assert forecast.farthest > 0.0788 + 0.077  # what grains did in 1.1 s, and the next row ahead of the centre
 
 
-def test_jsc1a_without_stages_is_told_before_the_bed_is_made_which_would_do(tmp_path, monkeypatch):
-    """Its grains were calibrated at 0.57: the stages named are those of the cases that ship, and a bed can go through
-    them; with them, and for sand, whose grains belong to no packing, nothing is said."""
+def test_beds_of_jsc1a_are_prepared_as_their_material_needs_it_and_a_message_names_the_stages(tmp_path, monkeypatch):
+    """By the recipe of the material; as set where stages are set. Sand is rained and levelled, without a message."""
 
     class ReachedError(Exception):
         pass
@@ -382,8 +381,10 @@ def test_jsc1a_without_stages_is_told_before_the_bed_is_made_which_would_do(tmp_
     monkeypatch.setattr(PlanarOnBed, "prepare", prepare)
     shipped = ("rain:dry", "compact:0.57", "stick", "level")
     told = {}
-    for name, given in (
-        ("plain", {"surface": "jsc1a"}), ("staged", {"surface": "jsc1a", "bed_stages": shipped}), ("sand", {}),
+    for name, given, stages in (
+        ("plain", {"surface": "jsc1a"}, ("rain:dry", "compact:0.56", "stick", "level")),
+        ("older", {"surface": "jsc1a-heights"}, shipped), ("sand", {}, None),
+        ("staged", {"surface": "jsc1a", "bed_stages": shipped}, shipped),
     ):  # fmt: skip
         settings = on_bed(bed_size=(0.4, 0.06, 0.061), **given)
         tumble.check(settings)
@@ -391,10 +392,11 @@ def test_jsc1a_without_stages_is_told_before_the_bed_is_made_which_would_do(tmp_
         monkeypatch.setattr(progress, "message", told[name].append)
         with pytest.raises(ReachedError):
             tumble.run(settings, tmp_path / name, progress=progress)
-    (said,) = (text for text in told["plain"] if "without bed_stages" in text)
-    assert said.startswith("warning: ") and "compacted to 0.57" in said and "jsc1a" in said
-    assert f"--bed-stages {' '.join(shipped)}" in said
-    assert not any("without bed_stages" in text for name in ("staged", "sand") for text in told[name])
+        assert PlanarOnBed(settings).stages == stages
+    (said,) = (text for text in told["plain"] if "is prepared as" in text)
+    assert "jsc-1a-loose-cut" in said and said.endswith("rain:dry compact:0.56 stick level")
+    assert any("jsc-1a-loose-heights" in text for text in told["older"])
+    assert not any("is prepared as" in text for name in ("staged", "sand") for text in told[name])
 
 
 @pytest.mark.parametrize("false", [False, True])
@@ -608,7 +610,7 @@ def test_stages_of_a_bed_reach_the_laboratory_and_its_cache(monkeypatch):
 
 
 def test_a_tumble_with_stages_asks_the_laboratory_for_a_bed_with_all_it_was_told(monkeypatch):
-    """jsc1a as its cases have it: what the tumble hands on, the laboratory takes (it ended in a TypeError)."""
+    """jsc1a with the stages of older cases, and by its recipe: the laboratory takes what the tumble hands on."""
     import inspect
 
     from dem.prepare.prepare import prepare_as as laboratory
@@ -624,10 +626,12 @@ def test_a_tumble_with_stages_asks_the_laboratory_for_a_bed_with_all_it_was_told
         return SimpleNamespace(bed=bed)
 
     monkeypatch.setattr(bed_staged, "prepare_as", prepare_as)
-    stages = ("rain:dry", "compact:0.57", "stick", "level")
-    settings = on_bed(surface="jsc1a", bed_size=(0.4, 0.06, 0.061), bed_stages=stages, threads=1, seed=7)
-    staged = PlanarOnBed(settings)
-    softening = staged.softening()
-    assert staged.prepare(softening, Progress()) is bed
-    assert asked["stages"] == stages and asked["seed"] == 7 and asked["young"] == softening.young
-    assert (asked["arch"], asked["threads"], asked["gravity"]) == ("cpu", 1, pytest.approx(9.80665))
+    shipped, own = (("rain:dry", f"compact:{packing}", "stick", "level") for packing in ("0.57", "0.56"))
+    for given, stages in ((shipped, shipped), (None, own)):
+        settings = on_bed(surface="jsc1a", bed_size=(0.4, 0.06, 0.061), bed_stages=given, threads=1, seed=7)
+        staged = PlanarOnBed(settings)
+        softening = staged.softening()
+        assert staged.prepare(softening, Progress()) is bed
+        assert asked["stages"] == stages and asked["seed"] == 7 and asked["young"] == softening.young
+        assert (asked["arch"], asked["threads"], asked["gravity"]) == ("cpu", 1, pytest.approx(9.80665))
+        assert asked["material"].name == "jsc-1a-loose-cut"
