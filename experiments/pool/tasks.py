@@ -18,7 +18,6 @@ from typing import Any, Protocol, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from dem.prepare.bedfile import bed_shelf
 from experiments.runs.folder import BusyError, RunFolder, holding, write_json, write_text
 from experiments.runs.progress import Progress
 from experiments.runs.registry import Experiment, find_experiment
@@ -271,6 +270,8 @@ def _path_in(text: str, setting: str) -> tuple[Path | None, str]:
 
 def _content(text: str, setting: str) -> str:
     """A digest of what a text names: a file, a folder, or a bed on the shelf; the text itself where it names none."""
+    from dem.prepare.bedfile import bed_shelf  # this module is loaded by commands without grains
+
     path, rest = _path_in(text, setting)
     if path is None and setting == "bed" and _there(shelved := bed_shelf() / f"{text}.npz"):
         path = shelved

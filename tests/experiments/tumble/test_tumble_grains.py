@@ -394,7 +394,7 @@ def test_beds_of_jsc1a_are_prepared_as_their_material_needs_it_and_a_message_nam
             tumble.run(settings, tmp_path / name, progress=progress)
         assert PlanarOnBed(settings).stages == stages
     (said,) = (text for text in told["plain"] if "is prepared as" in text)
-    assert "jsc-1a-loose-cut" in said and said.endswith("rain:dry compact:0.56 stick level")
+    assert "jsc-1a-loose-cut" in said and said.endswith(" ".join(PlanarOnBed(on_bed(surface="jsc1a")).stages))
     assert any("jsc-1a-loose-heights" in text for text in told["older"])
     assert not any("is prepared as" in text for name in ("staged", "sand") for text in told[name])
 
