@@ -6,15 +6,18 @@ One trial by the planar and by the spatial model, through what `rigid` offers, a
 import sys
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 
 import rigid
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
+from vis.page.plots import BED, DOTTED, GREY, INK, MODEL, handle, legend_above, sheet, styled
 
 DURATION, TOLERANCE = 2.5, 1e-9
+_PLANAR = {"color": MODEL, "lw": 4.0, "alpha": 0.45}
+_SPATIAL = {"color": BED, "lw": 1.2}
+_APART = ({"color": BED}, {"color": "#009E73", "ls": (0, (4, 1.6))}, {"color": INK, "ls": (0, (6, 1.5, 1, 1.5))},
+          {"color": GREY, "ls": DOTTED})  # fmt: skip
+_LEAST = 1e-18
+"""A smaller difference is drawn here."""
 
 
 def both(duration: float = DURATION) -> tuple[rigid.Trajectory, rigid.SpatialTrajectory]:
@@ -41,25 +44,32 @@ def draw(path: Path) -> str:
     apart = {
         "x [m]": np.abs(space.position[:, 0] - flat.x),
         "y [m]": np.abs(space.position[:, 2] - flat.y),
-        "theta [rad]": np.abs(space.turn - flat.theta),
+        "θ [rad]": np.abs(space.turn - flat.theta),
         "out of the plane [m]": np.abs(space.position[:, 1]),
     }
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4))
-    left.plot(flat.time, 1e3 * flat.x, color="#0072B2", lw=4, alpha=0.4, label="x, planar")
-    left.plot(flat.time, 1e3 * space.position[:, 0], color="#0072B2", lw=1, label="x, spatial")
-    left.plot(flat.time, np.degrees(flat.theta), color="#D55E00", lw=4, alpha=0.4, label="theta, planar")
-    left.plot(flat.time, np.degrees(space.turn), color="#D55E00", lw=1, label="theta, spatial")
-    left.set(xlabel="time [s]", ylabel="x [mm], theta [degrees]")
-    left.legend(fontsize=8)
-    for (name, values), style in zip(apart.items(), ("-", "--", "-.", ":"), strict=True):
-        right.semilogy(flat.time, np.maximum(values, 1e-18), style, lw=1.2, label=name)
-    right.set(xlabel="time [s]", ylabel="difference")
-    right.legend(fontsize=8)
-    for axis in (left, right):
-        axis.grid(alpha=0.3)
-    figure.tight_layout()
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    with styled():
+        drawing, axes = sheet(3, 2, 4.8, sharex=True)
+        left, right = axes[:, 0], axes[:, 1]
+        for axis, label, one, other in (
+            (left[0], "x [mm]", 1e3 * flat.x, 1e3 * space.position[:, 0]),
+            (left[1], "y [mm]", 1e3 * flat.y, 1e3 * space.position[:, 2]),
+            (left[2], "θ [degrees]", np.degrees(flat.theta), np.degrees(space.turn)),
+        ):
+            axis.plot(flat.time, one, **_PLANAR)
+            axis.plot(flat.time, other, **_SPATIAL)
+            axis.set(ylabel=label)
+        for spare in right[1:]:
+            spare.remove()
+        whole = drawing.add_subplot(axes[0, 1].get_gridspec()[:, 1])
+        right[0].remove()
+        for (name, values), style in zip(apart.items(), _APART, strict=True):
+            whole.semilogy(flat.time, np.maximum(values, _LEAST), label=name, lw=1.3, **style)
+        whole.set(xlabel="time [s]", ylabel="difference [m] or [rad]", ylim=(0.3 * _LEAST, 1e-7))
+        whole.legend(loc="lower right", ncols=2)
+        left[0].set_title("brick, 0.0085 g, 0.22 N m for 0.5 s")
+        left[2].set_xlabel("time [s]")
+        legend_above(drawing, [handle("planar", **_PLANAR), handle("spatial", **_SPATIAL)], 2)
+        drawing.savefig(path, dpi=126)
     return ", ".join(f"{name} {values.max():.1e}" for name, values in apart.items())
 
 

@@ -10,17 +10,15 @@ import sys
 from collections.abc import Iterable
 from itertools import product
 from pathlib import Path
+from typing import Any
 
-import matplotlib
 import numpy as np
 
 from rigid import EFFECTS, Trial, simulate, simulate_batch
 from rigid.planar.dynamics import System
 from rigid.planar.located import integrate
-from vis.paper.figures import COLOURS
-
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
+from vis.page.plots import BED, INK, MODEL, STATES, handle, legend_above, sheet, styled
+from vis.page.states import legend_of_states, panels, state_runs
 
 GRAVITY, MASS = 9.80665, 5.3
 MARKS = "<!-- planar {0}: begin -->", "<!-- planar {0}: end -->"
@@ -29,6 +27,14 @@ TORQUES = (0.125, 0.22, 6.0)
 WHEEL_SPEED = 300.0  # of the brake trials [rad/s]: ours, the paper gives none
 DURATION = 2.0
 NAMES = ("x", "y", "theta", "vx", "vy", "omega")
+_SHOWN = 45.0
+"""End of the figure of states [degrees]."""
+_INTEGRATORS = (
+    ("the paper's step, order 1", MODEL, "s", 1e-3),
+    ("the batch, order 2", BED, "o", 1e-3),
+    ("located, order 5 (over its longest step)", INK, "^", 8e-3),
+)
+"""Name, colour, mark and longest step [s]."""
 
 
 def case(level: float, torque: float, mu_s: float) -> Trial:
@@ -90,49 +96,58 @@ def _final(trial: Trial, duration: float, longest: float, tolerance: float) -> n
 
 def draw_orders(path: Path) -> None:
     """Error at the end of a tumble over the step, three integrators, two trials with events."""
-    figure, axes = plt.subplots(1, 2, figsize=(9, 4.4), sharey=True, layout="constrained")
     trials = (
-        ("motor, 0.125 N m on brick, 0.4 s: slips, sticks, a row lifts off", case(0.0085, 0.125, 0.5), 0.4),
-        ("brake, 6 N m on steel, 0.1 s: slips, the wheel stops, hops", case(0.0085, 6.0, 0.25), 0.1),
+        ("brick, 0.125 N m (motor), 0.4 s:\nslips, sticks, a row lifts off", case(0.0085, 0.125, 0.5), 0.4),
+        ("steel, 6 N m (brake), 0.1 s:\nslips, the wheel stops, hops", case(0.0085, 6.0, 0.25), 0.1),
     )
-    for axis, (title, trial, duration) in zip(axes, trials, strict=True):
-        exact = _final(trial, duration, 5e-3, 1e-13)
-        halved = 0.5 ** np.arange(5)
-        runs = [simulate(trial, duration=duration, method="paper", time_step=float(h)) for h in 1e-3 * halved]
-        batches = [simulate_batch([trial], duration=duration, time_step=float(h)).final for h in 1e-3 * halved]
-        located = [_final(trial, duration, float(h), 1e3) for h in 8e-3 * halved]
-        for label, marker, longest, ends in (
-            ("the paper's step, order 1", "s-", 1e-3, [[getattr(run, name)[-1] for name in NAMES] for run in runs]),
-            ("the batch, order 2", "o-", 1e-3, [[final[name][0] for name in NAMES] for final in batches]),
-            ("located, order 5 (its longest step)", "^-", 8e-3, located),
-        ):
-            axis.loglog(longest * halved, np.abs(np.array(ends) - exact).max(axis=1), marker, label=label)
-        axis.set(xlabel="step [s]", title=title)
-        axis.title.set_fontsize(9)
-        axis.grid(alpha=0.3)
-    axes[0].set_ylabel("largest error in x, y, theta and their rates (SI)")
-    # Below the axes: within them it would cover points.
-    figure.legend(*axes[0].get_legend_handles_labels(), fontsize=8, ncols=3, loc="outside lower center")
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    with styled():
+        drawing, (axes,) = sheet(1, 2, 4.0, sharey=True)
+        for axis, trial in zip(axes, trials, strict=True):
+            _draw_orders_of(axis, *trial)
+        axes[0].set_ylabel("largest error of x, y, θ and rates [SI]")
+        legend_above(drawing, [handle(label, colour, marker=marker) for label, colour, marker, _ in _INTEGRATORS], 3)
+        drawing.savefig(path, dpi=126)
+
+
+def _draw_orders_of(axis: Any, title: str, trial: Trial, duration: float) -> None:
+    exact = _final(trial, duration, 5e-3, 1e-13)
+    halved = 0.5 ** np.arange(5)
+    runs = [simulate(trial, duration=duration, method="paper", time_step=float(h)) for h in 1e-3 * halved]
+    batches = [simulate_batch([trial], duration=duration, time_step=float(h)).final for h in 1e-3 * halved]
+    located = [_final(trial, duration, float(h), 1e3) for h in 8e-3 * halved]
+    found = (
+        [[getattr(run, name)[-1] for name in NAMES] for run in runs],
+        [[final[name][0] for name in NAMES] for final in batches],
+        located,
+    )
+    for (_, colour, marker, longest), ends in zip(_INTEGRATORS, found, strict=True):
+        error = np.abs(np.array(ends) - exact).max(axis=1)
+        axis.loglog(longest * halved, error, color=colour, marker=marker)
+    axis.set(xlabel="step [s]", title=title)
 
 
 def draw_states(path: Path) -> None:
     """State over theta, as the paper's Figure 6 has it, for steel and brick at 0.0085 g."""
-    figure, axes = plt.subplots(1, 2, figsize=(9, 2.6), sharey=True)
-    order = {"pivot": 0, "slip": 1, "hop": 2, "stand": 0}
-    for axis, (surface, mu_s) in zip(axes, SURFACES.items(), strict=True):
-        for torque, colour in zip(TORQUES, COLOURS, strict=False):
-            run = simulate(case(0.0085, torque, mu_s), duration=DURATION)
-            states = [order[name] for name in run.state_names]
-            axis.step(np.degrees(run.theta), states, label=f"{torque:g} N m", color=colour)
-        axis.set(title=f"{surface}, 0.0085 g", xlabel="theta [deg]", xlim=(0, 45), yticks=(0, 1, 2))
-        axis.set_yticklabels(["pivot", "slip", "hop"])
-        axis.grid(alpha=0.3)
-    axes[0].legend(fontsize=8, loc="center right")
-    figure.tight_layout()
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+    with styled():
+        drawing, axes = panels(2, 2.7)
+        drawing.subplots_adjust(top=0.76, bottom=0.2, left=0.13)
+        seen: set[str] = set()
+        for axis, (surface, mu_s) in zip(axes, SURFACES.items(), strict=True):
+            for place, torque in enumerate(TORQUES):
+                run = simulate(case(0.0085, torque, mu_s), duration=DURATION)
+                theta, names = np.degrees(run.theta), np.array(run.state_names)
+                for low, high, name in state_runs(names):
+                    ends = theta[low], theta[min(high, len(theta) - 1)]
+                    if max(ends) > 0 and min(ends) < _SHOWN:
+                        seen.add(name)
+                        axis.barh(place, ends[1] - ends[0], left=ends[0], height=0.62, color=STATES[name])
+            axis.set(title=f"{surface}, 0.0085 g", xlabel="θ [degrees]", xlim=(0, _SHOWN))
+            axis.grid(False, axis="y")
+            axis.invert_yaxis()
+            axis.set_yticks(range(len(TORQUES)), ["0.125 N m (motor)", "0.22 N m (motor)", "6 N m (brake)"])
+        axes[1].tick_params(labelleft=False)
+        legend_of_states(drawing, np.array(sorted(seen)))
+        drawing.savefig(path, dpi=126)
 
 
 def main(folder: str) -> None:

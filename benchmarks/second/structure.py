@@ -13,11 +13,11 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib as mpl
-import matplotlib.pyplot as plt
+from matplotlib.patches import Patch
 
 from benchmarks.diagnosis.table import read_cases
 from experiments.runs.types import Json
+from vis.page.plots import legend_above, sheet, styled
 
 __all__ = ["counted", "draw", "outcome_of"]
 
@@ -69,23 +69,23 @@ def draw(path: Path, cases: Sequence[Json]) -> None:
     found = counted(cases)
     if not any(found.values()):
         raise ValueError("no record has a stated structure: run bench diagnose with --structure")
-    mpl.use("Agg")
-    figure, axes = plt.subplots(1, len(GROUPS), figsize=(10, 3.6), sharey=True, layout="constrained")
-    for axis, group in zip(axes, GROUPS, strict=True):
-        sizes = sorted(found[group])
-        below = [0.0] * len(sizes)
-        for outcome, colour in OUTCOMES.items():
-            shares = [found[group][size][outcome] / found[group][size].total() for size in sizes]
-            axis.bar(range(len(sizes)), shares, bottom=below, color=colour, label=outcome, width=0.8)
-            below = [low + share for low, share in zip(below, shares, strict=True)]
-        axis.set_xticks(range(len(sizes)), [f"{size:g}\n({found[group][size].total()})" for size in sizes])
-        axis.set_title(group)
-        axis.set_xlabel("structure error over the noise\n(campaigns)")
-    axes[0].set_ylabel("share of campaigns")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    groups = [group for group in GROUPS if found[group]]
+    seen = {outcome for group in groups for counts in found[group].values() for outcome in counts}
+    with styled():
+        drawing, (axes,) = sheet(1, len(groups), 3.4, sharey=True)
+        for axis, group in zip(axes, groups, strict=True):
+            sizes = sorted(found[group])
+            below = [0.0] * len(sizes)
+            for outcome, colour in OUTCOMES.items():
+                shares = [found[group][size][outcome] / found[group][size].total() for size in sizes]
+                axis.bar(range(len(sizes)), shares, bottom=below, color=colour, width=0.7)
+                below = [low + share for low, share in zip(below, shares, strict=True)]
+            axis.set_xticks(range(len(sizes)), [f"{size:g}\n({found[group][size].total()})" for size in sizes])
+            axis.set(title=group, xlabel="structure error over the noise [1]\n(campaigns)")
+            axis.grid(False, axis="x")
+        axes[0].set_ylabel("share of campaigns [1]")
+        legend_above(drawing, [Patch(color=OUTCOMES[name], label=name) for name in OUTCOMES if name in seen], 6)
+        drawing.savefig(path, dpi=126)
 
 
 def main(arguments: Sequence[str]) -> None:

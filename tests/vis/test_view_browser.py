@@ -1,6 +1,7 @@
 """The page of a run in Chromium, drawn by software: something is there, time and camera change it, keys suffice."""
 
 import io
+import json
 
 import numpy as np
 import pytest
@@ -143,6 +144,36 @@ def test_colours_cut_and_runs_can_be_chosen(browser, page):
     browser.open(page, "frame=4&colour=nonsense&run=99")
     assert browser.value(f"{STATE}.frame") >= 0 and browser.errors == []
     assert "--frame-count" in browser.value("document.querySelector('.scene .message').textContent")
+
+
+def standing(folder):
+    """A run that was never computed: a platform of 0.2 m stands on a law, its tips 12 mm deep."""
+    names = ("t_s", "x_m", "y_m", "theta_rad", "vx_m_s", "vy_m_s", "omega_rad_s")
+    rows = [f"{time},0.0,{0.2 * np.cos(np.pi / 8) - 0.012},0.0,0.0,0.0,0.0,stand" for time in (0.0, 0.5, 1.0)]
+    (folder / "trajectory.csv").write_text("\n".join([",".join((*names, "state")), *rows]) + "\n")
+    trial = {"spike_length": 0.2, "weight": 1.0, "mass": 5.3, "stiffness": 40.0, "damping": 0.0}
+    result = {
+        "experiment": "tumble", "title": "made up", "ground": "spring-damper", "surface": "sand", "spike_count": 8,
+        "effects": [], "trial": {name: {"value": value} for name, value in trial.items()},
+    }  # fmt: skip
+    (folder / "result.json").write_text(json.dumps(result))
+    return folder
+
+
+def test_tips_in_the_ground_of_a_law_show_through_it(browser, tmp_path):
+    """From behind the block covers the tips: where it hides them once it is opaque, they show through as it is."""
+    viewer = "document.querySelector('.scene').viewer"
+    browser.open(write_view(standing(tmp_path)), "frame=0&az=3.1416&el=0&zoom=2")
+    assert browser.value(f"{viewer}.scene.title") == "Platform on the spring-damper, sand"
+    pictures = []
+    for change in ("0", "page.opacity = 1", "bodies = () => []", "page.opacity = 0.55"):
+        browser.value(f"({viewer}.{change}, 0)" if "=" in change else change)
+        pictures.append(seen(browser))
+    through, opaque, opaque_alone, alone = pictures
+    hidden = np.abs(opaque - opaque_alone).max(axis=-1) == 0
+    shown = hidden & (np.abs(through - alone).max(axis=-1) > 12)
+    assert 1e-4 < shown.mean() < 0.05
+    assert (through[..., 3] == 255).all() and browser.errors == []
 
 
 def test_a_drag_turns_the_scene(browser, page):

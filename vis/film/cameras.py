@@ -13,7 +13,7 @@ from vis.film.reel import AnyReel, Reel, SpaceReel
 from vis.page.plots import INK, Array, nice_below
 from vis.pictures.canvas import HALO
 from vis.pictures.frames import Frame
-from vis.pictures.scene import Eye, Stage
+from vis.pictures.scene import OPACITY, Eye, Stage
 from vis.pictures.sections import FlatStage
 
 __all__ = ["Camera", "Panel", "layout"]
@@ -116,9 +116,10 @@ class _Space(Camera):
 
     def set_up(self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         width = max(self.width, self.tall * pixels[0] / pixels[1]) * reach
-        (low, high), centres, kind = reel.box, reel.centres, Stage if opengl else FlatStage
+        (low, high), centres = reel.box, reel.centres
         cut, pitch = (float(low[1]), self.pitch) if opengl else (float(centres[:, 1].mean()), 0.0)
-        stage = kind(pixels, width=width, cut=cut, low=low, high=high, radius=reel.radius, pitch=pitch)
+        seen = {"width": width, "cut": cut, "pitch": pitch, "low": low, "high": high, "radius": reel.radius}
+        stage = Stage(pixels, **seen, opacity=OPACITY) if opengl else FlatStage(pixels, **seen)
         stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
         level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(stage.pitch)
         return stage, _steady(np.column_stack([centres[:, 0], level - 0.12 * stage.height]))

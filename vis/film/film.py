@@ -91,7 +91,7 @@ class Sheet:
                 self._panel(sheet, number, time)
             for number, reel in enumerate(self.reels):
                 left = next(panel.place[0] for panel in self.panels if panel.run == number)
-                title = str(reel.result["title"]) if len(self.reels) == 1 else self.labels[number]
+                title = str(reel.result["title"]) if len(self.reels) == 1 else _with_surface(self.labels[number], reel)
                 sheet.text(left, 0.975, title, fontsize=15, fontweight="bold", va="top")
                 sheet.text(left, 0.93, reel.line(reel.nearest(time)), fontsize=13, va="top", color="#444444")
             for panel in self.panels:
@@ -128,6 +128,12 @@ class Sheet:
             for point, force in zip(points, fields.get("force", np.zeros((0, 3))), strict=True):
                 ends = stage.place(np.array([point, point + long * np.asarray(force, dtype=float)]), focus)
                 canvas.draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
+
+
+def _with_surface(label: str, reel: AnyReel) -> str:
+    """What to call one of two runs on a picture: the surface is named."""
+    surface = str(reel.result.get("surface") or "")
+    return label if not surface or surface in label else f"{label}, {surface}"
 
 
 def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> list[tuple[str, str, float, str]]:

@@ -121,7 +121,7 @@ def state_strip(drawing: Figure, runs: Sequence[Mapping[str, Any]], labels: Sequ
         _band(axis, count - 1 - number, run["t_s"], run["state"])
     axis.axvline(time, color=INK, lw=2.0)
     axis.set(xlim=(0.0, max(float(run["t_s"][-1]) for run in runs)), ylim=(-0.5, count - 0.5))
-    axis.set_yticks(range(count), names)
+    axis.set_yticks(range(count) if count > 1 else [], names if count > 1 else [])
     axis.grid(False)
     axis.set_xlabel("time [s]", labelpad=1)
     there = [name for name in STATES if any(name in run["state"] for run in runs)]

@@ -17,6 +17,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from vis.page.numbers import quote
@@ -24,7 +25,7 @@ from vis.page.plots import INK, styled
 
 __all__ = [
     "COLOURS", "FORCE", "HALO", "Page", "blank_page", "colour_top", "colour_values", "colourmap", "draw_force",
-    "draw_measure", "moved_since", "nice_above", "pixels",
+    "draw_measure", "even_steps", "moved_since", "nice_above", "pixels",
 ]  # fmt: skip
 
 #: What grains are coloured by: name -> (label with unit, factor from SI).
@@ -36,10 +37,13 @@ COLOURS: dict[str, tuple[str, float]] = {
 }
 HALO = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
 """Box of a word on a picture."""
-FORCE = {
+FORCE: dict[str, Any] = {
     "arrowstyle": "-|>,head_width=0.28,head_length=0.55", "color": "#B00020", "lw": 2.2, "shrinkA": 0, "shrinkB": 0,
+    "path_effects": [withStroke(linewidth=5.0, foreground="white")],
 }  # fmt: skip
-"""How an arrow of a force is drawn."""
+"""How an arrow of a force is drawn; its white rim keeps it apart from dark grains and metal."""
+_STEPS = {1.0: 5, 1.5: 3, 2.0: 4, 3.0: 3, 4.0: 4, 5.0: 5, 6.0: 6, 8.0: 4}
+"""Ends of a colour scale, over a power of ten, and how many equal steps of a round number each is divided into."""
 _SHORTEST = 0.005
 """A shorter arrow is not drawn, in fractions of the picture."""
 _RIM = 0.01
@@ -95,9 +99,13 @@ def nice_above(value: float) -> float:
     if not (np.isfinite(value) and value > 0.0):
         return 1.0
     power = 10.0 ** np.floor(np.log10(value))
-    return float(
-        next((n * power for n in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0) if n * power >= 0.9999 * value), 10 * power)
-    )
+    return float(next((n * power for n in _STEPS if n * power >= 0.9999 * value), 10 * power))
+
+
+def even_steps(top: float) -> NDArray[np.float64]:
+    """Numbers at a colour bar: round ones at equal distances from 0 to its end, where that is a `nice_above`."""
+    power = 10.0 ** np.floor(np.log10(top) + 1e-9)
+    return np.linspace(0.0, top, 1 + _STEPS.get(round(top / power, 6), 5))
 
 
 class Page:
@@ -151,6 +159,7 @@ class Page:
         """The bar of the colour scale: left, foot, width, height in fractions of the figure."""
         scale = ScalarMappable(self.norm, self.map)
         bar = figure.colorbar(scale, cax=figure.add_axes(place), extend="max", extendfrac=0.04)
+        bar.set_ticks(even_steps(float(self.norm.vmax or 1.0)).tolist())
         bar.set_label(COLOURS[self.by][0], fontsize=fontsize)
         bar.outline.set_visible(False)  # type: ignore[operator]
         return bar

@@ -20,7 +20,7 @@ from PIL import Image
 from vis.page.plots import Array
 from vis.pictures.frames import Frame
 
-__all__ = ["FLOOR", "GROUND", "METAL", "PARTS", "Eye", "Rendered", "Scene", "Stage"]
+__all__ = ["FLOOR", "GROUND", "METAL", "OPACITY", "PARTS", "Eye", "Rendered", "Scene", "Stage"]
 
 _OVERSAMPLE = 1.5  # rendered larger and shrunk: smooth edges at a third of the cost of multi-sampling
 _LIGHTS = (((-1.0, -1.6, 1.9), 0.72), ((1.6, -1.4, 0.5), 0.26), ((0.1, 1.0, 1.4), 0.22))
@@ -28,6 +28,8 @@ _RIM = (0.30, 0.32, 0.35)
 FLOOR = (0.55, 0.55, 0.57)
 METAL = (0.74, 0.76, 0.79)
 GROUND = (0.86, 0.80, 0.70)
+OPACITY = 0.55
+"""Of a block of ground with tips in it: they show through."""
 PARTS = {"hull": (0.80, 0.82, 0.85), "spikes": (0.52, 0.55, 0.60)}
 """Colours of the parts of a platform."""
 
@@ -53,10 +55,20 @@ class Rendered:
         self._actors: list[Any] = []
 
     def add_block(
-        self, corners: Sequence[float], colour: tuple[float, float, float], ambient: float, diffuse: float
+        self,
+        corners: Sequence[float],
+        colour: tuple[float, float, float],
+        ambient: float,
+        diffuse: float,
+        opacity: float = 1.0,
     ) -> None:
         """A box, its corners in VTK's order [m], that stays: ground or floor."""
-        self._plotter.add_mesh(self._pyvista.Box(corners), color=colour, ambient=ambient, diffuse=diffuse)
+        # A translucent one without its rear faces: one face is mixed in at each place.
+        culling = "back" if opacity < 1.0 else False
+        box = self._pyvista.Box(corners)
+        self._plotter.add_mesh(
+            box, color=colour, ambient=ambient, diffuse=diffuse, opacity=opacity, culling=culling, smooth_shading=False
+        )
 
     def draw(self, axis: Any, *frame: Any, **more: Any) -> None:
         """Show the picture of a frame on an axes whose limits are 0 to 1; arguments as those of `render`."""
@@ -212,15 +224,25 @@ class Stage(Eye, Rendered):
     """Renders frames with VTK. Needs OpenGL: use it only in a process that may die.
 
     ``low``, ``high``: Corners of the bed [m]; without grains, of a block of ground. ``radius``: Typical radius of a
-    grain [m], for the shading of gaps; None: a block of ground in place of grains. (the others as `Eye`)
+    grain [m], for the shading of gaps; None: a block of ground in place of grains. ``opacity``: Of that block. (the
+    others as `Eye`)
     """
 
-    def __init__(self, size: tuple[int, int], *, low: Array, high: Array, radius: float | None, **view: float) -> None:
+    def __init__(
+        self,
+        size: tuple[int, int],
+        *,
+        low: Array,
+        high: Array,
+        radius: float | None,
+        opacity: float = 1.0,
+        **view: float,
+    ) -> None:
         Eye.__init__(self, size, **({"pitch": 0.24} | view))
         Rendered.__init__(self, size, centre=np.zeros(3), reach=1.0)
         thick = 0.03 * float(high[2] - low[2])
         if radius is None:
-            self.add_block((low[0], high[0], self.cut, high[1], low[2], high[2]), GROUND, 0.4, 0.7)
+            self.add_block((low[0], high[0], self.cut, high[1], low[2], high[2]), GROUND, 0.4, 0.7, opacity)
         else:
             self.add_block((low[0], high[0], self.cut, high[1], low[2] - thick, low[2] - 1e-6), FLOOR, 0.25, 0.8)
             if radius / self.width * size[0] > 4.0:  # on smaller grains the shading of gaps does not show

@@ -13,7 +13,7 @@ from vis.page.page import Block, scene_block, text, write_template
 from vis.page.report import Progress
 from vis.page.sentences import Sentences
 from vis.pictures.canvas import colourmap
-from vis.pictures.scene import FLOOR, GROUND
+from vis.pictures.scene import FLOOR, GROUND, OPACITY
 from vis.view.scene import Limits, Packed, make_scene
 from vis.view.sources import Source, sources_of
 
@@ -124,7 +124,7 @@ def _head(scenes: Sequence[Packed], title: str, live: float = 0.0) -> str:
     """What the page's script reads, as JSON that cannot end the script's tag."""
     palette = np.round(255 * colourmap()(np.arange(256))[:, :3]).astype(int).tolist()
     head = {
-        "title": title, "live": live, "palette": palette, "ground": GROUND, "floor": FLOOR,
+        "title": title, "live": live, "palette": palette, "ground": GROUND, "opacity": OPACITY, "floor": FLOOR,
         "scenes": [scene.head for scene in scenes],
     }  # fmt: skip
     return json.dumps(head, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

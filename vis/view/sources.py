@@ -80,7 +80,7 @@ def _in_plane(home: Path) -> Source:
     grains_missing = reel.frames is None and reel.result.get("ground") == "bed"
     low, high = reel.box
     return Source(
-        id=NAME, title=f"Platform on a {called}" if called.startswith("bed") else f"Platform on the {called}",
+        id=NAME, title=f"Platform on {_stands_on(reel.result)}",
         times=reel.times, frame=reel.frame, cut=reel.cut, surface=reel.surface,
         low=low, high=high, block=not reel.on_grains, force=("weight", reel.number("weight")),
         panels=curves.of_tumble(home, reel.series, called), states=curves.bands(reel.series["t_s"], reel.states),
@@ -92,19 +92,27 @@ def _in_space(home: Path) -> Source:
     series = _read(lambda: SpaceReel(home), home)
     states = curves.bands(series.series["t_s"], series.states) if len(series.states) else []
     weight = ("weight", series.number("weight")) if len(series) else None
-    return _on_reel(series, "Platform in space", weight, curves.of_space(home, series.series), states)
+    title = f"Platform in space on {_stands_on(series.result)}"
+    return _on_reel(series, title, weight, curves.of_space(home, series.series), states)
 
 
 def _of_robot(home: Path) -> Source:
     """A robot of MuJoCo; without gravity its arrows are measured by the largest force."""
     series = _read(lambda: SpaceReel(home), home)
-    ground = "bed of grains" if series.result.get("ground") == "bed" else series.result.get("ground", "law")
     largest = float(series.result["quantities"]["largest_force"]["value"])
     force = ("weight", series.number("weight"))
     if not force[1]:
         force = ("largest force", largest)
     panels = _read(lambda: curves.of_robot(home), home)
-    return _on_reel(series, f"Robot on the {ground}", force if largest else None, panels, [])
+    return _on_reel(series, f"Robot on {_stands_on(series.result)}", force if largest else None, panels, [])
+
+
+def _stands_on(result: Result) -> str:
+    """The ground of a run in words, with its surface."""
+    ground, surface = str(result.get("ground", "law")), str(result.get("surface") or "")
+    if ground == "bed":
+        return f"a bed of {surface or 'grains'}"
+    return f"the {ground}" + (f", {surface}" if surface else "")
 
 
 def _on_reel(

@@ -15,7 +15,7 @@ import numpy as np
 from experiments import groundmap, tumble
 from experiments.converge.statistics import interval_of
 from rigid.ground_file import GroundFile, read_ground
-from vis.page.plots import BED, MODEL, new_panels
+from vis.page.plots import BED, MODEL, handle, legend_above, sheet, styled
 
 HERE = Path(__file__).parent
 RESULTS = HERE.parent
@@ -108,18 +108,22 @@ def main() -> None:
             cells.append(f"{value:.1f} ± {std:.1f}" if std else f"{value:.1f}")
         print(f"| {words} | {' | '.join(cells)} |")
     shown = ("trajectory_angle", "ahead_1s", "sinkage_largest", "sinkage_start")
-    drawing, panels = new_panels(4, height=3.4, sharey=True)
-    for axis, name in zip(panels, shown, strict=True):
-        for place, size in enumerate(SIZES):
-            values = grains[size][name]
-            axis.plot(values, [place] * len(values), "o", color=BED, ms=4)
-        for place, numbers in enumerate(found.values(), len(SIZES)):
-            value, std = numbers[name]
-            axis.errorbar([value], [place], xerr=[std], fmt="s", color=MODEL, ms=5, capsize=3)
-        axis.set_title(QUANTITIES[name][1].replace(" [", "\n["), fontsize=8)
-    panels[0].set_yticks(np.arange(len(heads)), heads, fontsize=7)
-    panels[0].invert_yaxis()
-    drawing.savefig(RESULTS.parent / "images" / "tumble-laws.png", dpi=110, bbox_inches="tight")
+    with styled():
+        drawing, (panels,) = sheet(1, 4, 3.6, sharey=True)
+        for axis, name in zip(panels, shown, strict=True):
+            for place, size in enumerate(SIZES):
+                values = grains[size][name]
+                axis.plot(values, [place] * len(values), "o", color=BED, ms=4)
+            for place, numbers in enumerate(found.values(), len(SIZES)):
+                value, std = numbers[name]
+                axis.errorbar([value], [place], xerr=[std], fmt="s", color=MODEL, ms=5, capsize=3)
+            axis.set_xlabel(QUANTITIES[name][1].replace(" [", "\n["))
+        panels[0].set_yticks(np.arange(len(heads)), heads)
+        panels[0].invert_yaxis()
+        marks = [handle("grains of sand, each bed", BED, ls="", marker="o", ms=4)]
+        marks.append(handle("surface law, ± standard deviation", MODEL, ls="", marker="s", ms=5))
+        legend_above(drawing, marks, 2)
+        drawing.savefig(RESULTS.parent / "images" / "tumble-laws.png", dpi=126)
 
 
 if __name__ == "__main__":

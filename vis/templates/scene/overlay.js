@@ -1,6 +1,6 @@
 // What lies over the picture: arrows of forces, the undisturbed surface, a scale bar, axes, the colour scale.
 
-const INK = "#222222", FORCE = "#B00020", HALO = "rgba(255, 255, 255, 0.75)";
+const INK = "#222222", FORCE = "#B00020", RIM = "#ffffff", HALO = "rgba(255, 255, 255, 0.75)";
 const ARROW = 0.22; // Length of the arrow of the reference force, over the picture's height.
 
 /** The largest 1, 2 or 5 times a power of ten not above a number. */
@@ -70,14 +70,18 @@ class Overlay {
     const inside = Math.min(1, this.roomAlong(from, dx, dy)), end = [from[0] + inside * dx, from[1] + inside * dy];
     if (inside <= 0) return;
     const head = Math.min(11, 0.5 * long * inside), [ux, uy] = [dx / long, dy / long];
-    this.line([from, [end[0] - 0.8 * head * ux, end[1] - 0.8 * head * uy]], FORCE, 3);
-    const pen = this.pen;
+    const shaft = [from, [end[0] - 0.8 * head * ux, end[1] - 0.8 * head * uy]], pen = this.pen;
+    const tip = new Path2D();
+    tip.moveTo(...end);
+    tip.lineTo(end[0] - head * ux - 0.45 * head * uy, end[1] - head * uy + 0.45 * head * ux);
+    tip.lineTo(end[0] - head * ux + 0.45 * head * uy, end[1] - head * uy - 0.45 * head * ux);
+    tip.closePath();
+    this.line(shaft, RIM, 6); // A white rim: dark grains and metal hide a dark arrow.
+    Object.assign(pen, { strokeStyle: RIM, lineWidth: 3, lineJoin: "round" });
+    pen.stroke(tip);
+    this.line(shaft, FORCE, 3);
     pen.fillStyle = FORCE;
-    pen.beginPath();
-    pen.moveTo(...end);
-    pen.lineTo(end[0] - head * ux - 0.45 * head * uy, end[1] - head * uy + 0.45 * head * ux);
-    pen.lineTo(end[0] - head * ux + 0.45 * head * uy, end[1] - head * uy - 0.45 * head * ux);
-    pen.fill();
+    pen.fill(tip);
     if (newton !== null) {
       const text = withUnit(newton, "N") + (inside < 1 ? ", arrow cut" : "");
       const left = end[0] < 0.6 * this.width;

@@ -44,13 +44,13 @@ void main() {
 const BODY_FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 seen;
-uniform vec3 colour;
+uniform vec4 colour;  // its fourth part is the opacity
 out vec4 pixel;
 void main() {
   vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));  // of the triangle; away is its third component
   if (normal.z > 0.0) normal = -normal;
   float light = max(0.0, dot(normal, vec3(-0.40, 0.62, -0.675)));
-  pixel = vec4(colour * (0.55 + 0.5 * light), 1.0);
+  pixel = vec4(colour.rgb * (0.55 + 0.5 * light), colour.a);
 }`;
 
 /** Cells of the screen at most. */
@@ -69,6 +69,8 @@ class Picture {
     this.capacity = 0;
     this.drawn = 0;
     gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE);
     gl.clearColor(1, 1, 1, 1);
   }
 
@@ -105,16 +107,30 @@ class Picture {
    * Draw a frame and wait until it is there.
    * view: right, up, away (unit vectors), centre [m], tall (height of the picture [m]), reach (half depth [m]).
    * grains: position (codes), low [m], step [m], radius [m] of each, colour (code of each, or null), cut (y) [m].
-   * bodies: points [m], triangles and colour of each. palette: a 32-bit colour for each code.
+   * bodies: points [m], triangles, colour and opacity (1 if not given) of each. palette: a 32-bit colour for each code.
+   * Translucent bodies come last: what lies in them shows through their nearest face.
    */
   draw(view, grains, bodies, palette) {
     const gl = this.gl, { width, height } = this.canvas;
     gl.viewport(0, 0, width, height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const scale = [(2 / view.tall) * (height / width), 2 / view.tall, 1 / view.reach];
-    this.drawBodies(view, bodies, scale);
+    const clear = ({ opacity = 1 }) => opacity < 1;
+    this.drawBodies(view, bodies.filter((body) => !clear(body)), scale);
     this.drawn = grains ? this.drawGrains(view, grains, scale, palette) : 0;
+    for (const body of bodies.filter(clear)) this.drawClear(view, body, scale);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+
+  /** Its depths first and then its colour, so that one of its faces is mixed in at each place, whatever their order. */
+  drawClear(view, body, scale) {
+    const gl = this.gl;
+    gl.colorMask(false, false, false, false);
+    this.drawBodies(view, [body], scale);
+    gl.colorMask(true, true, true, true);
+    gl.enable(gl.BLEND);
+    this.drawBodies(view, [body], scale);
+    gl.disable(gl.BLEND);
   }
 
   drawBodies(view, bodies, scale) {
@@ -131,7 +147,7 @@ class Picture {
       gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.triangles);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, body.triangles, gl.STREAM_DRAW);
-      gl.uniform3fv(at.colour, body.colour);
+      gl.uniform4fv(at.colour, [...body.colour, body.opacity ?? 1]);
       gl.drawElements(gl.TRIANGLES, body.triangles.length, gl.UNSIGNED_INT, 0);
     }
   }

@@ -303,7 +303,7 @@ class Viewer {
     });
   }
 
-  /** The block that stands for a law, or the floor below the grains. */
+  /** The block that stands for a law, translucent for the tips in it, or the floor below the grains. */
   ground() {
     const { scene } = this, { low, high } = scene, thick = 0.03 * (high[2] - low[2]);
     if (!scene.block && !scene.grains.count) return [];
@@ -312,7 +312,8 @@ class Viewer {
     const points = new Float32Array(24);
     for (let k = 0; k < 8; k++) points.set([k & 1 ? high[0] : low[0], k & 2 ? high[1] : front, k & 4 ? head : foot], 3 * k);
     const triangles = new Uint32Array([0, 1, 5, 0, 5, 4, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 3, 7, 1, 7, 5, 4, 5, 7, 4, 7, 6, 0, 1, 3, 0, 3, 2]);
-    return [{ points, triangles, colour: scene.block ? this.page.ground : this.page.floor }];
+    if (scene.block) return [{ points, triangles, colour: this.page.ground, opacity: this.page.opacity }];
+    return [{ points, triangles, colour: this.page.floor }];
   }
 
   drawOver(view, wide, high) {
