@@ -45,7 +45,7 @@ def draw(path: Path) -> str:
         "x [m]": np.abs(space.position[:, 0] - flat.x),
         "y [m]": np.abs(space.position[:, 2] - flat.y),
         "θ [rad]": np.abs(space.turn - flat.theta),
-        "out of the plane [m]": np.abs(space.position[:, 1]),
+        "out of the plane [m] (0)": np.abs(space.position[:, 1]),
     }
     with styled():
         drawing, axes = sheet(3, 2, 4.8, sharex=True)
@@ -65,7 +65,7 @@ def draw(path: Path) -> str:
         for (name, values), style in zip(apart.items(), _APART, strict=True):
             whole.semilogy(flat.time, np.maximum(values, _LEAST), label=name, lw=1.3, **style)
         whole.set(xlabel="time [s]", ylabel="difference [m] or [rad]", ylim=(0.3 * _LEAST, 1e-7))
-        whole.legend(loc="lower right", ncols=2)
+        whole.legend(loc="center right", bbox_to_anchor=(1.0, 0.3), ncols=2)
         left[0].set_title("brick, 0.0085 g, 0.22 N m for 0.5 s")
         left[2].set_xlabel("time [s]")
         legend_above(drawing, [handle("planar", **_PLANAR), handle("spatial", **_SPATIAL)], 2)

@@ -130,7 +130,7 @@ def draw_states(path: Path) -> None:
     """State over theta, as the paper's Figure 6 has it, for steel and brick at 0.0085 g."""
     with styled():
         drawing, axes = panels(2, 2.7)
-        drawing.subplots_adjust(top=0.76, bottom=0.2, left=0.13)
+        drawing.subplots_adjust(top=0.76, bottom=0.2, left=0.15, wspace=0.08)
         seen: set[str] = set()
         for axis, (surface, mu_s) in zip(axes, SURFACES.items(), strict=True):
             for place, torque in enumerate(TORQUES):
@@ -141,7 +141,7 @@ def draw_states(path: Path) -> None:
                     if max(ends) > 0 and min(ends) < _SHOWN:
                         seen.add(name)
                         axis.barh(place, ends[1] - ends[0], left=ends[0], height=0.62, color=STATES[name])
-            axis.set(title=f"{surface}, 0.0085 g", xlabel="θ [degrees]", xlim=(0, _SHOWN))
+            axis.set(title=f"{surface}, 0.0085 g, first {DURATION:g} s", xlabel="θ [degrees]", xlim=(0, _SHOWN))
             axis.grid(False, axis="y")
             axis.invert_yaxis()
             axis.set_yticks(range(len(TORQUES)), ["0.125 N m (motor)", "0.22 N m (motor)", "6 N m (brake)"])

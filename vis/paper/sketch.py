@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
 from vis.page.plots import BED, GREY, INK, MODEL, Array, new_figure, styled
@@ -55,6 +56,7 @@ def draw_sketch() -> Figure:
         axis.plot([low, low + span], [0.0, 0.0], color=INK, lw=0.9, ls=(0, (5, 4)), zorder=1)
     figure.text(0.012, 0.985, "The platform and its contact", fontsize=11, fontweight="bold", va="top")
     figure.text(0.587, 0.985, "The rig that offloads gravity", fontsize=11, fontweight="bold", va="top")
+    figure.add_artist(Line2D([0.575, 0.575], [0.0, 0.93], color="white", lw=7.0, zorder=9))
     _platform_panel(left)
     _rig_panel(right)
     return figure
@@ -72,8 +74,8 @@ def _platform_panel(axis: Axes) -> None:
     _arrow(axis, centre, (centre[0], centre[1] - 0.078), colour=_FORCE)
     _words(axis, (centre[0] - 0.006, centre[1] - 0.075), "$W$", color=_FORCE, ha="right", zorder=9)
     axis.plot(*centre, "o", color=INK, ms=5, zorder=8)
-    _words(axis, (0.165, 0.40), "geometric centre\nand centre of mass:\n$(x, y)$;  $m$, $J$", va="top")
-    axis.annotate("", centre, (0.162, 0.37), zorder=8, arrowprops={
+    _words(axis, (0.163, 0.375), "geometric centre\nand centre of mass:\n$(x, y)$;  $m$, $J$", va="top")
+    axis.annotate("", centre, (0.160, 0.345), zorder=8, arrowprops={
         "arrowstyle": "-", "color": INK, "lw": 0.8, "shrinkA": 0, "shrinkB": 3})  # fmt: skip
     _rows(axis, centre)
     _length(axis, centre)
@@ -86,7 +88,7 @@ def _rig_panel(axis: Axes) -> None:
     centre = (-0.09, small * LENGTH * math.cos(math.pi / ROWS) - 0.008)
     _platform(axis, centre, 0.0, small * LENGTH)
     axis.plot(*centre, "o", color=INK, ms=4, zorder=8)
-    _words(axis, (centre[0] + 0.013, centre[1] - 0.002), "shaft: $(x, y)$", fontsize=8.5, zorder=9)
+    _words(axis, (centre[0] + 0.013, centre[1] - 0.002), "shaft", fontsize=8.5, zorder=9)
     top, radius, block = 0.375, 0.019, 0.215
     far = 0.085
     wheels = [(centre[0] + radius, top), (far - radius, top)]
@@ -110,7 +112,7 @@ def _rig_panel(axis: Axes) -> None:
     _words(axis, (far + 0.02, block - 0.088), "$dy_b/dt = -dy/dt$", va="center")
     _arrow(axis, (0.24, 0.36), (0.24, 0.29), colour=_FORCE)
     _words(axis, (0.248, 0.325), "$g$", color=_FORCE, va="center")
-    _axes(axis, (-0.2, 0.0), 0.045)
+    _axes(axis, (0.19, 0.0), 0.05)
     rules = (
         r"free fall of the pair:  $g_{sim} = g\,(m - m_b)\,/\,(m + m_b)$",
         r"load on the surface:  $W = (m + m_b)\,g_{sim}$",
@@ -133,11 +135,12 @@ def _platform(axis: Axes, centre: Point, theta: float, length: float) -> None:
 
 def _axes(axis: Axes, origin: Point, long: float) -> None:
     """x to the right along the surface, y up from it."""
-    for name, end in (("$x$", (origin[0] + long, origin[1])), ("$y$", (origin[0], origin[1] + long))):
+    for name, end, place in (
+        ("$x$", (origin[0] + long, origin[1]), (origin[0] + long - 0.006, origin[1] + 0.016)),
+        ("$y$", (origin[0], origin[1] + long), (origin[0] + 0.014, origin[1] + long - 0.006)),
+    ):
         _arrow(axis, origin, end)
-        along = (end[0] - origin[0], end[1] - origin[1])
-        place = (end[0] + 0.18 * along[0], end[1] + 0.18 * along[1])
-        _words(axis, place, name, ha="center", va="center")
+        _words(axis, place, name, ha="center", va="center", fontsize=11)
 
 
 def _angle_of_body(axis: Axes, centre: Point) -> None:
@@ -180,7 +183,7 @@ def _length(axis: Axes, centre: Point) -> None:
     """l, from the centre to the tip of the leading row."""
     end = tip(LEADING, centre, THETA)
     axis.plot([centre[0], end[0]], [centre[1], end[1]], color=INK, lw=0.8, zorder=6)
-    along = 0.62
+    along = 0.47
     place = (centre[0] + along * (end[0] - centre[0]) + 0.008, centre[1] + along * (end[1] - centre[1]))
     _words(axis, place, "$l$", fontsize=11, zorder=9)
 
@@ -207,11 +210,11 @@ def _contact(axis: Axes, end: Point) -> None:
     _words(axis, (left - 0.006, 0.5 * end[1]), r"depth $\delta = -y_n$", ha="right", va="center")
     rules = (
         r"$N = K\delta + C\,\max(0,\,d\delta/dt)$",
-        r"sticks while $|F| \leq \mu_s N$",
-        r"slides:  $|F| = \mu_d N$, against the slip",
+        r"sticks:  $|F| \leq \mu_s N$",
+        r"slips:  $|F| = \mu_d N$, against the slip",
     )
     for place, rule in enumerate(rules):
-        _words(axis, (0.1, -0.062 - 0.03 * place), rule, va="center", fontsize=8.8)
+        _words(axis, (0.091, -0.062 - 0.03 * place), rule, va="center", fontsize=8.8)
 
 
 def _spring(axis: Axes, x: float, top: float, foot: float) -> None:
@@ -226,8 +229,8 @@ def _damper(axis: Axes, x: float, top: float, foot: float) -> None:
     middle = 0.5 * (top + foot)
     axis.plot([x, x], [top, middle], color=INK, lw=1.2)
     axis.plot([x - 0.006, x + 0.006], [middle, middle], color=INK, lw=2.4)
-    pot = [(x - 0.009, middle + 0.012), (x - 0.009, middle - 0.012), (x + 0.009, middle - 0.012), (x + 0.009, middle + 0.012)]
-    axis.plot(*np.array(pot).T, color=INK, lw=1.2)
+    sides, edges = x + 0.009 * np.array([-1, -1, 1, 1]), middle + 0.012 * np.array([1, -1, -1, 1])
+    axis.plot(sides, edges, color=INK, lw=1.2)
     axis.plot([x, x], [middle - 0.012, foot], color=INK, lw=1.2)
 
 

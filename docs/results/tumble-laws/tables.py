@@ -117,7 +117,7 @@ def main() -> None:
             for place, numbers in enumerate(found.values(), len(SIZES)):
                 value, std = numbers[name]
                 axis.errorbar([value], [place], xerr=[std], fmt="s", color=MODEL, ms=5, capsize=3)
-            axis.set_xlabel(QUANTITIES[name][1].replace(" [", "\n["))
+            axis.set_xlabel(QUANTITIES[name][1].replace(" [", "\n["), fontsize=8.5)
         panels[0].set_yticks(np.arange(len(heads)), heads)
         panels[0].invert_yaxis()
         marks = [handle("grains of sand, each bed", BED, ls="", marker="o", ms=4)]
