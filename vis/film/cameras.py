@@ -22,6 +22,8 @@ Focus = tuple[float, float]
 """x and z of the middle of a picture [m]."""
 View = tuple[Stage | FlatStage, Array]
 """The stage, and the focus at every picture [m], shape (n, 2)."""
+_INNER = 0.94
+"""Share of a picture's height that its margins leave."""
 _STEADY = 0.03
 """Over which a camera's way is smoothed (standard deviation), over the run's duration."""
 
@@ -109,20 +111,31 @@ class _Near(_Plane):
 class _Space(Camera):
     """From above and aside; least width and height of the picture over the largest distance of a tip from the centre.
 
-    The plane that a rendered picture looks at is the front of the bed: no grain is left out.
+    The plane that a rendered picture looks at is the front of the bed: no grain is left out. ``whole``: A bed that is
+    narrower than the picture is seen down to its floor; two runs side by side keep one scale instead.
     """
 
     width, tall, arrow, pitch = 4.4, 2.6, 0.22, 0.5
+
+    def __init__(self, *, whole: bool = False) -> None:
+        self.whole = whole
 
     def set_up(self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         width = max(self.width, self.tall * pixels[0] / pixels[1]) * reach
         (low, high), centres = reel.box, reel.centres
         cut, pitch = (float(low[1]), self.pitch) if opengl else (float(centres[:, 1].mean()), 0.0)
+        level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(pitch)
+        narrow = self.whole and reel.on_grains and float(high[0] - low[0]) < width
+        if narrow:
+            deep = float(level.max() - low[2]) * np.cos(pitch) + reach
+            width = max(width, deep / _INNER * pixels[0] / pixels[1])
         seen = {"width": width, "cut": cut, "pitch": pitch, "low": low, "high": high, "radius": reel.radius}
         stage = Stage(pixels, **seen, opacity=OPACITY) if opengl else FlatStage(pixels, **seen)
         stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
-        level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(stage.pitch)
-        return stage, _steady(np.column_stack([centres[:, 0], level - 0.12 * stage.height]))
+        focus = level - 0.12 * stage.height
+        if narrow:
+            focus = np.minimum(focus, low[2] + 0.5 * _INNER * stage.height / np.cos(pitch))
+        return stage, _steady(np.column_stack([centres[:, 0], focus]))
 
     def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
         _frame_and_ruler(axis, stage)
@@ -144,7 +157,8 @@ def layout(reels: Sequence[AnyReel]) -> list[Panel]:
     """The pictures of one run or two: in space one each; in the plane the whole beside the feet, or above them."""
     if isinstance(reels[0], SpaceReel):
         if len(reels) == 1:
-            return [Panel(0, _Space(), (0.015, 0.17, 0.895, 0.715))]
+            foot = 0.17 if len(reels[0].states) else 0.03  # below it the states, where there are any
+            return [Panel(0, _Space(whole=True), (0.015, foot, 0.895, 0.885 - foot))]
         return [Panel(run, _Space(), (left, 0.18, 0.445, 0.70)) for run, left in enumerate((0.015, 0.47))]
     if len(reels) == 1:
         return [Panel(0, _Plane(), (0.02, 0.17, 0.40, 0.70)), Panel(0, _Near(), (0.435, 0.17, 0.465, 0.70))]
