@@ -129,7 +129,14 @@ class _Space(Camera):
         if narrow:
             deep = float(level.max() - low[2]) * np.cos(pitch) + reach
             width = max(width, deep / _INNER * pixels[0] / pixels[1])
-        seen = {"width": width, "cut": cut, "pitch": pitch, "low": low, "high": high, "radius": reel.radius}
+        seen: dict[str, Any] = {
+            "width": width,
+            "cut": cut,
+            "pitch": pitch,
+            "low": low,
+            "high": high,
+            "radius": reel.radius,
+        }
         stage = Stage(pixels, **seen, opacity=OPACITY) if opengl else FlatStage(pixels, **seen)
         stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
         focus = level - 0.12 * stage.height

@@ -252,7 +252,8 @@ def _turn(axis: Axes, centre: Point, radius: float, begin: float, end: float, co
 
 
 def _words(axis: Axes, place: Point, words: str, **style: Any) -> None:
-    axis.text(*place, words, **({"fontsize": 9.5, "va": "baseline", "zorder": 7} | style))
+    usual: dict[str, Any] = {"fontsize": 9.5, "va": "baseline", "zorder": 7}
+    axis.text(*place, words, **(usual | style))
 
 
 def main(folder: str) -> Path:
