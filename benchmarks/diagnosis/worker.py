@@ -7,8 +7,12 @@ import os
 import time
 import traceback
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from experiments.runs.types import Json
+
+if TYPE_CHECKING:
+    from experiments.diagnose.core.outcome import Diagnosis
 
 __all__ = ["answer", "begin"]
 
@@ -43,6 +47,8 @@ def _diagnosed(folder: str) -> Json:
         "found_parameters": {effect: found.parameters(effect) for effect in found.effects},
         "before": {"fit": found.before.fit, "held_out": found.before.held_out},
         "after": {"fit": found.after.fit, "held_out": found.after.held_out},
+        "with_scatter": _weighed(found),
+        "base_parameters": found.base_parameters(found.best),
         "fitted": list(found.fitted),
         "held_out": list(found.held_out),
         "base_values": {name: float(value) for name, value in found.base_values.items()},
@@ -50,4 +56,16 @@ def _diagnosed(folder: str) -> Json:
         "findings": [finding.what for finding in found.findings],
         "leading": list(found.choice.best.effects) if found.choice is not None else [],
         "at_bounds": [bound.parameter for bound in found.bounds_after],
+    }
+
+
+def _weighed(found: "Diagnosis") -> Json | None:
+    """The gap with the scatter of replicates among the fitted trials; None where these differ by the sensors' noise
+    alone, or none repeats another."""
+    weighed = found.gap_with_fitted_scatter
+    if weighed is None:
+        return None
+    stages = {"before": weighed.before, "after": weighed.after, "after_std": weighed.after_std}
+    return {stage: {"fit": fitted, "held_out": held} for stage, (fitted, held) in stages.items()} | {
+        "freedom": weighed.freedom
     }

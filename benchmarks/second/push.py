@@ -128,7 +128,8 @@ def make_push(
         () if kind == "null" or outside else names, outside, {}, min((seen for _, seen in chosen), default=0.0),
         any(noise.kind == "coloured" for noise in plan.noise.values()), len(plan.trials),
         {"structure": reached, "legs": plan.structure, "each": [seen for _, seen in chosen], "settings": settings,
-         "noise": {name: noise.kind for name, noise in plan.noise.items()}},
+         "noise": {name: noise.kind for name, noise in plan.noise.items()},
+         "base": {"stiffness": plan.k, "damping": plan.c}},
     )  # fmt: skip
     return _record(random, plan, _measure(plan, settings)), secret
 

@@ -91,7 +91,8 @@ def make_tumble(
         effects, outside, parameters, min((seen for _, seen in chosen), default=0.0),
         any(noise.kind == "coloured" for noise in plan.noise.values()), len(plan.trials),
         {"structure": reached, "legs": plan.legs, "each": [seen for _, seen in chosen], "settings": settings,
-         "surface": plan.surface, "noise": {name: noise.kind for name, noise in plan.noise.items()}},
+         "surface": plan.surface, "noise": {name: noise.kind for name, noise in plan.noise.items()},
+         "base": plan.true},
     )  # fmt: skip
     return _record(random, plan, made), secret
 

@@ -50,6 +50,34 @@ def test_parameters_are_off_by_their_share_and_intervals_hold_the_truth_or_not()
     told = summarise(cases)["parameters"]
     assert told["median_relative_error"] == pytest.approx(0.125)
     assert told["intervals_hold_truth"] == {"share": 0.5, "of": 2}
+    assert told["intervals_90_hold_truth"] == {"share": 0.5, "of": 2}
+
+
+def test_held_out_gaps_are_counted_with_the_sensors_noise_and_with_the_scatter_of_replicates():
+    """Of a pair as well, where both are named."""
+    weighed = {"after": {"fit": 1.0, "held_out": 1.1}}
+    summary = summarise([
+        case(["adhesion"], "named", ["adhesion"], after=3.0, with_scatter=weighed),
+        case(["adhesion"], "named", ["adhesion"], after=3.0, with_scatter=None),
+        case(["adhesion", "layering"], "named", ["layering", "adhesion"], after=1.1),
+        case(["adhesion", "layering"], "named", ["layering"], after=9.0),
+    ])  # fmt: skip
+    assert summary["held_out_at_most_1_2"] == {"share": pytest.approx(1 / 3), "of": 3}
+    assert summary["held_out_with_scatter_at_most_1_2"] == {"share": pytest.approx(2 / 3), "of": 3}
+    assert summary["replicates_that_differ"] == {"share": pytest.approx(1 / 3), "of": 3}
+
+
+def test_ninety_percent_intervals_of_base_parameters_are_counted_by_number():
+    def told(value, **more):
+        numbers = {"stiffness": {"value": value, "std": 1.0}, "mass": {"value": 5.0, "std": 0.1}}
+        return {"hidden": {"base": {"stiffness": 100.0, "mass": 5.1}}, "base_parameters": numbers, **more}
+
+    found = summarise([
+        case(["adhesion"], "named", ["adhesion"], **told(101.6)), case((), "none", signature=0.0, **told(101.7)),
+        case((), "unknown", signature=0.0, **told(100.0)),
+    ])["base_parameters"]  # fmt: skip
+    assert found["by_name"] == {"mass": {"share": 1.0, "of": 2}, "stiffness": {"share": 0.5, "of": 2}}
+    assert found["intervals_90_hold_truth"] == {"share": 0.75, "of": 4}
 
 
 def test_baselines_stand_beside_us_on_the_very_same_cases():

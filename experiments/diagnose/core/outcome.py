@@ -23,6 +23,7 @@ from .deciding import Gap, certain, closes, gap_of, smallest, unscattered, value
 from .effect_texts import confirmation
 from .matters import undecided
 from .next_steps import after_unknown
+from .renoised import scatter_of, wander_of
 from .rivals import LEAD, Predicted, Rival
 from .scatter_gap import ScatterGap, gap_with_scatter, weighed_residuals
 from .search import Choice
@@ -128,9 +129,28 @@ class Diagnosis(Known):
     @cached_property
     def gap_with_scatter(self) -> ScatterGap | None:
         """The gap against the scatter of replicates; None where they differ by the sensors' noise alone."""
-        before, after = (self.base_values, ()), (self.best_values, self.forms)
-        stages = [before] if self.verdict == "none" else [before, after]
-        return gap_with_scatter(self.problem, self.model_std, stages, self.fitted, self.held_out)
+        return gap_with_scatter(self.problem, self.model_std, self._stages, self.fitted, self.held_out)
+
+    @cached_property
+    def gap_with_fitted_scatter(self) -> ScatterGap | None:
+        """The same with the scatter that replicates among the fitted trials show, held-out trials left out of it: then
+        it is a prediction of these. None where no fitted trial repeats another, or none differs beyond the sensors."""
+        if not self.model_std:
+            return None
+        factors = tuple(kind for kind in self.problem.scatter if kind in self.model_std)
+        stds = dict(self.problem.known_std)  # what the readings themselves show
+        if factors:
+            stds |= scatter_of(self.best, (), kinds=factors).model_std
+        stds |= wander_of(self.best, ()).model_std
+        return gap_with_scatter(
+            self.problem, stds, self._stages, self.fitted, self.held_out, scattered=self.fitted
+        )  # fmt: skip
+
+    @property
+    def _stages(self) -> list[tuple[Mapping[str, float], tuple[Form, ...]]]:
+        """Values and forms of the base model, and of the best one unless nothing is missing."""
+        stages: list[tuple[Mapping[str, float], tuple[Form, ...]]] = [(self.base_values, ())]
+        return stages if self.verdict == "none" else [*stages, (self.best_values, self.forms)]
 
     @property
     def equivalence(self) -> tuple[Rival, ...]:
@@ -182,6 +202,16 @@ class Diagnosis(Known):
             self.problem, self.own_values, self.forms, self.left, self.dependence[1], beside=self.choice.best.effects,
             is_scatter=bool(self.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
         )  # fmt: skip
+
+    def base_parameters(self, one: Fit) -> dict[str, dict[str, Any]]:
+        """The base model's shared numbers in one of the fits: name -> value, std (standard error), unit."""
+        variance = np.diag(one.covariance(inflation=inflation(one)))
+        names = [p.name for p in one.model.parameters]
+        return {
+            p.name: {"value": one.values[p.name], "std": math.sqrt(max(float(variance[names.index(p.name)]), 0.0)),
+                     "unit": p.unit}
+            for p in self.problem.base if p.trial is None and p.name in names
+        }  # fmt: skip
 
     def parameters(self, effect: str) -> dict[str, dict[str, Any]]:
         """An effect in diagnosis.json: name -> value, std, unit."""

@@ -41,12 +41,16 @@ class ScatterGap:
 
 def gap_with_scatter(
     problem: Problem, model_std: Stds, stages: Sequence[tuple[Values, Sequence[Form]]], fitted: Sequence[str],
-    held_out: Sequence[str],
+    held_out: Sequence[str], *, scattered: Sequence[str] | None = None,
 ) -> ScatterGap | None:  # fmt: skip
-    """The gap of the base model, the first of `stages`, and of the best model, the last; None without scatter."""
+    """The gap of the base model, the first of `stages`, and of the best model, the last; None without scatter.
+
+    `scattered`: trials from whose replicates `model_std` was estimated; None: all.
+    """
     if not model_std:
         return None
-    groups = groups_of([t for t in problem.trials if t.id in (*fitted, *held_out)])
+    whose = (*fitted, *held_out) if scattered is None else scattered
+    groups = groups_of([t for t in problem.trials if t.id in whose])
     freedom = sum(len(ids) - 1 for ids in groups.values())
     sums = [
         [

@@ -19,7 +19,7 @@ import numpy as np
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.outcome import Diagnosis
 from experiments.diagnose.core.scatter_gap import scatter_std
-from experiments.diagnose.fit.evidence import excess, held_out_fit, inflation
+from experiments.diagnose.fit.evidence import excess, held_out_fit
 from experiments.diagnose.fit.fitting import Fit, fit
 from experiments.diagnose.fit.gaps import unit_of
 from experiments.diagnose.fit.localise import phases_of
@@ -59,7 +59,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         words, shares = found.dependence
         diagnosis["latent"] = {"file": "latent.csv", "depends_on": words, "explained": shares,
                           "lines": line_rows(found.lines)}  # fmt: skip
-    diagnosis["base"] = _base_values(found)
+    diagnosis["base"] = {"before": found.base_parameters(found.base), "after": found.base_parameters(found.best)}
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
     diagnosis["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
     bounds = {"before": found.bounds_before, "after": found.bounds_after}
@@ -203,20 +203,6 @@ def _noise(found: Diagnosis) -> dict[str, dict[str, float]]:
         for channel in jitter.channels:
             noise.setdefault(channel, {"std": 1.0, "persistence": 0.0})["time_jitter_s"] = jitter.std
     return noise
-
-
-def _base_values(found: Diagnosis) -> dict[str, Any]:
-    """The base parameters before and after, with their standard errors."""
-    result = {}
-    for stage, one in (("before", found.base), ("after", found.best)):
-        variance = np.diag(one.covariance(inflation=inflation(one)))
-        names = [p.name for p in one.model.parameters]
-        result[stage] = {
-            p.name: {"value": one.values[p.name], "std": float(np.sqrt(max(variance[names.index(p.name)], 0.0))),
-                     "unit": p.unit}
-            for p in found.problem.base if p.trial is None and p.name in names
-        }  # fmt: skip
-    return result
 
 
 def _evidence(found: Diagnosis) -> list[dict[str, Any]]:
