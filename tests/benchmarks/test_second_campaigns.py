@@ -90,6 +90,21 @@ def test_a_crater_beside_loose_first_grains_is_not_called_adhesion():
     assert found.after.held_out < 1.2
 
 
+def test_a_force_that_relaxes_in_a_hold_tells_its_time_constant():
+    """The rows of a hold count: a time constant 4 % below the true one leaves more of the fast pushes."""
+    campaign, told = KINDS["second-push"].make(seed=971006, kind="relaxation", strength=39.065, trials=6)
+    problem, true = make_problem(campaign), told.extra["base"]
+    form = next(form for form in problem.forms if form.id == "relaxation:with one time constant")
+    share, time = told.extra["settings"]["relax"] / true["stiffness"], told.extra["settings"]["relax_time"]
+    left = []
+    for factor in (1.0, 0.96):
+        numbers = {"relaxation.relax_fast": share, "relaxation.relax_soon": math.log(factor * time)}
+        rest = problem.evaluate([true | numbers], [form], ["002", "004", "006"])[0]
+        left.append(sum(float(rows @ rows) for rows in rest.values()) / sum(map(len, rest.values())))
+    assert left[0] < 1.3
+    assert left[1] > left[0] + 0.5
+
+
 @pytest.mark.long
 def test_a_signature_is_near_what_was_asked_for():
     _, told = make_push(4, kind="depth-hardening", strength=10.0, trials=6)

@@ -14,6 +14,7 @@ __all__ = ["off_rest", "off_surface", "path_error", "reversing", "touching", "tu
 _BESIDE = 5  # rows before and after a turn that show the force there
 _AT_TURN = 6
 """Rows that a turn may last; where a spike is slow for longer it is held, or eased, and its direction is what it is."""
+_AT_END = 2  # rows at either end of a hold in which the motion may not have stopped, or may have begun again
 
 
 def path_error(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:
@@ -59,17 +60,29 @@ def reversing(trial: Prepared) -> NDArray[np.bool_]:
     return found
 
 
-def turning(speed: Array, std: Array, force: Array, noise: float) -> Array:
-    """How far the force is in doubt where the direction of motion is: by its jump from before to after [N].
+def turning(speed: Array, std: Array, force: Array, noise: float) -> tuple[Array, Array]:
+    """How far the force is in doubt where the direction of motion is: by its jump from before to after [N], shape
+    [row_count]; and, shape [row_count, hold_count], the same of holds, one column for each.
 
-    Dry friction changes sign where a spike turns; the smoothed depth shows when to within some rows only.
+    Dry friction changes sign where a spike turns; the smoothed depth shows when to within some rows only. While a spike
+    is held, a friction that may be of either sign is one number for all rows of the hold: what changes with time there
+    is not in doubt, as where the force relaxes.
     """
     doubt = np.zeros(len(speed))
+    held = []
     for low, high in spells(np.abs(speed) < 3 * std):
         before, after = force[max(0, low - _BESIDE) : low], force[high : high + _BESIDE]
         if len(before) < _BESIDE or len(after) < _BESIDE:
             continue
         jump = abs(float(np.median(after) - np.median(before)))
-        if jump > 3 * noise:
-            doubt[max(0, low - 1) : high + 1] = jump
-    return doubt
+        if jump <= 3 * noise:
+            continue
+        first, last = max(0, low - 1), high + 1
+        if high - low <= _AT_TURN:
+            doubt[first:last] = jump
+            continue
+        doubt[first : first + _AT_END] = doubt[last - _AT_END : last] = jump
+        column = np.zeros(len(speed))
+        column[first + _AT_END : last - _AT_END] = jump
+        held.append(column)
+    return doubt, np.column_stack(held) if held else np.zeros((len(speed), 0))

@@ -273,10 +273,11 @@ class PenetrationProblem(Problem):
             start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
             touch = start * touching(trial)
             rows = trial.has_other
-            turn = turning(smooth.speed[rows], smooth.speed_std[rows], trial.other[rows], std_force)
+            turn, held = turning(smooth.speed[rows], smooth.speed_std[rows], trial.other[rows], std_force)
             shaken = self._along.get(trial.info.id, 0.0)
             doubtful = np.sqrt(1 + ((bend**2 + touch**2)[rows] + turn**2) / std_force**2 + shaken**2)
-            left, sizes, _ = np.linalg.svd(factor[rows] / std_force / doubtful[:, None], full_matrices=False)
+            factor = np.column_stack([factor[rows], held])
+            left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
             kept = sizes > 1e-3
             self._whitening[trial.info.id] = (left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2), doubtful)
 

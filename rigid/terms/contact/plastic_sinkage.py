@@ -34,7 +34,7 @@ def bent_unloading(depth, top, force, share, bend):
 TERM = Term(
     rank=140, id="plastic-sinkage", summary="the surface does not spring back", acts="the ground's law, with memory",
     parameters=(
-        Parameter("share", "1", 0.0, "of the deepest depth that stays when the load is gone", lowest=0.0, highest=0.95,
+        Parameter("share", "1", 0.0, "of the deepest depth that stays when the load is gone", lowest=0.0, highest=0.97,
                   visible=(0.05, 0.6)),
         Parameter("bend", "1", 0.0,
                   "c: what unloading's exponent has more than loading's, fully from a share of 0.2 on", lowest=0.0,
@@ -60,7 +60,7 @@ TERM = Term(
 
 def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
     """A share of the depth that stays; with unloading bent, or with a crater that is open."""
-    share = fit.free("share", "1", 0.1, 0.0, 0.93)
+    share = fit.free("share", "1", 0.1, 0.0, 0.97)
     bend = fit.prior("bend", "1", 1.0, 0.3, 0.01, 0.0, 4.0)
     shares = ((0.15,), (0.5,), (0.85,))
     return (

@@ -8,6 +8,7 @@ import pytest
 from penetration_campaigns import DAMPING, FORCE_STD, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose.core.diagnosis import diagnose
+from experiments.diagnose.push.doubt import turning
 from experiments.diagnose.push.problem import make_problem
 
 STEEP = 4.0
@@ -66,6 +67,20 @@ def test_at_a_turn_a_row_or_two_may_lie_on_either_side_of_a_friction_and_no_othe
     # half of what the force is there on the way in less that on the way out: 2 x 0.5 N, and C v for 0.1 to 0.25 m/s
     assert 0.5 + 0.5 * DAMPING * 0.1 < std[wide].max() < 0.55 + 0.5 * DAMPING * 0.25
     assert np.delete(std[inside], np.flatnonzero(np.isin(np.flatnonzero(inside), wide))).max() < 2 * FORCE_STD
+
+
+def test_a_hold_leaves_one_number_of_the_force_in_doubt_and_not_how_it_changes_with_time():
+    speed = np.concatenate([np.full(20, 0.1), np.zeros(40), np.full(20, -0.1)])
+    force = np.concatenate([np.full(20, 5.0), 3.0 + 2.0 * np.exp(-np.arange(40) / 8.0), np.full(20, 2.0)])
+    doubt, held = turning(speed, np.full(80, 1e-3), force, 0.05)
+    assert np.flatnonzero(doubt).tolist() == [19, 20, 59, 60]  # two rows at either end
+    assert held.shape == (80, 1) and set(held[21:59, 0]) == {3.0}
+    assert not held[:21].any() and not held[59:].any()
+    # a turn of few rows is in doubt as a whole, and a hold into which the force does not jump not at all
+    doubt, held = turning(np.delete(speed, np.s_[24:60]), np.full(44, 1e-3), np.delete(force, np.s_[24:60]), 0.05)
+    assert np.flatnonzero(doubt).tolist() == [19, 20, 21, 22, 23, 24] and held.shape == (44, 0)
+    doubt, held = turning(speed, np.full(80, 1e-3), np.full(80, 5.0), 0.05)
+    assert not doubt.any() and held.shape == (80, 0)
 
 
 def test_a_plain_crater_with_its_own_weights_leaves_replicates_alike():
