@@ -53,7 +53,7 @@ class FootForces(AbstractContextManager["FootForces"]):
     ----------
     model, data : of MuJoCo. Calls with any other model do nothing; the stability is checked where `data` is.
     feet : as `find_feet` gives them.
-    law, parameters, scales : as `LawFeet` has them.
+    law, parameters, scales, under : as `LawFeet` has them; all parts must spring back the same share.
     mu_d : friction of sliding [1].
     slip_speed : below which friction falls with the slip [m/s]; a step of dt needs mu_d g dt at least.
 
@@ -75,14 +75,18 @@ class FootForces(AbstractContextManager["FootForces"]):
         mu_d: float = 0.25,
         slip_speed: float = 0.01,
         scales: Mapping[str, float] | None = None,
+        under: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
         mujoco = self._mujoco = refuse_missing()
         check_above_zero("in m/s", slip_speed=slip_speed)
-        found, given, scales = find_law(law), parameters or {}, scales or {}
+        found, given, scales, under = find_law(law), parameters or {}, scales or {}, under or {}
         self.model, self._data, self.feet, self.points, self._law = model, data, list(feet), 0, found
-        self._make_ground = partial(LawFeet, self.feet, law=law, parameters=given, scales=scales)
+        self._make_ground = partial(LawFeet, self.feet, law=law, parameters=given, scales=scales, under=under)
         self._mu_d, self._slip = float(mu_d), float(slip_speed)
-        self._rebound = found.rebound(given) or 1.0
+        rebounds = {found.rebound(under.get(part.name, given)) or 1.0 for foot in feet for part in foot.parts}
+        if len(rebounds) > 1:
+            raise ValueError(f"under has several values of rebound, {sorted(rebounds)}: all feet must have the same")
+        self._rebound = rebounds.pop() if rebounds else 1.0
         self._kind = mujoco.mjtObj.mjOBJ_BODY
         self._rates, self._force, self._torque = np.zeros(6), np.zeros(3), np.zeros(3)
         self._depths: WeakKeyDictionary[Any, _Depths] = WeakKeyDictionary()
@@ -91,7 +95,8 @@ class FootForces(AbstractContextManager["FootForces"]):
         for foot in feet:
             groups = []
             for part in foot.parts:
-                numbers = found.numbers(given, count=part.share * scales.get(part.name, 1.0))
+                own = under.get(part.name, given)
+                numbers = found.numbers(own, count=part.share * scales.get(part.name, 1.0))
                 groups += _groups(part, numbers, count)
                 count += len(part.centres)
             self._plans.append((foot, groups))

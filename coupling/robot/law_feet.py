@@ -27,6 +27,7 @@ class LawFeet(LawPoints):
     mu_s, mu_d : friction [1]; None: half of mu_s.
     time_step : [s], of which a macro step has `substeps`.
     scales : name of a part -> how many times the law it has, such as its area over that the law is of [1].
+    under : name of a part -> its own parameters, in place of `parameters`; `law_under_feet` makes all three.
 
     Raises ValueError for a law or parameter there is not.
     """
@@ -46,17 +47,16 @@ class LawFeet(LawPoints):
         mu_d: float | None = None,
         time_step: float = 1e-4,
         scales: Mapping[str, float] | None = None,
+        under: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
-        self.feet, scales = list(feet), scales or {}
+        self.feet, scales, under = list(feet), scales or {}, under or {}
         self.grounds: list[list[SurfaceGround]] = []
         for foot in feet:
             own = []
             for part in foot.parts:
-                count = part.share * scales.get(part.name, 1.0)
+                count, numbers = part.share * scales.get(part.name, 1.0), under.get(part.name, parameters or {})
                 own += [
-                    SurfaceGround(
-                        law=law, parameters=parameters or {}, mu_s=mu_s, mu_d=mu_d, count=count, time_step=time_step
-                    )
+                    SurfaceGround(law=law, parameters=numbers, mu_s=mu_s, mu_d=mu_d, count=count, time_step=time_step)
                     for _ in part.centres
                 ]
             self.grounds.append(own)

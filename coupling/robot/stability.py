@@ -17,8 +17,9 @@ from coupling.poses import Vector
 
 from .bed_feet import BedFeet
 from .law_feet import LawFeet
+from .soles import plan_area
 
-__all__ = ["ITERATED", "ExchangeLoad", "ExpectedBed", "Load", "check_exchange", "plan_area"]
+__all__ = ["ITERATED", "ExchangeLoad", "ExpectedBed", "Load", "check_exchange"]
 
 ITERATED = 10.0
 """Load up to which the iterated exchange settles: K H^2 / m = 40 is the largest that did (docs/coupling.md)."""
@@ -176,18 +177,6 @@ def _of_grain(bed: ExpectedBed) -> float:
     overlap = 0.5 * bed.overlap_limit * 2 * bed.radius
     pair = bed.material.young / (1 - bed.material.poisson**2)  # a rigid foot
     return float(2 * pair * math.sqrt(bed.radius * overlap))
-
-
-def plan_area(vertices: Any) -> float:
-    """Area of a part seen from above [m2]; 0 of a point."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    if len(vertices) < 3:
-        return 0.0
-    try:
-        return float(ConvexHull(vertices[:, :2]).volume)
-    except QhullError:
-        return 0.0
 
 
 def check_exchange(robot: Any, ground: LawFeet | BedFeet | ExpectedBed, *, substeps: int, iterations: int = 1) -> float:

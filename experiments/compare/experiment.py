@@ -1,8 +1,9 @@
 """`hedgebed compare`: two finished runs in one report, their numbers with differences, what they did over time.
 
 Differences are the second less the first. Of tumbles, two in the plane or two in space, on any ground and by any
-integrator, series/compared.csv holds both on one grid of time. Where one lasts longer, numbers that depend on that are
-compared over the time that both last; those of each whole run are beside. Of penetrations numbers are compared.
+integrator, and of two runs of one robot, series/compared.csv holds both on one grid of time. Where one lasts longer,
+numbers that depend on that are compared over the time that both last; those of each whole run are beside. Of
+penetrations numbers are compared.
 """
 
 import math
@@ -25,18 +26,23 @@ from experiments.runs.whole_runs import computed_run
 from experiments.spatial.settings import ON_ANY_GROUND
 from rigid.planar.trajectory import LAUNCH_DISTANCE
 
+from . import robots as compare_robots
 from . import spatial as compare_spatial
 from . import tumbles as compare_tumbles
+from .robots import MovedRobot
 from .settings import CompareSettings, say
 from .spatial import QUATERNION, MovedInSpace
 from .tumbles import Moved
 
 __all__ = ["ALIKE", "TIMELESS", "check", "numbers_until", "resume", "run", "sinkage_of"]
 
-IN_THE_PLANE, IN_SPACE = "tumble", "tumble spatial"
-KINDS = (IN_THE_PLANE, IN_SPACE, "penetrate")
+IN_THE_PLANE, IN_SPACE, ROBOT = "tumble", "tumble spatial", "mujoco"
+KINDS = (IN_THE_PLANE, IN_SPACE, ROBOT, "penetrate")
+MODULES: dict[str, Any] = {IN_THE_PLANE: compare_tumbles, IN_SPACE: compare_spatial, ROBOT: compare_robots}
+"""What is compared over time."""
 OF_A_BED: dict[str, tuple[type[GrainsSettings], tuple[str, ...]]] = {
     IN_THE_PLANE: (TumbleBedSettings, OF_THE_MASTER), IN_SPACE: (GrainsSettings, ON_ANY_GROUND),
+    ROBOT: (GrainsSettings, (*ON_ANY_GROUND, "threads")),
 }  # fmt: skip
 """Settings that are of a bed of grains, and those among them that other grounds take too."""
 MOST_RELATIVE = 10.0
@@ -54,9 +60,11 @@ def check(settings: CompareSettings) -> None:
         raise ValueError(say("two_kinds", runs=settings.runs, first=first, second=second))
     for one in (first, second):
         one.read_result()
-    if first.command == IN_SPACE:  # an older folder lacks series: said before anything is written
+    if first.command == ROBOT:
+        compare_robots.check_alike(settings.runs, [one.read_result() for one in (first, second)])
+    if first.command in (IN_SPACE, ROBOT):  # an older folder lacks series: said before anything is written
         for one in (first, second):
-            compare_spatial.read_moved(one.path, one.read_result())
+            MODULES[first.command].read_moved(one.path, one.read_result())
 
 
 def _finished(path: str) -> RunFolder:
@@ -123,7 +131,7 @@ def _add_motion(
     result: Json, runs: Sequence[RunFolder], results: list[Json], labels: tuple[str, str], folder: RunFolder
 ) -> None:
     """series/compared.csv, the gaps between both as quantities, and sentences."""
-    module: Any = compare_spatial if result["kind"] == IN_SPACE else compare_tumbles
+    module = MODULES[result["kind"]]
     moved = [module.read_moved(one.path, found) for one, found in zip(runs, results, strict=True)]
     whole = [one["quantities"] for one in results]
     if result["kind"] == IN_THE_PLANE:
@@ -139,7 +147,9 @@ def _add_motion(
     columns = module.compared_columns(*moved)
     folder.write_series("compared", columns)
     result["series"] = "series/compared.csv"
-    if result["kind"] == IN_SPACE:
+    if result["kind"] == ROBOT:
+        result["feet"] = list(moved[0].names)
+    elif result["kind"] == IN_SPACE:
         result["spikes"] = list(dict.fromkeys(spike for one in moved for spike in one.spikes))
     else:
         result["spike_count"] = min(one.count for one in moved)
@@ -153,15 +163,17 @@ def _add_motion(
 
 def _labels(folders: tuple[RunFolder, RunFolder], results: list[Json]) -> tuple[str, str]:
     """What to call the two: by their ground where that differs, else by their folders."""
-    by_ground, paths = [_ground(one) for one in results], [str(one.path) for one in folders]
+    by_ground = [_ground(one, folder.settings) for one, folder in zip(results, folders, strict=True)]
+    paths = [str(one.path) for one in folders]
     choices = (by_ground, [one.path.name or str(one.path) for one in folders], paths)
     first, second = next((words for words in choices if words[0] != words[1]), paths)
     return first, second
 
 
-def _ground(result: Mapping[str, Any]) -> str:
+def _ground(result: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
     ground = str(result.get("ground", ""))
-    named = {"bed": f"bed of {result.get('surface', 'grains')}", "": "bed of grains"}.get(ground, ground)
+    elsewhere = " in LAMMPS" if settings.get("ground") == "lammps" else ""
+    named = {"bed": f"bed of {result.get('surface', 'grains')}{elsewhere}", "": "bed of grains"}.get(ground, ground)
     return named if result.get("method") != "paper" else f"{named}, the paper's step"
 
 
@@ -283,18 +295,23 @@ class _Numbers:
 
 
 def numbers_until(
-    end: float, moved: Moved | MovedInSpace, result: Mapping[str, Any], folder: Path
+    end: float, moved: Moved | MovedInSpace | MovedRobot, result: Mapping[str, Any], folder: Path
 ) -> dict[str, float | None]:
     """Those of the result's quantities that go with how long it lasts, until `end` [s]; all in SI."""
     own = {name: entry.get("value") for name, entry in result.get("quantities", {}).items()}
-    known = _in_space(moved, result) if isinstance(moved, MovedInSpace) else _in_the_plane(moved, result)
+    counted: dict[str, float] = {}
+    if isinstance(moved, MovedRobot):
+        *parts, counted = compare_robots.numbers_over_time(moved, end)
+        known = _Numbers(*parts)
+    else:
+        known = _in_space(moved, result) if isinstance(moved, MovedInSpace) else _in_the_plane(moved, result)
     path = folder / "series" / "bed.csv"
     bed = read_series(path) if path.exists() else {}
     lost = {f"dissipated_{name}": f"{name}_lost_J" for name in LOST}
     known.final |= {name: (bed["t_s"], bed[column]) for name, column in lost.items() if column in bed}
     found: dict[str, float | None] = {}
     if float(moved.time[-1]) <= end + ALIKE:
-        names = (*known.largest, "time_of_max_speed", *known.final, *known.events)
+        names = (*known.largest, "time_of_max_speed", *known.final, *known.events, *counted)
         return {name: own[name] for name in names if name in own}
     for name, (time, values) in known.largest.items():
         if name in own:
@@ -308,7 +325,7 @@ def numbers_until(
     for name, when in known.events.items():
         if name in own:
             found[name] = own[name] if when is not None and when <= end else None
-    return found
+    return found | {name: value for name, value in counted.items() if name in own}
 
 
 def sinkage_of(moved: Moved) -> dict[str, Json]:

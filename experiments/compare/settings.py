@@ -16,7 +16,7 @@ class CompareSettings(StrictSettings):
     """Two finished runs side by side: numbers with their differences, curves, pictures."""
 
     runs: tuple[str, str]
-    """Folders of two finished runs of one kind: tumble, tumble spatial or penetrate."""
+    """Folders of two finished runs of one kind: tumble, tumble spatial, mujoco or penetrate."""
     colour: Literal["displacement", "speed", "force", "coordination"] = "displacement"
     """Quantity that colours the grains in pictures."""
-    pictures: bool = Field(True, description="Draw pictures and film of the runs side by side (only tumbles).")
+    pictures: bool = Field(True, description="Draw pictures and film of the runs side by side (not of penetrate).")

@@ -49,6 +49,8 @@ def _compute(settings: HopSettings, folder: RunFolder, progress: Progress) -> Re
     plan, hop = find_hop(settings, keep_platform(settings.platform, folder.path, progress.message))
     for sentence in plan.sentences():
         progress.message(sentence)
+    if settings.threads is not None:
+        progress.message(say("threads_of_a_hop", s=settings))
     progress.stage("hop", total=1.0)
     given, sought = _on_given_ground(settings, plan, hop)
     progress.update(1.0)

@@ -5,13 +5,13 @@ on rigid ground is refused; the message states what each ground allows.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rigid.hop import Flight, Launch, brake_launch, flight, impulsive_launch, launch, launch_speed_for
+from rigid.hop import Flight, Launch, Tumbler, brake_launch, flight, impulsive_launch, launch, launch_speed_for
 
 from .numbers import HopPlan, plan_hop
 from .on_surface import hop_on_surface, hop_trial
@@ -25,6 +25,8 @@ SURFACE_SCAN = 6
 """Points among which the planar model's longest hop is found, for a refusal."""
 HALVINGS = 8
 """How often the stretch between two of them is halved, where the distance lies in it."""
+GRAVITIES = 12
+"""How often gravity is halved or doubled, until a refusal can name one with which the hop is possible."""
 BEYOND = 10.0
 """How many times what a distance takes at once, or from the energy, is looked through where no limit is known."""
 
@@ -57,7 +59,7 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
     Raises ValueError for numbers that cannot be, and for a distance or means with which there is no hop.
     """
     plan = plan_hop(settings, platform_file)
-    means = _by_brake(plan, settings) if settings.actuator == "brake" else _by_motor(plan, settings)
+    means = _means(plan, settings)
     if settings.asks_for == "distance":
         return plan, _search(settings, plan, means)
     key, effort = ("wheel_speed_0", settings.wheel_speed_0) if settings.wheel_speed_0 else ("torque", settings.torque)
@@ -68,6 +70,8 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
         enough = next((each for each in efforts if _hop(settings, means, each) is not None), None)
         would = "nor does any other" if enough is None else f"from some {enough:.3g} {means.unit} on it does"
         where = say("where", t=plan.tumbler)
+        other = _other_gravity(settings, lambda own, plan, means: _hop(own, means, effort) is not None, (0.5, 2.0))
+        would += other
         raise ValueError(say("no_hop", key=key, effort=effort, unit=means.unit, where=where, would=would))
     return plan, found
 
@@ -77,10 +81,31 @@ def longest_flight(plan: HopPlan, left: Launch) -> float:
     return 2 * left.time + 0.5 + 0.5 * flight(left.speed, left.angle, gravity=plan.tumbler.gravity).time  # type: ignore[union-attr]
 
 
+def _means(plan: HopPlan, settings: HopSettings) -> _Means:
+    return _by_brake(plan, settings) if settings.actuator == "brake" else _by_motor(plan, settings)
+
+
+def _other_gravity(
+    settings: HopSettings, works: Callable[[HopSettings, HopPlan, _Means], bool], factors: Sequence[float]
+) -> str:
+    """For a refusal: the nearest gravity that `works`, each of `factors` taken once and more; "" if none is found."""
+    for power in range(1, GRAVITIES + 1):
+        for factor in factors:
+            gravity = float(f"{settings.gravity * factor**power:.2g}")
+            other = settings.model_copy(update={"gravity": gravity})
+            try:
+                plan = plan_hop(other)
+                if works(other, plan, _means(plan, other)):
+                    return say("other_gravity", gravity=gravity)
+            except (ValueError, RuntimeError):
+                continue
+    return ""
+
+
 def _by_brake(plan: HopPlan, settings: HopSettings) -> _Means:
     tumbler, wheel, torque = plan.tumbler, plan.wheel, plan.numbers["torque"].value
     if torque <= tumbler.tipping_torque:
-        raise ValueError(say("does_not_tip", key="torque", torque=torque, t=tumbler))
+        raise _too_weak("torque", torque, tumbler)
     most, limit = wheel.max_speed, "its largest speed"
     if math.isinf(most):
         most, limit = max(BEYOND * _impulsive_speed(plan, settings), settings.wheel_speed_0 or 0.0), "no limit known"
@@ -100,14 +125,20 @@ def _by_motor(plan: HopPlan, settings: HopSettings) -> _Means:
         work = 0.5 * wheel.inertia * speed * impulsive_launch(tumbler, wheel.inertia).spin * speed
         most, limit = BEYOND * (work / tumbler.lean + tumbler.tipping_torque), "no limit known"
     if most <= tumbler.tipping_torque:
-        raise ValueError(say("does_not_tip", key="the motor's torque", torque=most, t=tumbler))
+        raise _too_weak("the motor's torque", most, tumbler)
     if settings.torque is not None and settings.torque <= tumbler.tipping_torque:
-        raise ValueError(say("does_not_tip", key="torque", torque=settings.torque, t=tumbler))
+        raise _too_weak("torque", settings.torque, tumbler)
     return _Means(
         leave=lambda torque: launch(tumbler, torque, wheel.inertia * wheel.max_speed / torque),
         torque=lambda torque: torque, least=tumbler.tipping_torque * (1 + 1e-6), most=most,
         what=say("motor_means", most=most, limit=limit), unit="N m",
     )  # fmt: skip
+
+
+def _too_weak(key: str, torque: float, tumbler: Tumbler) -> ValueError:
+    """The refusal of a torque that does not tip; it tips below the gravity at which W l sin(lean) is as large."""
+    most = tumbler.gravity * torque / tumbler.tipping_torque
+    return ValueError(say("does_not_tip", key=key, torque=torque, t=tumbler, most=most))
 
 
 def _impulsive_speed(plan: HopPlan, settings: HopSettings) -> float:
@@ -136,6 +167,32 @@ def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
     """The smallest effort whose hop reaches the distance on rigid ground. Raises ValueError if none does."""
     distance = plan.distance
     assert distance is not None
+    found, reach = _seek(settings, means, distance)
+    if found is not None and _reaches(found, distance):
+        return found
+    where = say("where", t=plan.tumbler)
+
+    def works(own: HopSettings, plan: HopPlan, means: _Means) -> bool:
+        there, _ = _seek(own, means, distance)
+        return there is not None and _reaches(there, distance)
+
+    other = _other_gravity(settings, works, (0.5,) if found is None else (2.0,))
+    if found is None:
+        way = f"hops {reach:.4g} m at most" if reach > 0 else "does not make it leave the ground"
+        there = _on_surface(settings, plan, means) + other
+        raise ValueError(say("too_far", distance=distance, what=means.what, way=way, where=where, on_surface=there))
+    if found.flight is None:
+        raise ValueError(say("next_escapes", distance=distance) + other)
+    raise ValueError(say("too_short", distance=distance, shortest=found.flight.distance, where=where) + other)
+
+
+def _reaches(found: Hop, distance: float) -> bool:
+    """Whether the hop lands at the distance [m], and not beyond it after a jump of what the effort does."""
+    return found.flight is not None and abs(found.flight.distance - distance) <= 1e-6 * distance
+
+
+def _seek(settings: HopSettings, means: _Means, distance: float) -> tuple[Hop | None, float]:
+    """The hop by the smallest effort that goes as far as `distance` or beyond, or None; and the longest one [m]."""
 
     def missed(effort: float) -> float:
         found = _hop(settings, means, effort)
@@ -146,22 +203,12 @@ def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
     efforts = np.geomspace(means.least, means.most, SCAN)
     beyond = [missed(float(effort)) for effort in efforts]
     first = next((k for k, over in enumerate(beyond) if over >= 0), None)
-    where = say("where", t=plan.tumbler)
     if first is None:
-        reach = max(beyond) + distance
-        way = f"hops {reach:.4g} m at most" if reach > 0 else "does not make it leave the ground"
-        there = _on_surface(settings, plan, means)
-        raise ValueError(say("too_far", distance=distance, what=means.what, way=way, where=where, on_surface=there))
+        return None, max(beyond) + distance
     low, high = float(efforts[max(first - 1, 0)]), float(efforts[first])
     while high - low > 1e-13 * high and low < (middle := 0.5 * (low + high)) < high:  # halving gets over jumps too
         low, high = (middle, high) if missed(middle) < 0 else (low, middle)
-    found = _hop(settings, means, high)
-    assert found is not None
-    if abs(missed(high)) > 1e-6 * distance:
-        if found.flight is None:
-            raise ValueError(say("next_escapes", distance=distance))
-        raise ValueError(say("too_short", distance=distance, shortest=found.flight.distance, where=where))
-    return found
+    return _hop(settings, means, high), math.inf
 
 
 def _on_surface(settings: HopSettings, plan: HopPlan, means: _Means) -> str:

@@ -35,10 +35,13 @@ from .laws import CANDIDATES, Candidate
 from .reading import read_folders
 from .settings import LawFitSettings, say
 
-__all__ = ["Designed", "check_design", "compute_runs", "how_sure", "middle_force", "sure_enough"]
+__all__ = ["Designed", "check_design", "compute_runs", "how_sure", "middle_force", "sure_enough", "with_chosen"]
 
 LEAST_BEDS = 4
 """Least number of beds before the design may stop [1]."""
+FOR_FURTHER = 0.5
+"""Share of the budget that `LEAST_BEDS` beds may cost with the further runs that the design chooses itself [1]. The
+rest is for more beds."""
 
 
 @dataclass
@@ -110,6 +113,7 @@ def _seeds(settings: LawFitSettings) -> list[int]:
 def check_design(settings: LawFitSettings) -> None:
     """Raise ValueError for runs that cannot be computed, and for a budget below the cost of the first two beds."""
     Where.of(settings).check()
+    settings, _ = with_chosen(settings)
     cells, seeds = cells_of(settings), _seeds(settings)[:2]
     for cell in cells:
         penetrate.check(cell.base)
@@ -127,6 +131,35 @@ def check_design(settings: LawFitSettings) -> None:
         raise ValueError(say("small_budget", budget=budget, least=least, **numbers))
 
 
+def with_chosen(settings: LawFitSettings) -> tuple[LawFitSettings, str]:
+    """`settings` with the further runs that the design chooses, and the sentence that states them; "" for none.
+
+    It chooses only if none are given: unloading at half the depth, then half the load, then a drag at half the depth,
+    each if `LEAST_BEDS` beds with it cost at most `FOR_FURTHER` of the budget. Half the load leaves the modulus of the
+    grains as it is, which follows from the largest load.
+    """
+    if not settings.choose_further or settings.loads or settings.unload_depths or settings.drag_depths:
+        return settings, ""
+    half = float(f"{0.5 * settings.depth:.6g}")
+    load = float(f"{0.5 * cells_of(settings)[0].base.weight:.6g}")
+    chosen: dict[str, tuple[float, ...]] = {}
+    for key, value in (("unload_depths", half), ("loads", load), ("drag_depths", half)):
+        more = settings.model_copy(update=chosen | {key: (value,)})
+        if _cost_of_least(more) <= FOR_FURTHER * (settings.budget or 0.0):
+            chosen[key] = (value,)
+    words = " ".join(f"--{key.replace('_', '-')} {value:g}" for key, (value,) in chosen.items())
+    return settings.model_copy(update=chosen), say("chosen", words=words) if chosen else ""
+
+
+def _cost_of_least(settings: LawFitSettings) -> float:
+    """Estimated cost of `LEAST_BEDS` beds in every cell, each with the faster drive [s of one core]."""
+    seeds = _seeds(settings)[:LEAST_BEDS]
+    return sum(
+        _cost(cell, [_member(cell, seed, faster=faster) for seed in seeds for faster in (False, True)])
+        for cell in cells_of(settings)
+    )
+
+
 def _cost(cell: Cell, members: Sequence[Member]) -> float:
     """Estimated cost of `members` [s of one core]."""
     plain = [core_hours(member.settings, bed=cell.new_bed) for member in members if member.variant.what == BASE]
@@ -140,6 +173,9 @@ def compute_runs(settings: LawFitSettings, folder: RunFolder, progress: Progress
     Beds that are needed in any case are computed together with the first two. Raises RuntimeError if a run fails: the
     finished runs are kept, and resuming continues from them.
     """
+    settings, chosen = with_chosen(settings)
+    if chosen:
+        progress.message(chosen)
     home = Path(settings.members) if settings.members else folder.path / "members"
     growing = [_Growing(cell, _seeds(settings)) for cell in cells_of(settings)]
     budget, spent, designed = settings.budget or 0.0, 0.0, Designed()

@@ -22,7 +22,7 @@ LAWS = (
 )  # fmt: skip
 
 
-_OF_DESIGN = ("tips", "gravities", "loads", "unload_depths", "drag_depths")
+_OF_DESIGN = ("tips", "gravities", "loads", "unload_depths", "drag_depths", "choose_further")
 _TIP = re.compile(r"(ball|sphere|flat|cone):([^:]+)(?::([0-9.]+))?")
 _SHAPES = {"ball": "sphere"}
 """What a tip may also be called."""
@@ -87,6 +87,8 @@ class LawFitSettings(PenetrateSettings):
     """Depths at which the tip is unloaded and loaded again in each bed [m]."""
     drag_depths: tuple[Positive, ...] = ()
     """Depths at which the tip is moved sideways by its diameter in each bed [m]."""
+    choose_further: bool = True
+    """Whether loads, unload_depths and drag_depths are chosen if none of them is given and the budget is sufficient."""
     speeds: tuple[Positive, ...] = Field(
         (0.1, 0.4), min_length=2, description="Speeds of the drives in each bed [m/s]."
     )
@@ -121,6 +123,8 @@ class LawFitSettings(PenetrateSettings):
         if not isinstance(given, dict):
             return given
         found: dict[str, object] = {}
+        if str(given.get("tip", "")).lower().endswith((".stl", ".obj", ".ply")):
+            raise ValueError(say("tip_file", tip=given["tip"]))
         if (tips := given.get("tips")) and isinstance(tips, list | tuple):
             found |= dict(zip(("tip", "tip_diameter", "cone_angle"), _tip_of(str(tips[0])), strict=True))
         if (gravities := given.get("gravities")) and isinstance(gravities, list | tuple):

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from coupling.members import Member
 from coupling.poses import Vector as Array
 from coupling.robot import BedFeet, LammpsFeet, MujocoRobot, RobotRun, refuse_in_lammps
-from coupling.robot.stability import ExpectedBed, check_exchange, plan_area
+from coupling.robot.soles import plan_area
+from coupling.robot.stability import ExpectedBed, check_exchange
 from dem import Bed
 from dem.contact.timestep import time_step_for
 from experiments.grains.following import Followed

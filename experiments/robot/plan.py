@@ -14,24 +14,20 @@ import numpy as np
 
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
-from coupling.robot.stability import plan_area
-from dem.grains.materials import material
+from coupling.robot.soles import plan_area
 from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import Surface, find_surface
-from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
-from rigid.platform.rig import STANDARD_GRAVITY
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
+from .laws import SPIKE, law_of, settle_other_law, settle_spring
 from .settings import RobotSettings
 
 __all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "try_controller", "width_of"]
 
 LAW_STEP = 4e-5  # Of a surface law [s], ten of which make an exchange by default
-SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
-SPIKE = 0.012  # Diameter of the spike that the defaults of the other laws are of [m] (rigid.ground.laws)
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MODEL, CONTROLLER = "model.mjb", "controller.py"  # Copies in the run folder
 
@@ -47,7 +43,7 @@ class RobotPlan:
     controller: Controller | None
     surface: Surface
     numbers: Mapping[str, Number]
-    scales: Mapping[str, float]  # Of the law under each part of a foot [1]
+    scales: Mapping[str, float]  # Area of each part of a foot over that of the tip that the law is of [1]
     fitted: GroundFile | None  # The file that the law comes from
     warnings: tuple[str, ...]
 
@@ -58,18 +54,10 @@ class RobotPlan:
 
     def law_feet(self, robot: MujocoRobot, *, as_spring: bool = False) -> LawFeet:
         """The surface law under the robot's feet; `as_spring`: the spring-damper, whatever the settings say."""
-        s, value = self.settings, {name: number.value for name, number in self.numbers.items()}
-        law = "spring-damper" if as_spring else self.law
-        if self.fitted is not None and not as_spring:
-            parameters, scales = self.fitted.values, self.scales
-        elif law == "spring-damper":
-            parameters, scales = {key: value[key] for key in ("stiffness", "damping")}, self.scales
-        else:
-            parameters, scales = find_law(law).in_gravity(value["gravity"], _given(s)), {}
-        return LawFeet(
-            robot.feet, law=law, parameters=parameters, mu_s=value["mu_s"], mu_d=value["mu_d"], time_step=LAW_STEP,
-            scales=scales,
-        )  # fmt: skip
+        own = law_of(self.settings, self.surface, self.fitted, self.numbers, as_spring=as_spring)
+        options = own.options(robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)])
+        friction = {name: self.numbers[name].value for name in ("mu_s", "mu_d")}
+        return LawFeet(robot.feet, **options, **friction, time_step=LAW_STEP)
 
     @property
     def law(self) -> str:
@@ -83,7 +71,7 @@ class RobotPlan:
         gravity, numbers = self.numbers["gravity"].value, dict(self.numbers)
         some = max(self.scales[name] for name in parts)
         of_all, of_some = (
-            _settle_law(self.settings, self.surface, gravity, most, numbers)
+            settle_spring(self.settings, self.surface, gravity, most, numbers)
             for most in (max(self.scales.values()), some)
         )
         told = dict(zip(of_all, of_some, strict=True))
@@ -146,7 +134,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     scales = {}
     for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
         for part in foot.parts:
-            tip = None if settings.stiffness is not None or not surface.granular else surface.spike
+            tip = surface.spike if surface.granular else None
             tip = fitted.foot.diameter if fitted is not None else tip if of_surface else SPIKE
             scales[part.name] = _scale(part, to_matrix(turn), tip)
     largest = max(scales.values())
@@ -154,7 +142,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
         warnings += [say("fitted", file=fitted, most=largest)] if largest != 1.0 else []
         warnings += [say("beyond_range", sentence=said, file=fitted) for said in _beyond_gravity(fitted, robot.gravity)]
     else:
-        settle = _settle_law if of_surface else _settle_other_law
+        settle = settle_spring if of_surface else settle_other_law
         warnings += settle(settings, surface, robot.gravity, largest, numbers)
     _settle_friction(settings, surface, numbers)
     if surface.guess and of_surface:
@@ -173,59 +161,6 @@ def _beyond_gravity(fitted: GroundFile, gravity: float) -> list[str]:
     return fitted.beyond(gravity=near if abs(near - gravity) < 0.01 * near else gravity)
 
 
-def _settle_law(
-    settings: RobotSettings, surface: Surface, gravity: float, largest: float, numbers: dict[str, Number]
-) -> list[str]:
-    """Settle K and C of one spike, and warn where they are those of another gravity [m/s2].
-
-    Without cohesion the forces among grains in slow motion go with their weight. So K goes with gravity g, and C,
-    a force over a speed, with sqrt(g), as speeds do in motions that are similar (docs/coupling.md).
-    """
-    share = gravity / STANDARD_GRAVITY
-    times = f"; {largest:.3g} times under a foot" if largest > 1 else ""
-    loose = surface.grains is not None and material(surface.grains).cohesion == "none"
-    if settings.scale_with_gravity and not loose:
-        what = "made of grains with cohesion" if surface.granular else "hard ground"
-        raise ValueError(say("scaled_surface", surface=surface.name, what=what))
-    for key, unit, power in (("stiffness", "N/m", 1.0), ("damping", "N s/m", 0.5)):
-        given, own = getattr(settings, key), getattr(surface, key) / SPIKES_PER_ROW
-        scaled = f" times (g / {STANDARD_GRAVITY:g} m/s2)^{power:g}" if settings.scale_with_gravity else ""
-        own *= share**power if settings.scale_with_gravity else 1.0
-        origin = f"surface {surface.name}{scaled}, of one spike{times}"
-        numbers[key] = Number(own, unit, origin) if given is None else Number(given, unit, "given")
-    fits = settings.scale_with_gravity or settings.stiffness is not None or not surface.granular
-    if fits or share >= 0.5:
-        return []
-    stiffness = largest * numbers["stiffness"].value
-    key = "of_earth" if loose else "of_earth_cohesive"
-    return [say(key, stiffness=stiffness, scaled=share * stiffness, gravity=gravity, surface=surface.name)]
-
-
-def _settle_other_law(
-    settings: RobotSettings, surface: Surface, gravity: float, largest: float, numbers: dict[str, Number]
-) -> list[str]:
-    """Settle the parameters of a law other than the spring-damper, and warn of those that are the law's defaults.
-
-    ``largest``: area of the largest foot over that of the spike that the defaults are of [1]. Raises ValueError for a
-    parameter there is not, or out of bounds.
-    """
-    law, given = find_law(settings.ground), _given(settings)
-    own = law.in_gravity(gravity, given)
-    values = law.values(own)
-    for parameter in law.parameters:
-        name, origin = parameter.name, "given" if parameter.name in given else f"default of {law.name}, of one spike"
-        if name != "gravity":
-            numbers[name] = Number(values[name], parameter.unit, origin)
-        elif name in given:
-            numbers["ground_gravity"] = Number(values[name], parameter.unit, origin)
-    left = [name for name in values if name not in own]
-    if not left:
-        return []
-    times = f" (up to {largest:.3g} times its area)" if largest > 1 else ""
-    more = times if "gravity" in own else f"{times}, nor gravity"
-    return [say("law_defaults", names=", ".join(left), law=law, spike=1e3 * SPIKE, surface=surface, more=more)]
-
-
 def _settle_friction(settings: RobotSettings, surface: Surface, numbers: dict[str, Number]) -> None:
     own = f"surface {surface.name}"
     mu_s = surface.mu_s if settings.mu_s is None else settings.mu_s
@@ -241,10 +176,7 @@ def _settle_friction(settings: RobotSettings, surface: Surface, numbers: dict[st
 
 
 def _scale(part: Part, matrix: Any, tip: float | None) -> float:
-    """How many times the law of a tip of this diameter [m] a part has: by its area from above; None, and a point: once.
-
-    So goes K on sand.
-    """
+    """Area of a part from above over that of a tip of this diameter [m]; 1 without a tip, and of a point."""
     if tip is None or part.kind == "site":
         return 1.0
     return max(plan_area(part.vertices @ matrix.T) / (0.25 * math.pi * tip**2), 1e-3)
@@ -253,19 +185,6 @@ def _scale(part: Part, matrix: Any, tip: float | None) -> float:
 def width_of(part: Part, matrix: Any) -> float:
     """The smaller of a part's two extents from above [m], turned by `matrix`."""
     return float(np.ptp(part.vertices @ matrix.T, axis=0)[:2].min())
-
-
-def _given(settings: RobotSettings) -> dict[str, float]:
-    """The ground_parameters."""
-    return dict(_assignment(text) for text in settings.ground_parameters)
-
-
-def _assignment(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        raise ValueError(say("no_number", text=text)) from None
 
 
 def _controller(settings: RobotSettings, folder: Path | None) -> Controller | None:

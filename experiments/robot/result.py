@@ -189,12 +189,15 @@ def _ground_named(plan: RobotPlan) -> str:
 
 
 def _beyond(plan: RobotPlan, run: RobotRun) -> list[str]:
-    """A sentence for load of a tip and depth where they are outside the range of the law of a file."""
+    """A sentence for load and depth outside the range of the law of a file: those of a tip in a similar motion.
+
+    There F / (rho g D^3) and z / D are the same, so that loads go with the cube of the diameter (`rigid.ground.soles`).
+    """
     assert plan.fitted is not None
     feet, fitted = run.feet, plan.fitted
-    shares = [sum(plan.scales[part.name] for part in foot.parts) for foot in run.robot.feet]
-    load = float((feet[:, :, 9].max(axis=0) / shares).max())
-    found = {"load": load, "depth": float(feet[:, :, -1].max())}
+    sizes = np.sqrt([sum(plan.scales[part.name] for part in foot.parts) for foot in run.robot.feet])
+    load = float((feet[:, :, 9].max(axis=0) / sizes**3).max())
+    found = {"load": load, "depth": float((feet[:, :, -1].max(axis=0) / sizes).max())}
     return fitted.beyond(**{name: max(value, fitted.range[name][0]) for name, value in found.items()})
 
 

@@ -48,12 +48,15 @@ class RobotSettings(GrainsSettings):
     rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or lammps (a bed whose grains
     are in LAMMPS; the feet move in the plane of x and z)."""
     ground_parameters: tuple[str, ...] = ()
-    """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot."""
+    """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot. Defaults are those of a
+    spike of 12 mm and follow the size of each foot."""
+    accept_unsized: bool = False
+    """Whether to run defaults that follow no foot, those of a spike on brick (hunt-crossley, power), on grains."""
     stiffness: Positive | None = None
     """K of one foot [N/m]; that of one spike on the surface if not given, on sand times the area of the foot over the
     spike's."""
     damping: NotNegative | None = None
-    """C of one foot, while going in [N s/m]; likewise."""
+    """C of one foot, while going in [N s/m]; likewise, on sand times that ratio of areas to the power 1.25."""
     scale_with_gravity: bool = False
     """Whether K and C of the surface, which are those of 1 g, follow gravity: K in proportion, C with its square root.
     So do those of grains without cohesion."""
@@ -81,6 +84,8 @@ class RobotSettings(GrainsSettings):
     def _of_ground(self) -> str | None:
         if is_ground_file(self.ground):
             own = self.ground_parameters or self.stiffness is not None or self.damping is not None
+            if self.accept_unsized:
+                return say("nothing_unsized", s=self)
             return say("of_a_file", s=self) if own else None
         known = [*GROUNDS, *ON_GRAINS]
         if self.ground not in known:
@@ -88,7 +93,9 @@ class RobotSettings(GrainsSettings):
         if self.ground_parameters and self.ground in SPRING:
             return say("no_parameters", s=self, given=" ".join(self.ground_parameters))
         of_spring = self.stiffness is not None or self.damping is not None
-        return say("of_the_spring", s=self) if of_spring and self.ground not in SPRING else None
+        if of_spring and self.ground not in SPRING:
+            return say("of_the_spring", s=self)
+        return say("nothing_unsized", s=self) if self.accept_unsized and self.ground in SPRING else None
 
     def _scaled(self) -> str | None:
         if not self.scale_with_gravity:

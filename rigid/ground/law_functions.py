@@ -10,7 +10,8 @@ __all__ = [
     "spring_damper_rate_force", "spring_damper_rate_work", "power_loading", "power_loading_work",
     "hunt_crossley_rate_force", "hunt_crossley_rate_work", "inertial_rate_force", "inertial_rate_work",
     "bekker_loading", "bekker_loading_work", "no_rate_force", "no_rate_work", "rft_loading", "rft_loading_work",
-    "rft_rate_force", "rft_rate_work",
+    "rft_rate_force", "rft_rate_work", "rft_foot_loading", "rft_foot_loading_work", "rft_foot_rate_force",
+    "rft_foot_rate_work",
 ]  # fmt: skip
 
 
@@ -184,3 +185,55 @@ def rft_rate_work(depth, rate, p):
     s = max(depth, 0.0) / p[2]
     left = 1.0 - min(s, 1.0)
     return p[1] * max(rate, 0.0) ** 2 * p[2] * (s - (1.0 - left * left * left * left * left) / 5.0)
+
+
+def rft_foot_loading(depth, p):
+    """A h xi_n s^e (sum of c_k s^k), s = z / h <= 1; beyond, level with the slope, and the walls."""
+    s = depth / p[2]
+    above = 0.0
+    if s < 0.0:
+        s = 0.0
+    if s > 1.0:
+        above = s - 1.0
+        s = 1.0
+    square = s * s
+    low = p[4] + s * (p[5] + s * (p[6] + s * p[7]))
+    high = p[8] + s * (p[9] + s * (p[10] + s * p[11]))
+    return p[0] * (s ** p[3] * (low + square * square * high) + above * (p[12] + 0.5 * p[13] * above))
+
+
+def rft_foot_loading_work(depth, p):
+    """Integral of the above over depth."""
+    s = max(depth, 0.0) / p[2]
+    above = max(s - 1.0, 0.0)
+    s = min(s, 1.0)
+    e = p[3] + 1.0
+    low = p[4] / e + s * (p[5] / (e + 1.0) + s * (p[6] / (e + 2.0) + s * p[7] / (e + 3.0)))
+    high = p[8] / (e + 4.0) + s * (p[9] / (e + 5.0) + s * (p[10] / (e + 6.0) + s * p[11] / (e + 7.0)))
+    full = p[4] + p[5] + p[6] + p[7] + p[8] + p[9] + p[10] + p[11]
+    work = s**e * (low + s * s * s * s * high) + above * (full + above * (0.5 * p[12] + p[13] * above / 6.0))
+    return work * p[0] * p[2]
+
+
+def rft_foot_rate_force(depth, rate, p):
+    """A lambda rho v^2 s^(e - 1) (sum of d_k s^k), s = z / h <= 1, while going in."""
+    s = depth / p[2]
+    force = 0.0
+    inwards = rate
+    if s > 1.0:
+        s = 1.0
+    if inwards < 0.0:
+        inwards = 0.0
+    if depth > 0.0:
+        force = p[1] * inwards * inwards * s ** (p[3] - 1.0) * (p[14] + s * (p[15] + s * (p[16] + s * p[17])))
+    return force
+
+
+def rft_foot_rate_work(depth, rate, p):
+    """Integral of the above over depth."""
+    s = max(depth, 0.0) / p[2]
+    above = max(s - 1.0, 0.0)
+    s = min(s, 1.0)
+    e = p[3]
+    work = s**e * (p[14] / e + s * (p[15] / (e + 1.0) + s * (p[16] / (e + 2.0) + s * p[17] / (e + 3.0))))
+    return p[1] * max(rate, 0.0) ** 2 * p[2] * (work + above * (p[14] + p[15] + p[16] + p[17]))

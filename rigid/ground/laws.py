@@ -29,8 +29,12 @@ from rigid.checks import Parameter, check_parameters
 from . import law_functions as fn
 from .law_functions import springback, springback_energy
 from .rft import ball_profile, stress_gradient
+from .rft_foot import foot_profile
 
-__all__ = ["GROUNDS", "Parameter", "SurfaceLaw", "find_law", "katsuragi_durian", "springback", "springback_energy"]
+__all__ = [
+    "FOOT_LAWS", "GROUNDS", "Parameter", "SurfaceLaw", "find_law", "katsuragi_durian", "springback",
+    "springback_energy",
+]  # fmt: skip
 
 Numbers = Any  # A law's numbers: anything that p[0], p[1] ... can be read from.
 
@@ -99,7 +103,9 @@ class SurfaceLaw:
 
 
 def find_law(name: str) -> SurfaceLaw:
-    """The law called `name`. Raises ValueError naming those there are."""
+    """The law called `name`, of `GROUNDS` or `FOOT_LAWS`. Raises ValueError naming those of `GROUNDS`."""
+    if name in FOOT_LAWS:
+        return FOOT_LAWS[name]
     if name not in GROUNDS:
         raise ValueError(f"there is no surface law {name!r}: there is {', '.join(GROUNDS)}")
     return GROUNDS[name]
@@ -136,6 +142,15 @@ def _make_rft(v: Mapping[str, float]) -> tuple[float, ...]:
     return (ring, drag, v["radius"], *shape, slope, wall)
 
 
+def _make_rft_foot(v: Mapping[str, float]) -> tuple[float, ...]:
+    gradient = stress_gradient(bulk_density=v["bulk_density"], friction=v["friction"], gravity=v["gravity"])
+    shape = {name: v[name] for name in ("area", "height", "roundness", "perimeter")}
+    profile = foot_profile(**shape, surface_friction=v["surface_friction"])
+    stiff, drag = v["area"] * profile.height * gradient, v["area"] * v["inertia"] * v["bulk_density"]
+    lead = (stiff, drag, profile.height, profile.exponent)
+    return (*lead, *profile.loading, profile.slope, profile.wall, *profile.inertia)
+
+
 def _law(name: str, loading: str, rate: str, **others: Any) -> SurfaceLaw:
     """A law whose functions are those of `rigid.ground.law_functions` that begin with `loading` and with `rate`."""
     functions = {kind: getattr(fn, f"{loading}_{kind}") for kind in ("loading", "loading_work")}
@@ -149,6 +164,20 @@ _REBOUND = _number("rebound", "1", 0.05, "share of the deepest depth that spring
 _RADIUS = _number("radius", "m", 0.006, "radius of the spike's ball and shaft", highest=1.0, above_lowest=True,
                   source="ours : 12 mm across")  # fmt: skip
 _SAND = katsuragi_durian(diameter=0.012, projectile_density=7850.0, bulk_density=1500.0, friction=0.6, gravity=9.80665)
+
+_RFT = (
+    _number("bulk_density", "kg/m3", 1500.0, "rho_c of the bed", highest=2e4, above_lowest=True,
+            source="dry sand"),
+    _number("friction", "1", 0.6, "internal friction coefficient of the grains", lowest=0.1, highest=0.9,
+            source="dry sand; the fit of xi_n is for 0.3 to 0.9"),
+    _number("surface_friction", "1", 0.4, "friction coefficient of grains and spike", highest=2.0,
+            source="ours"),
+    _number("gravity", "m/s2", 9.80665, "gravity of the grains: 1 g even in the rig", highest=100.0,
+            above_lowest=True, source="docs/planar.md"),
+    _number("inertia", "1", 1.1, "lambda of the term lambda rho v_n^2", highest=10.0,
+            source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rft.py"),
+)  # fmt: skip
+"""Of the grains, of all laws of 3D-RFT."""
 
 _LAWS = (
     _law(
@@ -235,16 +264,7 @@ _LAWS = (
         source="Agarwal, Goldman and Kamrin, PNAS 120 (2023), e2214017120; see rigid/ground/rft.py",
         parameters=(
             _RADIUS,
-            _number("bulk_density", "kg/m3", 1500.0, "rho_c of the bed", highest=2e4, above_lowest=True,
-                    source="dry sand"),
-            _number("friction", "1", 0.6, "internal friction coefficient of the grains", lowest=0.1, highest=0.9,
-                    source="dry sand; the fit of xi_n is for 0.3 to 0.9"),
-            _number("surface_friction", "1", 0.4, "friction coefficient of grains and spike", highest=2.0,
-                    source="ours"),
-            _number("gravity", "m/s2", 9.80665, "gravity of the grains: 1 g even in the rig", highest=100.0,
-                    above_lowest=True, source="docs/planar.md"),
-            _number("inertia", "1", 1.1, "lambda of the term lambda rho v_n^2", highest=10.0,
-                    source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rft.py"),
+            *_RFT,
             _REBOUND,
         ),
         slots=("2 pi R^3 xi_n", "pi R^2 lambda rho / 2", "radius", *(f"shape {k}" for k in range(8)), "slope", "wall"),
@@ -252,4 +272,28 @@ _LAWS = (
     ),
 )  # fmt: skip
 
+_FOOT_LAWS = (
+    _law(
+        "rft-foot", "rft_foot", "rft_foot",
+        summary="3D-RFT over the underside of a foot going straight down, with the inertia of the grains",
+        source="as rft; the surface integral of `rigid.ground.rft_foot`",
+        parameters=(
+            _number("area", "m2", math.pi * 0.006**2, "of the foot from above", above_lowest=True,
+                    source="ours: 12 mm across"),
+            _number("height", "m", 0.006, "depth at which the section is full; of no effect on a flat foot",
+                    highest=10.0, source="geometry"),
+            _number("roundness", "1", 0.0, "0: flat, 1: a cylinder that lies, 2: a ball or spheroid", highest=2.0,
+                    source="geometry"),
+            _number("perimeter", "m", 0.0, "of upright walls above the underside", source="geometry"),
+            *_RFT,
+            _REBOUND,
+        ),
+        slots=("A h xi_n", "A lambda rho", "height", "exponent", *(f"shape {k}" for k in range(8)), "slope", "wall",
+               *(f"inertia {k}" for k in range(4))),
+        extensive=(0, 1), bends=(2,), make=_make_rft_foot,
+    ),
+)  # fmt: skip
+
 GROUNDS: dict[str, SurfaceLaw] = {law.name: law for law in _LAWS}  # All laws by name; `hedgebed tumble --ground NAME`
+FOOT_LAWS: dict[str, SurfaceLaw] = {law.name: law for law in _FOOT_LAWS}
+"""Laws whose parameters are the shape of a foot: `rigid.ground.soles` makes them, a user does not choose them."""

@@ -4,7 +4,7 @@ from itertools import product
 
 import pytest
 
-pytest.importorskip("mujoco")
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
 from benchmarks import feet
 from experiments.runs.progress import Progress

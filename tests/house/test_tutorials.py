@@ -46,7 +46,7 @@ def test_the_material_of_the_tutorial_is_a_material(tmp_path):
 
 
 def test_the_robot_of_the_tutorial_has_the_feet_that_the_command_names():
-    mujoco = pytest.importorskip("mujoco")
+    mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
     model = mujoco.MjModel.from_xml_string(block("own-robot", "xml"))
     assert {model.geom(number).name for number in range(model.ngeom)} >= {"foot_l", "foot_r"}
 

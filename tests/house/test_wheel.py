@@ -20,7 +20,11 @@ import hedgebed
 from experiments.cli.main import main
 
 assert Path(hedgebed.__file__).is_relative_to(sys.argv[1]), hedgebed.__file__
-for command in (
+for command in sys.argv[2:]:
+    code = main([*command.split()])
+    assert code == 0, (command, code)
+"""
+BASE = (
     "penetrate --tip-diameter 0.012 --grain 0.004 --allow-coarse --bed-size 0.048 0.048 0.03 --depth 0.004 --seeds 1"
     " --speeds 0.4 --drop-speeds 0.2 --frame-count 0 --threads 1 --max-overlap 0.1 --out runs/bed",
     "tumble --out runs/tumble",
@@ -30,10 +34,7 @@ for command in (
     "view runs/tumble --no-open",
     "experiments list",
     "effects",
-):
-    code = main([*command.split()])
-    assert code == 0, (command, code)
-"""
+)
 
 
 def run(*words: str, cwd: Path, **environment: str) -> str:
@@ -43,6 +44,14 @@ def run(*words: str, cwd: Path, **environment: str) -> str:
     )
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
+
+
+@pytest.fixture(scope="module")
+def site(wheel, tmp_path_factory):
+    """A folder of packages that has the wheel alone; what it needs is in this Python."""
+    folder = tmp_path_factory.mktemp("site")
+    run(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", str(folder), str(wheel), cwd=folder)
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +81,25 @@ def test_the_wheel_has_every_data_file_and_only_the_documented_top_level_names(w
     assert [name for name in TOP if f"`{name.removesuffix('.py')}`" not in page] == []
 
 
-def test_the_commands_work_from_the_wheel_in_another_folder(wheel, tmp_path):
-    site = tmp_path / "site"
-    run(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", str(site), str(wheel), cwd=tmp_path)
-    out = run(sys.executable, "-c", COMMANDS, str(site), cwd=tmp_path, PYTHONPATH=str(site))
+def test_the_commands_work_from_the_wheel_in_another_folder(site, tmp_path):
+    out = run(sys.executable, "-c", COMMANDS, str(site), *BASE, cwd=tmp_path, PYTHONPATH=str(site))
     assert {path.parent.name for path in tmp_path.glob("runs/*/report.html")} >= {"bed", "tumble", "hop", "diagnosis"}
     assert "stiffness" in out
+
+
+def test_a_robot_that_ships_stands_on_a_law_from_the_wheel(site, tmp_path):
+    for name in ("mujoco", "trimesh"):
+        pytest.importorskip(name, reason=f"{name} is not installed: pip install 'hedgebed[mujoco]'")
+    command = "mujoco hopper --feet foot --duration 0.05 --frame-count 0 --out runs/robot"
+    run(sys.executable, "-c", COMMANDS, str(site), command, cwd=tmp_path, PYTHONPATH=str(site))
+    assert (tmp_path / "runs" / "robot" / "result.json").is_file()
+
+
+def test_an_fmu_is_written_from_the_wheel_and_another_importer_finds_no_fault_in_it(site, tmp_path):
+    pytest.importorskip("pythonfmu3", reason="pythonfmu3 is not installed: pip install 'hedgebed[fmi]'")
+    run(sys.executable, "-c", COMMANDS, str(site), "fmu hedgehog.fmu", cwd=tmp_path, PYTHONPATH=str(site))
+    assert zipfile.ZipFile(tmp_path / "hedgehog.fmu").testzip() is None
+    fmpy = pytest.importorskip(
+        "fmpy", reason="fmpy is not installed: pip install fmpy; the FMU is written, not imported"
+    )
+    assert fmpy.read_model_description(str(tmp_path / "hedgehog.fmu")).coSimulation is not None

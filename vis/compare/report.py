@@ -20,6 +20,8 @@ from vis.page.report import Report, Result, again, report_of, unit_text
 from vis.page.states import LINES, draw_bands, legend_of_runs
 from vis.pictures.frames import frame_names
 
+from .robots import draw_robots
+
 __all__ = ["write_compare_report"]
 
 Columns = Mapping[str, Array]
@@ -30,17 +32,17 @@ _ROWS = (BED, "#E69F00", "#009E73", "#CC79A7", GREY, "#56B4E9", INK, MODEL)
 
 @report_of(dpi=130)
 def write_compare_report(report: Report) -> Path:
-    """Make figures/ and report.html (of tumbles also stills and film.gif) of a comparison, and return the report.
+    """Make figures/ and report.html of a comparison, and return the report.
 
     Raises FileNotFoundError where the folder has no result.json, or a run is gone whose pictures are asked for.
     """
     result = report.result
     labels = (result["runs"][0]["label"], result["runs"][1]["label"])
-    penetrations = result["kind"] == "penetrate"
+    shown = {"penetrate": lambda: [Section("", _drives(report, labels))], "mujoco": lambda: _robots(report, labels)}
     rows = [(row["key"], row["first"], row["second"], row["unit"]) for row in result["differs"]]
     given = table_of(("key", *labels, "unit"), rows, words=True)
     sections = [
-        *([Section("", _drives(report, labels))] if penetrations else _tumbles(report, labels)),
+        *shown.get(result["kind"], lambda: _tumbles(report, labels))(),
         Section("Every number, side by side", _numbers(result, labels)),
         *([Section("Settings of the two runs", given)] if given else []),
         again("hedgebed compare run.toml"),
@@ -63,6 +65,20 @@ def _tumbles(report: Report, labels: Labels) -> list[Section]:
     ]
 
 
+def _robots(report: Report, labels: Labels) -> list[Section]:
+    """Figures and pictures of two runs of one robot."""
+    result = report.result
+    columns = dict(read_series(report.folder / result["series"], text=("state_1", "state_2")))
+    drawn = draw_robots(columns, result["feet"], result["weights"], labels)
+    path, *others = [report.draw(f"robot_{name}", one, name=name) for name, one in drawn.items()]
+    seen = _seen(report, labels) if result["pictures"] else []
+    return [
+        Section("", [listing(result["departures"]["sentences"]), path]),
+        *([Section("Pictures side by side", seen)] if seen else []),
+        Section("Forces and energy", others),
+    ]
+
+
 def _folders(report: Report) -> list[Path]:
     return [(report.folder / run["folder"]).resolve() for run in report.result["runs"]]
 
@@ -70,7 +86,7 @@ def _folders(report: Report) -> list[Path]:
 def _seen(report: Report, labels: Labels) -> list[Block]:
     """Stills of both at the same moments, and the film; in space where both have frames."""
     folders = _folders(report)
-    if report.result["kind"] != "tumble spatial":
+    if report.result["kind"] == "tumble":
         reels: Sequence[AnyReel] = _alike([Reel(folder) for folder in folders])
     elif without := [label for label, home in zip(labels, folders, strict=True) if NAME not in frame_names(home)]:
         return [text(f"There are no pictures: {' and '.join(without)} kept no frames (frame_count = 0).", small=True)]
@@ -115,7 +131,8 @@ def _drives(report: Report, labels: Labels) -> list[Block]:
 def _tiles(result: Result) -> list[Tile]:
     wanted = (
         ("trajectory_angle", "Trajectory angle"), ("max_speed", "Largest speed"), ("largest_turn", "Largest turn"),
-        ("sinkage_largest", "Deepest"), ("sinkage", "Sinkage"), ("stiffness", "Stiffness"),
+        ("highest", "Highest"), ("sinkage_largest", "Deepest"), ("sinkage", "Sinkage"), ("stiffness", "Stiffness"),
+        ("largest_force", "Largest force"),
         ("energy_residual", "Energy residual"),
     )  # fmt: skip
     rows = {row["name"]: row for row in result["compared"]}

@@ -11,7 +11,7 @@ from coupling.robot.distances import distances
 from coupling.robot.feet import mesh_of
 from rigid.spatial.quaternions import from_turn, multiply, to_matrix
 
-mujoco = pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
 TWO = """<mujoco><asset>
 <mesh name="closed" vertex="0 0 0 .02 0 0 0 .02 0 0 0 .02"/></asset><worldbody>

@@ -9,7 +9,7 @@ from coupling.robot.models import switch_off_floors
 from rigid.ground.laws import find_law
 from rigid.ground_file import read_ground
 
-mujoco = pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
 SOFT = {"stiffness": 2000.0, "damping": 30.0}
 

@@ -14,7 +14,7 @@ from rigid.platform.platform import Platform
 from rigid.platform.solids import box_vertices
 from rigid.spatial.spatial import SpatialTrial
 
-pytest.importorskip("mujoco")
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 pytestmark = pytest.mark.long
 
 MIDDLE = (0.048, 0.048)

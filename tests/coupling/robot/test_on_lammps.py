@@ -11,7 +11,7 @@ from coupling.lammps import LammpsBed, LammpsMissingError, find_lammps
 from coupling.robot import BedFeet, LammpsFeet, LostRobotError, MujocoRobot, RobotRun
 from dem import Bed
 
-pytest.importorskip("mujoco")
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 pytestmark = pytest.mark.long
 try:
     find_lammps()

@@ -16,7 +16,7 @@ from rigid.platform.files import find_platform
 from rigid.spatial.quaternions import from_turn, to_matrix
 from rigid.spatial.spatial import SpatialTrial, simulate, standing
 
-pytest.importorskip("mujoco")
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
 HEDGEHOG = EXAMPLES / "mujoco-hedgehog" / "hedgehog.xml"
 SPRING = {"stiffness": 2000.0, "damping": 0.0}

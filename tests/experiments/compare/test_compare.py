@@ -143,7 +143,8 @@ def test_the_loads_on_the_rows_are_the_force_that_lifts_the_platform(runs):
         (("begun",), "has no result yet"),
         (
             ("hop",),
-            "is of hop, which has nothing to compare over time; expected: runs of tumble, tumble spatial or penetrate",
+            "is of hop, which has nothing to compare over time; expected: runs of tumble, "
+            "tumble spatial, mujoco or penetrate",
         ),
         (("spike",), "is of tumble and .* of penetrate: expected two runs of one kind"),
     ],

@@ -18,8 +18,8 @@ from experiments.tumble.trial import plan_tumble
 from rigid import simulate
 from rigid.ground_file import GroundFile
 
-fmpy = pytest.importorskip("fmpy")
-pytest.importorskip("pythonfmu3")
+fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed: pip install fmpy")
+pytest.importorskip("pythonfmu3", reason="pythonfmu3 is not installed: pip install 'hedgebed[fmi]'")
 
 CHANNELS = {"x": "x", "z": "y", "theta": "theta", "vx": "vx", "vz": "vy", "omega": "omega"}  # Ours: the trajectory's
 STEP = 1e-3

@@ -5,9 +5,10 @@ import pytest
 from fake_bed import FakeBed
 
 from experiments import lawfit
+from experiments.cli.main import main
 from experiments.lawfit.cells import cells_of
 from experiments.lawfit.data import Data, PushRun
-from experiments.lawfit.design import how_sure
+from experiments.lawfit.design import how_sure, with_chosen
 from experiments.lawfit.fit import fit_law
 from experiments.lawfit.laws import CANDIDATES
 from experiments.lawfit.synthetic import BINS, DEPTH, FOUNDATION, stopping_coverage
@@ -18,7 +19,7 @@ SPREAD = {1: -1.0, 2: 1.0, 3: 0.0, 4: 0.5, 5: -0.5, 6: 0.0, 7: 0.0, 8: 0.0}
 QUICK = {
     "budget": 3600.0, "tip_diameter": 0.012, "bed_size": (0.06, 0.06, 0.04), "grain": 0.0024, "seeds": (1, 2, 3),
     "speeds": (0.2, 0.8), "drop_speeds": (), "mass": 0.3, "load": 0.4, "depth": 0.01, "young": 2e7,
-    "laws": ("spring-damper",),
+    "laws": ("spring-damper",), "choose_further": False,
 }  # fmt: skip
 
 
@@ -128,6 +129,40 @@ def test_what_is_computed_is_found_again(made, tmp_path):
     assert second["quantities"] == first["quantities"]
     again = lawfit.resume(tmp_path / "b")
     assert again["quantities"] == first["quantities"]
+
+
+def test_further_runs_are_chosen_where_half_of_the_budget_is_sufficient(made, tmp_path):
+    """Unloading and a drag at half the depth, half the load; fewer under a smaller budget, none where one is given."""
+    rich, said = with_chosen(lawfit.Settings(**(QUICK | {"choose_further": True, "budget": 1e6})))
+    assert (rich.unload_depths, rich.loads, rich.drag_depths) == ((0.005,), (0.2,), (0.005,))
+    assert "--unload-depths 0.005 --loads 0.2 --drag-depths 0.005" in said
+    least = 2 * sum(step["cost"] for step in calibrate(tmp_path / "plain", tolerance=1e-4, most_beds=4)["design"])
+    counts = []
+    for budget in np.geomspace(0.5, 8.0, 12) * least:
+        some, said = with_chosen(lawfit.Settings(**(QUICK | {"choose_further": True, "budget": float(budget)})))
+        counts.append(sum(bool(getattr(some, name)) for name in ("unload_depths", "loads", "drag_depths")))
+        assert bool(said) == (counts[-1] > 0)
+    assert counts[0] == 0 and counts[-1] == 3 and counts == sorted(counts)
+    for own in ({"choose_further": False}, {"choose_further": True, "loads": (0.3,)}):
+        settings = lawfit.Settings(**(QUICK | {"budget": 1e6} | own))
+        assert with_chosen(settings) == (settings, "")
+
+
+@pytest.mark.long
+def test_runs_that_were_chosen_are_made_in_every_bed_and_found_again(made, tmp_path):
+    given = {"choose_further": True, "budget": 1e6, "members": str(tmp_path / "kept"), "most_beds": 4}
+    result = calibrate(tmp_path / "a", **given)
+    assert len(result["unloadings"]) == len(result["drags"]) == 4
+    assert {place["load"] for place in result["placements"]} == {0.2, 0.4}
+    made.clear()
+    assert calibrate(tmp_path / "b", **given)["unloadings"] == result["unloadings"] and made == []
+
+
+def test_a_tip_of_ones_own_is_refused_with_what_does_it(capsys):
+    with pytest.raises(ValueError, match=r"tip = 'foot.stl': expected sphere, cone or flat.* --shapes foot.stl"):
+        lawfit.Settings(**(QUICK | {"tip": "foot.stl"}))
+    assert main(["calibrate", "--budget", "60", "--tip", "foot.stl"]) == 2
+    assert "bed test plates --shapes foot.stl" in " ".join(capsys.readouterr().err.split())
 
 
 def test_settings_that_contradict_each_other_are_refused():

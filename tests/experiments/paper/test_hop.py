@@ -10,6 +10,7 @@ import pytest
 from golden import golden
 
 from experiments.cli.main import BAD_INPUT, DONE, main
+from experiments.hop.experiment import check
 from experiments.hop.numbers import plan_hop
 from experiments.hop.on_surface import flight_path, hop_on_surface
 from experiments.hop.settings import HopSettings
@@ -332,6 +333,39 @@ def test_a_hop_that_cannot_be_is_refused_before_there_is_a_folder(tmp_path, caps
     assert status == BAD_INPUT
     assert said in error
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--distance", "5000"), r"at gravity = (\S+) m/s2 it is possible"),
+        (("--actuator", "motor", "--distance", "1"), r"at gravity = (\S+) m/s2 it is possible"),
+        (("--distance", "30", "--body-radius", "20"), r"at gravity = (\S+) m/s2 it is possible"),
+        (("--gravity", "9.81", "--torque", "1"), r"a gravity below (\S+) m/s2 is accepted"),
+        (("--wheel-speed-0", "0.001"), r"at gravity = (\S+) m/s2 it is possible"),
+    ],
+)
+def test_a_refusal_names_another_gravity_with_which_the_hop_is_possible(tmp_path, capsys, options, said):
+    _, error = hop(tmp_path, capsys, *options)
+    gravity = float(re.search(said, " ".join(error.split()))[1])
+    if "below" in said:
+        gravity *= 0.99
+    own = [word for pair in zip(options[::2], options[1::2], strict=True) if pair[0] != "--gravity" for word in pair]
+    check(HopSettings(**settings_of([*own, "--gravity", str(gravity)])))
+
+
+def settings_of(words):
+    """Settings by their names, of options."""
+    values = {"distance": float, "torque": float, "gravity": float, "body_radius": float, "wheel_speed_0": float}
+    pairs = [
+        (key.removeprefix("--").replace("-", "_"), value) for key, value in zip(words[::2], words[1::2], strict=True)
+    ]
+    return {key: values.get(key, str)(value) for key, value in pairs}
+
+
+def test_threads_are_taken_with_a_message_as_elsewhere(tmp_path, capsys):
+    assert main(["hop", "--threads", "2", "--distance", "1", "--out", str(tmp_path / "run")]) == DONE
+    assert "threads = 2: a hop uses one thread" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_platform_file_of_ones_own_will_do(tmp_path, capsys):

@@ -12,6 +12,7 @@ from coupling.lammps import LammpsMissingError, find_lammps
 from experiments.cli.main import main
 from experiments.robot import experiment as robot
 from experiments.robot.energy import MOST_RESIDUAL, growth_warning
+from experiments.robot.laws import given_parameters
 from experiments.robot.on_grains import RobotFollowed, RobotOnBed
 from experiments.robot.plan import keep_files, plan_robot
 from experiments.robot.result import conclude
@@ -23,7 +24,7 @@ from vis.page.folder import read_columns
 from vis.view.page import report_scene
 from vis.view.sources import sources_of
 
-pytest.importorskip("mujoco")
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
 HOP = f"{EXAMPLES / 'mujoco-hopper' / 'hop.py'}:control"
 HOPPER = {"model": "hopper", "feet": ("foot",)}
@@ -44,6 +45,7 @@ ON_BED = HOPPER | {"ground": "bed", "height": 0.012, "grain": 0.012, "bed_size":
         ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
         ({"feet": ()}, "feet"),
         ({"ground": "power", "scale_with_gravity": True}, "scale_with_gravity.*'power'"),
+        ({"accept_unsized": True}, "accept_unsized: ground = 'spring-damper' follows"),
         ({"stiffness": 1.0, "damping": 1.0, "scale_with_gravity": True}, "scale_with_gravity"),
         ({"ground": "lammps", "iterations": 3}, r"iterations = 3 .* iterations = 1"),
         ({"ground": "bed", "ranks": 2}, r"ranks = 2 .*ground = 'bed'"),
@@ -173,10 +175,10 @@ def test_a_gravity_beyond_the_range_of_a_ground_file_is_told_before_the_run(tmp_
     assert not told[0] and "gravity = 0.00981" in told[1][0]
 
 
-@pytest.mark.parametrize("law", ["hunt-crossley", "power", "katsuragi-durian", "bekker", "rft"])
+@pytest.mark.parametrize("law", ["hunt-crossley", "power", "power-irreversible", "katsuragi-durian", "bekker", "rft"])
 def test_a_law_whose_parameters_do_not_follow_from_the_surface_says_so_and_its_title_names_none(law, tmp_path):
     """The foot of the hopper has 60 mm, 25 times the area of the spike of 12 mm that the defaults are of."""
-    settings = RobotSettings(**HOPPER, ground=law, surface="jsc1a", duration=0.01)
+    settings = RobotSettings(**HOPPER, ground=law, surface="jsc1a", duration=0.01, accept_unsized=True)
     plan = plan_robot(settings)
     (said,) = [said for said in plan.warnings if "ground_parameters" in said]
     assert all(word in said for word in ("12 mm", "'jsc1a'", "ground.toml"))
@@ -189,7 +191,7 @@ def test_a_law_whose_parameters_do_not_follow_from_the_surface_says_so_and_its_t
 
 
 def test_a_law_with_all_its_parameters_given_has_no_warning_of_defaults():
-    given = ("stiffness=4000", "damping=9", "exponent=1.2")
+    given = ("stiffness=4000", "damping=9", "exponent=1.2")  # of the foot: they stay
     told = [plan_robot(RobotSettings(**HOPPER, ground="power", ground_parameters=some)) for some in (given, given[:2])]
     assert [number.value for number in map(told[0].numbers.get, ("stiffness", "damping", "exponent"))] == [4000, 9, 1.2]
     assert not [said for said in told[0].warnings if "defaults" in said]
@@ -199,13 +201,52 @@ def test_a_law_with_all_its_parameters_given_has_no_warning_of_defaults():
         plan_robot(RobotSettings(**HOPPER, ground="power", ground_parameters=("stiffnes=1",)))
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            {"ground": "power"},
+            r"ground = 'power': its defaults of stiffness and damping are those of brick .* accept_unsized",
+        ),
+        ({"ground": "hunt-crossley", "ground_parameters": ("stiffness=4000",)}, "its defaults of dissipation are"),
+        ({"ground": "bekker", "ground_parameters": ("exponent=1.3",)}, "exponent is given, and cohesive_modulus and"),
+    ],
+)
+def test_defaults_that_follow_no_foot_are_refused_on_grains_unless_they_are_accepted(given, said):
+    with pytest.raises(ValueError, match=said):
+        plan_robot(RobotSettings(**HOPPER | given))
+    for accepted in ({"accept_unsized": True}, {"surface": "brick"}):
+        plan = plan_robot(RobotSettings(**HOPPER | given | accepted))
+        ground, found = plan.law_feet(plan.robot()), find_law(given["ground"])
+        own = found.values(given_parameters(plan.settings))
+        once = found.force(2e-3, 0.1, found.numbers(own))
+        assert sum(float(one.force(2e-3, 0.1)) for one in ground.grounds[0][:8]) == pytest.approx(once, rel=1e-9)
+
+
+def test_a_larger_foot_has_more_force_under_a_law_and_its_numbers_say_how_much():
+    """A plate of 60 mm has 25 times the area of the spike of 12 mm: K is as the area, C as its power 1.25."""
+    plan = plan_robot(RobotSettings(**HOPPER, ground="katsuragi-durian"))
+    spike = find_law("katsuragi-durian").values({})
+    (one, *_), value = plan.law_feet(plan.robot()).grounds[0], plan.scales["foot"]
+    assert value == pytest.approx(25, rel=0.01)
+    for name in ("stiffness", "drag"):
+        assert one.parameters[name] == pytest.approx(value * spike[name])
+        assert f"{value:.3g} times under a foot" in plan.numbers[name].origin
+    spring = plan_robot(RobotSettings(**HOPPER))
+    (one, *_), own = spring.law_feet(spring.robot()).grounds[0], spring.numbers
+    assert one.parameters["stiffness"] == pytest.approx(value * own["stiffness"].value)
+    assert one.parameters["damping"] == pytest.approx(value**1.25 * own["damping"].value)
+    given = plan_robot(RobotSettings(**HOPPER, stiffness=900.0, damping=3.0))
+    assert given.law_feet(given.robot()).grounds[0][0].parameters == {"stiffness": 900.0, "damping": 3.0}
+
+
 def test_gravity_of_the_run_goes_into_a_law_that_takes_it_unless_it_is_given():
-    """The stress of resistive force theory is in proportion to gravity."""
+    """The stress of resistive force theory is in proportion to gravity, also under the sole of a foot."""
 
     def stress(gravity, *given):
         plan = plan_robot(RobotSettings(**HOPPER, ground="rft", gravity=gravity, ground_parameters=given))
         law = plan.law_feet(plan.robot()).grounds[0][0]
-        return find_law("rft").numbers(law.parameters)[0], plan.numbers
+        return find_law("rft-foot").numbers(law.parameters)[0], plan.numbers
 
     (low, _), (high, _), (own, numbers) = stress(1.0), stress(4.0), stress(1.0, "gravity=4")
     assert high == pytest.approx(4 * low) and own == high

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from rigid.ground import law_functions
-from rigid.ground.laws import GROUNDS, find_law, katsuragi_durian
+from rigid.ground.laws import FOOT_LAWS, GROUNDS, find_law, katsuragi_durian
 
-ALL = pytest.mark.parametrize("law", GROUNDS.values(), ids=lambda law: law.name)
+ALL = pytest.mark.parametrize("law", [*GROUNDS.values(), *FOOT_LAWS.values()], ids=lambda law: law.name)
 DEPTHS = [1e-5, 3e-4, 2e-3, 0.0059, 0.0061, 0.02]
 
 

@@ -1,0 +1,156 @@
+"""The surface law under a robot's feet: where its numbers come from, and how they follow the size of a foot."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from coupling.robot import Foot, law_under_feet
+from dem.grains.materials import material
+from experiments.platform.settled import Number
+from experiments.platform.surfaces import Surface
+from rigid.ground.laws import SurfaceLaw, find_law
+from rigid.ground.soles import diameter_powers, ill_sized
+from rigid.ground_file import GroundFile
+from rigid.platform.rig import STANDARD_GRAVITY
+
+from . import say
+from .settings import RobotSettings
+
+__all__ = ["SPIKE", "UnderFeet", "given_parameters", "law_of", "settle_other_law", "settle_spring"]
+
+SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
+SPIKE = 0.012  # Diameter of the spike that the defaults of the other laws are of [m] (rigid.ground.laws)
+OWN_SCALE = {"bekker": ("radius", "tip_height"), "rft": ("radius",)}
+"""Laws that take the foot's own size -> the parameters that it replaces."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnderFeet:
+    """A law, and the tip that its parameters are of."""
+
+    law: str
+    parameters: Mapping[str, float]
+    of: float | None  # Diameter of the tip [m]; None where they do not follow the size of a foot
+    given: Collection[str] = ()  # Names of parameters that are of one foot already
+
+    def options(self, feet: Sequence[Foot], matrices: Sequence[Any]) -> dict[str, Any]:
+        """Arguments of `LawFeet` for `feet`, turned by `matrices`."""
+        if self.of is None:
+            return {"law": self.law, "parameters": self.parameters}
+        return law_under_feet(feet, matrices, self.law, self.parameters, of=self.of, given=self.given)
+
+
+def law_of(
+    settings: RobotSettings,
+    surface: Surface,
+    fitted: GroundFile | None,
+    numbers: Mapping[str, Number],
+    *,
+    as_spring: bool,
+) -> UnderFeet:
+    """The law of `settings`, or the spring-damper where `as_spring` or on grains.
+
+    On hard ground K is of the spike that gives way, so that the spring-damper, hunt-crossley and power do not follow
+    the size of a foot there.
+    """
+    if fitted is not None and not as_spring:
+        return UnderFeet(law=fitted.law, parameters=fitted.values, of=fitted.foot.diameter)
+    if as_spring or settings.on_grains or settings.ground == "spring-damper":
+        own = {key: numbers[key].value for key in ("stiffness", "damping")}
+        given = [key for key in own if getattr(settings, key) is not None]
+        return UnderFeet(
+            law="spring-damper", parameters=own, of=surface.spike if surface.granular else None, given=given
+        )
+    given_here = given_parameters(settings)
+    parameters = find_law(settings.ground).in_gravity(numbers["gravity"].value, given_here)
+    unsized = bool(ill_sized(settings.ground, given_here))  # on hard ground, or accepted
+    return UnderFeet(law=settings.ground, parameters=parameters, of=None if unsized else SPIKE, given=tuple(given_here))
+
+
+def settle_spring(
+    settings: RobotSettings, surface: Surface, gravity: float, largest: float, numbers: dict[str, Number]
+) -> list[str]:
+    """Settle K and C of one spike, and warn where they are those of another gravity [m/s2].
+
+    ``largest``: area of the largest foot over that of the spike [1]. Without cohesion the forces among grains in slow
+    motion go with their weight. So K goes with gravity g, and C, a force over a speed, with sqrt(g), as speeds do in
+    motions that are similar (docs/coupling.md). Raises ValueError where K of the surface does not go with gravity.
+    """
+    share = gravity / STANDARD_GRAVITY
+    loose = surface.grains is not None and material(surface.grains).cohesion == "none"
+    if settings.scale_with_gravity and not loose:
+        what = "made of grains with cohesion" if surface.granular else "hard ground"
+        raise ValueError(say("scaled_surface", surface=surface.name, what=what))
+    powers = diameter_powers("spring-damper", {})
+    for key, unit, power in (("stiffness", "N/m", 1.0), ("damping", "N s/m", 0.5)):
+        given, own = getattr(settings, key), getattr(surface, key) / SPIKES_PER_ROW
+        scaled = f" times (g / {STANDARD_GRAVITY:g} m/s2)^{power:g}" if settings.scale_with_gravity else ""
+        own *= share**power if settings.scale_with_gravity else 1.0
+        origin = f"surface {surface.name}{scaled}, of one spike{_times(largest, powers[key])}"
+        numbers[key] = Number(own, unit, origin) if given is None else Number(given, unit, "given")
+    fits = settings.scale_with_gravity or settings.stiffness is not None or not surface.granular
+    if fits or share >= 0.5:
+        return []
+    stiffness = largest * numbers["stiffness"].value
+    key = "of_earth" if loose else "of_earth_cohesive"
+    return [say(key, stiffness=stiffness, scaled=share * stiffness, gravity=gravity, surface=surface.name)]
+
+
+def settle_other_law(
+    settings: RobotSettings, surface: Surface, gravity: float, largest: float, numbers: dict[str, Number]
+) -> list[str]:
+    """Settle the parameters of a law other than the spring-damper, and warn of those that are the law's defaults.
+
+    ``largest``: area of the largest foot over that of the spike that the defaults are of [1]. Raises ValueError for a
+    parameter there is not, or out of bounds, and for one that no foot on grains has and that is not accepted as it is.
+    """
+    law, given = find_law(settings.ground), given_parameters(settings)
+    own = law.in_gravity(gravity, given)
+    values = law.values(own)
+    ill = ill_sized(law.name, given)
+    _refuse_unsized(settings, surface, law, ill)
+    powers = {} if ill else diameter_powers(law.name, values)
+    replaced = () if "radius" in given else OWN_SCALE.get(law.name, ())
+    for parameter in law.parameters:
+        name = parameter.name
+        origin = f"default of {law.name}, of one spike{_times(largest, powers.get(name, 0.0))}"
+        origin = "given" if name in given else origin
+        if name not in ("gravity", *replaced) or (name in given and name != "gravity"):
+            numbers[name] = Number(values[name], parameter.unit, origin)
+        elif name == "gravity" and name in given:
+            numbers["ground_gravity"] = Number(values[name], parameter.unit, origin)
+    left = [name for name in values if name not in own and name not in replaced]
+    if not left:
+        return []
+    scaled = any(name in powers for name in left)
+    how = "unsized" if ill else "own_scale" if law.name in OWN_SCALE else "similar" if scaled else "none"
+    size = say(f"size_{how}", most=largest, spike=1e3 * SPIKE)
+    more = "" if "gravity" in own else ", nor gravity"
+    return [say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)]
+
+
+def _refuse_unsized(settings: RobotSettings, surface: Surface, law: SurfaceLaw, ill: list[str]) -> None:
+    """Raise ValueError for parameters that belong to hard ground or to another exponent, on grains."""
+    if not ill or settings.accept_unsized or not surface.granular:
+        return
+    key = "unsized_law" if law.name in ("hunt-crossley", "power") else "unsized_exponent"
+    needed = " ".join(f"{name}=VALUE" for name in ill)
+    raise ValueError(say(key, law=law, names=" and ".join(ill), surface=surface, needed=needed, spike=1e3 * SPIKE))
+
+
+def _times(largest: float, power: float) -> str:
+    """How many times a number of one spike is under the largest foot, in words; ``power``: of the diameter."""
+    return f"; {largest ** (0.5 * power):.3g} times under a foot" if power and largest > 1 else ""
+
+
+def given_parameters(settings: RobotSettings) -> dict[str, float]:
+    """The ground_parameters. Raises ValueError for one that is no name=value."""
+    return dict(_assignment(text) for text in settings.ground_parameters)
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise ValueError(say("no_number", text=text)) from None
