@@ -25,7 +25,7 @@ SURFACE_SCAN = 6
 """Points among which the planar model's longest hop is found, for a refusal."""
 HALVINGS = 8
 """How often the stretch between two of them is halved, where the distance lies in it."""
-GRAVITIES = 12
+GRAVITIES = 16
 """How often gravity is halved or doubled, until a refusal can name one with which the hop is possible."""
 BEYOND = 10.0
 """How many times what a distance takes at once, or from the energy, is looked through where no limit is known."""
@@ -59,7 +59,10 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
     Raises ValueError for numbers that cannot be, and for a distance or means with which there is no hop.
     """
     plan = plan_hop(settings, platform_file)
-    means = _means(plan, settings)
+    try:
+        means = _means(plan, settings)
+    except _TooWeakError as error:
+        raise ValueError(f"{error}{_other_gravity(settings, _possible, (0.5,))}") from None
     if settings.asks_for == "distance":
         return plan, _search(settings, plan, means)
     key, effort = ("wheel_speed_0", settings.wheel_speed_0) if settings.wheel_speed_0 else ("torque", settings.torque)
@@ -70,8 +73,7 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
         enough = next((each for each in efforts if _hop(settings, means, each) is not None), None)
         would = "nor does any other" if enough is None else f"from some {enough:.3g} {means.unit} on it does"
         where = say("where", t=plan.tumbler)
-        other = _other_gravity(settings, lambda own, plan, means: _hop(own, means, effort) is not None, (0.5, 2.0))
-        would += other
+        would += _other_gravity(settings, _possible, (0.5, 2.0))
         raise ValueError(say("no_hop", key=key, effort=effort, unit=means.unit, where=where, would=would))
     return plan, found
 
@@ -79,6 +81,19 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
 def longest_flight(plan: HopPlan, left: Launch) -> float:
     """Longest time to step the planar model [s], from the flight on rigid, flat ground."""
     return 2 * left.time + 0.5 + 0.5 * flight(left.speed, left.angle, gravity=plan.tumbler.gravity).time  # type: ignore[union-attr]
+
+
+class _TooWeakError(ValueError):
+    """A torque that does not tip the platform at this gravity."""
+
+
+def _possible(settings: HopSettings, plan: HopPlan, means: _Means) -> bool:
+    """Whether the hop that was asked for is possible on rigid ground."""
+    if plan.distance is not None:
+        found, _ = _seek(settings, means, plan.distance)
+        return found is not None and _reaches(found, plan.distance)
+    effort = settings.wheel_speed_0 or settings.torque
+    return effort is not None and _hop(settings, means, effort) is not None
 
 
 def _means(plan: HopPlan, settings: HopSettings) -> _Means:
@@ -135,10 +150,10 @@ def _by_motor(plan: HopPlan, settings: HopSettings) -> _Means:
     )  # fmt: skip
 
 
-def _too_weak(key: str, torque: float, tumbler: Tumbler) -> ValueError:
+def _too_weak(key: str, torque: float, tumbler: Tumbler) -> _TooWeakError:
     """The refusal of a torque that does not tip; it tips below the gravity at which W l sin(lean) is as large."""
     most = tumbler.gravity * torque / tumbler.tipping_torque
-    return ValueError(say("does_not_tip", key=key, torque=torque, t=tumbler, most=most))
+    return _TooWeakError(say("does_not_tip", key=key, torque=torque, t=tumbler, most=most))
 
 
 def _impulsive_speed(plan: HopPlan, settings: HopSettings) -> float:
@@ -171,12 +186,7 @@ def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
     if found is not None and _reaches(found, distance):
         return found
     where = say("where", t=plan.tumbler)
-
-    def works(own: HopSettings, plan: HopPlan, means: _Means) -> bool:
-        there, _ = _seek(own, means, distance)
-        return there is not None and _reaches(there, distance)
-
-    other = _other_gravity(settings, works, (0.5,) if found is None else (2.0,))
+    other = _other_gravity(settings, _possible, (0.5,) if found is None else (2.0,))
     if found is None:
         way = f"hops {reach:.4g} m at most" if reach > 0 else "does not make it leave the ground"
         there = _on_surface(settings, plan, means) + other

@@ -336,20 +336,16 @@ def test_a_hop_that_cannot_be_is_refused_before_there_is_a_folder(tmp_path, caps
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    "options",
     [
-        (("--distance", "5000"), r"at gravity = (\S+) m/s2 it is possible"),
-        (("--actuator", "motor", "--distance", "1"), r"at gravity = (\S+) m/s2 it is possible"),
-        (("--distance", "30", "--body-radius", "20"), r"at gravity = (\S+) m/s2 it is possible"),
-        (("--gravity", "9.81", "--torque", "1"), r"a gravity below (\S+) m/s2 is accepted"),
-        (("--wheel-speed-0", "0.001"), r"at gravity = (\S+) m/s2 it is possible"),
+        ("--actuator", "motor", "--distance", "1"),
+        ("--gravity", "9.81", "--torque", "1"),
+        ("--wheel-speed-0", "5"),
     ],
 )
-def test_a_refusal_names_another_gravity_with_which_the_hop_is_possible(tmp_path, capsys, options, said):
+def test_a_refusal_names_another_gravity_with_which_the_hop_is_possible(tmp_path, capsys, options):
     _, error = hop(tmp_path, capsys, *options)
-    gravity = float(re.search(said, " ".join(error.split()))[1])
-    if "below" in said:
-        gravity *= 0.99
+    gravity = float(re.search(r"at gravity = (\S+) m/s2 it is possible", " ".join(error.split()))[1])
     own = [word for pair in zip(options[::2], options[1::2], strict=True) if pair[0] != "--gravity" for word in pair]
     check(HopSettings(**settings_of([*own, "--gravity", str(gravity)])))
 
