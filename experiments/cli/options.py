@@ -86,12 +86,14 @@ def option_of(name: str, field: FieldInfo) -> inspect.Parameter:
     default = None if field.is_required() else field.get_default(call_default_factory=True)
     shown: bool | Callable[[Any], str] = False if default is None or default is PydanticUndefined else _shown
     is_flag = field.annotation is bool
+    more = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     hint = _bare(field.annotation, with_unit=find_unit(field.description) is not None)
+    if more.get("as_text"):  # the settings class refuses other words, with what they ask for
+        hint = str
     if may_be_empty(field):
         hint = tuple[get_args(hint)[0] | None, ...]  # type: ignore[misc]
     elif field.is_required() and get_origin(field.annotation) is tuple:
         default = ()  # cyclopts checks a list's default, and None is none; what is missing is refused with the settings
-    more = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     annotation = Annotated[
         hint,  # type: ignore[valid-type]
         Parameter(help=field.description, show_default=shown, consume_multiple=True, negative=None if is_flag else "",

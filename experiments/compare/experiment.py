@@ -301,8 +301,8 @@ def numbers_until(
     own = {name: entry.get("value") for name, entry in result.get("quantities", {}).items()}
     counted: dict[str, float] = {}
     if isinstance(moved, MovedRobot):
-        *parts, counted = compare_robots.numbers_over_time(moved, end)
-        known = _Numbers(*parts)
+        largest, final, events, counted = compare_robots.numbers_over_time(moved, end)
+        known = _Numbers(largest, final, events)
     else:
         known = _in_space(moved, result) if isinstance(moved, MovedInSpace) else _in_the_plane(moved, result)
     path = folder / "series" / "bed.csv"

@@ -2,7 +2,7 @@
 
 import math
 import re
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -65,6 +65,9 @@ class LawFitSettings(PenetrateSettings):
     """Folders of finished runs of penetrate, or folders with such run folders (the members of a converge run)."""
 
     # New runs
+    tip: Literal["sphere", "cone", "flat"] = Field(
+        "sphere", description="Shape of the tip: sphere, cone or flat.", json_schema_extra={"as_text": True}
+    )
     budget: Positive | None = None
     """Estimated time of one core for new runs [s], such as 30min; the runs are then chosen and computed."""
     tolerance: float = Field(0.1, gt=0, lt=1)

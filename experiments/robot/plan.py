@@ -56,8 +56,8 @@ class RobotPlan:
         """The surface law under the robot's feet; `as_spring`: the spring-damper, whatever the settings say."""
         own = law_of(self.settings, self.surface, self.fitted, self.numbers, as_spring=as_spring)
         options = own.options(robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)])
-        friction = {name: self.numbers[name].value for name in ("mu_s", "mu_d")}
-        return LawFeet(robot.feet, **options, **friction, time_step=LAW_STEP)
+        mu_s, mu_d = (self.numbers[name].value for name in ("mu_s", "mu_d"))
+        return LawFeet(robot.feet, mu_s=mu_s, mu_d=mu_d, time_step=LAW_STEP, **options)
 
     @property
     def law(self) -> str:

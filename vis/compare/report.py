@@ -70,7 +70,8 @@ def _robots(report: Report, labels: Labels) -> list[Section]:
     result = report.result
     columns = dict(read_series(report.folder / result["series"], text=("state_1", "state_2")))
     drawn = draw_robots(columns, result["feet"], result["weights"], labels)
-    path, *others = [report.draw(f"robot_{name}", one, name=name) for name, one in drawn.items()]
+    kind = "robot"
+    path, *others = [report.draw(f"{kind}_{name}", one, name=name) for name, one in drawn.items()]
     seen = _seen(report, labels) if result["pictures"] else []
     return [
         Section("", [listing(result["departures"]["sentences"]), path]),
