@@ -56,8 +56,9 @@ def parted(trials: Sequence[TrialInfo], sizes: Mapping[str, Sequence[float]]) ->
 
 def split_trials(trials: Sequence[TrialInfo]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Trials to fit and trials held out: a quarter of them, rounded up, none below four, spread over the conditions. A
-    condition gives up one of its replicates before another loses its only trial, and of conditions with one trial those
-    go first whose settings others share."""
+    condition gives up one of its replicates before another loses its only trial. Of conditions with one trial those go
+    first whose settings others share, and of these those that share least with what is held out already: two of one
+    gravity would leave hardly any trial that shows what happens there."""
     if len(trials) < 4:
         return tuple(trial.id for trial in trials), ()
     wanted = math.ceil(len(trials) / 4)
@@ -84,8 +85,16 @@ def split_trials(trials: Sequence[TrialInfo]) -> tuple[tuple[str, ...], tuple[st
             others = [by_id[left[c][0]].settings for c in single if c != condition]
             return sum(min(1, sum(other.get(key) == value for other in others)) for key, value in mine.items())
 
+        held = [by_id[id].settings for id in out]
+
+        def repeated(condition: tuple[object, ...], held: list[Mapping[str, float]] = held) -> int:
+            mine = by_id[left[condition][0]].settings
+            return sum(other.get(key) == value for other in held for key, value in mine.items())
+
         most = max(shared(c) for c in single)
         best = [c for c in single if shared(c) == most]
+        fewest = min(repeated(c) for c in best)
+        best = [c for c in best if repeated(c) == fewest]
         out.append(left[best[len(best) // 2]].pop())
     return tuple(t.id for t in trials if t.id not in out), tuple(t.id for t in trials if t.id in out)
 

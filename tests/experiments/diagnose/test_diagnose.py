@@ -59,6 +59,20 @@ def test_a_quarter_of_the_trials_is_held_out_and_no_condition_loses_all_its_tria
     assert split_trials(trials[:3]) == (("0", "1", "2"), ())
 
 
+def test_trials_that_are_held_out_share_as_few_settings_as_they_can():
+    """Two gravities, two torques and a brake without replicates: every gravity keeps a motor and one trial more."""
+    trials = [
+        TrialInfo(id=f"{g} {torque}", condition=(g, torque), settings={"torque_N_m": torque, "gravity_m_s2": g})
+        for g in (0.08, 0.15) for torque in (0.16, 0.22, 6.0)
+    ]  # fmt: skip
+    fitted, held_out = split_trials(trials)
+    assert len(held_out) == 2 and len({id.split()[0] for id in held_out}) == 2
+    assert len({id.split()[1] for id in held_out}) == 2
+    for g in ("0.08", "0.15"):
+        assert len([id for id in fitted if id.startswith(g)]) == 2
+        assert any(id.startswith(g) and not id.endswith("6.0") for id in fitted)
+
+
 def test_parameters_that_are_off_within_their_uncertainty_are_no_effect():
     found = diagnosed(pushes(base), stiffness=0.85 * STIFFNESS, damping=1.3 * DAMPING)
     assert (found.verdict, found.effects, found.where) == ("none", (), ())
