@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -13,7 +12,7 @@ from vis.film.film import ARROWS, draw_runs, shown
 from vis.film.reel import NAME, SpaceReel
 from vis.page.numbers import quantity
 from vis.page.page import Section, Tile, listing, text
-from vis.page.plots import AXES, BED, DASHED, INK, MODEL, Array, legend_above, mean_over
+from vis.page.plots import AXES, BED, DASHED, INK, MODEL, Array, legend_above, line_styles, mean_over
 from vis.page.report import Report, given, report_of
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frame_names
@@ -84,8 +83,8 @@ def _draw_ground(motion: Columns, feet: Columns, names: list[str]) -> Figure:
     means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in AXES))
     for (axis, colour), mean in zip(AXES.items(), means, strict=True):
         force.plot(time, mean, color=colour, label=axis)
-    for k, name in enumerate(names[:MOST_LINES]):
-        depth.plot(time, 1e3 * feet[f"{name}_depth_m"], color=colormaps["tab10"](k), label=name)
+    for name, style in line_styles(names[:MOST_LINES]).items():
+        depth.plot(time, 1e3 * feet[f"{name}_depth_m"], label=str(name), **style)
     depth.invert_yaxis()
     depth.legend(loc="best")
     legend_above(drawing, force.lines, 3)
@@ -107,10 +106,10 @@ def _draw_joints(joints: Columns) -> Figure:
     drawing, place, force = pair("position [rad, m]", "force [N, N m]")
     time = joints["t_s"]
     moved, driven = joint_columns(joints)
-    for k, name in enumerate(moved):
-        place.plot(time, joints[name], color=colormaps["tab10"](k), label=name.rpartition("_")[0])
-    for k, name in enumerate(driven):
-        force.plot(time, joints[name], color=colormaps["tab10"](k), label=name.removesuffix("_force"))
+    for name, style in zip(moved, line_styles(moved).values(), strict=True):
+        place.plot(time, joints[name], label=name.rpartition("_")[0], **style)
+    for name, style in zip(driven, line_styles(driven).values(), strict=True):
+        force.plot(time, joints[name], label=name.removesuffix("_force"), **style)
     for axis in (place, force):
         if axis.lines:
             axis.legend(loc="best")

@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 
 from vis.page.folder import Run, read_columns
-from vis.page.plots import AXES, BED, INK, MODEL, STATES, Array, mean_over
+from vis.page.plots import AXES, BED, INK, MODEL, STATES, Array, line_styles, mean_over
 from vis.page.states import States, state_runs
 from vis.pictures.frames import Frames
 
@@ -188,8 +186,8 @@ def _many(
     """A panel of columns over t_s, called by their names less `ending`, or less the unit; one alone is in the label."""
     called = [name.removesuffix(ending) if ending else name.rpartition("_")[0] for name in names]
     lines = [
-        line(own, columns["t_s"], scale * columns[name], colour=to_hex(colormaps["tab10"](k)))
-        for k, (own, name) in enumerate(zip(called, names, strict=True))
+        line(own, columns["t_s"], scale * columns[name], colour=str(style["color"]), dashed=style["ls"] != "-")
+        for own, name, style in zip(called, names, line_styles(names).values(), strict=True)
     ]
     return panel(f"{label}: {called[0]}" if len(lines) == 1 else label, *lines)
 
