@@ -2,12 +2,14 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from vis.compare.report import _alike
+from vis.film.cameras import _Space
 from vis.film.film import Sheet, film_times, moments, run_film_job
 from vis.film.reel import Reel
 from vis.pictures import canvas
@@ -80,6 +82,20 @@ def test_the_camera_follows_and_the_scale_stays_put(folder):
     sheet.draw(0.0)
     sheet.draw(1.0)
     assert sheet.page.norm.vmax == 2.0
+
+
+def test_a_bed_narrower_than_the_picture_is_seen_down_to_its_floor_unless_two_runs_share_a_scale():
+    """A robot that reaches 0.15 m about its centre, 0.1 m above a bed of 0.2 x 0.2 x 0.17 m, seen level."""
+    low, high, reach = np.array([0.0, 0.0, -0.17]), np.array([0.2, 0.2, 0.0]), 0.15
+    centres = np.column_stack([np.full(9, 0.1), np.full(9, 0.1), np.full(9, 0.1)])
+    reel = SimpleNamespace(box=(low, high), centres=centres, on_grains=True, radius=0.006)
+    places = {}
+    for whole in (True, False):
+        stage, way = _Space(whole=whole).set_up(reel, (900, 500), reach, opengl=False)
+        ends = np.array([[0.1, 0.1, low[2]], [0.1, 0.1, 0.1 + reach]])
+        places[whole] = stage.place(ends, (float(way[0, 0]), float(way[0, 1])))[:, 1]
+    assert places[True].min() > 0.02 and places[True].max() < 0.98
+    assert places[False].min() < 0.0
 
 
 def test_displacement_counts_from_the_first_picture_whatever_the_setting_down_moved_and_however_grains_are_listed():
