@@ -43,8 +43,8 @@ slow: $(VENV)/.installed-test  ## the tests that take minutes: physics against c
 fuzz: $(VENV)/.installed-test  ## settings and campaigns drawn at random, 10,000 and 500, what FUZZED=fuzzed.jsonl has left out
 	HEDGEBED_FUZZ=10000 HEDGEBED_FUZZ_KEPT=$(abspath $(FUZZED)) $(PYTEST) tests/faults/test_fuzz.py $(ARGS)
 
-torture: $(VENV)/.installed-test  ## files damaged, 1,200 in all, and experiments killed, 50 times in all, resumed to the same bits
-	HEDGEBED_DAMAGES=200 $(PYTEST) tests/faults/test_damage.py $(ARGS)
+torture: $(VENV)/.installed-test  ## files damaged, 4,000 in all, and experiments killed, 50 times in all, resumed to the same bits
+	HEDGEBED_DAMAGES=200 $(PYTEST) -m "long or slow or not long" tests/faults/test_damage.py tests/faults/test_damaged_folders.py $(ARGS)
 	HEDGEBED_KILLS=50 HEDGEBED_KILLED_KEPT=$(abspath $(KILLED)) $(PYTEST) -m "long or slow" tests/faults/test_killed.py $(ARGS)
 
 tiers: $(VENV)/.installed-test  ## measure again which files of tests `make fast` may take (tests/durations.toml)

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from .checks import read_toml
+from .digests import check_as_written
 from .ground.grounds import SurfaceGround
 from .ground.laws import SurfaceLaw, find_law
 from .result import toml_value, write_text
@@ -185,9 +186,11 @@ def is_ground_file(name: str) -> bool:
 def read_ground(path: str | Path) -> GroundFile:
     """The ground file at `path`.
 
-    Raises ValueError naming the file and, a line for each fault, the key, what was found and what was expected.
+    Raises ValueError naming the file and, a line for each fault, the key, what was found and what was expected; and for
+    the file of a run that is not as the run wrote it.
     """
     path = Path(path)
+    check_as_written(path)
     table = read_toml(path)
     try:
         return GroundFile(**table)

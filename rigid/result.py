@@ -8,7 +8,6 @@ result.to_dataframe()
 Its JSON schema is experiments/runs/result.schema.json: ``python -m experiments.runs.result`` prints it.
 """
 
-import hashlib
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -18,11 +17,12 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StrictFloat, StrictInt, ValidationError, model_validator
 
+from .digests import check_digests
 from .series import RESULT_FORMAT, ResultFormat, pandas, replacing
 from .version import __version__
 
 __all__ = [
-    "Departures", "Quantity", "Result", "Table", "check_digests", "digest_of", "plain", "quantities_of", "quantity",
+    "Departures", "Quantity", "Result", "Table", "plain", "quantities_of", "quantity",
     "read_json", "read_result", "schema", "toml_value", "write_json", "write_text",
 ]  # fmt: skip
 
@@ -202,27 +202,6 @@ def read_json(path: Path) -> Any:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{path}: is no JSON: {error}") from None
-
-
-def digest_of(path: Path) -> str:
-    """The digest of a file, as the status.json of a finished run keeps it."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-
-
-def check_digests(folder: Path, *names: str) -> None:
-    """Raise ValueError, naming the file, for one of a finished run that is not as the run wrote it; all if no `names`.
-
-    status.json has the digests; an older one has none, and a file that is not there is not looked at.
-    """
-    try:
-        kept = read_json(folder / "status.json").get("digests", {})
-    except (OSError, ValueError, AttributeError):
-        return
-    for name, digest in kept.items() if isinstance(kept, dict) else ():
-        if (not names or name in names) and (folder / name).is_file() and digest_of(folder / name) != digest:
-            raise ValueError(
-                f"{folder / name}: is not as the run wrote it: its digest differs from that in status.json"
-            )
 
 
 def read_result(path: Path) -> Json:

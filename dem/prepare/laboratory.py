@@ -1,8 +1,10 @@
 """A bed on its way through the stages of its preparation, with a report of what each of them left."""
 
+import hashlib
 import json
 import math
 import time
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -75,15 +77,22 @@ class Laboratory(Preparation[B]):
                 np.savez(self._path.with_suffix(".densest.npz"), **self._densest)  # type: ignore[arg-type]
             reports = [asdict(report) for report in self.reports]
             kept = {"recipe": self._recipe, "done": self.done, "reports": reports, "notes": self.notes}
-            self._path.with_suffix(".json").write_text(json.dumps(kept | {"steps": self.bed.steps}))
+            kept |= {"steps": self.bed.steps}
+            self._path.with_suffix(".json").write_text(json.dumps(kept | {"digest": _digest(kept)}))
             self._kept = time.monotonic()
 
     def find(self, **options: Any) -> None:
-        """Go back to what was kept, if there is something whole; options are those of ``Bed.load``."""
+        """Go back to what was kept, if there is something whole; options are those of ``Bed.load``.
+
+        Warns where it is damaged; the preparation then begins anew.
+        """
         if self._path is None or not self._path.exists():
             return
+        about = self._path.with_suffix(".json")
         try:
-            kept = json.loads(self._path.with_suffix(".json").read_text())
+            kept = json.loads(about.read_text())
+            if kept.pop("digest") != _digest(kept):
+                raise ValueError(f"the digest of {about.name} differs")
             bed, notes = type(self.bed).load(self._path, **options), dict(kept["notes"])
             # The work ended between the two files, or is another's.
             if kept["steps"] != bed.steps or kept["recipe"] != json.loads(json.dumps(self._recipe)):
@@ -91,7 +100,11 @@ class Laboratory(Preparation[B]):
             reports, done = [StageReport(**report) for report in kept["reports"]], int(kept["done"])
             if (densest := self._path.with_suffix(".densest.npz")).exists():
                 self._densest = read_arrays(densest)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        except FileNotFoundError:  # the work ended before the second file
+            return
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as problem:
+            words = f"{about} or {self._path.name} beside it is damaged ({problem}): the preparation begins anew"
+            warnings.warn(words, stacklevel=3)
             return
         self.bed, self.notes, self.reports, self.done = bed, notes, reports, done
 
@@ -274,6 +287,11 @@ class Laboratory(Preparation[B]):
             notes |= {"held": angle, "settle": None}
             self._pause(min(1.0, angle / stage.value))
         return {"angle": notes["held"]}
+
+
+def _digest(kept: Json) -> str:
+    """The digest of what JSON takes, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()
 
 
 def touching_as(bed: B, material: Material, floor: Facing | None = None) -> B:

@@ -22,7 +22,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from experiments.runs.folder import toml_value, write_text
+from experiments.runs.given import keep_given, kept_copy
 from rigid.checks import nearest
+from rigid.digests import check_as_written
 
 from .recording import Recording, read_recording, write_recording
 from .tables import (
@@ -180,11 +182,16 @@ def _same(one: Campaign, other: Campaign) -> bool:
 
 
 def read_model(path: str | Path) -> TumbleModel | PenetrationModel:
-    """Read a model.toml. Raises ValueError as `read_campaign` does."""
+    """Read a model.toml. Raises ValueError as `read_campaign` does; and where it, or an effect beside it, is of a run
+    and is not as the run wrote it."""
+    check_as_written(Path(path))
     model, faults = _make_tables(Path(path), _read_toml(Path(path), _MODELS), _MODELS)
     if model is None:
         raise ValueError("\n".join(faults))
     assert isinstance(model, TumbleModel | PenetrationModel)
+    for effect in model.effect:
+        if effect.file is not None:
+            check_as_written(Path(path).parent / effect.file)
     return model
 
 
@@ -194,17 +201,17 @@ def write_model(path: str | Path, model: TumbleModel | PenetrationModel) -> None
 
 
 def keep_model(model: str | Path | None, folder: Path) -> Path | None:
-    """Copy a model.toml and the files of its effects into a run's folder, once; return the copy, None for no model."""
+    """Copy a model.toml and the files of its effects into a run's folder, once; return the copy, None for no model.
+
+    Raises ValueError as `read_model` does, and where a copy is damaged."""
     if model is None:
         return None
-    copy, source = folder / MODEL_COPY, Path(model)
-    if not copy.exists():
+    source = Path(model)
+    if (copy := kept_copy(folder, MODEL_COPY)) is None:
         for effect in read_model(source).effect:
             if effect.file is not None:
-                target = folder / effect.file
-                target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(source.parent / effect.file, target)
-        shutil.copyfile(source, copy)
+                keep_given(folder, effect.file, (source.parent / effect.file).read_bytes())
+        copy = keep_given(folder, MODEL_COPY, source.read_bytes())
     return copy
 
 

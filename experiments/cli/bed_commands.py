@@ -152,9 +152,11 @@ def _foot(
     from experiments.bed.plates import shaped
     from experiments.bed.plates_fit import direction_of
     from experiments.bed.test_settings import SHAPES
+    from rigid.digests import check_as_written
     from rigid.ground.rft_table import read_rft
 
     with refusing():
+        check_as_written(table)
         found = read_rft(table)
         for name, value in (("depth", depth), ("size", size), ("scale", scale), ("gravity", gravity)):
             if value is not None and not 0 < value < math.inf:

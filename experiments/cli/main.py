@@ -37,7 +37,6 @@ from experiments.runs.streams import (
 )
 from experiments.runs.version import __version__
 from hedgebed_taichi import chosen
-from rigid.result import check_digests
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "GROUPS", "STOPPED", "build_app", "main"]
 
@@ -202,7 +201,6 @@ def _resume(
         if not kept:
             with naming(folder / "run.toml"):
                 settings_from(experiment.settings_class(), [Layer(str(folder / "run.toml"), run.settings)])
-            check_digests(run.path, "run.toml")
             with run.lock():
                 pass
         done = kept or (run.status == "done" and (folder / "result.json").exists())

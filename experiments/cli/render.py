@@ -27,6 +27,8 @@ def render(
     quiet: Annotated[bool, Parameter(help="Show no progress.", negative="")] = False,
 ) -> int:
     """Draw pictures, film and report of a finished run again."""
+    from vis.pictures.frames import check_frames
+
     with refusing():
         folder = RunFolder.open(run)
         if not (run / "result.json").exists():
@@ -34,6 +36,7 @@ def render(
                 f"run = {str(run)!r} has no result yet: `hedgebed resume {run}` finishes it where it can be"
             )
         folder.read_result()
+        check_frames(run)
         if folder.command in ("tumble", "tumble spatial"):
             require_files(folder, drawn_from(folder), key="run")
             for name in drawn_from(folder):

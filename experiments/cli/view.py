@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import make_progress
 from experiments.runs.streams import refusing, say, stdout_to_stderr
+from rigid.digests import check_digests
 
 __all__ = ["view"]
 
@@ -43,6 +44,7 @@ def view(
         if frames < 1:
             raise ValueError(f"frames = {frames}; a page shows at least 1")
         folder = RunFolder.open(run)
+        check_digests(run)
         page = run / "view.html" if out is None else out
         if page.suffix != ".html" or not page.parent.is_dir():
             raise ValueError(f"out = {str(out)!r}; it must name a file that ends in .html, in a folder that exists")
@@ -61,6 +63,7 @@ def view(
                 break
             time.sleep(interval)
             folder = RunFolder.open(run)
+            check_digests(run)
     print(f"page: {page}")
     return 0
 

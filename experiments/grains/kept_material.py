@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from experiments.runs.folder import write_text
+from experiments.runs.given import keep_given, kept_copy
+from rigid.digests import check_as_written
 
 __all__ = ["BASE_COPY", "MATERIAL_COPY", "keep_material"]
 
@@ -13,15 +14,16 @@ BASE_COPY = "base.toml"  # Its name in that of a calibration, whose material.tom
 def keep_material(name: str, folder: Path, *, copy: str = MATERIAL_COPY) -> str:
     """Where the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made once.
 
-    Raises ValueError for an unknown name and for a faulty file, unless the copy exists.
+    Raises ValueError for an unknown name and for a faulty file, unless the copy exists; for a damaged copy, and for the
+    file of a run that is not as the run wrote it.
     """
     from dem.grains.materials import MATERIALS, material
     from hedgebed_renamed import material_of_today
 
-    kept = folder / copy
     if (today := material_of_today(name.lower())) in MATERIALS:
         return today
-    if not kept.exists():
+    if (kept := kept_copy(folder, copy)) is None:
         material(name)
-        write_text(kept, Path(name).read_text(encoding="utf-8"))
+        check_as_written(Path(name))
+        kept = keep_given(folder, copy, Path(name).read_bytes())
     return str(kept)

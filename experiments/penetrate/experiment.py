@@ -178,8 +178,7 @@ class _Work:
 
     def _notes(self, seed: int) -> list[Json]:
         """Where grains of a seed were made stiffer, and by how much, so far."""
-        name = f"stiffer-{seed}"
-        return list(self.folder.done_data(name)) if self.folder.is_done(name) else []
+        return list(self.folder.noted(f"stiffer-{seed}", []))
 
     def _young(self, seed: int, *, prepared: bool = False) -> float:
         """The modulus of the grains of a seed as it is now [Pa], or the one its bed is `prepared` with."""

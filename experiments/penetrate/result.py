@@ -47,8 +47,7 @@ def conclude(
     for name, series in findings.models.items():
         folder.write_series(f"{name}.model", series.columns())
     overlap = max((note["max_overlap"] for note in notes.values() if note.get("max_overlap") is not None), default=None)
-    names = [f"stiffer-{seed}" for seed in settings.seeds]
-    stiffened: list[Json] = [note for name in names if folder.is_done(name) for note in folder.done_data(name)]
+    stiffened: list[Json] = [note for seed in settings.seeds for note in folder.noted(f"stiffer-{seed}", [])]
     rest = answer(findings, material)
     quantities = findings.quantities() | bed_quantities(facts, overlap) | _depth_needed(rest)
     codes = ({note.get("code") for note in notes.values()} | {folder.code}) - {None, ""}

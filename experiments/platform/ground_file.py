@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from pydantic import BaseModel
 
-from experiments.runs.folder import write_text
+from experiments.runs.given import keep_given, kept_copy
 from rigid.ground_file import GroundFile, is_ground_file, read_ground
 from rigid.model.trial import Trial
 from rigid.planar.trajectory import Trajectory
@@ -41,10 +41,10 @@ def with_kept_ground(settings: Settings, folder: Path) -> Settings:
     ground: str | None = settings.ground  # type: ignore[attr-defined]
     if ground is None or not is_ground_file(ground):
         return settings
-    copy = folder / GROUND_COPY
-    if not copy.exists():
+    copy = kept_copy(folder, GROUND_COPY)
+    if copy is None:
         read_ground(ground)
-        write_text(copy, Path(ground).read_text(encoding="utf-8"))
+        copy = keep_given(folder, GROUND_COPY, Path(ground).read_bytes())
     return settings.model_copy(update={"ground": str(copy)})
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.runs.folder import write_text
+from experiments.runs.given import keep_given, kept_copy
 from rigid.model.model import contact_arms
 from rigid.model.trial import Trial
 from rigid.planar.dynamics import System
@@ -166,14 +166,15 @@ PLATFORM_COPY = "platform.toml"
 def keep_platform(name: str, folder: Path, message: Callable[[str], object] | None = None) -> Path | None:
     """The copy in ``folder`` of the platform's file ``name``, made if missing; None for a platform that ships.
 
-    ``message`` is called where the file differs from the copy. Raises ValueError for a bad file without a copy.
+    ``message`` is called where the file differs from the copy. Raises ValueError for a bad file without a copy, and for
+    a damaged copy.
     """
     if Path(name).suffix != ".toml":
         return None
-    kept = folder / PLATFORM_COPY
-    if not kept.exists():
+    kept = kept_copy(folder, PLATFORM_COPY)
+    if kept is None:
         find_platform(name)
-        write_text(kept, Path(name).read_text(encoding="utf-8"))
+        kept = keep_given(folder, PLATFORM_COPY, Path(name).read_bytes())
     elif message is not None and not _same(Path(name), kept):
         message(say("changed", name=name, kept=kept))
     return kept

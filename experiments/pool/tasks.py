@@ -18,9 +18,10 @@ from typing import Any, Protocol, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from experiments.runs.folder import BusyError, RunFolder, holding, write_json, write_text
+from experiments.runs.folder import BusyError, RunFolder, holding, write_text
 from experiments.runs.progress import Progress
 from experiments.runs.registry import Experiment, find_experiment
+from experiments.runs.streams import naming
 from experiments.runs.whole_runs import keeping_status, without_reports
 
 __all__ = ["After", "Outcome", "Task", "Tell", "carry_out", "code_of", "done_before", "name_of", "received", "task_of"]
@@ -191,9 +192,15 @@ def _with_after(task: Task, tell: Tell, shown: Progress | None) -> Outcome:
 
 
 def _folder_of(task: Task) -> RunFolder:
-    """The folder of the task, made where it is not there; this process holds it."""
+    """The folder of the task, made where it is not there; this process holds it.
+
+    Raises ValueError, naming the file, where its settings are damaged.
+    """
     if (task.path / "run.toml").is_file():
-        return RunFolder.open(task.path)
+        try:
+            return RunFolder.open(task.path)
+        except ValueError as error:
+            raise ValueError(f"{error}; remove the folder {task.path}, and this run is computed again") from None
     code = find_experiment(task.experiment).code() or task.code
     return RunFolder.create(task.path, task.experiment, task.settings, code=code)
 
@@ -204,7 +211,8 @@ def _unsaid(_: str) -> None:
 
 def _compute(task: Task, folder: RunFolder, progress: Progress) -> Outcome:
     experiment = find_experiment(task.experiment)
-    same = type(task.settings)(**folder.settings) == task.settings  # not so where it was begun on other threads
+    with naming(folder.path / "run.toml"):
+        same = type(task.settings)(**folder.settings) == task.settings  # not so where it was begun on other threads
     with without_reports(not task.reports), keeping_status(folder):
         if same and not folder.has_work:
             experiment.run(task.settings, folder.path, progress=progress)
@@ -226,11 +234,7 @@ def received(task: Task, outcome: Outcome) -> None:
     with suppress(BusyError), holding(task.path):
         folder = _folder_of(task)
         write_text(task.path / "result.json", outcome.result)
-        write_json(
-            task.path / "status.json",
-            {"status": "done", "reason": "computed elsewhere", "processor_time": outcome.processor_time},
-        )
-        assert folder.status == "done"
+        folder.set_status("done", "computed elsewhere", processor_time=outcome.processor_time)
 
 
 def _replaced(value: Any, of: Callable[[str], str]) -> Any:

@@ -3,7 +3,7 @@
 import copy
 import importlib.util
 import math
-import shutil
+import tempfile
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -18,6 +18,7 @@ from coupling.robot.soles import plan_area
 from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import Surface, find_surface
+from experiments.runs.given import keep_given, kept_copy
 from rigid.ground_file import GroundFile
 from rigid.spatial.quaternions import to_matrix
 
@@ -99,12 +100,18 @@ def find_model(name: str) -> Path:
 
 
 def keep_files(settings: RobotSettings, folder: Path) -> None:
-    """Copy the compiled model and the controller into the run folder, once, so that it goes on with the same."""
+    """Copy the compiled model and the controller into the run folder, once, so that it goes on with the same.
+
+    Raises ValueError where a copy is damaged.
+    """
     mujoco = refuse_missing()
-    if not (folder / MODEL).exists():
-        mujoco.mj_saveModel(load_model(find_model(settings.model)), str(folder / MODEL), None)
-    if settings.controller is not None and not (folder / CONTROLLER).exists():
-        shutil.copyfile(settings.controller.rpartition(":")[0], folder / CONTROLLER)
+    if kept_copy(folder, MODEL) is None:
+        with tempfile.TemporaryDirectory() as scratch:
+            compiled = Path(scratch) / MODEL
+            mujoco.mj_saveModel(load_model(find_model(settings.model)), str(compiled), None)
+            keep_given(folder, MODEL, compiled.read_bytes())
+    if settings.controller is not None and kept_copy(folder, CONTROLLER) is None:
+        keep_given(folder, CONTROLLER, Path(settings.controller.rpartition(":")[0]).read_bytes())
 
 
 def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotPlan:

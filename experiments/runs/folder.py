@@ -5,7 +5,7 @@ was killed) finds either the whole of a file or none of it.
 
 ```
 run.toml                  the settings, each with its meaning and unit in a comment; reads back to the same settings
-status.json               {"status": "running|stopped|failed|done", "reason", "updated", "processor_time"}
+status.json               {"status": "running|stopped|failed|done", "reason", "updated", "processor_time"}, and digests
 lock                      the process that is writing the folder; the system frees it when that process dies
 result.json               the numbers a person would quote
 series/<id>.csv           time series, the unit of each column in its name
@@ -14,8 +14,6 @@ checkpoint/<name>.done.json    says that a piece of the work is finished; with d
 ```
 """
 
-import hashlib
-import json
 import os
 import re
 import sys
@@ -32,7 +30,8 @@ from pydantic import BaseModel
 
 from dem.files.arrays import read_arrays
 from hedgebed_renamed import BEFORE_RUN_2, BEFORE_RUN_3
-from rigid.result import check_digests, digest_of, plain, read_json, read_result, toml_value, write_json, write_text
+from rigid.digests import check_digests, digest_of, digest_of_data
+from rigid.result import plain, read_json, read_result, toml_value, write_json, write_text
 from rigid.series import read_series, replacing, write_series
 from rigid.version import __version__
 
@@ -62,6 +61,10 @@ RUN_FORMATS = tuple(_NAMES_OF)  # what can be read
 _NAMED = ("material", "surface", "surfaces")
 _NAMES = "names-of-all"  # in a checkpoint: a zip file whose list is cut off is read as a shorter one
 _DONE = "hedgebed-done/1"
+_MARK = {"format", "data", "digests"}  # Keys of a mark
+_WITH_NUMBERS = (".csv", ".json", ".mjb", ".nc", ".py", ".toml")  # Files of a finished run that have a digest
+_WITHOUT_DIGEST = ("campaign", "checkpoint", "figures", "frames", "members")
+"""Folders whose files have none: a person changes a campaign, frames and checkpoints have digests of their own."""
 _BEFORE = ".before"  # ends the name of the checkpoint before the last
 _POLL = 0.2  # Between two looks whether a folder is free [s]
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
@@ -69,11 +72,6 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 
 _TOLD: set[str] = set()
 """Damage that was told: a folder is looked at more than once."""
-
-
-def _digest_of_data(data: Any) -> str:
-    """The digest of what JSON gives back."""
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 def settings_toml(command: str, settings: BaseModel, version: str, code: str = "") -> str:
@@ -158,6 +156,16 @@ def _in_use(path: Path) -> list[str]:
 
 class BusyError(ValueError):
     """Another process is writing the folder."""
+
+
+def _numbers_in(folder: Path) -> Iterator[Path]:
+    """The files of a run folder that hold numbers, in whatever order; not those of runs and campaigns within it."""
+    for path in folder.iterdir():
+        own = ("run.toml", "campaign.toml")
+        if path.is_dir() and path.name not in _WITHOUT_DIGEST and not any((path / name).exists() for name in own):
+            yield from _numbers_in(path)
+        elif path.suffix in _WITH_NUMBERS and not path.name.startswith(".") and path != folder / "status.json":
+            yield path
 
 
 @contextmanager
@@ -254,7 +262,7 @@ class RunFolder:
 
     @classmethod
     def open(cls, path: Path) -> "RunFolder":
-        """Take up the folder of an earlier run. Raises ValueError if `path` is not one."""
+        """Take up the folder of an earlier run. Raises ValueError if `path` is not one, or its run.toml is damaged."""
         path = Path(path)
         try:
             table = tomllib.loads((path / "run.toml").read_text(encoding="utf-8"))
@@ -264,6 +272,7 @@ class RunFolder:
             raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
         if table.get("format") not in RUN_FORMATS or not isinstance(table.get("settings"), dict):
             raise ValueError(f"{str(path / 'run.toml')!r} is not of the format {RUN_FORMAT}")
+        check_digests(path, "run.toml")
         command, version, code = (str(table.get(key, "")) for key in ("command", "version", "code"))
         folder = cls(path, command, version, settings_in(table), code)
         folder.format = table["format"]
@@ -316,23 +325,27 @@ class RunFolder:
         """
         return round(self._spent_before + _processor_time() - self._began, 2)
 
-    def set_status(self, status: Status, reason: str = "") -> None:
-        """Write status.json, of a run that is done with digests of its files. `reason`: why it stopped or failed."""
+    def set_status(self, status: Status, reason: str = "", *, processor_time: float | None = None) -> None:
+        """Write status.json, of a run that is done with digests of its files. `reason`: why it stopped or failed.
+
+        `processor_time` [s]: that of a run that was computed elsewhere.
+        """
         if status not in get_args(Status):
             raise ValueError(f"status = {status!r} is none of {', '.join(get_args(Status))}")
-        now = {"status": status, "reason": reason, "updated": _now(), "processor_time": self.processor_time}
-        digests = self._kept_digests()
+        spent = self.processor_time if processor_time is None else processor_time
+        given, digests = self._digests("given"), self._digests("digests")
+        fixed = {"run.toml": digests.get("run.toml") or digest_of(self.path / "run.toml")}  # as the run began
         if status == "done":
-            files = (path for name in ("result.json", "*.csv", "series/*.csv") for path in sorted(self.path.glob(name)))
-            digests |= {path.relative_to(self.path).as_posix(): digest_of(path) for path in files}
-        now["digests"] = digests
-        write_json(self.path / "status.json", now)
+            names = sorted(path.relative_to(self.path).as_posix() for path in _numbers_in(self.path))
+            fixed |= {name: digest_of(self.path / name) for name in names if name not in (*given, "run.toml")}
+        now = {"status": status, "reason": reason, "updated": _now(), "processor_time": spent}
+        write_json(self.path / "status.json", now | {"given": given, "digests": fixed})
 
     # What it holds
 
     def write_result(self, result: Mapping[str, Any]) -> None:
         """Write result.json (see `write_json`): what the settings determine, so no times of day or of computing."""
-        self._forget_digests()
+        self._forget_digest("result.json")
         write_json(self.path / "result.json", result)
 
     def read_result(self) -> dict[str, Any]:
@@ -352,24 +365,25 @@ class RunFolder:
     def write_series(self, name: str, columns: Mapping[str, Any]) -> str:
         """Write series/<name>.csv (see `write_series`); return its path relative to the folder."""
         path = self._series(name)
-        self._forget_digests()
+        file = path.relative_to(self.path).as_posix()
+        self._forget_digest(file)
         write_series(path, columns)
-        return path.relative_to(self.path).as_posix()
+        return file
 
     def read_series(self, name: str) -> dict[str, np.ndarray]:
         """The columns of series/<name>.csv."""
         return read_series(self._series(name))
 
-    def _kept_digests(self) -> dict[str, str]:
-        """That of run.toml as it was when the run began."""
-        kept, name = self._kept_status().get("digests"), "run.toml"
-        return {name: kept[name] if isinstance(kept, dict) and name in kept else digest_of(self.path / name)}
+    def _digests(self, table: str) -> dict[str, str]:
+        """Name of a file -> digest, of a table of status.json."""
+        kept = self._kept_status().get(table)
+        return dict(kept) if isinstance(kept, dict) else {}
 
-    def _forget_digests(self) -> None:
-        """All but that of run.toml, of a run that was done and is written again."""
-        kept = self._kept_status()
-        if len(kept.get("digests", ())) > 1:
-            write_json(self.path / "status.json", kept | {"digests": self._kept_digests()})
+    def _forget_digest(self, name: str) -> None:
+        """Take the digest of a file that is written again out of status.json; those of other files stay."""
+        digests = self._digests("digests")
+        if digests.pop(name, None) is not None:
+            write_json(self.path / "status.json", self._kept_status() | {"digests": digests})
 
     def save_checkpoint(self, name: str, arrays: Mapping[str, Any]) -> None:
         """Write `arrays` (name -> array, number or text) to checkpoint/<name>.npz; the one before is kept beside it.
@@ -422,7 +436,7 @@ class RunFolder:
         A series of that name belongs to it and has been written before.
         """
         series = self._series(name)
-        digests = {"data": _digest_of_data(plain(data)), "series": digest_of(series) if series.exists() else None}
+        digests = {"data": digest_of_data(plain(data)), "series": digest_of(series) if series.exists() else None}
         write_json(self._mark(name), {"format": _DONE, "data": data, "digests": digests})
 
     def is_done(self, name: str) -> bool:
@@ -448,14 +462,18 @@ class RunFolder:
         """
         mark, series = self._mark(name), self._series(name)
         kept = read_json(mark)
-        if not isinstance(kept, dict) or kept.get("format") != _DONE:
+        if not isinstance(kept, dict) or len(_MARK & set(kept)) < 2:
             return kept
-        digests = kept.get("digests")
-        if not isinstance(digests, dict) or digests.get("data") != _digest_of_data(kept.get("data")):
+        digests, known = kept.get("digests"), kept.get("format") == _DONE
+        if not known or not isinstance(digests, dict) or digests.get("data") != digest_of_data(kept.get("data")):
             raise ValueError(f"{mark}: is not as the run wrote it: its digest differs")
         if (wanted := digests.get("series")) is not None and (not series.exists() or digest_of(series) != wanted):
             raise ValueError(f"{series}: is not as the run wrote it: its digest differs from that in {mark.name}")
         return kept.get("data")
+
+    def noted(self, name: str, default: Any) -> Any:
+        """As `done_data`; `default` where there is no such mark."""
+        return self.done_data(name) if self._mark(name).exists() else default
 
     def _mark(self, name: str) -> Path:
         return self.path / "checkpoint" / f"{_checked(name)}.done.json"

@@ -164,13 +164,21 @@ def whole_run(
     of what computes; `as_given`: whether settings at their defaults count as not given when the run is resumed.
     """
 
+    def renewed(settings: Settings, folder: RunFolder, progress: Progress) -> Result:
+        """Carry it out; where the run was done before, its digests are those of the files that are there after it."""
+        done = folder.status == "done"
+        result = carry_out(settings, folder, progress)
+        if done:
+            folder.set_status("done")
+        return result
+
     def run(settings: Settings, folder: str | Path, *, progress: Progress | None = None) -> Result:
         """Carry it out into `folder` and return the result, as result.json has it.
 
         Raises ValueError for settings that will not do, before any work; RuntimeError where it cannot go on.
         """
         check(settings)
-        return carry_out(settings, RunFolder.ensure(Path(folder), name, settings, code=code()), progress or Progress())
+        return renewed(settings, RunFolder.ensure(Path(folder), name, settings, code=code()), progress or Progress())
 
     def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
         """Carry out again, from its start, what `folder` was made for."""
@@ -188,6 +196,6 @@ def whole_run(
         # Where another value is taken for what is not given, as how long a tumble on grains lasts, it was given.
         made, whole = settings_class(**given), settings_class(**asked)
         given |= {name: asked[name] for name in asked if getattr(made, name) != getattr(whole, name)}
-        return carry_out(settings_class(**given), kept, progress or Progress())
+        return renewed(settings_class(**given), kept, progress or Progress())
 
     return run, resume

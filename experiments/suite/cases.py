@@ -23,6 +23,8 @@ from experiments.runs.folder import read_json, write_json
 from experiments.runs.reading import read_case, settings_from
 from experiments.runs.registry import CASES, find_experiment
 from experiments.tumble.settings import TumbleSettings
+from rigid.digests import digest_of
+from rigid.result import read_result
 
 __all__ = ["EXPERIMENTS", "KEPT", "LONGEST", "Case", "Cost", "cases", "cost_of_tumble", "estimate", "keep", "planned"]
 
@@ -199,7 +201,7 @@ def estimate(case: Case, results: Path | None = None) -> Cost | str:
 def _kept_grain_steps(folder: Path) -> float | None:
     """Grain-steps of a kept result, those of earlier rules of sleep at what today's are expected to be."""
     try:
-        grains = read_json(folder / "result.json")["grains"]
+        grains = read_result(folder / "result.json")["grains"]
         tumble, lowering = grains["grain_steps"], grains["grain_steps_lowering"]
         settings = tomllib.loads((folder / "run.toml").read_text(encoding="utf-8"))["settings"]
     except (OSError, ValueError, KeyError):
@@ -254,7 +256,8 @@ def keep(folder: Path, target: Path) -> None:
     """Put the settings and the numbers of a finished run where results are kept, and what it cost.
 
     All or nothing: it is put together beside `target` and renamed; where `target` is there already, result.json, by
-    which a case is done, comes last. cost.json has null for what an older run's status.json does not have.
+    which a case is done, comes last. cost.json has digests of these files, and null for what an older run's
+    status.json does not have.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as beside:
@@ -267,7 +270,9 @@ def keep(folder: Path, target: Path) -> None:
         (made / "trajectory.csv").write_text("\n".join(thinned) + "\n", encoding="utf-8")
         read_json(made / "result.json")
         cost = read_json(folder / "status.json")
-        write_json(made / "cost.json", {name: cost.get(name) for name in ("processor_time", "updated")})
+        digests = {name: digest_of(made / name) for name in KEPT}
+        kept = {name: cost.get(name) for name in ("processor_time", "updated")} | {"digests": digests}
+        write_json(made / "cost.json", kept)
         if not target.exists():
             made.rename(target)
             return

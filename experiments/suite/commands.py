@@ -12,13 +12,13 @@ from rich.table import Table
 
 from experiments.pool.tasks import Outcome
 from experiments.pool.together import Planned, Where, run_all, whole_folder
-from experiments.runs.folder import read_json
 from experiments.runs.progress import duration, make_progress
 from experiments.runs.streams import refusing, say, stdout_to_stderr
 from experiments.runs.strict import Scheduler, Workers, described
 from experiments.runs.types import Json
 from experiments.suite.cases import EXPERIMENTS, KEPT, LONGEST, Case, cases, estimate, keep, planned, standing
 from experiments.tumble.footfalls import Footfall, sinking_over
+from rigid.result import read_result
 
 __all__ = ["add_suite_commands"]
 
@@ -147,7 +147,7 @@ def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
     with refusing(), stdout_to_stderr():
         for case in cases(names):
             kept = results / case.name / "result.json"
-            if kept.exists() and (falls := read_json(kept).get("footfalls")):
+            if kept.exists() and (falls := read_result(kept).get("footfalls")):
                 group = case.name.removesuffix(f"-seed{case.settings.seed}")
                 groups.setdefault(group, {})[case.name] = [Footfall(**fall) for fall in falls]
     for group, beds in groups.items():

@@ -3,6 +3,7 @@
 `make torture` damages as many files as HEDGEBED_DAMAGES says; the suite does a few.
 """
 
+import json
 import os
 import random
 import re
@@ -39,7 +40,8 @@ def whole(tmp_path_factory):
             tokens = ["--duration", "0.2", "--torque", torque, "--out", str(home / name), "--quiet"]
             assert main(["tumble", *tokens]) == 0
         assert [main(tokens) for tokens in reading(home / "run", home, home)] == [0, 0]
-    new_campaign(home / "campaign", kind="tumble")
+        new_campaign(home / "campaign", kind="tumble")
+        assert main(["campaign", "check", str(home / "campaign"), "--out", str(home / "checked"), "--quiet"]) == 0
     return home
 
 
@@ -130,19 +132,41 @@ def test_a_damaged_file_of_a_run_is_named_by_who_reads_it(seed, whole, tmp_path,
         if name == "result.json":
             assert status == 2 and str(run / name) in said
         elif status:
-            assert str(run) in said or "compare" in said, said
+            assert str(run / name) in said or name == "status.json" in said, said
         else:
             assert numbers(tmp_path / written, run) == numbers(whole / written, whole / "run"), (name, said)
 
 
 @pytest.mark.parametrize("seed", range(DAMAGES))
-def test_a_damaged_campaign_is_told_in_words(seed, whole, tmp_path, capsys):
+def test_a_damaged_campaign_is_refused_by_the_name_of_the_file_or_all_other_recordings_are_the_same(
+    seed, whole, tmp_path, capsys
+):
+    """A person writes a campaign and changes it: it has no digests, so that another digit is another measurement."""
     chance = random.Random(seed)
     folder = tmp_path / "campaign"
     shutil.copytree(whole / "campaign", folder)
-    damaged(chance.choice(sorted(path for path in folder.rglob("*") if path.is_file())), chance)
+    file = chance.choice(sorted(path for path in folder.rglob("*") if path.is_file()))
+    damaged(file, chance)
     status, said = said_of(["campaign", "check", str(folder), "--out", str(tmp_path / "checked"), "--quiet"], capsys)
     assert status in (0, 2) and "Traceback" not in said, said
+    if status:  # of campaign.toml also by the name of a recording that it now names, and that is not there
+        assert str(file) in said or (file.name == "campaign.toml" and f"{folder}{os.sep}" in said), said
+        return
+    found, expected = recorded(tmp_path / "checked"), recorded(whole / "checked")
+    changed = {name for name in expected if found.get(name) != expected[name]}
+    if file.name == "campaign.toml":
+        assert not changed & set(found)  # a trial or a sensor less, or its name: what is there is as it was
+    else:
+        assert set(found) == set(expected) and changed <= {file.name}
+
+
+def recorded(checked):
+    """What the folder of a check holds of each recording, by the name of its file: its rows, and the facts on them."""
+    entries = json.loads((checked / "result.json").read_text())["recordings"]
+    return {
+        f"{entry['trial']}-{entry['sensor']}.csv": (entry, (checked / entry["series"]).read_bytes())
+        for entry in entries
+    }
 
 
 @pytest.mark.parametrize("seed", range(DAMAGES))

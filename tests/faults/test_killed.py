@@ -8,6 +8,7 @@ had kept a file before.
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -16,7 +17,10 @@ from pathlib import Path
 import pytest
 from small_cases import CALIBRATE, GRAINS
 
+from coupling.lammps import LammpsMissingError, find_lammps
+from coupling.lammps.watch import descendants
 from experiments.campaign.files import new_campaign
+from experiments.runs.folder import read_json, read_series
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = os.environ.get("HEDGEBED_KILLED_KEPT")
@@ -83,6 +87,18 @@ tolerance = 1.0
 source = "made up"
 """,
 }  # fmt: skip
+ON_LAMMPS = (
+    GRAINS
+    + """
+ground = "lammps"
+ranks = 2
+grain = 0.0024
+seeds = [1]
+speeds = [0.1]
+hold = 0.0
+drop_speeds = []
+"""
+)
 OF_CASES = """
 import sys
 from pathlib import Path
@@ -200,3 +216,56 @@ def prepared(name, home):
         (home / "cases" / "grains" / "grains1-small.toml").write_text(CASES["tumble"].replace("0.06", "0.03"))
     else:
         (home / "case.toml").write_text(CASES[name])
+
+
+def alive(pids):
+    """Those of these processes that still run."""
+    found = []
+    for pid in pids:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            continue
+        if state != "Z":
+            found.append(pid)
+    return found
+
+
+def at_a_checkpoint(process, out):
+    """Wait until the run has written its next checkpoint; return the processes that it has started, ranks last."""
+    path, before = out / "checkpoint" / "seed1-driven-0.1.npz", 0
+    if path.exists():
+        before = path.stat().st_mtime_ns
+    while not path.exists() or path.stat().st_mtime_ns == before:
+        assert process.poll() is None
+        time.sleep(0.02)
+    return descendants(process.pid)
+
+
+@pytest.mark.slow
+def test_a_run_in_lammps_that_is_killed_leaves_no_process_behind_and_ends_when_it_is_resumed(tmp_path):
+    """hedgebed is killed, then a rank of the resumed run. Its bits differ: docs/scale.md has by how much."""
+    try:
+        find_lammps()
+    except LammpsMissingError as missing:
+        pytest.skip(str(missing))
+    (tmp_path / "case.toml").write_text(ON_LAMMPS)
+    assert begun("penetrate", tmp_path / "whole", tmp_path).wait() == 0, (tmp_path / "log").read_text()
+    out = tmp_path / "broken"
+    for killed in ("hedgebed", "a rank"):
+        process = begun("penetrate", out, tmp_path)
+        started = at_a_checkpoint(process, out)
+        assert len(started) >= 4  # a process that watches, mpiexec, two ranks
+        os.kill(process.pid if killed == "hedgebed" else started[-1], signal.SIGKILL)
+        status, said = process.wait(60), (tmp_path / "log").read_text()
+        until = time.monotonic() + 10.0
+        while alive(started) and time.monotonic() < until:
+            time.sleep(0.1)
+        assert alive(started) == []
+        if killed == "hedgebed":
+            assert status == -signal.SIGKILL
+        else:
+            assert status == 1 and "LAMMPS on 2 ranks has ended" in said and f"hedgebed resume {out}" in said, said
+    assert begun("penetrate", out, tmp_path).wait() == 0, (tmp_path / "log").read_text()
+    forces = [read_series(home / "series" / "seed1-driven-0.1.csv")["force_N"] for home in (tmp_path / "whole", out)]
+    print(forces, [read_json(home / "result.json")["quantities"] for home in (tmp_path / "whole", out)])

@@ -1,5 +1,6 @@
 """What is written is what other programs read back; a resumed series has neither gaps nor doubles."""
 
+import re
 import xml.etree.ElementTree as ElementTree
 
 import meshio
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista
 
-from vis.pictures.frames import GRAIN_FIELDS, FrameWriter, frame_names, read_frames
+from vis.pictures.frames import GRAIN_FIELDS, FrameWriter, check_frames, frame_names, read_frames
 from vis.pictures.meshes import spike_mesh
 
 COUNT = 50
@@ -140,3 +141,32 @@ def test_other_misuse_is_refused(tmp_path):
     (tmp_path / "frames/frames.pvd").write_text("<VTKFile>")
     with pytest.raises(ValueError, match="PVD"):
         read_frames(tmp_path)
+
+
+@pytest.mark.parametrize("file", ["grains_0001.vtu", "spike_0000.vtu", "frames.pvd"])
+@pytest.mark.parametrize("end", [True, False])
+def test_a_damaged_frame_is_refused_by_name(file, end, tmp_path):
+    """Cut off, and with one digit changed that no reader of the format can see."""
+    fill(tmp_path, [0.0, 0.25])
+    check_frames(tmp_path)
+    path = tmp_path / "frames" / file
+    content = path.read_bytes()
+    changed = content.replace(b"0.25", b"0.35") if file == "frames.pvd" else content.replace(b"A", b"B", 1)
+    assert changed != content
+    path.write_bytes(content[:-40] if end else changed)
+    with pytest.raises(ValueError, match=re.escape(str(path))):
+        list(read_frames(tmp_path))
+    with pytest.raises(ValueError, match=re.escape(str(path))):
+        check_frames(tmp_path)
+
+
+def test_frames_of_earlier_versions_have_no_digests_and_are_read(tmp_path):
+    fill(tmp_path, [0.0, 0.25])
+    path = tmp_path / "frames" / "frames.pvd"
+    tree = ElementTree.parse(path)
+    tree.getroot().remove(tree.getroot().find("Digests"))
+    tree.write(path)
+    check_frames(tmp_path)
+    assert [frame.time for frame in read_frames(tmp_path)] == [0.0, 0.25]
+    FrameWriter(tmp_path, resume=True).write(0.5, grains())
+    assert [frame.time for frame in read_frames(tmp_path)] == [0.0, 0.25, 0.5]

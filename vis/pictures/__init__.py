@@ -1,4 +1,4 @@
 """Pictures of grains and bodies by PyVista, off screen, and the frames that they are drawn from.
 
-Imports `vis.page`.
+Imports `rigid`, `vis.page`.
 """

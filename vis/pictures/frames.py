@@ -8,7 +8,8 @@
 
 The default name, "frames", has no prefix: `frames/frames.pvd`, `frames/grains_0000.vtu`. Reals are float32, blocks are
 zlib-compressed, in base64. Every file is written beside its place and moved there, the PVD last, so a run that is
-killed leaves frames that open.
+killed leaves frames that open. The PVD ends with digests (SHA-256) of its list and of every file, which other programs
+pass over: a damaged frame is refused by name.
 """
 
 from __future__ import annotations
@@ -23,7 +24,12 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "HeightMap", "frame_names", "grains_box", "read_frames"]
+from rigid.digests import digest_of, digest_of_data
+
+__all__ = [
+    "GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "HeightMap", "check_frames", "frame_names", "grains_box",
+    "read_frames",
+]  # fmt: skip
 
 #: The fields of a grain that a frame keeps: name -> (components, meaning and unit).
 GRAIN_FIELDS: dict[str, tuple[int, str]] = {
@@ -35,6 +41,7 @@ GRAIN_FIELDS: dict[str, tuple[int, str]] = {
     "id": (1, "number of the grain"),
 }
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*\Z")
+_DIGESTS = "Digests"
 Body = tuple[ArrayLike, ArrayLike]
 Cloud = tuple[ArrayLike, Mapping[str, ArrayLike]]
 Points = NDArray[np.float32]
@@ -62,7 +69,7 @@ class FrameWriter:
     ``folder``: The run folder; frames go to its `frames/`. ``name``: The run's id, also the PVD's name. ``resume``:
     Continue an existing series; otherwise the old frames of this name are removed. ``keep_until``: With `resume`,
     frames later than this time [s] are removed and will be written again. Raises ValueError: a name that is no plain
-    file name; `keep_until` without `resume`; a PVD that cannot be read.
+    file name; `keep_until` without `resume`; a PVD that cannot be read or is damaged.
     """
 
     def __init__(
@@ -137,11 +144,11 @@ class FrameWriter:
         for part, (name, positions, fields, faces) in enumerate(parts):
             file = f"{self._prefix}{name}_{index:04d}.vtu"
             _write_vtu(self.folder / file, positions, fields, faces, scalars)
-            fresh.append(_Entry(time, part, name, file))
+            fresh.append(_Entry(time, part, name, file, digest_of(self.folder / file)))
         for name, grid in (maps or {}).items():
             file = f"{self._prefix}{name}_{index:04d}.vti"
             _write_vti(self.folder / file, name, grid, scalars)
-            fresh.append(_Entry(time, len(fresh), name, file))
+            fresh.append(_Entry(time, len(fresh), name, file, digest_of(self.folder / file)))
         self._entries = before + fresh
         self._write_pvd()
         return self.path
@@ -152,6 +159,9 @@ class FrameWriter:
         for entry in self._entries:
             place = {"timestep": repr(entry.time), "group": self.name, "part": str(entry.part)}
             ElementTree.SubElement(collection, "DataSet", place, name=entry.name, file=entry.file)
+        digests = ElementTree.SubElement(root, _DIGESTS, list=_digest_of_list(self._entries))
+        for entry in self._entries:
+            ElementTree.SubElement(digests, "File", name=entry.file, sha256=entry.digest)
         ElementTree.indent(root)
         temporary = self.path.with_name(self.path.name + ".part")
         temporary.write_text('<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n")
@@ -205,9 +215,9 @@ class Frames(Sequence[Frame]):
         maps: dict[str, HeightMap] = {}
         for entry in self._by_time[time]:
             if entry.file.endswith(".vti"):
-                maps[entry.name] = _read_vti(self.folder / entry.file)
+                maps[entry.name] = _read_vti(self._whole(entry))
                 continue
-            points, triangles, fields, scalars = _read_vtu(self.folder / entry.file)
+            points, triangles, fields, scalars = _read_vtu(self._whole(entry))
             values.update(scalars)
             if entry.name == "grains":
                 grains = {"position": points, **fields}
@@ -217,6 +227,19 @@ class Frames(Sequence[Frame]):
                 clouds[entry.name] = (points, fields)
         values.pop("TimeValue", None)
         return Frame(time, grains, bodies, values, clouds, maps)
+
+    def check(self) -> None:
+        """Raise ValueError, naming the file, for one that is not as it was written."""
+        for entries in self._by_time.values():
+            for entry in entries:
+                self._whole(entry)
+
+    def _whole(self, entry: _Entry) -> Path:
+        """The file of an entry. Raises ValueError where it is not as it was written."""
+        path = self.folder / entry.file
+        if entry.digest and path.is_file() and digest_of(path) != entry.digest:
+            raise ValueError(f"{path}: is not as the run wrote it: its digest differs from that in {self.name}.pvd")
+        return path
 
 
 def read_frames(folder: str | Path, name: str = "frames") -> Frames:
@@ -233,6 +256,12 @@ def frame_names(folder: str | Path) -> list[str]:
     return sorted(path.stem for path in (Path(folder) / "frames").glob("*.pvd"))
 
 
+def check_frames(folder: str | Path) -> None:
+    """Raise ValueError, naming the file, for a frame of a run folder that is not as the run wrote it."""
+    for name in frame_names(folder):
+        read_frames(folder, name).check()
+
+
 def grains_box(frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Corners of what the grains of a frame fill [m]."""
     position, radius = frame.grains["position"], frame.grains["radius"][:, None]
@@ -245,17 +274,29 @@ class _Entry:
     part: int
     name: str
     file: str
+    digest: str = ""  # of the file; empty in a PVD of an earlier version
+
+
+def _digest_of_list(entries: Sequence[_Entry]) -> str:
+    return digest_of_data([[entry.time, entry.part, entry.name, entry.file, entry.digest] for entry in entries])
 
 
 def _read_pvd(path: Path) -> list[_Entry]:
+    """The entries of a PVD, by time and part. Raises ValueError for one that cannot be read or is damaged."""
     try:
-        sets = ElementTree.parse(path).getroot().iter("DataSet")
-        entries = [
-            _Entry(float(s.attrib["timestep"]), int(s.attrib["part"]), s.attrib.get("name", "grains"), s.attrib["file"])
-            for s in sets
-        ]
+        root = ElementTree.parse(path).getroot()
+        own = root.find(_DIGESTS)
+        digests = {} if own is None else {file.attrib["name"]: file.attrib["sha256"] for file in own}
+        entries = []
+        for found in root.iter("DataSet"):
+            at, part, file = float(found.attrib["timestep"]), int(found.attrib["part"]), found.attrib["file"]
+            entries.append(_Entry(at, part, found.attrib.get("name", "grains"), file, digests.get(file, "")))
+        if own is not None and own.attrib["list"] != _digest_of_list(entries):
+            raise ValueError("the digest of its list differs")
     except (ElementTree.ParseError, KeyError, ValueError) as error:
-        raise ValueError(f"{path} is no PVD file of ours: {error}") from error
+        raise ValueError(
+            f"{path} is no PVD file of ours, or is damaged: {error}; without it the run has no frames of this name"
+        ) from error
     return sorted(entries, key=lambda entry: (entry.time, entry.part))
 
 

@@ -23,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from rigid.digests import digest_of_data
+
 from .fitting import Fit, Model, fit, settled_slopes
 from .problem import Array, Values
 
@@ -225,9 +227,11 @@ def _read(path: Path | None) -> Gate | None:
         return None
     try:
         null = json.loads(path.read_text(encoding="utf-8"))
+        if null.pop("digest") != digest_of_data(null):
+            raise ValueError("its digest differs")
         return Gate(tuple(null["names"]), np.array(null["mean"]), np.array(null["variance"]), float(null["threshold"]))
-    except (OSError, ValueError, KeyError) as problem:
-        warnings.warn(f"the gate {path.name} cannot be read and is made anew: {problem}", stacklevel=2)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as problem:
+        warnings.warn(f"the gate {path} cannot be read and is made anew: {problem}", stacklevel=2)
         return None
 
 
@@ -237,7 +241,7 @@ def _write(path: Path, gate: Gate) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = path.with_suffix(f".{os.getpid()}")
-        unfinished.write_text(json.dumps(null), encoding="utf-8")
+        unfinished.write_text(json.dumps(null | {"digest": digest_of_data(null)}), encoding="utf-8")
         unfinished.replace(path)
     except OSError as problem:
         warnings.warn(f"the gate could not be kept: {problem}", stacklevel=2)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -194,6 +195,20 @@ def test_a_preparation_that_was_stopped_goes_on_to_the_same_bits(made, tmp_path)
     )
     other.find(threads=1)
     assert not other.reports
+
+
+@pytest.mark.long
+def test_a_wrong_digit_in_what_a_stopped_preparation_kept_is_named_and_the_work_begins_anew(made, tmp_path):
+    """The reports of finished stages are in the file, and go into the result."""
+    with pytest.raises(KeyboardInterrupt):
+        Bed.prepare_as(SAND_WEAK, **BED, progress=Interrupted("fluff", 3), keep=tmp_path / "kept.npz")
+    about = tmp_path / "kept.json"
+    kept = json.loads(about.read_text())
+    kept["reports"][0]["packing_fraction"] += 0.01
+    about.write_text(json.dumps(kept))
+    with pytest.warns(UserWarning, match=re.escape(str(about))):
+        again = Bed.prepare_as(SAND_WEAK, **BED, keep=tmp_path / "kept.npz")
+    assert again.reports == made[0].reports
 
 
 def test_a_report_of_a_bed_can_be_had_at_any_time(bed):

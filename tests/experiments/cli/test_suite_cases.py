@@ -13,6 +13,7 @@ from experiments.suite import cases as suite
 from experiments.suite import commands as suite_commands
 from experiments.suite.cases import Cost, cost_of_tumble, keep
 from experiments.tumble.settings import TumbleSettings
+from rigid.digests import digest_of
 
 
 def test_every_case_of_every_experiment_is_valid_and_found_by_its_name():
@@ -192,6 +193,7 @@ def test_a_run_of_before_the_processor_s_time_was_kept_is_kept_without_it(finish
     keep(finished, tmp_path / "results" / "case")
     assert json.loads((tmp_path / "results" / "case" / "cost.json").read_text()) == {
         "processor_time": None, "updated": "2026-11-20",
+        "digests": {name: digest_of(finished / name) for name in ("run.toml", "result.json", "trajectory.csv")},
     }  # fmt: skip
     assert [path.name for path in (tmp_path / "results").iterdir()] == ["case"]
 

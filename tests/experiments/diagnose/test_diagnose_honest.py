@@ -1,5 +1,6 @@
 """What keeps a diagnosis honest: errors near jumps, numbers too far from what was stated, noise that is none."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -14,7 +15,9 @@ from experiments.diagnose.core.search import Choice
 from experiments.diagnose.fit.bounds import bends_little_away, bounds_met
 from experiments.diagnose.fit.evidence import Hypothesis
 from experiments.diagnose.fit.fitting import Model, Whitener, fit, settled
-from experiments.diagnose.fit.gate import held_out_gate, open_gate
+from experiments.diagnose.fit.gate import Gate, held_out_gate, open_gate
+from experiments.diagnose.fit.gate import _read as read_null
+from experiments.diagnose.fit.gate import _write as write_null
 from experiments.diagnose.fit.problem import Parameter, Problem, Samples, TrialInfo
 from experiments.diagnose.noise.colour import find_colours, find_white_noise
 from experiments.diagnose.noise.replicates import (
@@ -319,3 +322,22 @@ def test_a_name_beside_a_shared_number_too_far_off_explains_no_little_thing():
     # Where much was missing the form of what is named may bend it as far.
     plain = replace(base, chi_square=2.0 * base.count)
     assert not bends_little_away(replace(found, values=far), plain)
+
+
+@pytest.mark.parametrize("damage", ["a digit", "the end", "no table", None])
+def test_a_kept_null_that_is_damaged_is_named_and_made_again(damage, tmp_path):
+    """Another threshold would be another verdict."""
+    kept = tmp_path / "null.json"
+    gate = Gate(("all", "slow"), np.array([2.5, 1.5]), np.array([1.0, 0.5]), 3.25)
+    write_null(kept, gate)
+    text = kept.read_text()
+    kept.write_text(
+        {"a digit": text.replace("3.25", "9.25"), "the end": text[:40], "no table": "[1]"}.get(damage, text)
+    )
+    if damage is None:
+        found = read_null(kept)
+        assert (found.names, found.threshold) == (gate.names, gate.threshold)
+        assert np.array_equal(found.mean, gate.mean) and np.array_equal(found.variance, gate.variance)
+        return
+    with pytest.warns(UserWarning, match=re.escape(str(kept))):
+        assert read_null(kept) is None

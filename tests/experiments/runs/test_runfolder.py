@@ -26,7 +26,9 @@ from experiments.runs.folder import (
     write_series,
     write_text,
 )
+from experiments.runs.given import keep_given, kept_copy
 from experiments.runs.reading import read_case
+from rigid.digests import check_as_written, kept_digests
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -282,6 +284,78 @@ def test_finished_work_that_is_damaged_is_named_and_not_done(folder, what, capsy
     folder.write_series("seed-1", {"t_s": [0.0, 1.0], "force_N": [0.5, 0.25]})
     folder.mark_done("seed-1", {"stiffness": 2.5})
     assert folder.is_done("seed-1") and folder.done_data("seed-1") == {"stiffness": 2.5}
+
+
+@pytest.mark.parametrize("key", ["format", "data", "digests"])
+def test_a_mark_with_a_wrong_key_is_not_taken_for_one_of_an_earlier_version(folder, key):
+    folder.mark_done("seed-1", {"stiffness": 2.5})
+    mark = folder.path / "checkpoint" / "seed-1.done.json"
+    mark.write_text(mark.read_text().replace(f'"{key}"', f'"{key[:-1]}~"', 1))
+    assert not folder.is_done("seed-1")
+    with pytest.raises(ValueError, match=re.escape(str(mark))):
+        folder.noted("seed-1", [])
+    assert folder.noted("seed-2", []) == []
+
+
+def finished(folder):
+    """A run that is done, with files of numbers, a copy that it was given, and others."""
+    for name in ("a", "b"):
+        folder.write_series(name, {"t_s": [0.0, 1.0], "force_N": [0.5, 0.25]})
+    folder.write_result({"quantities": {"n": 1}})
+    keep_given(folder.path, "law.toml", b"stiffness = 1.5\n")
+    for name in ("laws/one.toml", "table.nc", "note.txt", "frames/a.json", "members/x/result.json", "made/run.toml"):
+        write_text(folder.path / name, "1\n")
+    folder.set_status("done")
+    return folder
+
+
+def test_every_file_of_numbers_of_a_finished_run_has_a_digest(folder):
+    finished(folder)
+    wanted = {"run.toml", "result.json", "series/a.csv", "series/b.csv", "laws/one.toml", "table.nc", "law.toml"}
+    assert set(kept_digests(folder.path)) == wanted
+    folder.read_result()
+    for name in wanted - {"run.toml"}:
+        whole = (folder.path / name).read_bytes()
+        changed = folder.path / name
+        changed.write_bytes(whole.replace(b"1", b"3"))
+        with pytest.raises(ValueError, match=re.escape(str(changed))):
+            folder.read_result()
+        with pytest.raises(ValueError, match=re.escape(str(changed))):
+            check_as_written(changed)
+        changed.write_bytes(whole)
+
+
+def test_a_file_that_is_written_again_loses_its_digest_and_the_others_keep_theirs(folder):
+    before = set(kept_digests(finished(folder).path))
+    folder.write_series("a", {"t_s": [0.0], "force_N": [1.5]})
+    assert before - set(kept_digests(folder.path)) == {"series/a.csv"}
+    folder.read_result()
+    other = folder.path / "series" / "b.csv"
+    other.write_text(other.read_text().replace("0.25", "9.25"))
+    with pytest.raises(ValueError, match=re.escape(str(other))):
+        folder.read_result()
+    folder.write_series("b", {"t_s": [0.0, 1.0], "force_N": [0.5, 0.25]})
+    folder.write_result({"quantities": {"n": 2}})
+    assert folder.read_result() == {"quantities": {"n": 2}}
+
+
+def test_a_copy_of_what_a_run_was_given_has_its_digest_while_the_run_goes_on(folder):
+    copy = keep_given(folder.path, "law.toml", b"stiffness = 2.5\n")
+    for status in ("running", "stopped", "running"):
+        folder.set_status(status)
+        assert kept_copy(folder.path, "law.toml") == copy
+    copy.write_bytes(b"stiffness = 2.7\n")
+    folder.set_status("done")  # never that of a damaged copy
+    with pytest.raises(ValueError, match=re.escape(str(copy))):
+        kept_copy(folder.path, "law.toml")
+    assert kept_copy(folder.path, "other.toml") is None
+
+
+def test_settings_of_a_run_that_are_changed_are_not_opened(folder):
+    settings = folder.path / "run.toml"
+    settings.write_text(settings.read_text().replace("version", "versoin", 1))
+    with pytest.raises(ValueError, match=re.escape(str(settings))):
+        RunFolder.open(folder.path)
 
 
 def test_marks_of_earlier_versions_are_read(folder):
