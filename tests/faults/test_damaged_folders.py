@@ -18,6 +18,9 @@ from experiments.runs import folder as runs_folder
 
 DAMAGES = int(os.environ.get("HEDGEBED_DAMAGES", "2"))
 NOT_NUMBERS = ("lock", "report.html", "log")
+MARKED = [
+    pytest.param(name, marks=[getattr(pytest.mark, kind.tier)] if kind.tier else []) for name, kind in KINDS.items()
+]
 
 
 def damaged(path, chance):
@@ -76,10 +79,7 @@ def wholes(tmp_path_factory):
 
 
 @pytest.mark.parametrize("seed", range(DAMAGES))
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[getattr(pytest.mark, kind.tier)] if kind.tier else []) for name, kind in KINDS.items()],
-)
+@pytest.mark.parametrize("name", MARKED)
 def test_a_damaged_file_of_a_folder_is_named_or_changes_no_number(
     name, seed, wholes, tmp_path, monkeypatch, capsys, record_property
 ):
