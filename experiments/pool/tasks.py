@@ -192,17 +192,13 @@ def _with_after(task: Task, tell: Tell, shown: Progress | None) -> Outcome:
 
 
 def _folder_of(task: Task) -> RunFolder:
-    """The folder of the task, made where it is not there; this process holds it.
-
-    Raises ValueError, naming the file, where its settings are damaged.
-    """
+    """The folder of the task, made where it is not there, with its run.toml as it was; this process holds it."""
     if (task.path / "run.toml").is_file():
-        try:
+        with suppress(ValueError):  # damaged: the task knows what it held
             return RunFolder.open(task.path)
-        except ValueError as error:
-            raise ValueError(f"{error}; remove the folder {task.path}, and this run is computed again") from None
     code = find_experiment(task.experiment).code() or task.code
-    return RunFolder.create(task.path, task.experiment, task.settings, code=code)
+    make = RunFolder.mend if (task.path / "run.toml").is_file() else RunFolder.create
+    return make(task.path, task.experiment, task.settings, code=code)
 
 
 def _unsaid(_: str) -> None:

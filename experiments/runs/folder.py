@@ -293,6 +293,15 @@ class RunFolder:
                 return folder
         return cls.create(path, command, settings, version, code)
 
+    @classmethod
+    def mend(
+        cls, path: Path, command: str, settings: BaseModel, version: str = __version__, code: str = ""
+    ) -> "RunFolder":
+        """Write the run.toml of a run again, where it is damaged and the settings are known; what is done stays."""
+        write_text(path / "run.toml", settings_toml(command, settings, version, code))
+        cls(path, command, version, {})._forget_digest("run.toml")
+        return cls.open(path)
+
     # Who is writing
 
     @contextmanager

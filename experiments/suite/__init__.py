@@ -1,4 +1,4 @@
 """The cases on grains that ship: what each costs, which have a result; running the rest.
 
-Imports `coupling`, `dem`, `experiments.grains`, `experiments.pool`, `experiments.runs`, `experiments.tumble`.
+Imports `coupling`, `dem`, `experiments.grains`, `experiments.pool`, `experiments.runs`, `experiments.tumble`, `rigid`.
 """

@@ -356,6 +356,8 @@ def test_settings_of_a_run_that_are_changed_are_not_opened(folder):
     settings.write_text(settings.read_text().replace("version", "versoin", 1))
     with pytest.raises(ValueError, match=re.escape(str(settings))):
         RunFolder.open(folder.path)
+    again = RunFolder.mend(folder.path, "dig", DigSettings())
+    assert DigSettings(**again.settings) == DigSettings() and again.status == "running"
 
 
 def test_marks_of_earlier_versions_are_read(folder):
