@@ -312,7 +312,7 @@ class BedGround:
     def pushes(self) -> tuple[Vector, Vector]:
         """Where grains touch the members now [m], and the normal springs' forces on them [N], shape [n, 3] both.
 
-        In the body's world (z from the surface); of one of the `copies`, without damping and friction.
+        In the body's world (z from the surface); of one of the `copies`, with cohesion, without damping and friction.
         """
         from dem.engine.energy import body_pushes
 

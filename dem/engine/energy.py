@@ -57,23 +57,25 @@ def bed_energies(bed: BedState, *, bodies: Mapping[int, Gap]) -> dict[str, float
 
 
 def body_pushes(bed: BedState, *, bodies: Mapping[int, Gap]) -> tuple[Array, Array]:
-    """Where grains touch bodies, and the normal springs' forces on the bodies: Hertz's 2/3 (2 E*) a d.
+    """Where grains touch bodies, and the forces of the normal springs on the bodies, cohesion included.
+
+    Forces are those of ``dem.contact.law`` at rest: Hertz's 2/3 (2 E*) a d, DMT's less 2 pi w R*, or JKR's, which also
+    pulls grains within its range of the surface (``dem.contact.cohesion``).
 
     ``bodies``: as for ``bed_energies``. Returns points on the bodies' surfaces [m] and forces [N], shape [contact, 3]
     both; without damping and friction.
     """
-    state = bed.state()
+    state, law = bed.state(), COHESIONS[bed.material.cohesion]
     points, forces = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for body, surface in bodies.items():
         centres = state["position"][state["near_grain"][state["near_body"] == body]].astype(float)
         distance, normal, curvature = surface(centres[:, :3])
-        overlap = centres[:, 3] - distance
-        touching = overlap > 0
         radius = centres[:, 3] / (1 + centres[:, 3] * curvature)
-        a = np.sqrt(radius[touching] * overlap[touching])
-        push = 2 / 3 * state["body_pair"][body].astype(float)[_TWO_E] * a * overlap[touching]
+        row = state["body_pair"][body].astype(float)
+        a, push, _ = _normal_spring(law, row, centres[:, 3] - distance, radius)
+        touching = a > 0
         points.append(centres[touching, :3] - distance[touching, None] * normal[touching])
-        forces.append(-push[:, None] * normal[touching])
+        forces.append(-push[touching, None] * normal[touching])
     return np.concatenate(points), np.concatenate(forces)
 
 
@@ -81,7 +83,7 @@ def _springs(
     law: int, row: Array, overlap: Array, radius: Array, stretch: Array, turned: Array, normal: Array, share: Any
 ) -> Array:
     """Normal, tangential and turning springs of contacts [J], shape (3,); ``row`` their pairs' parameters."""
-    a, pressed = _normal_spring(law, row, overlap, radius)
+    a, _, pressed = _normal_spring(law, row, overlap, radius)
     k_t = row[..., _EIGHT_G] * a
     twist = (turned * normal).sum(axis=1)
     roll = (turned**2).sum(axis=1) - twist**2
@@ -89,8 +91,8 @@ def _springs(
     return np.array([float((share * part).sum()) for part in held])
 
 
-def _normal_spring(law: int, row: Array, overlap: Array, radius: Array) -> tuple[Array, Array]:
-    """Contact radius [m] and energy [J] at an overlap, both 0 where the pair has parted."""
+def _normal_spring(law: int, row: Array, overlap: Array, radius: Array) -> tuple[Array, Array, Array]:
+    """Contact radius [m], force [N] and energy [J] at an overlap, all 0 where the pair has parted."""
     two_e, pi_w = row[..., _TWO_E], row[..., _PI_W]
     if law == JKR and pi_w > 0:
         unit = (4 * pi_w * radius**2 / two_e) ** (1 / 3)
@@ -107,12 +109,16 @@ def _normal_spring(law: int, row: Array, overlap: Array, radius: Array) -> tuple
         def curve(s: Any) -> Any:
             return 16 / 15 * s**10 - 8 / 3 * s**7 + s**4
 
+        force = pi_w * radius * (8 / 3 * s**6 - 4 * s**3)
         # With 2 pi w = E* unit^3 / R^2 every term has pi w unit^2 for a factor.
-        return np.where(touching, unit * s**2, 0.0), np.where(touching, pi_w * unit**2 * (curve(s) - curve(least)), 0.0)
+        energy = pi_w * unit**2 * (curve(s) - curve(least))
+        return np.where(touching, unit * s**2, 0.0), np.where(touching, force, 0.0), np.where(touching, energy, 0.0)
     pressed = np.maximum(0.0, overlap)
     a = np.sqrt(radius * pressed)
-    energy = 4 / 15 * two_e * a * pressed**2
-    return a, energy - 2 * pi_w * radius * pressed if law == DMT else energy
+    force, energy = 2 / 3 * two_e * a * pressed, 4 / 15 * two_e * a * pressed**2
+    if law != DMT:
+        return a, force, energy
+    return a, force - 2 * pi_w * radius * (pressed > 0), energy - 2 * pi_w * radius * pressed
 
 
 def _pairs(bed: BedState, state: State, law: int) -> Array:

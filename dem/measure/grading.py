@@ -11,7 +11,9 @@ from dem.engine.core import BedCore
 from dem.grains.graded import THROAT, Graded, middles
 from dem.grains.packing import bulk_packing, surface_height
 
-__all__ = ["MOST_DRAINED", "MOST_STRAYED", "Grading", "Layer", "Zone", "measure_grading", "surface_under"]
+__all__ = [
+    "MOST_DRAINED", "MOST_STRAYED", "Grading", "Layer", "Zone", "measure_grading", "packing_under", "surface_under",
+]  # fmt: skip
 
 Array = np.ndarray
 
@@ -135,6 +137,15 @@ def surface_under(bed: BedCore, graded: Graded) -> float:
         end = max(end, high)
     area = bed.size[1] * covered
     return surface_height(heights, radii, area, bulk=bulk_packing(heights, radii, area))
+
+
+def packing_under(bed: BedCore, graded: Graded) -> float:
+    """Packing fraction of the fine grains under the footprints [1]; of the whole bed where they are too few to say."""
+    grains = bed.grains()
+    x, z, d = grains.position[:, 0], grains.position[:, 2], 2 * grains.radius
+    distance, place = graded.distance(x, z, bed.size), graded.diameter(x, z, bed.size)
+    found = _zones(bed, graded, x, z, d, math.pi / 6 * d**3, distance, place)[0].packing
+    return bed.packing_fraction if found is None else found
 
 
 def _under(graded: Graded, x: np.ndarray, length: float) -> np.ndarray:

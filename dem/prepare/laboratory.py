@@ -19,7 +19,7 @@ from dem.files.arrays import read_arrays
 from dem.grains.graded import Graded
 from dem.grains.materials import Facing, Material
 from dem.grains.sizes import Json
-from dem.measure.grading import measure_grading
+from dem.measure.grading import measure_grading, packing_under
 from dem.measure.lid import Lid
 
 from .recipe import FLUFF, Stage
@@ -68,6 +68,11 @@ class Laboratory(Preparation[B]):
         self.done = 0
         self._progress, self._path, self._kept = progress, path, time.monotonic()
         self._recipe, self._graded, self._sticking, self._labels = recipe, graded, sticking, labels
+
+    @property
+    def _packing(self) -> float:
+        """Of a graded bed that of its fine grains, which a tip meets: mixed sizes beside them lie denser."""
+        return self.bed.packing_fraction if self._graded is None else packing_under(self.bed, self._graded)
 
     def keep(self) -> None:
         """Write it down as it is."""
@@ -201,7 +206,7 @@ class Laboratory(Preparation[B]):
         return self._results()
 
     def _compact(self, stage: Stage) -> Json:
-        found, wanted = self.bed.packing_fraction, stage.value
+        found, wanted = self._packing, stage.value
         if not self.notes and wanted is not None and found > wanted + PAST:
             raise ValueError(
                 f"stages: {str(stage)!r} cannot be reached: the bed lies at {found:.4f} already and compacting only "
@@ -223,15 +228,15 @@ class Laboratory(Preparation[B]):
         weight = bed.weight / (bed.size[0] * bed.size[1])
         most = BEARING * weight
         if "pressure" not in notes:
-            notes |= {"pressure": 0.0, "trace": [bed.packing_fraction], "settle": None}
-        while notes["settle"] is not None or bed.packing_fraction < packing - SHORT:
+            notes |= {"pressure": 0.0, "trace": [self._packing], "settle": None}
+        while notes["settle"] is not None or self._packing < packing - SHORT:
             if notes["settle"] is None:
                 if "body" not in notes:
                     if notes["pressure"] >= most:
                         raise ValueError(
                             f"packing = {packing:g} cannot be reached: a lid pressed to {most:.4g} Pa, {BEARING:g} "
                             f"times what lies on the floor, brought the bed from {notes['trace'][0]:.4f} to "
-                            f"{bed.packing_fraction:.4f}; taps do more, or ask for less"
+                            f"{self._packing:.4f}; taps do more, or ask for less"
                         )
                     notes["pressure"] = min(most, max(weight, 2 * notes["pressure"]))
                 lid = Lid(bed, notes, grain=self._grain, fall_time=self._fall_time, drag_time=DRAG * self._fall_time)
@@ -240,10 +245,10 @@ class Laboratory(Preparation[B]):
                 notes["settle"] = {}
             self._settle(ENERGY_RATIO, notes["settle"])
             bed.measure_surface()
-            notes["trace"].append(bed.packing_fraction)
+            notes["trace"].append(self._packing)
             notes["settle"] = None
             way = max(1e-9, packing - notes["trace"][0])
-            self._pause(min(1.0, max(0.0, (bed.packing_fraction - notes["trace"][0]) / way)))
+            self._pause(min(1.0, max(0.0, (self._packing - notes["trace"][0]) / way)))
 
     def _cut(self, stage: Stage) -> Json:
         """Dig a strip out about x = 0 and let the faces do what they do: without drag first, so that they may fall."""

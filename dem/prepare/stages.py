@@ -51,6 +51,11 @@ class Preparation(Generic[B]):
         """Between two pieces of the work: report the share done of the stage, keep the work if it is time."""
 
     @property
+    def _packing(self) -> float:
+        """The packing fraction that stages bring to what is asked for [1]."""
+        return self.bed.packing_fraction
+
+    @property
     def _energy(self) -> float:
         """Mean kinetic energy of a grain over m g d [1]."""
         bed = self.bed
@@ -110,14 +115,13 @@ class Preparation(Generic[B]):
 
     def _reach(self, packing: float, notes: Json) -> None:
         """To a packing fraction from either side: loosened from below where the bed is denser, then tapped."""
-        bed = self.bed
-        notes.setdefault("start", bed.packing_fraction)
-        if "fluff" in notes or (not notes.get("taps") and bed.packing_fraction > packing + PAST):
+        notes.setdefault("start", self._packing)
+        if "fluff" in notes or (not notes.get("taps") and self._packing > packing + PAST):
             self._fluff(FLUFF, notes.setdefault("fluff", {}))
-            if bed.packing_fraction > packing + PAST:
+            if self._packing > packing + PAST:
                 raise ValueError(
                     f"packing = {packing:g} cannot be reached: this material rains in at {notes['start']:.4f} and "
-                    f"loosened from below still lies at {bed.packing_fraction:.4f}; ask for that or more, or give the "
+                    f"loosened from below still lies at {self._packing:.4f}; ask for that or more, or give the "
                     f"grains more friction, rolling friction or cohesion"
                 )
             notes["fluffed"] = notes.pop("fluff")
@@ -160,21 +164,21 @@ class Preparation(Generic[B]):
         """
         bed = self.bed
         if "taps" not in notes:
-            notes |= {"taps": 0, "height": _TAP, "trace": [bed.packing_fraction], "round": 0}
+            notes |= {"taps": 0, "height": _TAP, "trace": [self._packing], "round": 0}
             self._densest = bed.state() if packing is None else {}
         trace = notes["trace"]
-        while packing is None or bed.packing_fraction < packing - SHORT:
+        while packing is None or self._packing < packing - SHORT:
             tapped = len(trace) - 1 - notes["round"]
             gained = trace[-1] - trace[-1 - _TELLING_TAPS] if tapped >= _TELLING_TAPS else math.inf
             if packing is None and (gained < _NOTHING_GAINED or notes["taps"] >= 2 * _MOST_TAPS):
-                if bed.packing_fraction < max(trace):
+                if self._packing < max(trace):
                     bed.restore(self._densest)
                 softer = notes["height"] / 2
                 if bed.material.cohesion == "none" or softer < _SOFTEST_TAP or notes["taps"] >= 2 * _MOST_TAPS:
                     self._densest = {}
                     return
                 notes |= {"height": softer, "round": len(trace)}
-                trace.append(bed.packing_fraction)
+                trace.append(self._packing)
             if packing is not None:
                 self._refuse_dense(packing, gained / _TELLING_TAPS, notes)
             before = bed.state()
@@ -182,19 +186,19 @@ class Preparation(Generic[B]):
             self._settle(ENERGY_RATIO, {}, pausing=False)
             bed.measure_surface()
             notes["taps"] += 1
-            if packing is not None and bed.packing_fraction > packing + PAST and notes["height"] > _SOFTEST_TAP:
+            if packing is not None and self._packing > packing + PAST and notes["height"] > _SOFTEST_TAP:
                 bed.restore(before)
                 notes["height"] /= 2
             else:
-                trace.append(bed.packing_fraction)
+                trace.append(self._packing)
                 if packing is None and trace[-1] == max(trace):
                     self._densest = bed.state()
             way = (packing or 1.1 * trace[0]) - trace[0]
-            self._pause(min(1.0, max(0.0, (bed.packing_fraction - trace[0]) / max(1e-9, way))))
+            self._pause(min(1.0, max(0.0, (self._packing - trace[0]) / max(1e-9, way))))
 
     def _refuse_dense(self, packing: float, rate: float, notes: Json) -> None:
         """Raise ValueError where the taps left cannot bring the packing: each gains less than those before."""
-        left, found = _MOST_TAPS - notes["taps"], self.bed.packing_fraction
+        left, found = _MOST_TAPS - notes["taps"], self._packing
         hoped = found + max(0.0, rate) * left + PAST
         if left > 0 and hoped >= packing:
             return

@@ -208,7 +208,9 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         }  # fmt: skip
         with held_back() as asked_to_stop:
             if self.stages is None:
-                return Bed.prepare(self.material, **options, progress=BedProgress(progress, "bed", asked_to_stop))
+                packing = None if graded is None else recipe_of(self.material).rained
+                shown = BedProgress(progress, "bed", asked_to_stop, tapped=packing is not None)
+                return Bed.prepare(self.material, packing=packing, **options, progress=shown)
             return staged_bed(self.material, self.stages, **options, progress=progress, asked_to_stop=asked_to_stop)
 
     def laid_out(self, bed: Bed) -> Bed:

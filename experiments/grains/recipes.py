@@ -1,4 +1,4 @@
-"""Default preparation of a bed of each material, and what is known of its strength: recipes.toml."""
+"""Default preparation of a bed of each material, what is known of its strength, how densely it rains: recipes.toml."""
 
 import tomllib
 from dataclasses import dataclass
@@ -21,13 +21,15 @@ class Recipe:
     stages: tuple[str, ...] | None = None  # None: rained and levelled
     cohesion: float | None = None  # [Pa]; None: not known
     resistance: float | None = None  # What a tip meets for the cohesion alone [Pa]; None: not known
+    rained: float | None = None  # Packing fraction of one size, rained and levelled; graded beds get it too [1]
     source: str = ""
 
 
 @cache
 def _recipes() -> dict[str, Recipe]:
     tables = tomllib.loads(_FILE.read_text(encoding="utf-8"))
-    return {name: Recipe(**table | {"stages": tuple(table["stages"])}) for name, table in tables.items()}
+    stages = {name: {"stages": tuple(table["stages"])} for name, table in tables.items() if "stages" in table}
+    return {name: Recipe(**table | stages.get(name, {})) for name, table in tables.items()}
 
 
 def recipe_of(material: Material) -> Recipe:

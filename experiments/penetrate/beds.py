@@ -26,7 +26,7 @@ from .units import RAIN, deepest
 
 __all__ = [
     "bed_step", "choose_softness", "expected_bearing", "expected_stiffness", "find_material", "fingerprint",
-    "first_gravity", "overlap_bound", "prepare_bed", "resting_load",
+    "first_gravity", "overlap_bound", "packing_of", "prepare_bed", "resting_load",
     "sinks_away", "stages_of", "stiffened", "within_numbers",
 ]  # fmt: skip
 
@@ -77,8 +77,8 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
     with held_back() as asked_to_stop:
         if stages is None:
             return Bed.prepare(
-                find_material(settings), packing=settings.packing, **options,
-                progress=BedProgress(progress, name, asked_to_stop, tapped=settings.packing is not None),
+                find_material(settings), packing=(packing := packing_of(settings)), **options,
+                progress=BedProgress(progress, name, asked_to_stop, tapped=packing is not None),
             )  # fmt: skip
         stuff, ending = find_material(settings), asked_to_stop
         bed = staged_bed(stuff, stages, progress=progress, asked_to_stop=ending, name=name, **options)
@@ -96,6 +96,16 @@ def stages_of(settings: PenetrateSettings) -> tuple[str, ...] | None:
     if own is None or settings.packing is None:
         return own
     return ("rain:dry", f"compact:{settings.packing:g}", "stick", "level")
+
+
+def packing_of(settings: PenetrateSettings) -> float | None:
+    """Packing fraction to which a bed is brought [1]: that given; of a graded bed that of one size; None: as it settles.
+
+    A graded bed that is prepared in stages has that of its stages.
+    """
+    if settings.packing is not None or settings.graded is None:
+        return settings.packing
+    return recipe_of(find_material(settings)).rained
 
 
 def first_gravity(settings: PenetrateSettings) -> float:

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from dem import Bed, Material
 from dem.contact.cohesion import jkr_contact, jkr_range, pull_off
 from dem.contact.law import effective_moduli
+from dem.engine.energy import body_pushes
 
 RADIUS, YOUNG, POISSON, DENSITY, GAMMA = 0.0025, 1e7, 0.25, 2600, 0.5
 STAR = {
@@ -87,6 +88,34 @@ def test_the_force_curves_are_dmts_and_jkrs():
         grains = bed.grains()
         assert grains.force[:, 2] == pytest.approx(wanted[law], rel=1e-9, abs=1e-12)
         assert (grains.coordination == (wanted[law] != 0)).all()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_pushes_on_a_body_have_cohesion_and_their_work_from_no_load_to_parting_is_that_of_pulling_a_grain_off(law):
+    """DMT: integral of 2 pi w R - k d^1.5 from 0 to d_0, where it is 0: 1.2 pi w R d_0, k = 4/3 E* sqrt(R).
+
+    JKR: pi w a_1^2 (c(1/4) - c(3/2)), c(s^3) = 16/15 s^10 - 8/3 s^7 + s^4; it is without load at s^3 = 3/2 and parts at
+    1/4. Gauss's rule over t, d = d_end + (d_0 - d_end) t^2, which takes the root out of JKR's force where it parts.
+    """
+    w, young = 2 * GAMMA, STAR["plane"]
+    if law == "dmt":
+        rest, end = (2 * math.pi * w * RADIUS / (4 / 3 * young * math.sqrt(RADIUS))) ** (2 / 3), 0.0
+        work = 1.2 * math.pi * w * RADIUS * rest
+    else:
+        unit = (2 * math.pi * w * RADIUS**2 / young) ** (1 / 3)
+        rest, end = ((s**4 - s) * unit**2 / RADIUS for s in (1.5 ** (1 / 3), 0.25 ** (1 / 3)))
+        work = -jkr_energy(rest, RADIUS, young)
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    t = 0.5 * (nodes + 1)
+    bed = make(stuff(law), SITES + np.outer(RADIUS - end - (rest - end) * t**2, [0, 0, 1]))
+    floor = {0: lambda x: (x[:, 2], np.tile([0.0, 0.0, 1.0], (len(x), 1)), np.zeros(len(x)))}
+    points, forces = body_pushes(bed, bodies=floor)
+    order = np.lexsort((points[:, 0], points[:, 1]))
+    pull = forces[order, 2]
+    assert points[order] == pytest.approx(SITES, abs=1e-15)
+    assert pull == pytest.approx(-bed.grains().force[:, 2], rel=1e-9)
+    assert (pull > 0).all() and pull.max() < pull_off(law, surface_energy=GAMMA, radius=RADIUS)
+    assert 0.5 * weights @ (pull * 2 * (rest - end) * t) == pytest.approx(work, rel=1e-9)
 
 
 def test_jkrs_closed_solution_has_its_landmarks():
