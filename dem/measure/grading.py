@@ -99,7 +99,7 @@ def measure_grading(bed: BedCore, graded: Graded) -> Grading:
     beyond = np.maximum(distance - np.maximum(belongs, 0.0), 0.0) / place
     falls = d < THROAT * (1 + graded.spread) * place
     return Grading(
-        zones=_zones(bed, graded, x, z, d, solid, distance, place),
+        zones=_zones(size, bed.surface, graded, x, z, d, solid, distance, place),
         layers=_layers(graded, x, z, d, size, bed.surface),
         drained_share=float(solid[falls].sum()) / total,
         strayed_share=float(solid[beyond > _SCATTER].sum()) / total,
@@ -144,7 +144,8 @@ def packing_under(bed: BedCore, graded: Graded) -> float:
     grains = bed.grains()
     x, z, d = grains.position[:, 0], grains.position[:, 2], 2 * grains.radius
     distance, place = graded.distance(x, z, bed.size), graded.diameter(x, z, bed.size)
-    found = _zones(bed, graded, x, z, d, math.pi / 6 * d**3, distance, place)[0].packing
+    surface = surface_under(bed, graded)
+    found = _zones(bed.size, surface, graded, x, z, d, math.pi / 6 * d**3, distance, place)[0].packing
     return bed.packing_fraction if found is None else found
 
 
@@ -155,9 +156,9 @@ def _under(graded: Graded, x: np.ndarray, length: float) -> np.ndarray:
 
 
 def _zones(
-    bed: BedCore, graded: Graded, x: Array, z: Array, d: Array, solid: Array, distance: Array, place: Array
-) -> list[Zone]:
-    size, surface = bed.size, bed.surface
+    size: Sequence[float], surface: float, graded: Graded, x: Array, z: Array, d: Array, solid: Array, distance: Array,
+    place: Array,
+) -> list[Zone]:  # fmt: skip
     full = (graded.coarse - graded.fine) / graded.growth
     grid_x, grid_z = middles(graded.fine / _FINENESS, size[0], surface)
     cell = size[0] * size[1] * surface / len(grid_x)

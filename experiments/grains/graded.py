@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from coupling import CoupledTumble
 from dem.grains.graded import NARROWEST, THROAT, Graded
+from dem.grains.materials import Material
 from dem.measure.grading import MOST_DRAINED, MOST_STRAYED
 from dem.prepare.report import Prepared
 from experiments.platform.numbers import tip_angles, tip_depth
@@ -17,11 +18,12 @@ from experiments.runs.types import Json
 from rigid.planar.trajectory import Trajectory
 
 from . import say
+from .recipes import recipe_of
 from .spells import spells
 
 __all__ = [
     "coarsest_touched", "graded_quantities", "graded_under", "grading_told", "grading_warning", "places_touched",
-    "tips_in_ground",
+    "tips_in_ground", "unmatched_warning",
 ]  # fmt: skip
 
 
@@ -78,6 +80,18 @@ def grading_warning(found: Mapping[str, Any], *, after: str = "") -> str | None:
     )
 
 
+def unmatched_warning(
+    graded: Graded | None, material: Material, *, packing: float | None = None, stages: Sequence[str] | None = None
+) -> str | None:
+    """Warning that a graded bed lies as it fell, denser than a bed of one size; None where its packing was chosen.
+
+    `packing` and `stages`: as given; without both it is brought to `rained` of recipes.toml, where that is known.
+    """
+    if graded is None or packing is not None or stages is not None or recipe_of(material).rained is not None:
+        return None
+    return say("graded_unmatched", material=material.name)
+
+
 def graded_quantities(found: Sequence[Mapping[str, Any]]) -> dict[str, Json]:
     """Quantities of the graded beds of a run: their grading, of the worst bed, and the number of grains saved."""
     saved = [1 - bed["grain_count"] / bed["fine_count"] for bed in found]
@@ -91,6 +105,9 @@ def graded_quantities(found: Sequence[Mapping[str, Any]]) -> dict[str, Json]:
         "grains_saved": (fmean(saved), "1", "of the grains, and grain-steps, of a bed that is as fine throughout")
     }
     numbers |= {key: (max(bed[key] for bed in found), "1", note) for key, note in notes.items()}
+    under = [bed["zones"][0]["packing"] for bed in found]
+    if None not in under:
+        numbers["packing_under_footprints"] = (fmean(under), "1", "packing fraction of the fine grains")
     return quantities_of(numbers, std=None)
 
 

@@ -99,9 +99,9 @@ def stages_of(settings: PenetrateSettings) -> tuple[str, ...] | None:
 
 
 def packing_of(settings: PenetrateSettings) -> float | None:
-    """Packing fraction to which a bed is brought [1]: that given; of a graded bed that of one size; None: as it settles.
+    """Packing fraction to which a bed without stages is brought [1]; None: as it settles.
 
-    A graded bed that is prepared in stages has that of its stages.
+    That given; if none is given, a graded bed has that of a bed of one size.
     """
     if settings.packing is not None or settings.graded is None:
         return settings.packing

@@ -7,7 +7,7 @@ from pathlib import Path
 from coupling import Penetration, overdamped_below
 from dem.grains.materials import caveat
 from experiments.grains.advice import resolution_advice
-from experiments.grains.graded import grading_warning
+from experiments.grains.graded import grading_warning, unmatched_warning
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -61,6 +61,7 @@ def conclude(
         *map(stiffer_note, stiffened),
         None if stiffened else overlap_warning(overlap, settings, softening),
         *(grading_warning(entry.grading) for entry in facts if entry.grading is not None),
+        unmatched_warning(settings.graded, material, packing=settings.packing, stages=beds.stages_of(settings)),
         caveat(material),
         *(text for text in doubts if doubts[text]),
     ]

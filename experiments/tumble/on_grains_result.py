@@ -14,7 +14,13 @@ from dem import Graded
 from dem.measure.grading import measure_grading
 from dem.prepare.prepare import fingerprint
 from experiments.grains import bed_result as grains
-from experiments.grains.graded import coarsest_touched, graded_quantities, grading_warning, tips_in_ground
+from experiments.grains.graded import (
+    coarsest_touched,
+    graded_quantities,
+    grading_warning,
+    tips_in_ground,
+    unmatched_warning,
+)
 from experiments.grains.softening import Softening
 from experiments.grains.tracked_frames import PlatformFrames, member_mesh
 from experiments.platform.surfaces import find_surface
@@ -131,6 +137,7 @@ def conclude(
         grains.unsettled_warning(run.master), own_warning(run),
         grains.overlap_warning(bed, softening, settings.max_overlap),
         _same_sand_again(settings, run, spikes.diameter), coarser, lies,
+        unmatched_warning(graded, bed.material, stages=settings.bed_stages),
         *grains.bed_warnings(bed, plan.surface, across=spikes.diameter / coarsest),
         say("law_in_flight", plan=plan) if surface.granular and plan.trial.counterweight == 0 else None,
         say("one_bed") if surface.granular else None,

@@ -45,7 +45,7 @@ def sizes_of(name: str) -> tuple[Any, float, float | None]:
         middle, beside = 0.5 * SIZE[0], times * SPIKE.diameter
         grain = Graded(
             fine=FINE, coarse=FINE if name == "sequence" else COARSE, footprints=((middle - beside, middle + beside),),
-            depth=1e-3 * depth,
+            depth=depth / 1000,
         )  # fmt: skip
     return grain, float(start) if start else graded._START, float(packing) if packing else None
 

@@ -9,6 +9,8 @@ from scipy.spatial import cKDTree
 
 from dem import SAND, Bed, Graded, measure_grading
 from dem.grains.graded import DRIFT, THROAT, steepest
+from dem.measure.grading import packing_under
+from dem.prepare.stages import PAST, SHORT
 
 SIZE = (0.06, 0.024, 0.024)
 GRADED = Graded(fine=0.002, coarse=0.004, footprints=((0.004, 0.022),), depth=0.014)
@@ -112,3 +114,13 @@ def test_a_grading_that_cannot_be_is_refused_before_any_work(options, words):
         Bed.prepare(SAND, size=SIZE, grain=Graded(**given), cache=False)
     with pytest.raises(ValueError, match="Graded has a spread of its own"):
         Bed.prepare(SAND, size=SIZE, grain=GRADED, spread=0.1)
+
+
+@pytest.mark.long
+def test_a_packing_fraction_is_reached_under_the_footprints_where_a_tip_meets_it():
+    """Within the tolerances of tapping; the mixed sizes beside them lie denser, so the whole bed's would not do."""
+    bed = Bed.prepare(
+        SAND, size=SIZE, grain=GRADED, gravity=9.80665, young=1e7, packing=0.56, cache=False, threads=1
+    )  # fmt: skip
+    assert 0.56 - SHORT <= packing_under(bed, GRADED) <= 0.56 + PAST
+    assert measure_grading(bed, GRADED).held

@@ -2,17 +2,22 @@
 
 import json
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from dem import Bed, Graded, measure_grading
+from dem import SAND, SAND_WEAK, Bed, Graded, measure_grading
 from dem.prepare.bedfile import read_preparation
 from experiments.bed.refine import refined_options
 from experiments.bed.settings import BedRefineSettings
 from experiments.cli.main import BAD_INPUT, DONE, main
-from experiments.grains.graded import coarsest_touched, graded_under, places_touched
+from experiments.grains.graded import coarsest_touched, graded_under, places_touched, unmatched_warning
+from experiments.grains.recipes import recipe_of
+from experiments.runs.progress import Progress
+from experiments.tumble.on_grains import PlanarOnBed
+from experiments.tumble.settings import TumbleSettings
 
 SIZE = (0.044, 0.018, 0.013)
 MAKE = ["bed", "make", "--stages", "rain", "--size", *map(str, SIZE), "--grain", "0.002", "--quiet"]
@@ -106,3 +111,28 @@ def test_fine_grains_lie_where_the_tips_of_a_forecast_come_down():
             ground=SimpleNamespace(origin=np.array([0.2, 0.03, 0.05])),
         )  # fmt: skip
         assert coarsest_touched(run, graded, size=(0.6, 0.06, 0.05)) == pytest.approx(coarsest, rel=1e-9)
+
+
+def test_a_graded_bed_that_lies_as_it_fell_is_warned_of():
+    """Where the packing fraction of one size is not known, and neither a packing fraction nor stages are given."""
+    unknown = replace(SAND, name="mine")
+    assert "is not known for mine" in unmatched_warning(SIZES, unknown)
+    for known in (
+        unmatched_warning(None, unknown), unmatched_warning(SIZES, SAND),
+        unmatched_warning(SIZES, unknown, packing=0.6),
+        unmatched_warning(SIZES, unknown, stages=("rain", "packing:0.6", "level")),
+    ):  # fmt: skip
+        assert known is None
+
+
+def test_a_tumble_has_its_graded_bed_brought_to_the_packing_fraction_of_a_bed_of_one_size(monkeypatch):
+    asked = []
+    monkeypatch.setattr(Bed, "prepare", lambda material, *, packing, **_: asked.append((material.name, packing)))
+    for given in ({"coarse": 0.006}, {}):
+        on_grains = PlanarOnBed(
+            TumbleSettings(
+                surface="sand-weak", ground="bed", duration=0.9, grain=0.0024, bed_size=(0.4, 0.06, 0.046), **given
+            )
+        )
+        on_grains.prepare(on_grains.softening(), Progress())
+    assert asked == [("sand-weak", recipe_of(SAND_WEAK).rained), ("sand-weak", None)]

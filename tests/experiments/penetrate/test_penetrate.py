@@ -17,6 +17,7 @@ from golden import golden
 from pydantic import ValidationError
 
 from dem.grains.materials import Material
+from experiments.grains.recipes import recipe_of
 from experiments.grains.sizes import expected_grain_count
 from experiments.penetrate import beds, units
 from experiments.penetrate import experiment as penetrate
@@ -435,6 +436,16 @@ def test_a_graded_bed_is_fine_around_the_spike_and_has_fewer_grains():
     assert settings.graded.footprints == (pytest.approx((0.018, 0.054)),)
     assert (settings.graded.fine, settings.graded.depth) == (0.0024, 0.03)
     assert 0.4 < settings.grain_count / PenetrateSettings().grain_count < 0.8
+
+
+def test_a_graded_bed_is_brought_to_the_packing_fraction_of_a_bed_of_one_size():
+    """That of recipes.toml, unless another is given or none is known; a bed of one size lies as it settles."""
+    graded = {"coarse": 0.006}
+    assert beds.packing_of(PenetrateSettings(**graded)) == recipe_of(SAND).rained == 0.545
+    assert beds.packing_of(PenetrateSettings(**graded, material="sand-weak")) == 0.57
+    assert beds.packing_of(PenetrateSettings(**graded, packing=0.58)) == 0.58
+    assert beds.packing_of(PenetrateSettings(**graded, material="jsc-1a-loose")) is None
+    assert beds.packing_of(PenetrateSettings()) is None
 
 
 def test_coarse_tips_can_be_asked_for():
