@@ -62,7 +62,8 @@ class PenetrateSettings(StrictSettings):
     fine_depth: Positive | None = None
     """Graded bed: depth of the fine region [m]; if not given, two tip diameters below `depth`, or the whole bed."""
     packing: float | None = Field(None, gt=0.5, le=0.64)
-    """Packing fraction of the bed [1]; that after settling if not given."""
+    """Packing fraction of the bed [1], of a graded bed around the spike. If not given: that after settling; of a graded
+    bed that of a rained bed of one size, where it is known."""
     bed_stages: tuple[str, ...] | None = None
     """Stages of preparation, as for `hedgebed bed make --stages`, `level` last. If not given: rain and level; cohesive
     materials use a recipe of their own (rain without cohesion, compact, switch cohesion on)."""
