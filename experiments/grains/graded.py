@@ -85,9 +85,11 @@ def unmatched_warning(
 ) -> str | None:
     """Warning that a graded bed lies as it fell, denser than a bed of one size; None where its packing was chosen.
 
-    `packing` and `stages`: as given; without both it is brought to `rained` of recipes.toml, where that is known.
+    `packing` and `stages`: as given; without both it has the stages of its material, or is brought to `rained` of
+    recipes.toml, where one of them is known.
     """
-    if graded is None or packing is not None or stages is not None or recipe_of(material).rained is not None:
+    own = recipe_of(material)
+    if graded is None or any(choice is not None for choice in (packing, stages, own.stages, own.rained)):
         return None
     return say("graded_unmatched", material=material.name)
 
