@@ -17,6 +17,7 @@ from experiments.cli.main import main
 from experiments.runs import folder as runs_folder
 
 DAMAGES = int(os.environ.get("HEDGEBED_DAMAGES", "2"))
+TEXTS = (".csv", ".json", ".toml")
 NOT_NUMBERS = ("lock", "report.html", "log")
 MARKED = [
     pytest.param(name, marks=[getattr(pytest.mark, kind.tier)] if kind.tier else []) for name, kind in KINDS.items()
@@ -24,11 +25,15 @@ MARKED = [
 
 
 def damaged(path, chance):
-    """Cut the file off somewhere, or change one bit of it."""
+    """Cut the file off somewhere, change one bit of it, or one digit of a text: the number is as good as another."""
     content = bytearray(path.read_bytes())
-    place = chance.randrange(len(content))
-    if chance.random() < 0.5:
+    place, how = chance.randrange(len(content)), chance.choice(["cut", "bit", "digit", "digit"])
+    digits = [at for at, byte in enumerate(content) if byte in b"0123456789"] if path.suffix in TEXTS else []
+    if how == "cut":
         content = content[:place]
+    elif how == "digit" and digits:
+        at = chance.choice(digits)
+        content[at] = chance.choice([byte for byte in b"0123456789" if byte != content[at]])
     else:
         content[place] ^= 1 << chance.randrange(8)
     path.write_bytes(content)
