@@ -1,4 +1,4 @@
-"""Pushes a 12 mm ball tip into a bed of jsc-1a-loose-cut at 1 g: `python docs/results/penetrate-jsc-1a-push/push.py SEED`.
+"""Pushes a 12 mm ball tip into a bed of jsc-1a-loose-cut at 1 g: `python push.py SEED`, the repository on PYTHONPATH.
 
 The bed is that of the foot in docs/results/penetrate-foot-jsc-1a-loose-cut-beds before gravity is lowered, of grains
 stiffened to 80 MPa. Writes seed<SEED>.csv to the working folder: depth [m] and force [N] of each step of the spike.
