@@ -15,7 +15,7 @@ def control(model, data):
 
 
 robot = MujocoRobot(model, feet=["foot"], controller=control)
-ground = LawFeet(robot.feet, parameters={"stiffness": 1750.0, "damping": 37.0}, mu_s=0.6)  # sand under 60 mm
+ground = LawFeet(robot.feet, parameters={"stiffness": 966.0, "damping": 8.68}, mu_s=0.6)  # as --surface sand
 run = RobotRun(robot, ground, duration=0.35 if small else 1.0, substeps=4)
 rows = run.run()
 print(f"sinks {1e3 * rows['sinkage'].max():.1f} mm, rises {1e3 * (rows['z'].max() - rows['z'][0]):.1f} mm")

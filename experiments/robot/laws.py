@@ -19,6 +19,7 @@ from .settings import RobotSettings
 __all__ = ["SPIKE", "UnderFeet", "given_parameters", "law_of", "settle_other_law", "settle_spring"]
 
 SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
+HARD = ("hunt-crossley", "power")  # Laws that hard ground has too: their defaults are those of brick
 SPIKE = 0.012  # Diameter of the spike that the defaults of the other laws are of [m] (rigid.ground.laws)
 OWN_SCALE = {"bekker": ("radius", "tip_height"), "rft": ("radius",)}
 """Laws that take the foot's own size -> the parameters that it replaces."""
@@ -51,7 +52,8 @@ def law_of(
     """The law of `settings`, or the spring-damper where `as_spring` or on grains.
 
     On hard ground K is of the spike that gives way, so that the spring-damper, hunt-crossley and power do not follow
-    the size of a foot there.
+    the size of a foot there. Laws of grains have no numbers for it: they are refused there, and where they are accepted
+    all the same they do not follow the foot either. The law of a file always does.
     """
     if fitted is not None and not as_spring:
         return UnderFeet(law=fitted.law, parameters=fitted.values, of=fitted.foot.diameter)
@@ -63,7 +65,7 @@ def law_of(
         )
     given_here = given_parameters(settings)
     parameters = find_law(settings.ground).in_gravity(numbers["gravity"].value, given_here)
-    unsized = bool(ill_sized(settings.ground, given_here))  # on hard ground, or accepted
+    unsized = not surface.granular or bool(ill_sized(settings.ground, given_here))  # the second: accepted
     return UnderFeet(law=settings.ground, parameters=parameters, of=None if unsized else SPIKE, given=tuple(given_here))
 
 
@@ -102,15 +104,17 @@ def settle_other_law(
     """Settle the parameters of a law other than the spring-damper, and warn of those that are the law's defaults.
 
     ``largest``: area of the largest foot over that of the spike that the defaults are of [1]. Raises ValueError for a
-    parameter there is not, or out of bounds, and for one that no foot on grains has and that is not accepted as it is.
+    parameter there is not, or out of bounds. Unless they are accepted, it raises it also for one that no foot on grains
+    has, and for a law of grains on hard ground.
     """
     law, given = find_law(settings.ground), given_parameters(settings)
     own = law.in_gravity(gravity, given)
     values = law.values(own)
     ill = ill_sized(law.name, given)
     _refuse_unsized(settings, surface, law, ill)
-    powers = {} if ill else diameter_powers(law.name, values)
-    replaced = () if "radius" in given else OWN_SCALE.get(law.name, ())
+    unsized = bool(ill) or not surface.granular
+    powers = {} if unsized else diameter_powers(law.name, values)
+    replaced = () if unsized or "radius" in given else OWN_SCALE.get(law.name, ())
     for parameter in law.parameters:
         name = parameter.name
         origin = f"default of {law.name}, of one spike{_times(largest, powers.get(name, 0.0))}"
@@ -123,17 +127,21 @@ def settle_other_law(
     if not left:
         return []
     scaled = any(name in powers for name in left)
-    how = "unsized" if ill else "own_scale" if law.name in OWN_SCALE else "similar" if scaled else "none"
+    how = "unsized" if unsized else "own_scale" if law.name in OWN_SCALE else "similar" if scaled else "none"
     size = say(f"size_{how}", most=largest, spike=1e3 * SPIKE)
     more = "" if "gravity" in own else ", nor gravity"
     return [say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)]
 
 
 def _refuse_unsized(settings: RobotSettings, surface: Surface, law: SurfaceLaw, ill: list[str]) -> None:
-    """Raise ValueError for parameters that belong to hard ground or to another exponent, on grains."""
-    if not ill or settings.accept_unsized or not surface.granular:
+    """Raise ValueError for parameters that belong to the other kind of ground or to another exponent."""
+    if settings.accept_unsized:
         return
-    key = "unsized_law" if law.name in ("hunt-crossley", "power") else "unsized_exponent"
+    if not surface.granular and law.name not in HARD:
+        raise ValueError(say("grains_on_hard", law=law, surface=surface))
+    if not ill or not surface.granular:
+        return
+    key = "unsized_law" if law.name in HARD else "unsized_exponent"
     needed = " ".join(f"{name}=VALUE" for name in ill)
     raise ValueError(say(key, law=law, names=" and ".join(ill), surface=surface, needed=needed, spike=1e3 * SPIKE))
 

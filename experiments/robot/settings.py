@@ -51,7 +51,8 @@ class RobotSettings(GrainsSettings):
     """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot. Defaults are those of a
     spike of 12 mm and follow the size of each foot."""
     accept_unsized: bool = False
-    """Whether to run defaults that follow no foot, those of a spike on brick (hunt-crossley, power), on grains."""
+    """Whether to run defaults that follow no foot: those of a spike on brick (hunt-crossley, power) on grains, or those
+    of a spike in sand (power-irreversible, katsuragi-durian, bekker, rft) on hard ground."""
     stiffness: Positive | None = None
     """K of one foot [N/m]; that of one spike on the surface if not given, on sand times the area of the foot over the
     spike's."""

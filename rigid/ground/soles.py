@@ -84,10 +84,9 @@ def sized_law(
 
     ``parameters``: of the tip. ``given``: names of those that are of this foot already and stay. With bekker and rft
     a given radius means that the foot is the law's own ball or plate. Raises ValueError for a law or parameter there is
-    not, and for a diameter that is not above 0.
+    not, and for a diameter, area, width, height or perimeter that is not a finite number in its range.
     """
-    if not of > 0:
-        raise ValueError(f"of = {of!r} must be above 0 (m): the diameter of the tip that the parameters are of")
+    _refuse_sizes(sole, of)
     values = find_law(law).values(parameters)
     if law in ("bekker", "rft") and "radius" in given:
         return SizedLaw(law=law, parameters=values)
@@ -102,6 +101,22 @@ def sized_law(
     ratio = sole.diameter / of
     powers = {name: power for name, power in diameter_powers(law, values).items() if name not in given}
     return SizedLaw(law=law, parameters=values | {name: values[name] * ratio**power for name, power in powers.items()})
+
+
+def _refuse_sizes(sole: Sole, of: float) -> None:
+    """Raise ValueError, naming it, for a size that is not finite, or not above 0 (height, perimeter: below 0)."""
+    if not (math.isfinite(of) and of > 0):
+        raise ValueError(
+            f"of = {of!r} must be above 0 (m) and finite: the diameter of the tip that the parameters are of"
+        )
+    for name, unit in (("area", "m2"), ("width", "m")):
+        value = getattr(sole, name)
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"sole: {name} = {value!r} must be above 0 ({unit}) and finite")
+    for name in ("height", "perimeter"):
+        value = getattr(sole, name)
+        if not (math.isfinite(value) and value >= 0):
+            raise ValueError(f"sole: {name} = {value!r} must be at least 0 (m) and finite")
 
 
 def ill_sized(law: str, given: Collection[str]) -> list[str]:

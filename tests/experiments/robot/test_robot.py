@@ -215,12 +215,28 @@ def test_a_law_with_all_its_parameters_given_has_no_warning_of_defaults():
 def test_defaults_that_follow_no_foot_are_refused_on_grains_unless_they_are_accepted(given, said):
     with pytest.raises(ValueError, match=said):
         plan_robot(RobotSettings(**HOPPER | given))
-    for accepted in ({"accept_unsized": True}, {"surface": "brick"}):
+    on_brick = {"surface": "brick", "accept_unsized": given["ground"] == "bekker"}  # A law of grains
+    for accepted in ({"accept_unsized": True}, on_brick):
         plan = plan_robot(RobotSettings(**HOPPER | given | accepted))
         ground, found = plan.law_feet(plan.robot()), find_law(given["ground"])
         own = found.values(given_parameters(plan.settings))
         once = found.force(2e-3, 0.1, found.numbers(own))
         assert sum(float(one.force(2e-3, 0.1)) for one in ground.grounds[0][:8]) == pytest.approx(once, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["power-irreversible", "katsuragi-durian", "bekker", "rft"])
+@pytest.mark.parametrize("surface", ["steel", "brick"])
+def test_a_law_of_grains_is_refused_on_hard_ground_and_accepted_it_is_that_of_the_spike(law, surface):
+    with pytest.raises(ValueError, match=f"ground = '{law}' is a law of grains, and surface = '{surface}' is hard"):
+        plan_robot(RobotSettings(**HOPPER, ground=law, surface=surface))
+    plan = plan_robot(RobotSettings(**HOPPER, ground=law, surface=surface, accept_unsized=True))
+    found = find_law(law)
+    own = found.values(found.in_gravity(plan.numbers["gravity"].value, {}))
+    once = found.force(2e-3, 0.1, found.numbers(own))
+    parts = plan.law_feet(plan.robot()).grounds[0][:8]
+    assert sum(float(one.force(2e-3, 0.1)) for one in parts) == pytest.approx(once, rel=1e-9)
+    assert not [number.origin for number in plan.numbers.values() if "times under a foot" in number.origin]
+    assert [said for said in plan.warnings if "also under a foot of up to" in said]
 
 
 def test_a_larger_foot_has_more_force_under_a_law_and_its_numbers_say_how_much():

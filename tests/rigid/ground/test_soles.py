@@ -1,5 +1,6 @@
 """How a surface law follows the size of a foot: similar motions, Bekker's plate, 3D-RFT over the foot's underside."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -141,11 +142,30 @@ def test_the_powers_of_the_diameter_are_those_of_one_scale_of_length_and_time():
         ("power", {"width": 1.0}, 0.012, "width is no parameter of power"),
         ("power", {}, 0.0, "of = 0.0 must be above 0"),
         ("power", {}, math.nan, "of = nan must be above 0"),
+        ("bekker", {}, math.inf, "of = inf must be above 0 .* and finite"),
     ],
 )
 def test_what_cannot_be_sized_is_refused_by_name(law, values, of, said):
     with pytest.raises(ValueError, match=said):
         sized_law(law, values, BALL, of=of)
+
+
+@pytest.mark.parametrize("law", ["spring-damper", "bekker", "rft"])
+@pytest.mark.parametrize(
+    ("size", "value", "said"),
+    [
+        ("area", 0.0, r"area = 0\.0 must be above 0 \(m2\)"),
+        ("area", -1e-4, r"area = -0\.0001 must be above 0"),
+        ("area", math.nan, "area = nan must be above 0"),
+        ("width", 0.0, r"width = 0\.0 must be above 0 \(m\)"),
+        ("width", math.inf, "width = inf must be above 0 .* and finite"),
+        ("height", -1e-3, r"height = -0\.001 must be at least 0"),
+        ("perimeter", math.nan, "perimeter = nan must be at least 0"),
+    ],
+)
+def test_a_sole_of_no_size_is_refused_by_name_under_every_law(law, size, value, said):
+    with pytest.raises(ValueError, match=said):
+        sized_law(law, {}, dataclasses.replace(BALL, **{size: value}), of=0.012)
 
 
 def test_a_roundness_there_is_not_and_a_round_foot_without_height_are_refused():
