@@ -13,7 +13,8 @@ class KeptAngle:
     """One case on grains."""
 
     case: str  # Its folder under docs/results
-    surface: str
+    surface: str  # Of `hedgebed paper`, beside which it stands
+    grains: str  # Today's name of the material that was computed
     rig: float  # g_sim [9.80665 m/s2]
     torque: float  # [N m]
     angle: float  # Of the first 10 mm [degrees]
@@ -23,7 +24,8 @@ class KeptAngle:
 class AngleOfBeds:
     """The same tumble on several beds of one grain size (docs/results/tumble-sand)."""
 
-    surface: str
+    surface: str  # Of `hedgebed paper`, beside which it stands
+    grains: str  # The material that was computed
     rig: float  # g_sim [9.80665 m/s2]
     torque: float  # [N m]
     grain: float  # Mean diameter [mm]

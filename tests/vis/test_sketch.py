@@ -12,7 +12,7 @@ from vis.paper.sketch import CLEAR, LEADING, LENGTH, ROWS, draw_sketch, tip
 
 WORDS = (
     "$K$", "$C$", "$N$", "$F$", "$l$", "$x$", "$y$", "$W$", "$m_b$", "$g$", r"$+\tau$", r"\theta", r"\gamma_n",
-    "g_{sim}", r"\mu_s", r"\mu_d", r"\omega_w", "undisturbed surface", "flywheel", "pulleys", "wires",
+    "g_{sim}", r"\mu_s", r"\mu_d", r"\omega_w", "z = h - y", "undisturbed surface", "flywheel", "pulleys", "wires",
 )  # fmt: skip
 
 

@@ -22,6 +22,8 @@ __all__ = ["COLOURS", "FIGURES", "PaperRun", "in_order"]
 COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#56B4E9", "#009E73")
 """Of the torques, the smallest first."""
 _HARD = ("steel", "brick")
+_SOILS = {"sand": "sand", "jsc1a": "JSC-1A"}
+"""Surfaces of grains: the soil of the paper. Legends name the materials that we compute."""
 VARIANTS = ("low", "nominal", "high", "paper")
 """Of a case: friction at the lower end of its band, as it is, at the upper end; the paper's fixed step."""
 _DASHED, _DOTTED = (0, (5, 3)), (0, (1, 1.6))
@@ -283,13 +285,13 @@ def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: s
 def figure_signs(paper: PaperRun) -> Block | None:
     """Launch angles on sand and JSC-1A: spring-damper, grains, and the signs that the text states."""
     kept = paper.result.get("kept_on_grains")
-    surfaces = [name for name in ("sand", "jsc1a") if name in paper.surfaces]
+    surfaces = [name for name in _SOILS if name in paper.surfaces]
     if not kept or not surfaces:
         return None
     drawing, axes = sheet(1, len(paper.rigs), 3.9, sharey=True)
     places = [(surface, torque) for surface in surfaces for torque in paper.torques]
     for axis, rig in zip(axes[0], paper.rigs, strict=True):
-        axis.set_title(f"{rig:g} g, {' and '.join(surfaces)}")
+        axis.set_title(f"{rig:g} g")
         axis.axhline(0.0, color=INK, lw=0.8)
         for place, (surface, torque) in enumerate(places):
             _draw_signs(axis, paper, kept, (surface, rig, torque), place)
@@ -299,18 +301,24 @@ def figure_signs(paper: PaperRun) -> Block | None:
         axis.grid(False, axis="x")
         for number, surface in enumerate(surfaces):
             middle = (len(paper.torques) * (number + 0.5) - 0.5 + 0.5) / len(places)
-            axis.text(middle, 0.98, surface, transform=axis.transAxes, ha="center", va="top", fontweight="bold")
+            axis.text(middle, 0.98, _SOILS[surface], transform=axis.transAxes, ha="center", va="top", fontweight="bold")
             if number:
                 axis.axvline(len(paper.torques) * number - 0.5, color=GREY, lw=0.8)
         axis.set_xlim(-0.5, len(places) - 0.5)
     axes[0, 0].set(ylabel="launch angle [degrees]", ylim=(-45.0, 62.0))
     legend_above(drawing, [
-        handle("spring-damper", BED, marker="o", ls="", ms=6),
-        handle("grains, one bed each", MODEL, marker="s", mfc="none", ls="", ms=6),
-        handle("grains, mean of three beds and 95 %", MODEL, marker="s", ls="", ms=6),
+        handle(f"spring-damper of {' and '.join(surfaces)}", BED, marker="o", ls="", ms=6),
+        handle(f"{_grains_of(kept['one_bed'], surfaces)}: one bed each", MODEL, marker="s", mfc="none", ls="", ms=6),
+        handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three beds, 95 %", MODEL, marker="s", ls="", ms=6),
         Patch(color=GREY, alpha=0.22, lw=0, label="the paper: motors about +22.5°, brakes below 0"),
     ], 2)  # fmt: skip
     return paper.draw("signs", drawing)
+
+
+def _grains_of(entries: Sequence[Result], surfaces: Sequence[str]) -> str:
+    """The materials of kept runs on grains; older results do not name them."""
+    named = in_order(entry["grains"] for entry in entries if "grains" in entry and entry["surface"] in surfaces)
+    return f"grains of {' and '.join(named)}" if named else "grains"
 
 
 def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, float, float], place: int) -> None:

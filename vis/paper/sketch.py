@@ -207,9 +207,9 @@ def _contact(axis: Axes, end: Point) -> None:
     axis.annotate("", (left, 0.0), (left, end[1]), arrowprops={
         "arrowstyle": "<->", "color": INK, "lw": 0.9, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7})  # fmt: skip
     axis.plot([left - 0.006, end[0]], [end[1]] * 2, color=INK, lw=0.6)
-    _words(axis, (left - 0.006, 0.5 * end[1]), r"depth $\delta = -y_n$", ha="right", va="center")
+    _words(axis, (left - 0.006, 0.5 * end[1]), r"depth $z = h - y$", ha="right", va="center")
     rules = (
-        r"$N = K\delta + C\,\max(0,\,d\delta/dt)$",
+        r"$N = K z + C\,\max(0,\,dz/dt)$",
         r"sticks:  $|F| \leq \mu_s N$",
         r"slips:  $|F| = \mu_d N$, against the slip",
     )

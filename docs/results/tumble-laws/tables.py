@@ -1,12 +1,13 @@
 """A tumble on surface laws beside the same tumble on grains: writes laws.csv and the figure, prints the table.
 
 `python docs/results/tumble-laws/tables.py` from the root, with the repository on PYTHONPATH: a minute of one core.
-The runs on grains are kept in ../tumble-sand/runs.csv.
+`... tables.py draw` only draws the figure, from laws.csv. The runs on grains are kept in ../tumble-sand/runs.csv.
 """
 
 import csv
 import json
 import math
+import sys
 import tempfile
 from pathlib import Path
 
@@ -29,6 +30,7 @@ QUANTITIES = {  # name in result.json: column of runs.csv, in words, scale
     "sinkage_largest": ("deepest_mm", "deepest row until 1.1 s [mm]", 1e3),
     "sinkage_start": ("depth_at_start_mm", "depth after placement [mm]", 1e3),
 }
+SHIPPED_BEFORE = "spring-damper, 140 N/m, 3 N s/m"  # as it shipped until 2026-11-26
 SIZES = (3.0, 2.4)  # of the grains [mm]
 
 
@@ -80,7 +82,7 @@ def on_grains(size: float) -> dict[str, list[float]]:
 def main() -> None:
     """Run the laws, keep their numbers, print the table, draw the figure."""
     laws = {
-        "surfaces.toml (140 N/m, 3 N s/m)": {"surface": "sand", "stiffness": 140.0, "damping": 3.0},
+        SHIPPED_BEFORE: {"surface": "sand", "stiffness": 140.0, "damping": 3.0},
         "spring-damper of 2.4 mm": {"ground": str(RESULTS / "calibrate-sand-2.4mm" / "ground.toml")},
         "power-irreversible of 2.4 mm": {"ground": str(power_law("2.4mm"))},
         "spring-damper of 1 mm": {"ground": str(RESULTS / "calibrate-sand-1mm" / "ground.toml")},
@@ -107,6 +109,18 @@ def main() -> None:
             value, std = numbers[name]
             cells.append(f"{value:.1f} ± {std:.1f}" if std else f"{value:.1f}")
         print(f"| {words} | {' | '.join(cells)} |")
+    draw()
+
+
+def draw() -> None:
+    """The figure, from laws.csv and the runs on grains."""
+    kept: dict[str, dict[str, tuple[float, float]]] = {}
+    with (HERE / "laws.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            kept.setdefault(row["law"], {})[row["quantity"]] = (float(row["value"]), float(row["std"]))
+    grains = {size: on_grains(size) for size in SIZES}
+    heads = [*(f"grains of {size:g} mm" for size in SIZES), *kept]
+    heads[heads.index(SHIPPED_BEFORE)] += "\n(shipped until 2026-11-26)"
     shown = ("trajectory_angle", "ahead_1s", "sinkage_largest", "sinkage_start")
     with styled():
         drawing, (panels,) = sheet(1, 4, 3.6, sharey=True)
@@ -114,8 +128,8 @@ def main() -> None:
             for place, size in enumerate(SIZES):
                 values = grains[size][name]
                 axis.plot(values, [place] * len(values), "o", color=BED, ms=4)
-            for place, numbers in enumerate(found.values(), len(SIZES)):
-                value, std = numbers[name]
+            for place, numbers in enumerate(kept.values(), len(SIZES)):
+                value, std = numbers[QUANTITIES[name][1]]
                 axis.errorbar([value], [place], xerr=[std], fmt="s", color=MODEL, ms=5, capsize=3)
             axis.set_xlabel(QUANTITIES[name][1].replace(" [", "\n["), fontsize=8.5)
         panels[0].set_yticks(np.arange(len(heads)), heads)
@@ -127,4 +141,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    draw() if sys.argv[1:] == ["draw"] else main()

@@ -20,10 +20,12 @@ from experiments.paper.experiment import plan_jobs, run
 from experiments.paper.grains import angles_of_beds, kept_angles
 from experiments.paper.settings import PaperSettings
 from experiments.paper.transitions import slip_before_hop
+from experiments.platform.surfaces import find_surface
+from experiments.runs.folder import RunFolder
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
 from rigid.planar.simulate import simulate
-from vis.paper.figures import figure_5
+from vis.paper.figures import PaperRun, figure_5, figure_signs
 
 RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
 
@@ -160,6 +162,8 @@ def test_angles_on_grains_are_those_of_the_kept_results():
         angle = math.degrees(result["quantities"]["trajectory_angle"]["value"])
         assert angle == pytest.approx(entry.angle, abs=0.05), entry.case
         assert (result["surface"], result["trial"]["torque"]["value"]) == (entry.surface, entry.torque)
+        folder = RunFolder.open(RESULTS / entry.case)
+        assert find_surface(folder.of_today(result)["surface"]).grains == entry.grains, entry.case
 
 
 def test_angles_of_several_beds_are_those_of_the_kept_runs():
@@ -170,6 +174,24 @@ def test_angles_of_several_beds_are_those_of_the_kept_runs():
         case = ("jsc-" if entry.surface == "jsc1a" else "") + ("brake" if entry.torque == 6 else f"{entry.torque:g}")
         alike = [row for row in runs if row["case"] == case and float(row["grain_mm"]) == entry.grain]
         assert [float(row["angle_deg"]) for row in alike] == entry.angles, case
+
+
+def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
+    """One bed each is of `sand-weak`, three beds are of `sand`; JSC-1A, which was not asked for, is not named."""
+    drawn = []
+    paper = PaperRun(
+        SimpleNamespace(draw=lambda _, drawing: drawn.append(drawing), folder=small, result=result_of(small))
+    )
+    figure_signs(paper)
+    (figure,) = drawn
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words[0] == "spring-damper of sand"
+    assert words[1:3] == ["grains of sand-weak: one bed each", "grains of sand: mean of three beds, 95 %"]
+    assert [text.get_text() for text in figure.axes[0].texts] == ["sand"]
+    for entry in paper.result["kept_on_grains"]["one_bed"]:
+        del entry["grains"]
+    figure_signs(paper)
+    assert drawn[1].legends[0].get_texts()[1].get_text() == "grains: one bed each"
 
 
 def trials_of(*, kept=(), **angles):
