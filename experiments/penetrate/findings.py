@@ -240,22 +240,28 @@ def bed_entry(facts: Sequence[BedFacts], settings: PenetrateSettings, softening:
     }
 
 
-def bed_quantities(facts: Sequence[BedFacts], overlap: float | None) -> dict[str, Json]:
-    """Numbers of the beds, means over seeds; what is exact gets the std 0, what is unknown null."""
+def bed_quantities(facts: Sequence[BedFacts], overlap: float | None, made: Mapping[int, float]) -> dict[str, Json]:
+    """Numbers of the beds, means over seeds; what is exact gets the std 0, what is unknown null.
+
+    ``made``: seed -> Young's modulus [Pa] of its last runs, for the seeds that runs made stiffer.
+    """
     found: dict[str, Json] = {}
+    young = [made.get(entry.seed, entry.young) for entry in facts]
+    changed = made and f"; made stiffer during the runs: at last {min(young):.3g} to {max(young):.3g} Pa by seed"
     for name, unit, note in (
         ("grain_count", "1", ""),
         ("packing_fraction", "1", "bulk, before the first run"),
         ("coordination_number", "1", "before the first run"),
         ("surface", "m", "height of the undisturbed surface above the floor"),
-        ("young", "Pa", "of the softened grains"),
-        ("time_step", "s", "of the grains"),
+        ("young", "Pa", f"of the softened grains{changed or ''}"),
+        ("time_step", "s", f"of the grains{', before the first run' if made else ''}"),
     ):
-        values = [float(getattr(entry, name)) for entry in facts]
+        values = young if name == "young" else [float(getattr(entry, name)) for entry in facts]
         alike = all(value == values[0] for value in values)
         mean = values[0] if alike else float(np.mean(values))
-        # Young's modulus is set, and so exact; of the rest one bed does not show how much beds differ.
-        found[name] = _quantity(mean, 0.0 if alike and name == "young" else spread(values), unit, note)
+        # Young's modulus is exact unless a run changed it; of the rest one bed does not show how much beds differ.
+        exact = alike and name == "young" and not made
+        found[name] = _quantity(mean, 0.0 if exact else spread(values), unit, note)
     if gradings := [entry.grading for entry in facts if entry.grading is not None]:
         found |= graded_quantities(gradings)
     if overlap is not None:

@@ -49,7 +49,7 @@ def conclude(
     overlap = max((note["max_overlap"] for note in notes.values() if note.get("max_overlap") is not None), default=None)
     stiffened: list[Json] = [note for seed in settings.seeds for note in folder.noted(f"stiffer-{seed}", [])]
     rest = answer(findings, material)
-    quantities = findings.quantities() | bed_quantities(facts, overlap) | _depth_needed(rest)
+    quantities = findings.quantities() | bed_quantities(facts, overlap, _made(stiffened)) | _depth_needed(rest)
     codes = ({note.get("code") for note in notes.values()} | {folder.code}) - {None, ""}
     doubts = {
         "fewer than three seeds: the spread between beds is not known well": len(settings.seeds) < 3,
@@ -97,6 +97,11 @@ def conclude(
         result["model"] = {"file": settings.model, "effects": list(law.effects)}
     _compare(settings, result)
     return Result.make("penetrate", **result)
+
+
+def _made(stiffened: list[Json]) -> dict[int, float]:
+    """Seed -> Young's modulus [Pa] that its grains got last, of the seeds that were made stiffer."""
+    return {note["seed"]: float(note["young"]) for note in stiffened}
 
 
 def _depth_needed(rest: Json | None) -> Json:

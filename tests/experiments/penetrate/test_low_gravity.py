@@ -391,6 +391,11 @@ def test_a_run_past_its_overlap_is_done_again_with_stiffer_grains_and_says_so(so
     assert own[0]["unit"] == "seed1-driven-0.00316"
     assert own[-1]["young"] >= Soft.enough > own[-1]["before"]
     assert sum("went" in text or "overlapped" in text for text in result["warnings"]) == len(notes)
+    last = [[note["young"] for note in notes if note["seed"] == seed][-1] for seed in (1, 2)]
+    quantity = result["quantities"]["young"]
+    assert quantity["value"] == pytest.approx(np.mean(last)) and quantity["value"] > chosen
+    assert quantity["std"] == pytest.approx(np.std(last, ddof=1))
+    assert f"{min(last):.3g} to {max(last):.3g} Pa by seed" in quantity["note"]
     assert all(run["ended"] in ("done", "rest") for run in result["runs"])
     golden("penetrate/made_stiffer", [text for text in result["warnings"] if "overlapped" in text][:1])
 
