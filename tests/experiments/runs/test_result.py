@@ -1,6 +1,8 @@
 """The result of a run: one writer, one reader, and the schema that ships."""
 
 import json
+import shutil
+import subprocess
 import sys
 from importlib.resources import files
 from pathlib import Path
@@ -9,11 +11,14 @@ import jsonschema
 import numpy as np
 import pytest
 
+from experiments.cli.main import main
 from experiments.runs.folder import plain
 from experiments.runs.result import Result, Series, quantity, schema
+from rigid.digests import check_digests, kept_digests
 
 ROOT = Path(__file__).parents[3]
 KEPT = sorted((ROOT / "docs" / "results").rglob("result.json"))
+RUNS = [path for path in KEPT if (path.parent / "run.toml").is_file()]
 SCHEMA = json.loads(files("experiments.runs").joinpath("result.schema.json").read_text(encoding="utf-8"))
 
 
@@ -32,6 +37,49 @@ def test_a_kept_result_is_of_the_schema_and_reads_back_as_it_is(path):
     jsonschema.validate(raw, SCHEMA)
     result = Result.load(path.parent)
     assert result == raw and json.dumps(plain(result)) == json.dumps(raw)  # the order of the keys as well
+
+
+@pytest.mark.parametrize("path", RUNS, ids=lambda path: path.parent.name)
+def test_a_kept_run_has_digests_of_its_files_and_matches_them(path):
+    """Else a changed number is shown in silence; `python docs/results/digests.py` adds the digests of a new folder."""
+    check_digests(path.parent)
+    assert {"run.toml", "result.json"} <= set(kept_digests(path.parent)), "python docs/results/digests.py"
+
+
+def test_a_changed_number_of_a_kept_result_is_refused(tmp_path, capsys):
+    kept = shutil.copytree(ROOT / "docs" / "results" / "grains1-sand-0.0085-0.125", tmp_path / "kept")
+    assert main(["resume", str(kept), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads((kept / "result.json").read_text())
+    changed = json.loads((kept / "result.json").read_text())
+    next(iter(changed["quantities"].values()))["value"] += 1.0
+    (kept / "result.json").write_text(json.dumps(changed))
+    assert main(["resume", str(kept), "--json"]) != 0
+    shown = capsys.readouterr()
+    assert not shown.out and f"{kept / 'result.json'}: is not as the run wrote it" in shown.err
+
+
+def test_digests_are_added_to_kept_runs_and_never_replaced(tmp_path):
+    def digests():
+        script = ROOT / "docs" / "results" / "digests.py"
+        done = subprocess.run([sys.executable, script, tmp_path], capture_output=True, text=True, check=False)
+        return done.returncode, done.stderr
+
+    run = tmp_path / "a" / "run"
+    made().write(run)
+    (run / "run.toml").write_text("x = 1\n")
+    (run / "cost.json").write_text('{"processor_time": 1.5}')
+    assert digests() == (0, "")
+    first = json.loads((run / "cost.json").read_text())
+    assert first["processor_time"] == 1.5 and set(first["digests"]) == {"run.toml", "result.json"}
+    (run / "run.toml").write_text("x = 2\n")
+    (run / "series.csv").write_text("t_s\n0\n")
+    status, said = digests()
+    assert status == 1 and said.startswith(f"{run / 'run.toml'}: differs")
+    second = json.loads((run / "cost.json").read_text())["digests"]
+    assert set(second) == {"run.toml", "result.json", "series.csv"} and first["digests"].items() <= second.items()
+    (run / "cost.json").write_text("{")
+    status, said = digests()
+    assert status == 1 and said.startswith(f"{run / 'cost.json'}: cannot be read")
 
 
 def test_a_result_is_written_in_the_order_in_which_it_was_made(tmp_path):
