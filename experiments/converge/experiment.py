@@ -2,7 +2,8 @@
 
 Every member is an ordinary `penetrate` run in a folder of its own, found again by its settings and code. After each the
 result is written anew from those that are there, so that a sweep that is stopped has one. A member that fails is told,
-and the others are made; `hedgebed resume` tries it again.
+and the others are made; the result then has a warning, the run ends in RuntimeError (exit status 1), and `hedgebed
+resume` tries the member again.
 """
 
 import json
@@ -104,6 +105,11 @@ def _carry_out(settings: ConvergeSettings, folder: RunFolder, progress: Progress
         if work.result is None:
             raise RuntimeError(next(iter(work.failed.values())))
         draw_report(folder, progress)
+    if work.failed:
+        name, reason = next(iter(work.failed.items()))
+        raise RuntimeError(
+            say("members_failed", failed=len(work.failed), of=len(members), id=name, reason=reason, folder=folder.path)
+        )
     return work.result
 
 

@@ -14,6 +14,7 @@ from golden import golden
 from pydantic import ValidationError
 
 from dem.grains.materials import material
+from experiments.cli.main import main
 from experiments.converge import experiment as converge
 from experiments.converge.analysis import numbers_of, two_finest
 from experiments.converge.design import affordable, inertial_number, members_of, variants_of
@@ -257,7 +258,7 @@ def test_fewer_runs_give_wider_errors_and_say_what_is_missing(swift, tmp_path):
     assert told["unknown"] == ["chance", "grain size", "width", "depth", "overlap", "speed"]
 
 
-def test_a_member_that_fails_is_told_and_the_others_are_made(swift, tmp_path, monkeypatch):
+def test_a_member_that_fails_is_named_and_the_others_are_made(swift, tmp_path, monkeypatch):
     compute = penetrate.compute
 
     def one_fails(settings, folder, progress):
@@ -267,7 +268,10 @@ def test_a_member_that_fails_is_told_and_the_others_are_made(swift, tmp_path, mo
 
     with monkeypatch.context() as patch:
         patch.setattr(penetrate, "compute", one_fails)
-        result = sweep(tmp_path / "run")
+        with pytest.raises(RuntimeError, match=r"1 of 18 runs have no result, as width-8-seed2: .*an overlap of 7 %"):
+            sweep(tmp_path / "run")
+        assert main(["resume", str(tmp_path / "run"), "--quiet"]) == 1  # it fails again
+    result = Result.load(tmp_path / "run")
     assert (result["status"], len(result["members"])) == ("stopped", 17)
     assert any("width-8-seed2" in text and "7 %" in text for text in result["warnings"])
     assert converge.resume(tmp_path / "run")["status"] == "done"  # tried again
