@@ -272,11 +272,18 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
     elif isinstance(name, Path) or word.endswith(".toml") or "/" in word:
         stuff = read_material(name)
     else:
-        near = difflib.get_close_matches(word.lower(), MATERIALS, n=1)
+        near = _begins_so(word.lower()) or difflib.get_close_matches(word.lower(), MATERIALS, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         there = ", ".join(sorted(MATERIALS))
         raise ValueError(f"material = {name!r} is not known; there is {there}, and files that end in .toml{hint}")
     return stuff if grain is None else stuff.for_grain(grain)
+
+
+def _begins_so(word: str) -> list[str]:
+    """Materials that begin with the word, hyphens aside, as jsc1a; those without a caveat first, the loose first."""
+    short = word.replace("-", "")
+    found = [name for name in MATERIALS if short and name.replace("-", "").startswith(short)]
+    return sorted(found, key=lambda name: (name in CAVEATS, "dense" in name))
 
 
 def of_before(stuff: Material) -> Material:

@@ -34,11 +34,16 @@ def check(settings: GroundSettings) -> None:
     _answer(settings)
 
 
+def _interval(number: Number) -> tuple[float, float]:
+    """The 90 % interval of a normal distribution, in the unit of the number; it may begin below zero."""
+    return number.value - TO_90 * number.std, number.value + TO_90 * number.std
+
+
 def ground_file(settings: GroundSettings, table: GroundMap, answer: Answer) -> GroundFile:
     """The spring-damper of the answer."""
 
     def estimate(number: Number) -> Estimate:
-        low, high = (number.value + sign * TO_90 * number.std for sign in (-1, 1))
+        low, high = _interval(number)
         return Estimate(value=number.value, std=number.std, interval=(max(0.0, low), high))
 
     depth = DEPTH * settings.tip_diameter
@@ -89,6 +94,9 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
         "grain_ratio": quantity(answer.ratio, "1", "mean grain over tip diameter"),
     }
     warnings = [*_of_no_platform(settings, table, answer), say("of_real_grains")]
+    low, high = _interval(c)
+    if low <= 0:
+        warnings.append(say("unidentified", low=low, high=high))
     if answer.ratio < table.lines["stiffness"].finest:
         warnings.append(say("extrapolated", answer=answer, finest=table.lines["stiffness"].finest))
     if settings.packing is not None and settings.packing != table.packings[0]:

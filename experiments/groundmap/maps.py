@@ -19,6 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from dem.grains.materials import MATERIALS
+
 from .settings import say
 
 __all__ = ["DATA", "TO_STD", "Answer", "GroundMap", "Line", "Number", "read_map"]
@@ -155,11 +157,17 @@ def _tables() -> Mapping[str, Any]:
     return {name: table for name, table in found.items() if isinstance(table, dict)}
 
 
+def _to_calibrate(name: str) -> str:
+    """The JSC-1A to compute: of the packing asked for, with the right cohesion (docs/materials.md); else the loose."""
+    cut = name.removesuffix("-cut").removesuffix("-heights") + "-cut"
+    return cut if cut in MATERIALS else "jsc-1a-loose-cut"
+
+
 def read_map(material: str) -> GroundMap:
     """The map of a material. Raises ValueError for one that has none."""
     tables = _tables()
     if material not in tables:
-        why = say("no_map_of_jsc") if material.startswith(("jsc", "JSC")) else ""
+        why = say("no_map_of_jsc", proposed=_to_calibrate(material)) if material.startswith(("jsc", "JSC")) else ""
         raise ValueError(say("no_map", material=material, known=", ".join(tables), why=why))
     table = tables[material]
     lines = {name: _line(table[name]) for name in NAMES}

@@ -55,5 +55,7 @@ def find_surface(name: str) -> Surface:
     """The surface called `name`, by an earlier name with a FutureWarning. Raises ValueError naming those there are."""
     surfaces, name = _surfaces(), material_of_today(name)
     if name not in surfaces:
-        raise ValueError(f"surface = {name!r} is not known; {nearest(name, surfaces)}")
+        of_it = surface_of_grains(name)
+        hint = f"did you mean {of_it!r}, the surface of these grains?" if of_it else nearest(name, surfaces)
+        raise ValueError(f"surface = {name!r} is not known; {hint}")
     return surfaces[name]

@@ -232,6 +232,8 @@ def test_materials_are_found_by_name_and_the_nearest_is_offered():
     assert material("Sand") is SAND is material(SAND) and MATERIALS["sand"] is SAND
     with pytest.raises(ValueError, match=r"material = 'sandd' is not known.*did you mean 'sand'\?"):
         material("sandd")
+    with pytest.raises(ValueError, match=r"material = 'jsc1a' is not known.*did you mean 'jsc-1a-loose-cut'\?"):
+        material("jsc1a")  # The surface of that name has these grains
     with pytest.raises(ValueError, match="material = 'gold' is not known; there is "):
         material("gold")
 

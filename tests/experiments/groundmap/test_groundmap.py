@@ -130,6 +130,9 @@ def test_a_denser_bed_is_stiffer_and_sinks_less_and_a_heavier_spike_sinks_more()
         (["--load", "1e-9"], "grain"),
         (["--material", "mud"], "material"),
         (["--material", "jsc-1a-loose"], "docs/penetrate.md"),
+        (["--material", "jsc-1a-dense"], "--material jsc-1a-dense-cut "),
+        (["--material", "jsc-1a-dense-cut"], "--material jsc-1a-dense-cut "),
+        (["--material", "jsc1a"], "--material jsc-1a-loose-cut "),
         (["--tip", "flat"], "bed foot"),
         (["--tip", "cone"], "penetrate --tip cone"),
     ],
@@ -174,6 +177,16 @@ def test_a_load_that_was_not_given_is_set_beside_the_weight_of_a_platform(tmp_pa
     assert "0.219 N" in small["warnings"][0] and " ± " in small["warnings"][0]
     for name, settings in (("rig", ground.Settings()), ("given", ground.Settings(gravity=1.0, load=0.01))):
         assert not any("Hedgehog" in text for text in ground.run(settings, tmp_path / name)["warnings"])
+
+
+def test_c_is_called_not_identified_where_its_interval_contains_zero_and_only_there(tmp_path):
+    shipped = ground.run(ground.Settings(), tmp_path / "fine")
+    coarse = ground.run(ground.Settings(tip_diameter=0.1, grain=0.02), tmp_path / "coarse")
+    for result in (shipped, coarse):
+        c = result["quantities"]["damping"]
+        told = any("C is not identified" in text for text in result["warnings"])
+        assert told == (c["value"] <= 1.645 * c["std"])
+    assert any("C is not identified" in text for text in shipped["warnings"])
 
 
 def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_the_tip_is_a_ball(tmp_path, capsys):

@@ -35,6 +35,7 @@ G = 9.80665
         ("100g", "[kg]", 0.1),
         ("5 mN", "[N]", 0.005),
         ("+2ms", "[s]", 0.002),
+        ("1.5h", "[s]", 5400.0),
     ],
 )
 def test_a_number_is_read_in_the_unit_behind_it(text, stated, number):

@@ -486,6 +486,7 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
         (["--effects", "com-offset.x=0.01"], ["tips over", "com-offset.x may be up to 1.29 mm"]),
         (["--mu-d", "0.6"], ["mu_d = 0.6 is above mu_s = 0.5 (surface brick)"]),
         (["--mu-s", "0.2", "--mu-d", "0.3"], ["mu_d = 0.3", "mu_s = 0.2"]),
+        (["--surface", "jsc-1a-loose-cut"], ["surface = 'jsc-1a-loose-cut'", "did you mean 'jsc1a'"]),
         (["--surface", "snow"], ["surface = 'snow'", "steel, brick, sand, sand-weak, jsc1a"]),
         (["--ground", "moon"], ["ground = 'moon'", "spring-damper"]),
         (["--ground", "grains"], ["ground = 'grains'", "rft, bed, lammps (of grains)"]),
