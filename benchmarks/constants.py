@@ -8,12 +8,13 @@ verdict, and the same command with the same DIR goes on where it was stopped.
 """
 
 import json
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-from experiments.campaign import write_campaign
+from experiments.campaign import Campaign, write_campaign
 from experiments.runs.progress import Progress
 from experiments.runs.types import Json
 
@@ -27,6 +28,10 @@ __all__ = ["FILE", "continues", "run", "table"]
 
 FILE = "constants.jsonl"
 FACTORS = (0.5, 2.0)
+_RECORD = (
+    "kind", "case", "constant", "factor", "code", "suite", "truth", "outside", "verdict", "effects", "alternatives",
+    "cpu",
+)  # fmt: skip
 
 
 def run(
@@ -49,7 +54,7 @@ def run(
     folders = [out / "campaigns" / f"{kind}-{seed}-{trials}-{number}" for number in range(count)]
     for (campaign, _), folder in zip(made, folders, strict=True):
         if not folder.is_dir():
-            write_campaign(folder, campaign)
+            _write_whole(folder, campaign)
     variants = [(None, 1.0), *((constant, factor) for constant in chosen for factor in FACTORS)]
     path, known = out / FILE, _read(out / FILE)
     progress.plan({"diagnose": float(len(variants) * count)})
@@ -66,6 +71,10 @@ def run(
             known[_key(kind, cases[k], record["constant"], factor)] = record
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(record) + "\n")
+            if record["verdict"] == "failed":
+                progress.message(
+                    f"the diagnosis of {folders[k]} failed {_setting(constant, factor)}: {_reason(record)}"
+                )
             progress.update(number * count + k + 1)
         progress.update((number + 1) * count)
     rows = [[known[_key(kind, case, c.id if c else "", factor)] for case in cases] for c, factor in variants]
@@ -92,6 +101,23 @@ def _answers(
             yield k, pool.submit(answer, str(folders[k])).result()
 
 
+def _write_whole(folder: Path, campaign: Campaign) -> None:
+    """Write a campaign under a temporary name and rename it: a run that is killed leaves no half campaign."""
+    unfinished = folder.with_name(f"{folder.name}.unfinished")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    write_campaign(unfinished, campaign)
+    unfinished.rename(folder)
+
+
+def _setting(constant: Constant | None, factor: float) -> str:
+    return f"with {factor:g} times {constant.id}" if constant else "with the constants as they are"
+
+
+def _reason(record: Json) -> str:
+    """The last line of the traceback."""
+    return (str(record["error"]).strip() or "no reason was given").splitlines()[-1]
+
+
 def continues(out: Path) -> bool:
     """Whether `out` holds an unfinished or finished run of this benchmark, with which it goes on."""
     return (out / FILE).is_file()
@@ -113,7 +139,8 @@ def table(constants: Sequence[Constant], rows: Sequence[Sequence[Json]]) -> str:
         told = []
         for changed in (rows[1 + 2 * k], rows[2 + 2 * k]):
             other = sum(_said(a) != _said(b) for a, b in zip(base, changed, strict=True))
-            told.append(f"{other} change: {_told(changed)}" if other else "no change")
+            failed = any(r["verdict"] == "failed" for r in changed)
+            told.append(f"{other} change: {_told(changed)}" if other or failed else "no change")
         cells = (f"`{constant.id}`", f"{constant.value():g}", constant.decides, constant.source, *told)
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
@@ -125,7 +152,7 @@ def _said(record: Json) -> tuple[str, frozenset[str], frozenset[str]]:
 
 
 def _told(records: Sequence[Json]) -> str:
-    """How many empty campaigns are none, effects are named, and outside causes unknown."""
+    """How many empty campaigns are none, effects are named, outside causes unknown, and diagnoses failed."""
     empty = [r for r in records if not r["truth"] and not r["outside"]]
     inside = [r for r in records if r["truth"]]
     outside = [r for r in records if r["outside"]]
@@ -134,19 +161,31 @@ def _told(records: Sequence[Json]) -> str:
         (sum(r["verdict"] == "named" and set(r["effects"]) == set(r["truth"]) for r in inside), len(inside), "named"),
         (sum(r["verdict"] == "unknown" for r in outside), len(outside), "`unknown`"),
     )
-    return ", ".join(f"{found} of {total} {word}" for found, total, word in parts if total)
+    failed = sum(r["verdict"] == "failed" for r in records)
+    told = [f"{found} of {total} {word}" for found, total, word in parts if total]
+    return ", ".join([*told, *([f"**{failed} of {len(records)} failed**"] if failed else [])])
 
 
 def _read(path: Path) -> dict[str, Json]:
-    """Records of the present code by `_key`; a last line that was cut short is left out."""
+    """Records of the present code by `_key`; a last line that was cut short is left out.
+
+    Raises ValueError for another line that is no record.
+    """
     if not path.is_file():
         return {}
     data = path.read_bytes()
     if not data.endswith(b"\n"):
         path.write_bytes(data := data[: data.rfind(b"\n") + 1])
     found = {}
-    for line in data.decode().splitlines():
-        record = json.loads(line)
+    for number, line in enumerate(data.splitlines(), 1):
+        try:
+            record = json.loads(line)
+            if any(name not in record for name in _RECORD) or record["kind"] not in KINDS:
+                raise ValueError("a record lacks a key or has an unknown kind")
+        except (ValueError, TypeError):
+            raise ValueError(
+                f"{path}, line {number}: {line[:40]!r} was found, a record was expected. Remove the line"
+            ) from None
         if record["code"] == digest("code") and record["suite"] == digest(record["kind"]):
             found[_key(record["kind"], record["case"], record["constant"], record["factor"])] = record
     return found

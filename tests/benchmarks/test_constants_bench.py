@@ -64,3 +64,51 @@ def test_verdicts_that_change_are_counted_and_a_stopped_study_goes_on(tmp_path, 
     path.write_text("\n".join(lines[:-1]) + "\n" + lines[-1][:50])  # killed while it wrote
     assert constants.continues(tmp_path) and constants.run(tmp_path, **given)["table"] == text
     assert len(asked) == 7
+
+
+def test_a_diagnosis_that_fails_is_counted_and_shown(tmp_path, monkeypatch):
+    said, progress = [], Progress()
+    monkeypatch.setattr(progress, "message", said.append)
+
+    def answers(constant, factor, kind, cases, folders, known):
+        for k in range(len(cases)):
+            told = {"effects": [], "alternatives": [], "cpu": 1.0}
+            failed = factor == 0.5 and k == 1
+            yield k, told | ({"verdict": "failed", "error": "A\nLinAlgError: no"} if failed else {"verdict": "none"})
+
+    monkeypatch.setattr(constants, "_answers", answers)
+    given = {"count": 2, "seed": 7, "only": "core.rivals:LEAD"}
+    text = constants.run(tmp_path, progress=progress, **given)["table"]
+    row = next(line for line in text.splitlines() if "core.rivals:LEAD" in line)
+    assert row.count("failed") == 1 and "**1 of 2 failed** | no change" in row
+    assert len(said) == 1 and "LinAlgError" in said[0] and "core.rivals:LEAD" in said[0]
+
+
+@pytest.mark.parametrize("damage", [b"{not json", b"[]", b'{"kind": "second-push"}', b"\xff"])
+def test_a_damaged_line_is_refused_by_file_and_line(tmp_path, damage):
+    (tmp_path / constants.FILE).write_bytes(damage + b"\n")
+    with pytest.raises(ValueError, match=r"constants\.jsonl, line 1"):
+        constants.run(tmp_path, progress=Progress(), count=1, only="core.rivals:LEAD")
+
+
+def test_a_campaign_that_is_half_written_has_no_name_that_counts(tmp_path, monkeypatch):
+    def killed(folder, campaign):
+        folder.mkdir(parents=True)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(constants, "write_campaign", killed)
+    for _ in range(2):  # the second run meets what the first one left
+        with pytest.raises(KeyboardInterrupt):
+            constants.run(tmp_path, progress=Progress(), count=1, only="core.rivals:LEAD")
+        assert all(path.name.endswith(".unfinished") for path in (tmp_path / "campaigns").iterdir())
+
+
+@pytest.mark.long
+def test_one_campaign_is_diagnosed_with_a_constant_as_it_is_halved_and_doubled(tmp_path):
+    given = {"progress": Progress(), "count": 1, "seed": 1, "only": "fit.evidence:SMALL"}
+    constants.run(tmp_path, **given)
+    records = [json.loads(line) for line in (tmp_path / constants.FILE).read_text().splitlines()]
+    assert [record["factor"] for record in records] == [1.0, 0.5, 2.0]
+    assert all(
+        record["verdict"] in ("none", "named", "ambiguous", "unknown") and record["cpu"] > 0 for record in records
+    )

@@ -227,7 +227,9 @@ def _read(path: Path | None) -> Gate | None:
         return None
     try:
         null = json.loads(path.read_text(encoding="utf-8"))
-        if null.pop("digest") != digest_of_data(null):
+        if (digest := null.pop("digest", None)) is None:
+            raise ValueError("an earlier version wrote it without a digest")
+        if digest != digest_of_data(null):
             raise ValueError("its digest differs")
         return Gate(tuple(null["names"]), np.array(null["mean"]), np.array(null["variance"]), float(null["threshold"]))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as problem:
