@@ -97,7 +97,7 @@ def test_a_damaged_file_of_a_folder_is_named_or_changes_no_number(
     damaged(file, chance)
     status, said, found = answered(kind, home, capsys)
     record_property("damaged", f"{file}: {status}")
-    assert "Traceback (most recent call last)" not in said, (file, said)
+    assert "Traceback (most" not in said, (file, said)
     if status:
         named = file.relative_to(file.parts[0]) if len(file.parts) > 1 else file  # the run may be named by a whole path
         assert status in (1, 2) and str(named) in said, (file, said)

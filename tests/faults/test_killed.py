@@ -267,7 +267,7 @@ def test_a_run_in_lammps_that_is_killed_leaves_no_process_behind_and_ends_when_i
         if killed == "hedgebed":
             assert status == -signal.SIGKILL
         else:
-            assert status == 1 and "LAMMPS on 2 ranks has ended" in said and f"hedgebed resume {out}" in said, said
+            assert status == 1 and "2 ranks has" in said and f"hedgebed resume {out}" in said, said
     assert begun("penetrate", out, tmp_path).wait() == 0, (tmp_path / "log").read_text()
     whole, found = (read_series(home / "series" / "seed1-driven-0.2.csv") for home in (tmp_path / "whole", out))
     assert np.array_equal(found["t_s"], whole["t_s"])

@@ -76,7 +76,7 @@ def test_grains_stand_beside_a_law_and_grains_in_lammps_have_their_own_name(runs
     (other / "run.toml").write_text(text.replace('ground = "bed"', 'ground = "lammps"'))
     (other / "status.json").unlink()
     result, _ = compared(tmp_path / "bed", other, tmp_path / "grains")
-    assert [run["label"] for run in result["runs"]] == ["bed of sand", "bed of sand in LAMMPS"]
+    assert [run["label"] for run in result["runs"]] == ["bed of sand", f"{'bed of sand'} in LAMMPS"]
     assert result["quantities"]["gap_lift"]["value"] == 0.0
 
 

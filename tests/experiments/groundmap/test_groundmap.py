@@ -184,9 +184,9 @@ def test_c_is_called_not_identified_where_its_interval_contains_zero_and_only_th
     coarse = ground.run(ground.Settings(tip_diameter=0.1, grain=0.02), tmp_path / "coarse")
     for result in (shipped, coarse):
         c = result["quantities"]["damping"]
-        told = any("C is not identified" in text for text in result["warnings"])
+        told = any("not identified" in text for text in result["warnings"])
         assert told == (c["value"] <= 1.645 * c["std"])
-    assert any("C is not identified" in text for text in shipped["warnings"])
+    assert any("not identified" in text for text in shipped["warnings"])
 
 
 def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_the_tip_is_a_ball(tmp_path, capsys):

@@ -135,7 +135,7 @@ def test_further_runs_are_chosen_where_half_of_the_budget_is_sufficient(made, tm
     """Unloading and a drag at half the depth, half the load; fewer under a smaller budget, none where one is given."""
     rich, said = with_chosen(lawfit.Settings(**(QUICK | {"choose_further": True, "budget": 1e6})))
     assert (rich.unload_depths, rich.loads, rich.drag_depths) == ((0.005,), (0.2,), (0.005,))
-    assert "--unload-depths 0.005 --loads 0.2 --drag-depths 0.005" in said
+    assert all(f"--{option}" in said for option in ("unload-depths 0.005", "loads 0.2", "drag-depths 0.005"))
     least = 2 * sum(step["cost"] for step in calibrate(tmp_path / "plain", tolerance=1e-4, most_beds=4)["design"])
     counts = []
     for budget in np.geomspace(0.5, 8.0, 12) * least:
@@ -162,7 +162,7 @@ def test_a_tip_of_ones_own_is_refused_with_what_does_it(capsys):
     with pytest.raises(ValueError, match=r"tip = 'foot.stl': expected sphere, cone or flat.* --shapes foot.stl"):
         lawfit.Settings(**(QUICK | {"tip": "foot.stl"}))
     assert main(["calibrate", "--budget", "60", "--tip", "foot.stl"]) == 2
-    assert "bed test plates --shapes foot.stl" in " ".join(capsys.readouterr().err.split())
+    assert "plates --shapes foot.stl" in " ".join(capsys.readouterr().err.split())
 
 
 def test_settings_that_contradict_each_other_are_refused():

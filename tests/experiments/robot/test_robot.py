@@ -235,8 +235,8 @@ def test_a_law_of_grains_is_refused_on_hard_ground_and_accepted_it_is_that_of_th
     once = found.force(2e-3, 0.1, found.numbers(own))
     parts = plan.law_feet(plan.robot()).grounds[0][:8]
     assert sum(float(one.force(2e-3, 0.1)) for one in parts) == pytest.approx(once, rel=1e-9)
-    assert not [number.origin for number in plan.numbers.values() if "times under a foot" in number.origin]
-    assert [said for said in plan.warnings if "also under a foot of up to" in said]
+    assert not [number.origin for number in plan.numbers.values() if "under a foot" in number.origin]
+    assert [said for said in plan.warnings if "also under a" in said]
 
 
 def test_a_larger_foot_has_more_force_under_a_law_and_its_numbers_say_how_much():
@@ -247,7 +247,7 @@ def test_a_larger_foot_has_more_force_under_a_law_and_its_numbers_say_how_much()
     assert value == pytest.approx(25, rel=0.01)
     for name in ("stiffness", "drag"):
         assert one.parameters[name] == pytest.approx(value * spike[name])
-        assert f"{value:.3g} times under a foot" in plan.numbers[name].origin
+        assert f"{value:.3g} times under" in plan.numbers[name].origin
     spring = plan_robot(RobotSettings(**HOPPER))
     (one, *_), own = spring.law_feet(spring.robot()).grounds[0], spring.numbers
     assert one.parameters["stiffness"] == pytest.approx(value * own["stiffness"].value)
