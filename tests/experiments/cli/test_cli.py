@@ -313,6 +313,10 @@ def test_resume_refuses_settings_it_does_not_know(dig, capsys):
     assert main(["dig", "--out", "a"]) == 0
     text = Path("a/run.toml").read_text().replace("\nsteps =", "\nstepps =")
     Path("a/run.toml").write_text(text)
+    assert main(["resume", "a"]) == 2  # its digest is in status.json
+    assert "run.toml: is not" in capsys.readouterr().err
+    for name in ("status.json", "result.json"):  # as where a run was killed before it had them
+        Path("a", name).unlink()
     assert main(["resume", "a"]) == 2
     assert "'steps'" in capsys.readouterr().err
 
