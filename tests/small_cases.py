@@ -1,6 +1,6 @@
 """Cases on beds so small that a test can afford them, as the text of a case file."""
 
-__all__ = ["CALIBRATE", "GRAINS"]
+__all__ = ["CALIBRATE", "GRAINS", "TUMBLE_ON_GRAINS"]
 
 GRAINS = """
 bed_size = [0.03, 0.03, 0.0254]
@@ -29,3 +29,24 @@ laws = ["spring-damper"]
 workers = 1
 """
 )
+TUMBLE_ON_GRAINS = """
+surface = "sand-weak"
+ground = "bed"
+mass = 0.3
+inertia = 2e-4
+spike_length = 0.04
+spike_diameter = 0.008
+spike_clear = 0.015
+wheel_inertia = 1e-5
+rig = 0.03
+torque = 0.01
+lowering_speed = 0.04
+stiffness = 500.0
+damping = 2.0
+bed_size = [0.2, 0.036, 0.03]
+grain = 0.006
+young = 1e7
+max_overlap = 0.1
+substeps = 8
+threads = 1
+"""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fake_bed import FakeBed
-from small_cases import GRAINS
+from small_cases import GRAINS, TUMBLE_ON_GRAINS
 
 import dem
 import experiments.bed.work
@@ -50,29 +50,7 @@ life_grain = 0.00024
 workers = 1
 """  # fmt: skip
 ON_GRAINS = GRAINS + "grain = 0.004\nseeds = [1]\nspeeds = [0.4]\nhold = 0.0\ndrop_speeds = []\nyoung = 2e7\n"
-TUMBLE = """
-surface = "sand-weak"
-ground = "bed"
-mass = 0.3
-inertia = 2e-4
-spike_length = 0.04
-spike_diameter = 0.008
-spike_clear = 0.015
-wheel_inertia = 1e-5
-rig = 0.03
-torque = 0.01
-duration = 0.02
-lowering_speed = 0.04
-stiffness = 500.0
-damping = 2.0
-bed_size = [0.2, 0.036, 0.03]
-grain = 0.006
-young = 1e7
-max_overlap = 0.1
-substeps = 8
-frame_count = 2
-threads = 1
-"""
+TUMBLE = TUMBLE_ON_GRAINS + "duration = 0.02\nframe_count = 2\n"
 SWEEP = ["sweep", "--experiment", "tumble", "--fixed", "duration=0.1", "--over", "torque=[0.15, 0.2]", "--workers", "1"]
 
 

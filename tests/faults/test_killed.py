@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_cases import CALIBRATE, GRAINS
+from small_cases import CALIBRATE, GRAINS, TUMBLE_ON_GRAINS
 
 from coupling.lammps import LammpsMissingError, find_lammps
 from coupling.lammps.watch import descendants
@@ -36,30 +36,7 @@ drop_speeds = [0.1]
 after_stop = 0.01
 """,
     "calibrate": CALIBRATE,
-    "tumble": """
-surface = "sand-weak"
-ground = "bed"
-mass = 0.3
-inertia = 2e-4
-spike_length = 0.04
-spike_diameter = 0.008
-spike_clear = 0.015
-wheel_inertia = 1e-5
-rig = 0.03
-torque = 0.01
-duration = 0.06
-lowering_speed = 0.04
-stiffness = 500.0
-damping = 2.0
-bed_size = [0.2, 0.036, 0.03]
-grain = 0.006
-young = 1e7
-max_overlap = 0.1
-substeps = 8
-frame_count = 0
-checkpoint_interval = 0.5
-threads = 1
-""",
+    "tumble": TUMBLE_ON_GRAINS + "duration = 0.06\nframe_count = 0\ncheckpoint_interval = 0.5\n",
     "sweep": """
 experiment = "tumble"
 workers = 2

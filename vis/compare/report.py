@@ -17,7 +17,7 @@ from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, as_it_lies, handle, legend_above, sheet
 from vis.page.report import Report, Result, again, report_of, unit_text
-from vis.page.states import LINES, draw_bands, legend_of_runs
+from vis.page.states import LINES, draw_bands, draw_forces, legend_of_runs
 from vis.pictures.frames import frame_names
 
 from .robots import draw_robots
@@ -214,7 +214,7 @@ def _figures(report: Report, labels: Labels) -> list[Block]:
         "path": path,
         "states": draw_bands([(columns["t_s"], *run) for run in zip(angles, states, strict=True)], labels, label=label),
         "sinkage": _draw_spikes(columns, names, labels, called=called),
-        "forces": _draw_forces(result["weights"], columns, forces, labels),
+        "forces": draw_forces(result["weights"], columns, forces, labels),
         "energy": _draw_energy(columns, labels),
     }
     shape = "in proportion" if in_proportion else "heights stretched"
@@ -279,20 +279,6 @@ def _draw_spikes(columns: Columns, names: Sequence[str], labels: Labels, *, call
     names = [name if name == "hull" else f"{called} {name}" for name in names]
     handles = [handle(names[k], lw=2, **style) for k, style in zip(there, styles, strict=True)]
     legend_above(drawing, handles, 8)
-    return drawing
-
-
-def _draw_forces(weights: Sequence[float], columns: Columns, forces: Mapping[str, str], labels: Labels) -> Figure:
-    """Forces of the ground, column and words of each; in the first panel, that of the lift, the weights [N] too."""
-    drawing, (axes,) = sheet(1, len(forces), 3.0)
-    for axis, (name, words) in zip(axes, forces.items(), strict=True):
-        for number, style in enumerate(LINES, 1):
-            if f"{name}_{number}" in columns:
-                axis.plot(columns["t_s"], columns[f"{name}_{number}"], **{**style, "lw": 1.1})
-        axis.set(ylabel=words, xlabel="time [s]")
-    for weight, style in zip(weights, LINES, strict=True):
-        axes[0].axhline(weight, color=INK if weights[0] == weights[1] else style["color"], lw=0.8, ls=(0, (5, 4)))
-    legend_of_runs(drawing, labels)
     return drawing
 
 

@@ -8,12 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from vis.page.plots import DASHED, INK, Array, handle, legend_above, shades, sheet
-from vis.page.states import LINES, legend_of_runs
+from vis.page.states import LINES, draw_forces, legend_of_runs
 
 __all__ = ["draw_robots"]
 
 Columns = Mapping[str, Array]
 Labels = tuple[str, str]
+FORCES = {"lift_N": "force upwards [N]", "push_x_N": "force along x [N]", "push_y_N": "force along y [N]"}
 MOST_FEET = 6
 """Panels of single feet: those with the largest force come first."""
 
@@ -21,7 +22,7 @@ MOST_FEET = 6
 def draw_robots(columns: Columns, feet: Sequence[str], weights: Sequence[float], labels: Labels) -> dict[str, Figure]:
     """Name of a figure -> the figure, drawn from series/compared.csv; ``weights`` of both [N]."""
     return {
-        "path": _draw_path(columns, labels), "forces": _draw_forces(columns, weights, labels),
+        "path": _draw_path(columns, labels), "forces": draw_forces(weights, columns, FORCES, labels),
         "feet": _draw_feet(columns, feet, labels), "energy": _draw_energy(columns, labels),
     }  # fmt: skip
 
@@ -37,19 +38,6 @@ def _draw_path(columns: Columns, labels: Labels) -> Figure:
     words = ("z − z(0) of the centre of mass [mm]", "its way along the ground [mm]", "depth of the deepest foot [mm]")
     for axis, label in zip((height, way, depth), words, strict=True):
         axis.set(xlabel="time [s]", ylabel=label)
-    legend_of_runs(drawing, labels)
-    return drawing
-
-
-def _draw_forces(columns: Columns, weights: Sequence[float], labels: Labels) -> Figure:
-    drawing, (axes,) = sheet(1, 3, 3.0)
-    words = {"lift_N": "force upwards [N]", "push_x_N": "force along x [N]", "push_y_N": "force along y [N]"}
-    for axis, (name, label) in zip(axes, words.items(), strict=True):
-        for number, style in enumerate(LINES, 1):
-            axis.plot(columns["t_s"], columns[f"{name}_{number}"], **{**style, "lw": 1.1})
-        axis.set(ylabel=label, xlabel="time [s]")
-    for weight, style in zip(weights, LINES, strict=True):
-        axes[0].axhline(weight, color=INK if weights[0] == weights[1] else style["color"], lw=0.8, ls=(0, (5, 4)))
     legend_of_runs(drawing, labels)
     return drawing
 

@@ -21,8 +21,8 @@ from vis.page.page import Block, table, text
 from vis.page.plots import BED, GREY, INK, MODEL, STATES, Array, handle, legend_above, new_figure, sheet
 
 __all__ = [
-    "LINES", "States", "by_state", "draw_bands", "draw_states", "legend_of_runs", "legend_of_states", "panels",
-    "passages", "state_runs", "state_strip",
+    "LINES", "States", "by_state", "draw_bands", "draw_forces", "draw_states", "legend_of_runs", "legend_of_states",
+    "panels", "passages", "state_runs", "state_strip",
 ]  # fmt: skip
 
 States = NDArray[np.str_]
@@ -60,6 +60,22 @@ def legend_of_states(drawing: Figure, states: States, more: tuple[Line2D, ...] =
 def legend_of_runs(drawing: Figure, labels: Sequence[str], more: Sequence[Line2D] = (), *, columns: int = 2) -> None:
     """The lines of two runs, and what else there is."""
     legend_above(drawing, [*(handle(name, **style) for name, style in zip(labels, LINES, strict=True)), *more], columns)
+
+
+def draw_forces(
+    weights: Sequence[float], columns: Mapping[str, Array], forces: Mapping[str, str], labels: Sequence[str]
+) -> Figure:
+    """Forces of the ground in two runs, column and words of each; in the first panel the weights [N] too."""
+    drawing, (axes,) = sheet(1, len(forces), 3.0)
+    for axis, (name, words) in zip(axes, forces.items(), strict=True):
+        for number, style in enumerate(LINES, 1):
+            if f"{name}_{number}" in columns:
+                axis.plot(columns["t_s"], columns[f"{name}_{number}"], **{**style, "lw": 1.1})
+        axis.set(ylabel=words, xlabel="time [s]")
+    for weight, style in zip(weights, LINES, strict=True):
+        axes[0].axhline(weight, color=INK if weights[0] == weights[1] else style["color"], lw=0.8, ls=(0, (5, 4)))
+    legend_of_runs(drawing, labels)
+    return drawing
 
 
 def by_state(axis: Axes, x: Array, y: Array, states: States, **style: Any) -> None:
