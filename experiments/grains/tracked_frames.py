@@ -90,6 +90,8 @@ class PlatformFrames(ABC, Generic[Run]):
             grains.position, grains.radius, (float(size[0]), float(size[1])), spacing=self._spacing,
             lies=lying(grains.position, grains.radius),
         )  # fmt: skip
+        # A resumed run reads the first map from its frame, which keeps float32: both runs take the change from that.
+        found.fields["height"] = found.fields["height"].astype(np.float32)
         if self._untouched is None:
             self._untouched = found
         found.fields["change"] = found.fields["height"] - self._untouched.fields["height"]
