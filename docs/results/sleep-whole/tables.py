@@ -1,6 +1,7 @@
 """Errors of sleep over whole tumbles: the paired differences of beds.csv, with their 95 % intervals (t).
 
-python docs/results/sleep-whole/tables.py        rules: `default`; `strict` is speed 0.005, calm 1, own 0.02, unbalanced 0.2, still 0.003
+Run by `python docs/results/sleep-whole/tables.py`. Rules: `default`, those of `dem.Sleep`; `strict`: speed 0.005, calm
+1, own 0.02, unbalanced 0.2, still 0.003.
 """
 
 import csv
