@@ -63,7 +63,7 @@ class Target:
         value, tolerance: in the figure's unit; the tolerance counts as a standard deviation.
         source: where it comes from.
         figure: which of ``FIGURES`` it is; its name if not given.
-        plane: of a friction angle: "shear", stresses on the plane of shear as a shear box or a ring shear tester reads
+        plane: of a friction angle: "shear", stresses on the shear plane as a shear box or a ring shear tester reads
             them, "triaxial", the angle of triaxial compression, or "mohr", Mohr's circle of the largest and least
             stress. Of a cohesion "shear" or "mohr", as a vertical cut has it.
         state: in which the sample is sheared: "loose" or "dense"; "drained" of an angle of repose; "cut" of a cut.

@@ -4,12 +4,12 @@ Stresses at large strain are means over the second half of the strain, their sta
 the largest strength is that of the stress ratio averaged over a twentieth of strain.
 
 Friction angle and cohesion are those of a straight line through the tests' stresses, shear = cohesion + tan(angle)
-normal (Mohr-Coulomb), on the plane of shear; of grains that do not stick one test gives the angle, as nothing but the
+normal (Mohr-Coulomb), on the shear plane; of grains that do not stick one test gives the angle, as nothing but the
 pressure has the unit of a stress. The triaxial angle is that of triaxial compression at the same
 I1 I2 / I3 = (9 - sin^2) / (1 - sin^2) (Matsuoka & Nakai 1974, Proc. JSCE 232:59), from the whole stress tensor inside,
 cohesion c added to it as c / tan(angle). Those of Mohr's circle are of the straight line through the circles of the
 largest and least principal stress, radius = cohesion cos(angle) + sin(angle) centre: what Coulomb's wedge, and with it
-a vertical cut, is reckoned with. Where volume stays, the plane of shear has c cos(angle) and tan = sin(angle) instead.
+a vertical cut, is reckoned with. Where volume stays, the shear plane has c cos(angle) and tan = sin(angle) instead.
 
 A cut height comes from no formula: vertical faces are cut in a bed, and gravity rises until one falls
 (`dem.measure.cutting`). The critical height is anywhere between the last height that stood and the first that fell.

@@ -3,7 +3,7 @@
 value      at the real grain, by the line in d / D (`statistics`)
 chance     of its interval over beds
 grain      what that line may be wrong by
-the rest   width, depth, overlap, speed: each the end farther from 0 of the interval of the paired difference between
+rest       width, depth, overlap, speed: each the end farther from 0 of the interval of the paired difference between
            the base and the widest, the deepest, the stiffest and the slowest; together the root of their squares.
            A share of the base's mean, taken of the value, but for C, which may be 0. What was not measured is not in
            it, and named.

@@ -143,7 +143,7 @@ def _standing(sinkage: Finding, load: float) -> dict[str, Json]:
     return {"stiffness_standing": entry | {key: None if of is None else steep * of for key, of in errors.items()}}
 
 
-_NAMES = {"chance": "± chance", "grain_size": "± grain size", "rest": "± the rest", "total": "± all"}
+_NAMES = {"chance": "± chance", "grain_size": "± grain size", "rest": "± bed, softness, speed", "total": "± all"}
 
 
 def _errors(entries: Mapping[str, Json]) -> Json:

@@ -31,7 +31,7 @@ class UnderFeet:
 
     law: str
     parameters: Mapping[str, float]
-    of: float | None  # Diameter of the tip [m]; None where they do not follow the size of a foot
+    of: float | None  # Diameter of the tip [m]; None where they are not scaled to the size of a foot
     given: Collection[str] = ()  # Names of parameters that are of one foot already
 
     def options(self, feet: Sequence[Foot], matrices: Sequence[Any]) -> dict[str, Any]:
@@ -51,9 +51,9 @@ def law_of(
 ) -> UnderFeet:
     """The law of `settings`, or the spring-damper where `as_spring` or on grains.
 
-    On hard ground K is of the spike that gives way, so that the spring-damper, hunt-crossley and power do not follow
-    the size of a foot there. Laws of grains have no numbers for it: they are refused there, and where they are accepted
-    all the same they do not follow the foot either. The law of a file always does.
+    On hard ground K is that of the spike that gives way. The spring-damper, hunt-crossley and power are therefore not
+    scaled to the size of a foot there. Laws of grains have no numbers for hard ground: they are refused there. With
+    ``ignore_foot_size`` they run as under a spike. The law of a file is always scaled.
     """
     if fitted is not None and not as_spring:
         return UnderFeet(law=fitted.law, parameters=fitted.values, of=fitted.foot.diameter)
@@ -135,7 +135,7 @@ def settle_other_law(
 
 def _refuse_unsized(settings: RobotSettings, surface: Surface, law: SurfaceLaw, ill: list[str]) -> None:
     """Raise ValueError for parameters that belong to the other kind of ground or to another exponent."""
-    if settings.accept_unsized:
+    if settings.ignore_foot_size:
         return
     if not surface.granular and law.name not in HARD:
         raise ValueError(say("grains_on_hard", law=law, surface=surface))

@@ -39,7 +39,7 @@ class RobotSettings(GrainsSettings):
     """Python file and function that control the robot, as my_robot.py:control; it is called as control(model, data) at
     every time step of the model and sets data.ctrl. The controls of the start if not given."""
     gravity: NotNegative | None = Field(None, description="Gravity, downwards [m/s2]; the model's if not given.")
-    duration: Positive = Field(2.0, le=3600, description="How long it is followed [s].")
+    duration: Positive = Field(2.0, le=3600, description="Simulated time [s].")
 
     surface: str = "sand"
     """Material: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights."""
@@ -49,10 +49,11 @@ class RobotSettings(GrainsSettings):
     are in LAMMPS; the feet move in the plane of x and z)."""
     ground_parameters: tuple[str, ...] = ()
     """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot. Defaults are those of a
-    spike of 12 mm and follow the size of each foot."""
-    accept_unsized: bool = False
-    """Whether to run defaults that follow no foot: those of a spike on brick (hunt-crossley, power) on grains, or those
-    of a spike in sand (power-irreversible, katsuragi-durian, bekker, rft) on hard ground."""
+    spike of 12 mm, scaled to the size of each foot."""
+    ignore_foot_size: bool = False
+    """Whether to run a law whose defaults do not fit this ground, as they are, whatever the size of the foot: those of
+    a spike on brick (hunt-crossley, power) on grains, or those of a spike in sand (power-irreversible,
+    katsuragi-durian, bekker, rft) on hard ground."""
     stiffness: Positive | None = None
     """K of one foot [N/m]; that of one spike on the surface if not given, on sand times the area of the foot over the
     spike's."""
@@ -85,7 +86,7 @@ class RobotSettings(GrainsSettings):
     def _of_ground(self) -> str | None:
         if is_ground_file(self.ground):
             own = self.ground_parameters or self.stiffness is not None or self.damping is not None
-            if self.accept_unsized:
+            if self.ignore_foot_size:
                 return say("nothing_unsized", s=self)
             return say("of_a_file", s=self) if own else None
         known = [*GROUNDS, *ON_GRAINS]
@@ -96,7 +97,7 @@ class RobotSettings(GrainsSettings):
         of_spring = self.stiffness is not None or self.damping is not None
         if of_spring and self.ground not in SPRING:
             return say("of_the_spring", s=self)
-        return say("nothing_unsized", s=self) if self.accept_unsized and self.ground in SPRING else None
+        return say("nothing_unsized", s=self) if self.ignore_foot_size and self.ground in SPRING else None
 
     def _scaled(self) -> str | None:
         if not self.scale_with_gravity:

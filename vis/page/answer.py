@@ -17,7 +17,7 @@ __all__ = ["MOST_ROWS", "answer", "write_page"]
 say = Sentences(__package__)
 MOST_ROWS = 6
 _FINDINGS = 3
-_ERRORS = ("± chance", "± grain size", "± rest")
+_ERRORS = ("± chance", "± grain size", "± bed, softness, speed")
 _SPREAD = re.compile(r"^(?P<mean>[^±]+?)\s±\s(?P<error>\S+)(?P<unit>\s.*)?$")
 _ON_GRAINS = ("spike on grains", "platform on grains", "bed")
 

@@ -61,7 +61,7 @@ class Tile:
     label: str
     value: str
     note: str = ""
-    errors: tuple[str, str, str] = ("", "", "")  # Of chance, of grain size, of the rest; "": not known
+    errors: tuple[str, str, str] = ("", "", "")  # Of chance, of grain size, of bed, softness and speed; "": not known
 
 
 @dataclass(frozen=True)

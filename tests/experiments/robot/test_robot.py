@@ -45,7 +45,7 @@ ON_BED = HOPPER | {"ground": "bed", "height": 0.012, "grain": 0.012, "bed_size":
         ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
         ({"feet": ()}, "feet"),
         ({"ground": "power", "scale_with_gravity": True}, "scale_with_gravity.*'power'"),
-        ({"accept_unsized": True}, "accept_unsized: ground = 'spring-damper' follows"),
+        ({"ignore_foot_size": True}, "ignore_foot_size: ground = 'spring-damper' is always"),
         ({"stiffness": 1.0, "damping": 1.0, "scale_with_gravity": True}, "scale_with_gravity"),
         ({"ground": "lammps", "iterations": 3}, r"iterations = 3 .* iterations = 1"),
         ({"ground": "bed", "ranks": 2}, r"ranks = 2 .*ground = 'bed'"),
@@ -178,7 +178,7 @@ def test_a_gravity_beyond_the_range_of_a_ground_file_is_told_before_the_run(tmp_
 @pytest.mark.parametrize("law", ["hunt-crossley", "power", "power-irreversible", "katsuragi-durian", "bekker", "rft"])
 def test_a_law_whose_parameters_do_not_follow_from_the_surface_says_so_and_its_title_names_none(law, tmp_path):
     """The foot of the hopper has 60 mm, 25 times the area of the spike of 12 mm that the defaults are of."""
-    settings = RobotSettings(**HOPPER, ground=law, surface="jsc1a", duration=0.01, accept_unsized=True)
+    settings = RobotSettings(**HOPPER, ground=law, surface="jsc1a", duration=0.01, ignore_foot_size=True)
     plan = plan_robot(settings)
     (said,) = [said for said in plan.warnings if "ground_parameters" in said]
     assert all(word in said for word in ("12 mm", "'jsc1a'", "ground.toml"))
@@ -206,7 +206,7 @@ def test_a_law_with_all_its_parameters_given_has_no_warning_of_defaults():
     [
         (
             {"ground": "power"},
-            r"ground = 'power': its defaults of stiffness and damping are those of brick .* accept_unsized",
+            r"ground = 'power': its defaults of stiffness and damping are those of brick .* ignore_foot_size",
         ),
         ({"ground": "hunt-crossley", "ground_parameters": ("stiffness=4000",)}, "its defaults of dissipation are"),
         ({"ground": "bekker", "ground_parameters": ("exponent=1.3",)}, "exponent is given, and cohesive_modulus and"),
@@ -215,8 +215,8 @@ def test_a_law_with_all_its_parameters_given_has_no_warning_of_defaults():
 def test_defaults_that_follow_no_foot_are_refused_on_grains_unless_they_are_accepted(given, said):
     with pytest.raises(ValueError, match=said):
         plan_robot(RobotSettings(**HOPPER | given))
-    on_brick = {"surface": "brick", "accept_unsized": given["ground"] == "bekker"}  # A law of grains
-    for accepted in ({"accept_unsized": True}, on_brick):
+    on_brick = {"surface": "brick", "ignore_foot_size": given["ground"] == "bekker"}  # A law of grains
+    for accepted in ({"ignore_foot_size": True}, on_brick):
         plan = plan_robot(RobotSettings(**HOPPER | given | accepted))
         ground, found = plan.law_feet(plan.robot()), find_law(given["ground"])
         own = found.values(given_parameters(plan.settings))
@@ -229,7 +229,7 @@ def test_defaults_that_follow_no_foot_are_refused_on_grains_unless_they_are_acce
 def test_a_law_of_grains_is_refused_on_hard_ground_and_accepted_it_is_that_of_the_spike(law, surface):
     with pytest.raises(ValueError, match=f"ground = '{law}' is a law of grains, and surface = '{surface}' is hard"):
         plan_robot(RobotSettings(**HOPPER, ground=law, surface=surface))
-    plan = plan_robot(RobotSettings(**HOPPER, ground=law, surface=surface, accept_unsized=True))
+    plan = plan_robot(RobotSettings(**HOPPER, ground=law, surface=surface, ignore_foot_size=True))
     found = find_law(law)
     own = found.values(found.in_gravity(plan.numbers["gravity"].value, {}))
     once = found.force(2e-3, 0.1, found.numbers(own))
