@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vis.page.numbers import column, plain, quantity, quote
+from vis.page.numbers import column, plain, quantity, quote, typeset
 
 SPACE = "\N{NO-BREAK SPACE}"
 
@@ -52,3 +52,16 @@ def test_column_has_one_unit():
 
 def test_plain_keeps_to_its_digits():
     assert [plain(x) for x in (1234.5, 0.00123, 1e-7, 0.0)] == ["1234", "0.00123", "1.00×10⁻⁷", "0"]
+
+
+@pytest.mark.parametrize(
+    ("given", "set_"),
+    [
+        ("rig at 0.08336 m/s2", "rig at 0.08336 m/s²"),
+        ("v^2 [m2/s2]", "v² [m²/s²]"),
+        ("F / (rho g D^3) [1]", "F / (ρ g D³) [1]"),
+        ("robot s2 on bed m3", "robot s2 on bed m3"),
+    ],
+)
+def test_powers_of_a_title_are_raised_and_names_stay(given, set_):
+    assert typeset(given) == set_

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image, ImageColor
 
 from vis.compare.report import _draw_path
 from vis.diagnose.figures import _PHASES
-from vis.page.plots import STATES, as_it_lies
+from vis.page.plots import STATES, as_it_lies, name_below, new_figure
 from vis.pictures.render import write_gif
 
 
@@ -35,6 +36,30 @@ def test_the_caption_of_two_paths_says_of_their_shape_what_the_picture_does(heig
     assert in_proportion == (words == "in proportion")
     path = drawing.axes[0]
     assert path.get_title(loc="left") + path.get_title() == ("" if in_proportion else words)
+
+
+@pytest.mark.parametrize("layout", ["constrained", "none"])
+def test_a_figure_has_the_name_of_its_surface_below_its_panels_which_stay_as_high(layout: str) -> None:
+    figure = new_figure(3.0, layout=layout)
+    axis = figure.subplots()
+    if layout == "none":
+        figure.subplots_adjust(bottom=0.17)
+    axis.set_xlabel("time [s]")
+    figure.canvas.draw()
+    before = axis.get_window_extent().height
+    name_below(figure, "Plates in sand")
+    figure.canvas.draw()
+    words = next(text for text in figure.findobj(Text) if text.get_text() == "Plates in sand")
+    box, label = words.get_window_extent(), axis.xaxis.label.get_window_extent()
+    assert 0.0 <= box.y0 < box.y1 <= label.y0 and box.x1 <= figure.bbox.x1
+    assert axis.get_window_extent().height == pytest.approx(before, rel=1e-9 if layout == "none" else 0.1)
+
+
+def test_a_figure_whose_title_names_the_surface_is_left_as_it_is() -> None:
+    figure = new_figure(3.0, layout="none")
+    figure.subplots().set_title("Plates in sand", loc="left")
+    name_below(figure, "Plates in sand")
+    assert len(figure.texts) == 0 and figure.get_size_inches()[1] == 3.0
 
 
 SIGHT = {

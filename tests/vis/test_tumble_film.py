@@ -19,6 +19,7 @@ from vis.pictures.meshes import spike_mesh
 from vis.pictures.scene import Eye
 from vis.pictures.tracks import height_map
 from vis.tumble.report import draw_tracks
+from vis.view.sources import sources_of
 
 LENGTH, SIZE = 0.04, (0.12, 0.03)
 
@@ -82,6 +83,29 @@ def test_the_camera_follows_and_the_scale_stays_put(folder):
     sheet.draw(0.0)
     sheet.draw(1.0)
     assert sheet.page.norm.vmax == 2.0
+
+
+def test_the_picture_from_near_follows_a_tip_that_sinks_deep_so_that_its_arrow_stays_inside(folder):
+    """The tip ends 49 mm below the surface, where a picture 25 mm high that stayed there would show it no more."""
+    table = (folder / "trajectory.csv").read_text().splitlines()
+    rows = [line.split(",") for line in table[1:]]
+    sunk = [[r[0], r[1], repr(0.036 - 0.045 * float(r[0])), *r[3:]] for r in rows]
+    (folder / "trajectory.csv").write_text("\n".join([table[0], *map(",".join, sunk)]) + "\n")
+    reel = Reel(folder)
+    sheet = Sheet([reel], (320, 180), by="displacement", opengl=False)
+    (_, stage), (_, near) = sheet.stages, sheet.ways
+    assert reel.surface - reel.lowest()[-1] > 0.04 > 1.5 * stage.height
+    heights = [
+        stage.place(np.array([[focus[0], reel.cut, low]]), tuple(focus))[0, 1]
+        for focus, low in zip(near, reel.lowest(), strict=True)
+    ]
+    assert min(heights) > 0.1
+
+
+def test_the_page_says_that_grains_touch_a_cylinder_inside_the_hull_that_it_draws(folder):
+    result = json.loads((folder / "result.json").read_text())
+    (folder / "result.json").write_text(json.dumps(result | {"experiment": "tumble"}))
+    assert "cylinder" in sources_of(folder)[0].note
 
 
 def test_a_bed_narrower_than_the_picture_is_seen_down_to_its_floor_unless_two_runs_share_a_scale():

@@ -146,10 +146,13 @@ def test_colours_cut_and_runs_can_be_chosen(browser, page):
     assert "--frame-count" in browser.value("document.querySelector('.scene .message').textContent")
 
 
-def standing(folder):
+def standing(folder, states=("stand", "stand", "stand")):
     """A run that was never computed: a platform of 0.2 m stands on a law, its tips 12 mm deep."""
     names = ("t_s", "x_m", "y_m", "theta_rad", "vx_m_s", "vy_m_s", "omega_rad_s")
-    rows = [f"{time},0.0,{0.2 * np.cos(np.pi / 8) - 0.012},0.0,0.0,0.0,0.0,stand" for time in (0.0, 0.5, 1.0)]
+    rows = [
+        f"{time},0.0,{0.2 * np.cos(np.pi / 8) - 0.012},0.0,0.0,0.0,0.0,{state}"
+        for time, state in zip((0.0, 0.5, 1.0), states, strict=True)
+    ]
     (folder / "trajectory.csv").write_text("\n".join([",".join((*names, "state")), *rows]) + "\n")
     trial = {"spike_length": 0.2, "weight": 1.0, "mass": 5.3, "stiffness": 40.0, "damping": 0.0}
     result = {
@@ -174,6 +177,14 @@ def test_tips_in_the_ground_of_a_law_show_through_it(browser, tmp_path):
     shown = hidden & (np.abs(through - alone).max(axis=-1) > 12)
     assert 1e-4 < shown.mean() < 0.05
     assert (through[..., 3] == 255).all() and browser.errors == []
+
+
+def test_the_legend_lists_the_states_in_the_order_of_all_figures(browser, tmp_path):
+    browser.open(write_view(standing(tmp_path, states=("hop", "slip", "stand"))))
+    listed = (
+        "[...document.querySelectorAll('.scene svg[aria-label=\"state over time\"] text')].map((t) => t.textContent)"
+    )
+    assert browser.value(listed) == ["stand", "slip", "hop"]
 
 
 def test_a_drag_turns_the_scene(browser, page):

@@ -19,7 +19,7 @@ __all__ = ["write_calibration_report"]
 _COLOURS = (BED, MODEL, INK, GREY)
 
 
-@report_of()
+@report_of(named=True)
 def write_calibration_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a calibration, and return the report."""
     result, quantities = report.result, report.result["quantities"]

@@ -17,7 +17,7 @@ from vis.view.page import report_scene
 __all__ = ["write_bed_report"]
 
 
-@report_of()
+@report_of(named=True)
 def write_bed_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a prepared bed, and return the report."""
     result, quantities = report.result, report.result["quantities"]

@@ -34,7 +34,7 @@ say = Sentences(__package__)
 Grains = Mapping[str, NDArray[Any]]
 
 
-@report_of()
+@report_of(named=True)
 def write_test_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of such a test, shear aside, and return the report."""
     result, command = report.result, report.result["experiment"]
@@ -185,10 +185,10 @@ def _plates_tiles(result: Result) -> list[Tile]:
 def _forces_of_plates(report: Report) -> list[Block]:
     """Measured beside predicted forces of all plates and shapes, each component a panel."""
     rows = [*report.result["plates"], *report.result["shapes"]]
-    names = [f"{row['body']}, {row['gamma']:g}°" for row in rows]
+    names = [f"{row['body']}{'' if row['beta'] is None else '°'}, {row['gamma']:g}°" for row in rows]
     place = np.arange(len(rows))
     drawing, panels = new_panels(2, height=1.2 + 0.24 * len(rows), sharey=True)
-    for axis, key, label in zip(panels, ("x", "z"), ("backwards, -F_x", "upwards, F_z"), strict=True):
+    for axis, key, label in zip(panels, ("x", "z"), ("backwards, −F_x", "upwards, F_z"), strict=True):
         sign = -1.0 if key == "x" else 1.0
         measured = [sign * row[f"force_{key}"] for row in rows]
         axis.errorbar(
@@ -370,7 +370,7 @@ _TESTS: dict[str, tuple[tuple[_Drawer, ...], Callable[[Result], list[Tile]], tup
 # A lid shears it ------------------------------------------------------------------------------------------------------
 
 
-@report_of()
+@report_of(named=True)
 def write_shear_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a shear test, and return the report."""
     result, quantities = report.result, report.result["quantities"]

@@ -8,6 +8,7 @@ from itertools import cycle
 from pathlib import Path
 
 from rigid.series import read_series
+from vis.page.numbers import typeset
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
 from vis.page.plots import GREY, new_figure
 from vis.page.report import Report, Result, number_text, report_of
@@ -56,9 +57,9 @@ def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
             color=colour,
             ms=3.5,
             lw=1.6,
-            label=label,
+            label=typeset(label),
         )
-    axis.set(xlabel=plot["x"], ylabel=plot["y"])
+    axis.set(xlabel=typeset(plot["x"]), ylabel=typeset(plot["y"]))
     if "x" in plot["log"]:
         axis.set_xscale("log")
     if "y" in plot["log"]:

@@ -24,6 +24,8 @@ View = tuple[Stage | FlatStage, Array]
 """The stage, and the focus at every picture [m], shape (n, 2)."""
 _INNER = 0.94
 """Share of a picture's height that its margins leave."""
+_BELOW = 0.3
+"""How far a tip lies at most below the middle of the picture from near, over its height: its arrow stays inside."""
 _STEADY = 0.03
 """Over which a camera's way is smoothed (standard deviation), over the run's duration."""
 
@@ -101,8 +103,8 @@ class _Near(_Plane):
     width, tall, arrow = 0.75, 0.0, 0.28
 
     def way(self, reel: Reel, stage: Eye, reach: float) -> Array:
-        x = reel.feet()
-        return np.column_stack([x, np.full(len(x), reel.surface + 0.06 * stage.height)])
+        high = np.minimum(reel.surface + 0.06 * stage.height, reel.lowest() + _BELOW * stage.height)
+        return np.column_stack([reel.feet(), high])
 
     def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
         axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", bbox=HALO)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from vis.film.cameras import layout
 from vis.film.reel import AnyReel, Reel, SpaceReel
+from vis.page.numbers import typeset
 from vis.page.page import Block, figure
 from vis.page.plots import Array, styled
 from vis.page.report import Progress, capital
@@ -92,7 +93,7 @@ class Sheet:
             for number, reel in enumerate(self.reels):
                 left = next(panel.place[0] for panel in self.panels if panel.run == number)
                 title = str(reel.result["title"]) if len(self.reels) == 1 else _with_surface(self.labels[number], reel)
-                sheet.text(left, 0.975, title, fontsize=15, fontweight="bold", va="top")
+                sheet.text(left, 0.975, typeset(title), fontsize=15, fontweight="bold", va="top")
                 sheet.text(left, 0.93, reel.line(reel.nearest(time)), fontsize=13, va="top", color="#444444")
             for panel in self.panels:
                 if panel.camera.arrow:

@@ -230,6 +230,12 @@ class Reel(_Filmed):
         share = np.exp((wanted - wanted.max(axis=1, keepdims=True)) / (0.005 * length))
         return (share * x).sum(axis=1) / share.sum(axis=1) + self.origin[0]
 
+    def lowest(self) -> Array:
+        """Height of the lowest tip at every picture [m], shape (n,)."""
+        rows = [self.row(index) for index in range(len(self))]
+        angles = self._directions(self.series["theta_rad"][rows][:, None])
+        return np.asarray(self.origin[2] + self.series["y_m"][rows] - self.reach * np.cos(angles).max(axis=1))
+
     @property
     def _count(self) -> int:
         """Rows of spikes."""

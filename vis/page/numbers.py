@@ -10,10 +10,11 @@ Forces stay in newtons, as they are given: what is compared in one sentence has 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["column", "digits_for", "foldable", "in_two_digits", "plain", "quantity", "quote", "short"]
+__all__ = ["column", "digits_for", "foldable", "in_two_digits", "plain", "quantity", "quote", "short", "typeset"]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SCALED = {"J", "s", "Pa", "W", "kg"}
@@ -22,6 +23,7 @@ _AS_THEY_ARE = {
     "N s/m": (1.0, "N\N{NO-BREAK SPACE}s/m"),
 }  # fmt: skip
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_POWER = re.compile(r"(?<=[/\[])(m|s)([23])\b|\^(\d)")
 _MINUS, _SPACE = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 
 
@@ -93,6 +95,12 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
 def foldable(text: str) -> str:
     """With plain spaces for those that do not break, which a terminal cannot fold."""
     return text.replace(_SPACE, " ")
+
+
+def typeset(words: str) -> str:
+    """Words of a title or an axis as a picture has them: typeset("F / (rho g D^3) at 9.81 m/s2") has ρ, D³ and m/s²."""
+    raised = _POWER.sub(lambda found: (found[1] or "") + (found[2] or found[3]).translate(_RAISED), words)
+    return re.sub(r"\brho\b", "ρ", raised)
 
 
 def quantity(entry: Any, *, unit: str | None = None, significant: int | None = None) -> str:

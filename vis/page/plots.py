@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "AXES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES", "WIDTH", "Array", "as_it_lies",
-    "handle", "legend_above", "line_handles", "line_styles", "mean_over", "new_figure", "new_panels", "nice_below",
-    "shades", "sheet", "smooth_ratio", "styled",
+    "handle", "legend_above", "line_handles", "line_styles", "mean_over", "name_below", "new_figure", "new_panels",
+    "nice_below", "shades", "sheet", "smooth_ratio", "styled",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -125,6 +125,25 @@ def legend_above(figure: Figure, handles: Sequence[Any], columns: int | None = N
         figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), handlelength=2.6)
     else:
         figure.legend(handles=handles, loc="outside upper left", ncols=columns, **options)
+
+
+def name_below(figure: Figure, words: str) -> None:
+    """Name in the lower right corner what a figure is of, such as its surface; a figure laid out by hand grows for it.
+
+    Where the title of a panel says so already, nothing is added.
+    """
+    if not words or words in {axis.get_title("left") for axis in figure.axes}:
+        return
+    style: dict[str, Any] = {"fontsize": 7.5, "color": "#666666", "ha": "right"}
+    if figure.get_layout_engine() is not None:
+        figure.supxlabel(words, x=0.995, **style)
+        return
+    below, (width, height) = 0.2, figure.get_size_inches()
+    edges = figure.subplotpars
+    figure.set_size_inches(width, height + below)
+    share = height / (height + below)
+    figure.subplots_adjust(bottom=1 - share * (1 - edges.bottom), top=1 - share * (1 - edges.top))
+    figure.text(0.995, 0.012, words, va="bottom", **style)
 
 
 def handle(label: str, color: Any, **style: Any) -> Line2D:

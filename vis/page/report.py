@@ -13,8 +13,9 @@ from rigid.result import read_result
 from vis.page.answer import write_page
 from vis.page.folder import read_columns
 from vis.page.limits import limits_words
+from vis.page.numbers import typeset
 from vis.page.page import Block, Page, Section, Tile, code, figure, table, text
-from vis.page.plots import Array, styled
+from vis.page.plots import Array, name_below, styled
 from vis.page.sentences import Sentences
 
 __all__ = [
@@ -32,16 +33,19 @@ class Report:
     """The report of one run folder; its `figures/` is made with it.
 
     ``folder``: The run folder. ``progress``: Called with the share that is done, 0 to 1. ``package``: Whose
-    figures.toml has the titles and captions. ``dpi``: Of its figures; the style's own if not given. Raises
-    FileNotFoundError where the folder has no result.json, and where a series is missing that is drawn.
+    figures.toml has the titles and captions. ``dpi``: Of its figures; the style's own if not given. ``named``: Whether
+    each figure has the result's title, which names the surface, in a corner. Raises FileNotFoundError where the folder
+    has no result.json, and where a series is missing that is drawn.
     """
 
     def __init__(
-        self, folder: str | Path, progress: Progress | None = None, *, package: str = "", dpi: int | None = None
-    ) -> None:
+        self, folder: str | Path, progress: Progress | None = None, *, package: str = "", dpi: int | None = None,
+        named: bool = False,
+    ) -> None:  # fmt: skip
         self.folder, self.dpi, self.captions = Path(folder), dpi, Sentences(package, "figures.toml")
         self.done, self.progress = 0.0, progress
         self.result: Result = read_result(self.folder / "result.json")
+        self.about = typeset(str(self.result["title"])) if named else ""
         self.figures = self.folder / "figures"
         self.figures.mkdir(exist_ok=True)
 
@@ -54,6 +58,7 @@ class Report:
 
         Title and caption are those of `key` in figures.toml, their placeholders filled with `values`.
         """
+        name_below(drawing, self.about)
         path = self.figures / f"{name or key}.png"
         drawing.savefig(path, dpi=self.dpi)
         self.tell(self.done + 0.2 * (1.0 - self.done))
@@ -114,10 +119,11 @@ class Report:
         return report
 
 
-def report_of(dpi: int | None = None) -> Callable[[Callable[..., Path]], Callable[..., Path]]:
+def report_of(dpi: int | None = None, *, named: bool = False) -> Callable[[Callable[..., Path]], Callable[..., Path]]:
     """Make of a function of a `Report` one of its folder: `write(folder, *, progress=None, **options)`.
 
     It draws in the house's style, `dpi` dots an inch, and takes titles and captions from figures.toml of its package.
+    `named`: each figure has the result's title in a corner.
     Raises FileNotFoundError where the folder has no result.json, or a file that is drawn.
     """
 
@@ -126,7 +132,7 @@ def report_of(dpi: int | None = None) -> Callable[[Callable[..., Path]], Callabl
         def of_folder(folder: str | Path, *, progress: Progress | None = None, **options: Any) -> Path:
             with styled():
                 package = write.__module__.rpartition(".")[0]
-                return write(Report(folder, progress, package=package, dpi=dpi), **options)
+                return write(Report(folder, progress, package=package, dpi=dpi, named=named), **options)
 
         return of_folder
 

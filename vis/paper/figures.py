@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ _SOILS = {"sand": "sand", "jsc1a": "JSC-1A"}
 VARIANTS = ("low", "nominal", "high", "paper")
 """Of a case: friction at the lower end of its band, as it is, at the upper end; the paper's fixed step."""
 _DASHED, _DOTTED = (0, (5, 3)), (0, (1, 1.6))
+_SURFACE_LINES, _RIG_MARKS = {"steel": "-", "brick": (0, (4, 2))}, "os^D"
 _SHOWN = 0.045
 """How far Figure 5 goes [m]: a little more than what the paper trusts."""
 
@@ -409,9 +411,11 @@ def figure_evidence(paper: PaperRun) -> Block | None:
     left.axhline(22.5, color=GREY, lw=0.9, ls=_DASHED)
     times = [0.0 if entry["value"] is None else entry["value"] for entry in (step["best"], *rise["values"])]
     told = [step["best"], *rise["values"]]
-    for k in range(len(step["best"]["low_torque_angles"])):
+    motors = in_order(c["torque"] for c in paper.cases if c["actuator"] == "motor")
+    for k, (surface, rig, torque) in enumerate(product(_HARD, paper.rigs, motors)):  # the order of the result
         angles = [entry["low_torque_angles"][k] for entry in told]
-        left.plot(times, [math.nan if angle is None else angle for angle in angles], "o-", color=BED, ms=3.5, lw=0.8)
+        style = {"ls": _SURFACE_LINES[surface], "marker": _RIG_MARKS[paper.rigs.index(rig) % 4], "ms": 3.5, "lw": 1.1}
+        left.plot(times, [math.nan if a is None else a for a in angles], color=paper.colour(torque), **style)
     left.set(xlabel="time constant of the torque [s]", ylabel="trajectory angle [degrees]", ylim=(0, 70))
     left.set_title("low torque, steel and brick")
     shown = sorted(rows[1:], key=lambda row: row["nats"])
@@ -420,8 +424,12 @@ def figure_evidence(paper: PaperRun) -> Block | None:
         right.barh(place, row["nats"] - step["nats"], color=colour, height=0.62)
     right.axvline(0.0, color=INK, lw=0.8)
     right.set_yticks(range(len(shown)), [row["id"] for row in shown])
-    right.set_xlabel("ln odds against a step of the torque")
+    right.set_xlabel("log odds (natural) against a step of the torque")
     right.grid(False, axis="y")
+    lines = [handle(paper.label(torque), paper.colour(torque), lw=2.2) for torque in motors]
+    lines += [handle(surface, INK, lw=1.1, ls=_SURFACE_LINES[surface]) for surface in _HARD]
+    lines += [handle(f"{rig:g} g", INK, ls="", marker=_RIG_MARKS[k % 4], ms=3.5) for k, rig in enumerate(paper.rigs)]
+    legend_above(drawing, lines, 6)
     return paper.draw("evidence", drawing)
 
 

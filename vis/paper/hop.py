@@ -18,7 +18,7 @@ from vis.page.states import by_state, legend_of_states, panels
 __all__ = ["write_hop_report"]
 
 
-@report_of(dpi=130)
+@report_of(dpi=130, named=True)
 def write_hop_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a hop, and return the report."""
     result = report.result

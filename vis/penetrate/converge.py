@@ -24,7 +24,7 @@ _BEYOND = 0.4
 _TILES = ("stiffness", "damping", "sinkage", "stiffness_standing")
 
 
-@report_of()
+@report_of(named=True)
 def write_converge_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a sweep, and return the report."""
     result = report.result

@@ -11,7 +11,7 @@ from vis.page.report import Report, report_of
 __all__ = ["write_ground_report"]
 
 
-@report_of()
+@report_of(named=True)
 def write_ground_report(report: Report) -> Path:
     """Make report.html of the folder of a look-up, and return it."""
     numbers, source = report.result["quantities"], report.result["map"]["source"]

@@ -10,7 +10,7 @@ from matplotlib.colors import TwoSlopeNorm
 
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, listing, table
-from vis.page.plots import BED, GREY, INK, handle, legend_above, line_styles, new_panels, shades, sheet
+from vis.page.plots import BED, GREY, INK, handle, legend_above, line_styles, new_panels, sheet
 from vis.page.report import Report, Result, report_of, tables
 
 __all__ = ["write_lawfit_report"]
@@ -21,7 +21,7 @@ _FULL = 0.5
 """Error at which the colour of the map of trust is full [1]."""
 
 
-@report_of()
+@report_of(named=True)
 def write_lawfit_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a calibration, and return the report."""
     result = report.result
@@ -94,7 +94,8 @@ def _crossed(report: Report) -> list[Block]:
     cells = [cell["foundation"] for cell in report.result["cells"]]
     tips = list(dict.fromkeys((cell["tip"], cell["diameter"], cell["cone_angle"]) for cell in cells))
     gravities = sorted({cell["gravity"] for cell in cells}, reverse=True)
-    looks = [{"marker": mark, "color": colour} for mark, colour in zip("ox+sd^v", shades(len(gravities)), strict=False)]
+    styles = line_styles(gravities).values()
+    looks = [{"marker": mark, "color": style["color"]} for mark, style in zip("ox+sd^v", styles, strict=False)]
     drawing, axes = new_panels(len(tips), height=3.4)
     lines = {}
     for axis, tip in zip(axes, tips, strict=True):
@@ -109,10 +110,10 @@ def _crossed(report: Report) -> list[Block]:
             depth, place = np.unique(columns["depth"][on], return_index=True)
             axis.plot(depth, columns[best][on][place], style, color=INK, lw=1.5)
             lines[style] = handle(f"{best}, {end} drive", INK, ls=style)
-        axis.set(title=f"{tip[0]}, {1e3 * tip[1]:g} mm", xlabel="depth over diameter")
-    axes[0].set_ylabel("force over rho g D^3")
+        axis.set(title=f"{tip[0]}, {1e3 * tip[1]:g} mm", xlabel="depth over diameter [1]")
+    axes[0].set_ylabel("force / (ρ g D³) [1]")
     marks = [
-        handle(f"{gravity:.4g} m/s2", ls="", ms=4, **look) for gravity, look in zip(gravities, looks, strict=False)
+        handle(f"{gravity:.4g} m/s²", ls="", ms=4, **look) for gravity, look in zip(gravities, looks, strict=False)
     ]
     legend_above(drawing, [*marks, *lines.values()], 4)
     return [report.draw("crossed", drawing)]
@@ -138,8 +139,8 @@ def _trust(report: Report, laws: list[Result], cell: str) -> Block | None:
         for row, values in enumerate(error):
             for place, value in zip(depth, values, strict=True):
                 dark = abs(value) > 60 * _FULL
-                axis.text(place, row, f"{value:+.0f}", ha="center", va="center", fontsize=7.5,
-                          color="white" if dark else INK)  # fmt: skip
+                words = f"{value:+.0f}".replace("-", "−") if abs(value) >= 0.5 else "0"
+                axis.text(place, row, words, ha="center", va="center", fontsize=7.5, color="white" if dark else INK)
         axis.set_yticks(range(len(found["speeds"])), [f"{speed:.3g}" for speed in found["speeds"]])
         axis.set(title=law["name"], xlabel="depth of the tip [mm]")
         axis.grid(visible=False)

@@ -25,7 +25,7 @@ __all__ = ["write_robot_report"]
 Columns = Mapping[str, Array]
 
 
-@report_of(dpi=130)
+@report_of(dpi=130, named=True)
 def write_robot_report(
     report: Report, *, pictures: bool = True, colour: str = "displacement", film: bool = True
 ) -> Path:

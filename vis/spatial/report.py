@@ -27,7 +27,7 @@ Columns = Mapping[str, Array]
 _TURN = "turn from the start [degrees]"
 
 
-@report_of(dpi=130)
+@report_of(dpi=130, named=True)
 def write_spatial_report(
     report: Report, *, pictures: bool = True, colour: str = "displacement", film: bool = True
 ) -> Path:

@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 from vis.film.film import draw_runs, shown
 from vis.film.reel import Reel
 from vis.page.folder import read_columns
-from vis.page.numbers import quantity, quote, short
+from vis.page.numbers import quantity, quote, short, typeset
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
 from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result, given, report_of, tables, terms_text
@@ -41,7 +41,7 @@ _JOULES = (("mJ", 1.0), ("µJ", 1e3), ("nJ", 1e6), ("pJ", 1e9), ("fJ", 1e12))
 """Units of energy, and how many of them a mJ has."""
 
 
-@report_of(dpi=130)
+@report_of(dpi=130, named=True)
 def write_tumble_report(
     report: Report, *, pictures: bool | None = None, colour: str = "displacement", film: bool = True
 ) -> Path:
@@ -122,7 +122,7 @@ def _trajectory(report: Report, numbers: Columns, states: States) -> Block:
     height = 3.8
     drawing, (path, rates) = panels(2, height, widths=(1.25, 1.0), right=0.925)
     drawing.subplots_adjust(top=1 - 0.65 / height)  # the title stands between the legend and the powers of ten
-    path.set_title(report.result["title"], fontsize=8.5, pad=14)
+    path.set_title(typeset(report.result["title"]), fontsize=8.5, pad=14)
     label = _draw_path(path, numbers, states, far, _value(report.result, "trajectory_angle"))
     more = (handle(label, INK, lw=1.0, ls=(0, (4, 3))),) if label else ()
     speed = np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])

@@ -84,8 +84,13 @@ def _in_plane(home: Path) -> Source:
         times=reel.times, frame=reel.frame, cut=reel.cut, surface=reel.surface,
         low=low, high=high, block=not reel.on_grains, force=("weight", reel.number("weight")),
         panels=curves.of_tumble(home, reel.series, called), states=curves.bands(reel.series["t_s"], reel.states),
-        note=say("no_grains") if grains_missing else "",
+        note=say("no_grains") if grains_missing else _hull_words(reel),
     )  # fmt: skip
+
+
+def _hull_words(reel: Reel) -> str:
+    """That the hull is drawn with its corners and simulated without them; "" where none is simulated."""
+    return say("hull") if len(reel) and reel.frame(0).values.get("hull_radius") else ""
 
 
 def _in_space(home: Path) -> Source:

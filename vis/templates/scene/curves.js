@@ -20,6 +20,9 @@ function ticks(low, high) {
   return found;
 }
 
+/** The states as every legend lists them. */
+const LOSING_HOLD = ["stand", "pivot", "slip", "hop"];
+
 class Curves {
   /** Draws a scene's panels and states into `home`; `choose` is called with a time [s] that was clicked. */
   constructor(home, scene, choose) {
@@ -69,7 +72,8 @@ class Curves {
   }
 
   drawStates(states, choose) {
-    const sheet = this.sheet(44, "state", choose), seen = new Map(states.map((s) => [s.state, s.colour]));
+    const sheet = this.sheet(44, "state", choose), place = (s) => LOSING_HOLD.indexOf(s.state);
+    const seen = new Map([...states].sort((a, b) => place(a) - place(b)).map((s) => [s.state, s.colour]));
     let x = EDGE.left;
     for (const [state, colour] of seen) {
       sheet.append(svg("rect", { x, y: 4, width: 10, height: 10, fill: colour }));
