@@ -36,7 +36,7 @@ def _result(_: BedReposeSettings, runs: list[Json]) -> Json:
     of = partial(quantity, runs)
 
     def slope(flank: Json) -> str:
-        return f"{flank['angle']:.1f} +- {flank['error']:.1f}"
+        return f"{flank['angle']:.1f} ± {flank['error']:.1f}"
 
     fitted = "drained; mean of two slopes a run, fitted from three diameters to four fifths of the crest's height"
     quantities = {

@@ -148,7 +148,7 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
         "peak [Pa]": lambda row: f"{row[0].peak:.0f}",
         "at [d]": lambda row: f"{row[0].peak_way / grain:.1f}",
         "critical [Pa]": lambda row: f"{row[0].critical:.0f}",
-        "+- [Pa]": lambda row: f"{row[0].critical_error:.0f}",
+        "± [Pa]": lambda row: f"{row[0].critical_error:.0f}",
         "peak ratio": lambda row: f"{row[0].peak / row[0].normal:.3f}",
         "critical ratio": lambda row: f"{row[0].critical / row[0].normal:.3f}",
         "dilates [d]": lambda row: f"{row[1].height[-1] / grain:.2f}",

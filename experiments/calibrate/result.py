@@ -61,7 +61,7 @@ def calibration_result(
     warnings = _warnings(settings, fit)
     for target, entry in zip(targets, entries, strict=True):
         got, error, verdict = entry["measured"], entry["error"], entry["verdict"]
-        note = f"{verdict}; wanted {target.value:g} +- {target.tolerance:g}"
+        note = f"{verdict}; wanted {target.value:g} ± {target.tolerance:g}"
         quantities[target.name] = quantity(got, target.unit, note, std=error)
         if verdict != "met":
             warnings.append(_unmet(target, entry))
@@ -112,10 +112,10 @@ def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float]
 
 def _unmet(target: Target, entry: Json) -> str:
     value, error, verdict, reach = (entry[key] for key in ("measured", "error", "verdict", "reach"))
-    wanted = f"{target.value:g} +- {target.tolerance:g} {target.unit} was wanted"
+    wanted = f"{target.value:g} ± {target.tolerance:g} {target.unit} was wanted"
     if value is None:
         return f"{target.name} could not be measured: {wanted}"
-    said = f"{target.name} = {value:.3g}{'' if error is None else f' +- {error:.2g}'} where {wanted}: {verdict}"
+    said = f"{target.name} = {value:.3g}{'' if error is None else f' ± {error:.2g}'} where {wanted}: {verdict}"
     if reach is not None and verdict == "not met" and not reach[0] <= target.value <= reach[1]:
         said += f"; within the parameters' ranges it goes from {reach[0]:.3g} to {reach[1]:.3g}"
     return said
@@ -182,16 +182,16 @@ def _curves(settings: CalibrateSettings, responses: Surfaces, best: Values, fold
 
 
 def _measured(entry: Json) -> str:
-    error = "" if entry["error"] is None else f" +- {entry['error']:.2g}"
+    error = "" if entry["error"] is None else f" ± {entry['error']:.2g}"
     return "-" if entry["measured"] is None else f"{entry['measured']:.4g}{error}"
 
 
 _FIGURES: dict[str, Callable[[Json], str]] = {
     "figure": lambda entry: entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else ""),
-    "wanted": lambda entry: f"{entry['wanted']:g} +- {entry['tolerance']:g} {entry['unit']}",
+    "wanted": lambda entry: f"{entry['wanted']:g} ± {entry['tolerance']:g} {entry['unit']}",
     "measured": _measured,
     "surface": lambda entry: (
-        "-" if entry["expected"] is None else f"{entry['expected']:.4g} +- {entry['expected_std']:.2g}"
+        "-" if entry["expected"] is None else f"{entry['expected']:.4g} ± {entry['expected_std']:.2g}"
     ),
     "verdict": lambda entry: entry["verdict"],
     "source": lambda entry: entry["source"],
@@ -202,7 +202,7 @@ _FIGURES: dict[str, Callable[[Json], str]] = {
 def _point_table(settings: CalibrateSettings, done: Simulated) -> Json:
     names = [target.name for target in settings.wanted.values() if target.fit]
     rows = [
-        [str(k + 1), *(f"{v:.4g}" for v in point.values()), *(f"{found[n][0]:.4g} +- {found[n][1]:.2g}" for n in names)]
+        [str(k + 1), *(f"{v:.4g}" for v in point.values()), *(f"{found[n][0]:.4g} ± {found[n][1]:.2g}" for n in names)]
         for k, (point, found) in enumerate(zip(done.points, done.figures, strict=True))
     ]
     return {"title": "Point by point", "head": ["point", *settings.free, *names], "rows": rows, "words": False}
@@ -211,7 +211,7 @@ def _point_table(settings: CalibrateSettings, done: Simulated) -> Json:
 def material_toml(stuff: Material, settings: CalibrateSettings, fit: Fit, figures: list[Json]) -> str:
     """The text of material.toml, which ``dem.grains.materials.read_material`` reads."""
     found_keys = {"surface_energy" if key == "bond_number" else key for key in settings.free}
-    said = ", ".join(f"{t.name} {t.value:g} +- {t.tolerance:g} {t.unit}" for t in settings.wanted.values() if t.fit)
+    said = ", ".join(f"{t.name} {t.value:g} ± {t.tolerance:g} {t.unit}" for t in settings.wanted.values() if t.fit)
     sources = dict(stuff.sources) | dict.fromkeys(found_keys, f"calibrated to {said}")
     shown = [f.name for f in fields(stuff) if f.name != "sources" and getattr(stuff, f.name) is not None]
     if stuff.cohesion == "none":

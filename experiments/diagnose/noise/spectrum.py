@@ -252,14 +252,14 @@ def line_rows(lines: Sequence[Line]) -> list[dict[str, Any]]:
 def line_sentence(row: Mapping[str, Any]) -> str:
     """A row of ``latent.lines`` in words."""
     shown = row["channels"][:_SHOWN]
-    sizes = ", ".join(f"{p['channel']} {p['amplitude']:.2g} +- {p['std']:.1g} {p['unit']}".rstrip() for p in shown)
+    sizes = ", ".join(f"{p['channel']} {p['amplitude']:.2g} ± {p['std']:.1g} {p['unit']}".rstrip() for p in shown)
     more = len(row["channels"]) - len(shown)
     also = f" and in {more} more" if more else ""
     phases = sorted(shown[0]["phases"].items(), key=lambda pair: -pair[1])
     where = ", ".join(f"{size:.2g} in phase {name}" for name, size in phases) if len(phases) > 1 else ""
     odds = "below 1e-6" if row["chance"] < 1e-6 else f"{row['chance']:.1g}"
     return (
-        f"Its spectrum has a line at {row['frequency_hz']:.4g} +- {row['std_hz']:.1g} Hz: amplitudes {sizes}{also}"
+        f"Its spectrum has a line at {row['frequency_hz']:.4g} ± {row['std_hz']:.1g} Hz: amplitudes {sizes}{also}"
         + (f" ({shown[0]['channel']}: {where})" if where else "")
         + f"; by chance, in noise of that colour, {odds}."
     )

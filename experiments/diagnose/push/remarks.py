@@ -48,7 +48,7 @@ def _stiffness(pushes: Sequence[Push]) -> list[str]:
         by_size.setdefault(push.diameter, []).append(float(z @ push.force / max(float(z @ z), 1e-300)))
     parts = []
     for size, found in sorted(by_size.items()):
-        spread = f" +- {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
+        spread = f" ± {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
         parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m at {1e3 * size:g} mm ({len(found)})")
     sentences = [f"K of a straight spring, push by push (number of pushes): {', '.join(parts)}."]
     if len(by_size) > 2:

@@ -130,7 +130,7 @@ def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -
 
     def written(key: str) -> str:
         error = errors.get(key)
-        return numeral(gap[key] or 0.0) if error is None else f"{gap[key]:.2f} +- {error:.1g}"
+        return numeral(gap[key] or 0.0) if error is None else f"{gap[key]:.2f} ± {error:.1g}"
 
     out = "" if gap["held_out"] is None else f" ({written('held_out')} held out)"
     return f"{written('fit')} fitted{out}"
@@ -186,7 +186,7 @@ def _numbers(leading: Mapping[str, Any]) -> list[str]:
     parts = []
     for effect, parameters in leading.get("parameters", {}).items():
         for name, told in parameters.items() if effect not in leading["certain"] else ():
-            error = f" +- {told['std']:.2g}" if told["std"] > 0 else ""
+            error = f" ± {told['std']:.2g}" if told["std"] > 0 else ""
             lost = told["std"] > _LOST * abs(told["value"]) > 0  # nothing that was seen changes with it there
             value = f"{effect} {name} {told['value']:.4g}{'' if lost else error} {told['unit']}".removesuffix(" 1")
             parts.append(f"{value} (no standard error: small changes of it have no effect)" if lost else value)

@@ -356,7 +356,7 @@ def test_every_surface_has_its_numbers_and_their_source(name):
 def test_the_weak_sand_is_twice_the_spike_that_was_computed_grain_by_grain():
     """Of an older step of the contact: its source says of which, and what the results that ship have since."""
     sand = find_surface("sand-weak")
-    told = re.findall(r"[0-9.]+(?= \+-)", sand.source)
+    told = re.findall(r"[0-9.]+(?= ±)", sand.source)
     spikes = [sand.stiffness / 2, sand.damping / 2]
     for name in ("penetrate", "penetrate-full"):
         kept = json.loads((Path(__file__).parents[3] / f"docs/results/{name}/result.json").read_text())["quantities"]
