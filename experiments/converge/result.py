@@ -95,7 +95,7 @@ def conclude(
     return Result.make(
         "converge",
         code=beds.fingerprint(),
-        title=f"A {1e3 * tip:g} mm spike in {beds.find_material(settings).name}, with its errors",
+        title=f"A {settings.body_words} in {beds.find_material(settings).name}, with its errors",
         status="done" if len(done) == len(members) else "stopped",
         quantities=entries,
         departures={"sentences": list(_sentences(found, settings, variants))},

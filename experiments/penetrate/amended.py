@@ -331,7 +331,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             "penetrate",
             ground=settings.ground,
             version=__version__,
-            title=f"A {1e3 * settings.tip_diameter:g} mm spike on the spring-damper, and with {law.words}",
+            title=f"A {settings.body_words} on the spring-damper, and with {law.words}",
             quantities=quantities_of(found, std=None),
             runs=[
                 {

@@ -63,7 +63,7 @@ def run_on_law(settings: PenetrateSettings, folder: RunFolder, progress: Progres
             ground=fitted.law,
             ground_file=fitted.model_dump(),
             version=__version__,
-            title=f"A {1e3 * settings.tip_diameter:g} mm spike on the law {fitted.law} of {fitted.material}",
+            title=f"A {settings.body_words} on the law {fitted.law} of {fitted.material}",
             quantities=quantities_of(found, std=None) | fitted_to,
             runs=[_entry(unit, runs[unit.id]) for unit in units],
             spike=asdict(make_spike(settings)) | {"load": settings.weight},

@@ -79,7 +79,7 @@ def conclude(
             entry["quantities"] |= numbers[entry["id"]]
     result: Json = {
         "code": codes.pop() if len(codes) == 1 else beds.fingerprint(),
-        "title": f"A {1e3 * settings.tip_diameter:g} mm spike in {material.name}",
+        "title": f"A {settings.body_words} in {material.name}",
         "status": "done",
         "quantities": quantities,
         "runs": entries,

@@ -353,6 +353,11 @@ class PenetrateSettings(StrictSettings):
         return (*self.drop_speeds, *self.used("other_drop_speeds"))
 
     @property
+    def body_words(self) -> str:
+        """The body in words, as in titles: "12 mm spike", or "16 mm flat foot"."""
+        return f"{1e3 * self.tip_diameter:g} mm {'flat foot' if self.tip == 'flat' else 'spike'}"
+
+    @property
     def foot(self) -> float:
         """Length of the spike, tip and shaft [m]."""
         return self.tip_height + self.shaft_length

@@ -117,6 +117,11 @@ def test_under_a_flat_tip_grains_are_made_twice_as_stiff(monkeypatch):
     assert peak < 0.9 * 0.05 < 0.05 < peak * (flat / ball) ** (2 / 3)
 
 
+@pytest.mark.parametrize(("tip", "named"), [("flat", "flat foot"), ("sphere", "spike"), ("cone", "spike")])
+def test_titles_call_a_flat_tip_a_foot(tip, named):
+    assert PenetrateSettings(**FOOT | {"tip": tip}).body_words.split(" mm ") == ["16", named]
+
+
 def test_numbers_of_a_motion_are_their_definitions():
     """Fr = v / sqrt(g D), I = v / D d sqrt(rho / P) with P = phi rho g D, phi = 0.6."""
     v, g, d, grain = 0.2, 3.7, 0.012, 0.002
