@@ -180,7 +180,7 @@ def _foot(
     if found.shape_errors is not None:
         rms, worst = (100 * error for error in found.shape_errors)
         print(f"it missed other shapes by {rms:.0f} % (rms), by {worst:.0f} % at worst")
-    print(f"its plates moved at {found.speed:.3g} m/s; the law knows no rate")
+    print(f"its plates moved at {found.speed:.3g} m/s; the law does not depend on the speed")
     for warning in warnings:
         say(f"warning: {warning}")
     return 0

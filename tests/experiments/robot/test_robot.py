@@ -206,7 +206,7 @@ def test_a_law_with_all_its_parameters_given_has_no_warning_of_defaults():
     [
         (
             {"ground": "power"},
-            r"ground = 'power': its defaults of stiffness and damping are those of brick .* ignore_foot_size",
+            r"ground = 'power': its defaults of stiffness and damping are those of brick .* --ignore-foot-size",
         ),
         ({"ground": "hunt-crossley", "ground_parameters": ("stiffness=4000",)}, "its defaults of dissipation are"),
         ({"ground": "bekker", "ground_parameters": ("exponent=1.3",)}, "exponent is given, and cohesive_modulus and"),
