@@ -59,7 +59,7 @@ def folder(tmp_path):
             float(now), {"position": at, "radius": np.full(len(at), 0.0025), "displacement": moved},
             {"spikes": (spikes, faces), "hull": (spikes, faces)},
             clouds={"row_forces": (centre[None] - [[0, 0, 0.04]], {"force": np.array([[0.0, 0.0, 2.0]])})},
-            maps={"surface": surface},
+            maps={"surface": surface}, values={"theta_deg": 5.7 * float(now), "force_z": 2.0},
         )  # fmt: skip
     return tmp_path
 
@@ -100,6 +100,15 @@ def test_the_picture_from_near_follows_a_tip_that_sinks_deep_so_that_its_arrow_s
         for focus, low in zip(near, reel.lowest(), strict=True)
     ]
     assert min(heights) > 0.1
+
+
+def test_a_run_that_goes_on_has_arrows_of_its_forces_and_curves_with_units(folder):
+    """Without an experiment's name in its result, as while it goes on, its frames are all there is."""
+    (source,) = sources_of(folder)
+    assert source.force == ("largest force", pytest.approx(2.0))
+    angle, force = source.panels
+    assert angle["label"] == "θ [degrees]" and force["label"].endswith("z [N]")
+    assert angle["lines"][0]["y"][-1] == pytest.approx(5.7)
 
 
 def test_the_page_says_that_grains_touch_a_cylinder_inside_the_hull_that_it_draws(folder):

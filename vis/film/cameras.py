@@ -26,6 +26,8 @@ _INNER = 0.94
 """Share of a picture's height that its margins leave."""
 _BELOW = 0.3
 """How far a tip lies at most below the middle of the picture from near, over its height: its arrow stays inside."""
+_LINE = 0.0315
+"""From one line of a key to the next, over the height of the sheet."""
 _STEADY = 0.03
 """Over which a camera's way is smoothed (standard deviation), over the run's duration."""
 
@@ -86,15 +88,17 @@ class _Plane(Camera):
         ends = stage.place(np.array([ring.mean(axis=0), ring[0]]), focus)
         axis.plot(ends[:, 0], ends[:, 1], color=INK, lw=1.6, solid_capstyle="round")
         axis.plot(ends[:1, 0], ends[:1, 1], "o", color=INK, ms=4)
-        axis.plot([0.02, 0.06], [0.96, 0.96], color=INK, lw=1.6)
-        axis.plot([0.02], [0.96], "o", color=INK, ms=4)
-        axis.text(0.075, 0.96, "from the centre to row 0", fontsize=9, va="center", color=INK, bbox=HALO)
+        line = _LINE / axis.get_position().height
+        first, second = 1.0 - 0.9 * line, 1.0 - 1.9 * line
+        axis.plot([0.02, 0.06], [first, first], color=INK, lw=1.6)
+        axis.plot([0.02], [first], "o", color=INK, ms=4)
+        axis.text(0.075, first, "from the centre to row 0", fontsize=9, va="center", color=INK, bbox=HALO)
         if radius := frame.values.get("hull_radius"):
             turn = np.linspace(0.0, 2 * np.pi, 181)
             circle = ring.mean(axis=0) + radius * np.column_stack([np.cos(turn), 0.0 * turn, np.sin(turn)])
             axis.plot(*stage.place(circle, focus).T, color=INK, lw=1.0, ls=(0, (4, 3)))
-            axis.plot([0.02, 0.06], [0.915, 0.915], color=INK, lw=1.0, ls=(0, (4, 3)))
-            axis.text(0.075, 0.915, "the cylinder that grains touch", fontsize=9, va="center", color=INK, bbox=HALO)
+            axis.plot([0.02, 0.06], [second, second], color=INK, lw=1.0, ls=(0, (4, 3)))
+            axis.text(0.075, second, "the cylinder that grains touch", fontsize=9, va="center", color=INK, bbox=HALO)
 
 
 class _Near(_Plane):

@@ -202,7 +202,7 @@ def work_plot(run: RunFolder) -> Plot | None:
     figure, axes = new_panels(2, height=2.7, sharey=True)
     law = any(value_of(r.quantities, "model_work_in") is not None for r in driven)
     sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
-    titles = {"work_in": "work in", "work_out": "work recovered"}
+    titles = {"work_in": "Work done on the way in", "work_out": "Work recovered on the way out"}
     for axis, (key, title) in zip(axes, titles.items(), strict=True):
         for shift, prefix, colour in sides:
             mean, spread = by_speed(driven, speeds, prefix + key, 1e3)
@@ -218,7 +218,7 @@ def work_plot(run: RunFolder) -> Plot | None:
                         plain(y, 2 if abs(y) < 0.1 else 3), (x, max(y, 0.0) + s), xytext=(0, 3), fontsize=7.5,
                         textcoords="offset points", ha="center", color=INK,
                     )  # fmt: skip
-        axis.set_title(f"Work {title}")
+        axis.set_title(title)
         axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
         axis.grid(False, axis="x")
         axis.set_xlim(-0.7, max(len(speeds), 2) - 0.3 if len(speeds) > 1 else 0.7)

@@ -148,7 +148,7 @@ class Page:
             axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), autoscale_on=False)
             draw(axis)
             self._rulers(axis, place, section)
-            figure.text(0.03, 0.965, title, fontsize=16, fontweight="bold", va="top")
+            figure.text(0.03, 0.965, title, fontsize=16, fontweight="bold", va="top", bbox=HALO)
             figure.text(0.03, 0.905, lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35, bbox=HALO)
             if note:
                 figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")

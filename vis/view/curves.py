@@ -50,6 +50,13 @@ _SMOOTH = 5e-3
 _MEAN = f"mean over {1e3 * _SMOOTH:g} ms"
 """In the label of each panel of such a mean."""
 
+_VALUES = {
+    "depth": ("depth of the tip [mm]", 1e3), "velocity": ("velocity, downwards [mm/s]", 1e3),
+    "force": ("force on the spike [N]", 1.0), "theta_deg": ("θ [degrees]", 1.0),
+    **{f"force_{axis}": (f"force of the ground, {axis} [N]", 1.0) for axis in AXES},
+}  # fmt: skip
+"""Of the values in frames: label and factor from the unit there."""
+
 
 def line(name: str, time: Array, values: Array, *, colour: str = BED, dashed: bool = False) -> Line:
     """A line of at most `2 * _BINS` points; what is not finite is left out. Peaks of `values` are kept."""
@@ -199,7 +206,8 @@ def of_frames(frames: Frames) -> list[Panel]:
     return [
         one
         for name in names
-        for one in panel(name, line("", frames.times, np.array([row.get(name, np.nan) for row in rows])))
+        for label, scale in [_VALUES.get(name, (name, 1.0))]
+        for one in panel(label, line("", frames.times, scale * np.array([row.get(name, np.nan) for row in rows])))
     ]
 
 

@@ -157,7 +157,7 @@ def _of_frames(home: Path, name: str, result: Result, runs: list[Run]) -> Source
         high[2] = max(min(high[2], surface + _FLIES * (surface - low[2])), surface)
     has_series = run is not None and run.bed is not None
     panels = curves.of_penetration(run) if run is not None and has_series else curves.of_frames(frames)
-    forces = [abs(frame.values["force"]) for frame in frames if "force" in frame.values] if body is not None else []
+    forces = [size for one in frames for size in _forces(one)] if body is not None else []
 
     def frame(index: int) -> Frame:
         found = frames[index]
@@ -172,6 +172,14 @@ def _of_frames(home: Path, name: str, result: Result, runs: list[Run]) -> Source
         low=low, high=high, panels=panels,
         force=("largest force", max(forces)) if any(forces) else None,
     )  # fmt: skip
+
+
+def _forces(frame: Frame) -> list[float]:
+    """Sizes of the forces that arrows show [N]: the one on a spike, or those on rows or feet."""
+    if "force" in frame.values:
+        return [abs(frame.values["force"])]
+    _, fields = frame.clouds.get("row_forces", (None, {}))
+    return [float(np.linalg.norm(force)) for force in fields.get("force", ())]
 
 
 def _curves_only(run: Run) -> Source:
