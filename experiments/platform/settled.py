@@ -15,9 +15,19 @@ from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
 from .numbers import PlatformNumbers
-from .surfaces import DEFAULT_SURFACE, find_surface, surface_of_grains
+from .surfaces import DEFAULT_SURFACE, Surface, find_surface, surface_of_grains
 
-__all__ = ["Number", "Plan", "Settled", "at_default", "check_lengths", "check_spike_length", "of_earth", "rig_fault"]
+__all__ = [
+    "Number",
+    "Plan",
+    "Settled",
+    "at_default",
+    "check_lengths",
+    "check_spike_length",
+    "of_earth",
+    "refuse_other_grains",
+    "rig_fault",
+]
 
 OTHER_BODY = 0.2
 """A mass, inertia or spike length that is off the platform's by more than this share is another body's."""
@@ -45,6 +55,16 @@ class Number:
     value: float
     unit: str
     origin: str
+
+
+def refuse_other_grains(surface: Surface, fitted: GroundFile | None) -> None:
+    """Raise ValueError, naming both, where the law of a file was fitted to other grains than those of `surface`."""
+    if fitted is None or surface.grains == fitted.material:
+        return
+    own = surface_of_grains(fitted.material)
+    expected = say("leave_out_surface") if own is None else say("own_surface", own=own)
+    made = say("made_of", grains=surface.grains) if surface.granular else say("hard")
+    raise ValueError(say("other_grains", surface=surface, fitted=fitted, made=made, expected=expected))
 
 
 class Settled(dict[str, Number]):
@@ -114,7 +134,8 @@ class Settled(dict[str, Number]):
         K and C are of a row, or of one of its `spikes_per_row`, half a row's where that is 2. Those of a spring-damper
         in `fitted`, which is of one spike, are multiplied by `row_of`; friction is that of the surface of its grains.
 
-        Raises ValueError for an unknown surface, and for more sliding than static friction.
+        Raises ValueError for an unknown surface or one of other grains than `fitted`, and for more sliding than static
+        friction.
         """
         material: Any
         warnings: list[str] = []
@@ -127,8 +148,8 @@ class Settled(dict[str, Number]):
         else:
             material = found = find_surface(surface or DEFAULT_SURFACE)
             name, origin = found.name, f"surface {found.name}"
-            if fitted is not None and surface is not None and found.grains != fitted.material:
-                warnings.append(say("friction_of_other", fitted=fitted, surface=found.name))
+            if surface is not None:
+                refuse_other_grains(found, fitted)
             warnings += [say("guess", surface=found)] if found.guess and fitted is None else []
         shared = origin if spikes_per_row == 1 else f"{origin}, a row's halved"
         for key in ("stiffness", "damping"):

@@ -9,20 +9,36 @@ from dem.grains.materials import material
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import Surface
 from rigid.ground.laws import SurfaceLaw, find_law
-from rigid.ground.soles import diameter_powers, ill_sized
+from rigid.ground.soles import Sole, diameter_powers, ill_sized, shape_ratio
 from rigid.ground_file import GroundFile
 from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
 from .settings import RobotSettings
 
-__all__ = ["SPIKE", "UnderFeet", "given_parameters", "law_of", "settle_other_law", "settle_spring"]
+__all__ = [
+    "SPIKE", "Largest", "UnderFeet", "fitted_words", "given_parameters", "law_of", "settle_other_law", "settle_spring",
+    "spring_words",
+]  # fmt: skip
 
 SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
 HARD = ("hunt-crossley", "power")  # Laws that hard ground has too: their defaults are those of brick
 SPIKE = 0.012  # Diameter of the spike that the defaults of the other laws are of [m] (rigid.ground.laws)
+SHAPE_DEPTH = 0.2
+"""Depth over the diameter of the foot at which its shape is compared with that of the tip [1]: that of a light foot."""
+LIKE_TIP = 1.1
+"""Ratio of forces above which, and below whose inverse, a foot has another shape than the tip [1]."""
 OWN_SCALE = {"bekker": ("radius", "tip_height"), "rft": ("radius",)}
 """Laws that take the foot's own size -> the parameters that it replaces."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Largest:
+    """The part of the feet that has the largest area from above."""
+
+    name: str
+    times: float  # Its area over that of the tip that the law is of [1]
+    sole: Sole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,11 +115,11 @@ def settle_spring(
 
 
 def settle_other_law(
-    settings: RobotSettings, surface: Surface, gravity: float, largest: float, numbers: dict[str, Number]
+    settings: RobotSettings, surface: Surface, gravity: float, largest: Largest, numbers: dict[str, Number]
 ) -> list[str]:
     """Settle the parameters of a law other than the spring-damper, and warn of those that are the law's defaults.
 
-    ``largest``: area of the largest foot over that of the spike that the defaults are of [1]. Raises ValueError for a
+    The spike that the defaults are of is the tip of ``largest``. Raises ValueError for a
     parameter there is not, or out of bounds. Unless they are accepted, it raises it also for one that no foot on grains
     has, and for a law of grains on hard ground.
     """
@@ -117,7 +133,7 @@ def settle_other_law(
     replaced = () if unsized or "radius" in given else OWN_SCALE.get(law.name, ())
     for parameter in law.parameters:
         name = parameter.name
-        origin = f"default of {law.name}, of one spike{_times(largest, powers.get(name, 0.0))}"
+        origin = f"default of {law.name}, of one spike{_times(largest.times, powers.get(name, 0.0))}"
         origin = "given" if name in given else origin
         if name not in ("gravity", *replaced) or (name in given and name != "gravity"):
             numbers[name] = Number(values[name], parameter.unit, origin)
@@ -126,11 +142,49 @@ def settle_other_law(
     left = [name for name in values if name not in own and name not in replaced]
     if not left:
         return []
-    scaled = any(name in powers for name in left)
-    how = "unsized" if unsized else "own_scale" if law.name in OWN_SCALE else "similar" if scaled else "none"
-    size = say(f"size_{how}", most=largest, spike=1e3 * SPIKE)
+    if unsized:
+        size = say("size_unsized", most=largest, spike=1e3 * SPIKE)
+    elif law.name in OWN_SCALE:
+        size = say(f"size_{law.name}", most=largest, spike=1e3 * SPIKE)
+    elif any(name in powers for name in left):
+        size = _similar(largest, Sole.of_spike(SPIKE), say("tip_sphere"), SPIKE, "dry sand")
+    else:
+        size = say("size_none")
     more = "" if "gravity" in own else ", nor gravity"
     return [say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)]
+
+
+def spring_words(settings: RobotSettings, surface: Surface, largest: Largest) -> list[str]:
+    """For which foot K and C of `surface` are, and how far the largest is from it, in a sentence; none if given."""
+    left = [key for key in ("stiffness", "damping") if getattr(settings, key) is None]
+    if not left:
+        return []
+    if surface.spike is None:
+        size = say("size_hard", most=largest)
+    else:
+        size = _similar(largest, Sole.of_spike(surface.spike), say("tip_sphere"), surface.spike, surface.name)
+    return [say("spring_defaults", names=" and ".join(left), surface=surface, size=size)]
+
+
+def fitted_words(fitted: GroundFile, largest: Largest) -> list[str]:
+    """The same of the law of a file."""
+    if largest.times == 1.0:
+        return []
+    tip, diameter = fitted.foot.tip, fitted.foot.diameter
+    if fitted.law in OWN_SCALE:
+        size = say("size_file", kind=say(f"tip_{tip}"), spike=1e3 * diameter, grains=fitted.material, most=largest)
+        return [say("fitted", file=fitted, size=size)]
+    soles = {"sphere": Sole.of_spike, "flat": Sole.of_flat_tip}  # 3D-RFT has no series of a cone here
+    sole = soles[tip](diameter) if tip in soles else None
+    return [say("fitted", file=fitted, size=_similar(largest, sole, say(f"tip_{tip}"), diameter, fitted.material))]
+
+
+def _similar(largest: Largest, tip: Sole | None, kind: str, diameter: float, grains: str) -> str:
+    """The size and shape of the largest foot over those of a tip, in words; ``tip``: None where it has no sole."""
+    ratio = 1.0 if tip is None else shape_ratio(largest.sole, tip, depth=SHAPE_DEPTH)
+    how = "" if 1 / LIKE_TIP <= ratio <= LIKE_TIP else "stiffer" if ratio > 1 else "softer"
+    shape = how and say(f"shape_{how}", ratio=ratio, depth=SHAPE_DEPTH)
+    return say("size_similar", kind=kind, spike=1e3 * diameter, grains=grains, most=largest, shape=shape)
 
 
 def _refuse_unsized(settings: RobotSettings, surface: Surface, law: SurfaceLaw, ill: list[str]) -> None:

@@ -88,7 +88,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
 
     def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
         super().__init__(settings, plan)
-        self.duration, self.surface, self.counterweight = settings.duration, settings.surface, 0.0
+        self.duration, self.surface, self.counterweight = settings.duration, plan.surface.name, 0.0
         self.gravity = plan.numbers["gravity"].value
         robot = self._robot = plan.robot()
         self.widths, self.narrowest = {}, math.inf  # Of the feet and of any part [m]

@@ -14,21 +14,23 @@ import numpy as np
 
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
-from coupling.robot.soles import plan_area
+from coupling.robot.soles import plan_area, sole_of
 from experiments.platform.ground_file import fitted_ground
-from experiments.platform.settled import Number
-from experiments.platform.surfaces import Surface, find_surface
+from experiments.platform.settled import Number, refuse_other_grains
+from experiments.platform.surfaces import Surface, find_surface, surface_of_grains
 from experiments.runs.given import keep_given, kept_copy
 from rigid.ground_file import GroundFile
+from rigid.platform.rig import STANDARD_GRAVITY
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
-from .laws import SPIKE, law_of, settle_other_law, settle_spring
+from .laws import SPIKE, Largest, fitted_words, law_of, settle_other_law, settle_spring, spring_words
 from .settings import RobotSettings
 
 __all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "try_controller", "width_of"]
 
 LAW_STEP = 4e-5  # Of a surface law [s], ten of which make an exchange by default
+DEFAULT_SURFACE = "sand"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MODEL, CONTROLLER = "model.mjb", "controller.py"  # Copies in the run folder
 
@@ -131,26 +133,31 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     of_model = f"model {robot.name}"
     numbers["mass"] = Number(robot.mass, "kg", of_model)
     numbers["gravity"] = Number(robot.gravity, "m/s2", "given" if settings.gravity is not None else of_model)
-    surface, fitted = find_surface(settings.surface), fitted_ground(settings.ground)
-    warnings = [part.note for foot in robot.feet for part in foot.parts if part.note]
+    fitted = fitted_ground(settings.ground)
+    surface, of_friction = _surface(settings, fitted)
+    warnings = of_friction + [part.note for foot in robot.feet for part in foot.parts if part.note]
     if robot.hangs:
         warnings.append(say("hangs"))
     if robot.floors:
         warnings.append(say("floors_off", floors=", ".join(robot.floors)))
     of_surface = settings.on_grains or settings.ground == "spring-damper"
-    scales = {}
+    scales, soles = {}, {}
     for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
         for part in foot.parts:
             tip = surface.spike if surface.granular else None
             tip = fitted.foot.diameter if fitted is not None else tip if of_surface else SPIKE
             scales[part.name] = _scale(part, to_matrix(turn), tip)
-    largest = max(scales.values())
+            soles[part.name] = sole_of(part, to_matrix(turn), of=tip or SPIKE)
+    most = max(scales, key=lambda name: (scales[name], soles[name].area))
+    largest = Largest(name=most, times=scales[most], sole=soles[most])
     if fitted is not None:
-        warnings += [say("fitted", file=fitted, most=largest)] if largest != 1.0 else []
-        warnings += [say("beyond_range", sentence=said, file=fitted) for said in _beyond_gravity(fitted, robot.gravity)]
+        warnings += fitted_words(fitted, largest)
+        warnings += _beyond_gravity(settings, fitted, robot.gravity)
+    elif of_surface:
+        warnings += settle_spring(settings, surface, robot.gravity, largest.times, numbers)
+        warnings += [] if settings.on_grains else spring_words(settings, surface, largest)
     else:
-        settle = settle_spring if of_surface else settle_other_law
-        warnings += settle(settings, surface, robot.gravity, largest, numbers)
+        warnings += settle_other_law(settings, surface, robot.gravity, largest, numbers)
     _settle_friction(settings, surface, numbers)
     if surface.guess and of_surface:
         warnings.append(say("guess", surface=surface))
@@ -161,11 +168,33 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     )  # fmt: skip
 
 
-def _beyond_gravity(fitted: GroundFile, gravity: float) -> list[str]:
-    """Whether gravity [m/s2] is outside the range of the law of a file, in words."""
+def _surface(settings: RobotSettings, fitted: GroundFile | None) -> tuple[Surface, list[str]]:
+    """The surface that the settings or the grains of a ground file name, and a warning where neither does.
+
+    Raises ValueError for a surface there is not, and for one of other grains than those of the file.
+    """
+    if settings.surface is not None:
+        surface = find_surface(settings.surface)
+        refuse_other_grains(surface, fitted)
+        return surface, []
+    own = surface_of_grains(fitted.material) if fitted is not None else DEFAULT_SURFACE
+    surface = find_surface(own or DEFAULT_SURFACE)
+    known = own is not None or settings.mu_s is not None
+    return surface, [] if known else [say("friction_of_default", file=fitted, surface=surface)]
+
+
+def _beyond_gravity(settings: RobotSettings, fitted: GroundFile, gravity: float) -> list[str]:
+    """A warning where gravity [m/s2] is outside the range of the law of a file, and that is accepted.
+
+    Raises ValueError where it is not accepted.
+    """
     low, high = fitted.range["gravity"]
     near = min(max(gravity, low), high)  # MuJoCo's own 9.81 m/s2 are as good as 9.80665
-    return fitted.beyond(gravity=near if abs(near - gravity) < 0.01 * near else gravity)
+    found = fitted.beyond(gravity=near if abs(near - gravity) < 0.01 * near else gravity)
+    if found and not settings.accept_gravity:
+        here = gravity / STANDARD_GRAVITY
+        raise ValueError(say("other_gravity", s=settings, sentence=found[0], here=here))
+    return [say("beyond_range", sentence=sentence, file=fitted) for sentence in found]
 
 
 def _settle_friction(settings: RobotSettings, surface: Surface, numbers: dict[str, Number]) -> None:

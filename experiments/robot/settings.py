@@ -41,8 +41,9 @@ class RobotSettings(GrainsSettings):
     gravity: NotNegative | None = Field(None, description="Gravity, downwards [m/s2]; the model's if not given.")
     duration: Positive = Field(2.0, le=3600, description="Simulated time [s].")
 
-    surface: str = "sand"
-    """Material: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights."""
+    surface: str | None = None
+    """Material: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; if not given, that of the grains of a
+    ground.toml, else sand."""
     ground: str = "spring-damper"
     """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, katsuragi-durian, bekker,
     rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or lammps (a bed whose grains
@@ -54,6 +55,8 @@ class RobotSettings(GrainsSettings):
     """Whether to run a law whose defaults do not fit this ground, as they are, whatever the size of the foot: those of
     a spike on brick (hunt-crossley, power) on grains, or those of a spike in sand (power-irreversible,
     katsuragi-durian, bekker, rft) on hard ground."""
+    ignore_gravity_range: bool = False
+    """Whether to run a ground.toml under a gravity outside its range."""
     stiffness: Positive | None = None
     """K of one foot [N/m]; that of one spike on the surface if not given, on sand times the area of the foot over the
     spike's."""
@@ -89,6 +92,8 @@ class RobotSettings(GrainsSettings):
             if self.ignore_foot_size:
                 return say("nothing_unsized", s=self)
             return say("of_a_file", s=self) if own else None
+        if self.ignore_gravity_range:
+            return say("no_range", s=self)
         known = [*GROUNDS, *ON_GRAINS]
         if self.ground not in known:
             return say("no_ground", s=self, known=nearest(self.ground, known))

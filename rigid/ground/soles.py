@@ -17,12 +17,12 @@ None of this holds on hard ground, where the spike gives way and not the ground,
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .laws import find_law
 from .rft_foot import FLAT, ROUND
 
-__all__ = ["SizedLaw", "Sole", "diameter_powers", "ill_sized", "sized_law"]
+__all__ = ["SizedLaw", "Sole", "diameter_powers", "ill_sized", "shape_ratio", "sized_law"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +39,11 @@ class Sole:
     def diameter(self) -> float:
         """Of the circle of the same area [m]."""
         return 2 * math.sqrt(self.area / math.pi)
+
+    @classmethod
+    def of_flat_tip(cls, diameter: float) -> "Sole":
+        """A shaft of `diameter` [m] with a level end."""
+        return cls(area=0.25 * math.pi * diameter**2, width=0.5 * diameter, perimeter=math.pi * diameter)
 
     @classmethod
     def of_spike(cls, diameter: float) -> "Sole":
@@ -101,6 +106,28 @@ def sized_law(
     ratio = sole.diameter / of
     powers = {name: power for name, power in diameter_powers(law, values).items() if name not in given}
     return SizedLaw(law=law, parameters=values | {name: values[name] * ratio**power for name, power in powers.items()})
+
+
+def shape_ratio(sole: Sole, tip: Sole, *, depth: float) -> float:
+    """Force on `sole` over that on a sole of its area and of the shape of `tip`, by 3D-RFT going slowly down [1].
+
+    ``tip``: the ball or flat end of a spike. ``depth``: of both, over the diameter of the circle of that area [1]. This
+    is what similarity (`sized_law`) leaves out: it takes every foot for one of the tip's shape. Density, friction and
+    gravity of the grains have no effect; surface friction is rft's default. Raises ValueError for a depth that is not
+    above 0, and as `sized_law`.
+    """
+    if not (math.isfinite(depth) and depth > 0):
+        raise ValueError(f"depth = {depth!r} must be above 0 (diameters) and finite")
+    size = sole.diameter
+    like = replace(
+        tip, area=sole.area, width=0.5 * size, height=tip.height * size / tip.diameter,
+        perimeter=tip.perimeter * size / tip.diameter,
+    )  # fmt: skip
+    own, other = (sized_law("rft", {}, each, of=size) for each in (sole, like))
+    law = find_law(own.law)
+    return float(law.force(depth * size, 0.0, law.numbers(own.parameters))) / float(
+        law.force(depth * size, 0.0, law.numbers(other.parameters))
+    )
 
 
 def _refuse_sizes(sole: Sole, of: float) -> None:

@@ -19,7 +19,6 @@ from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
 from experiments.runs.folder import RunFolder, read_series
 from rigid.ground.laws import find_law
-from rigid.ground_file import GroundFile
 from vis.page.folder import read_columns
 from vis.view.page import report_scene
 from vis.view.sources import sources_of
@@ -157,24 +156,6 @@ def test_a_hull_that_stays_above_the_grains_does_not_set_the_k_that_a_warning_na
     assert len(on_bed.told.warnings) == len(on_bed.plan.warnings)
 
 
-def test_a_gravity_beyond_the_range_of_a_ground_file_is_told_before_the_run(tmp_path):
-    law = GroundFile(
-        format="hedgebed-ground/1", law="spring-damper", material="sand", source="a test",
-        foot={"tip": "sphere", "diameter": 0.012},
-        range={"load": (0, 50), "depth": (0, 0.1), "speed": (0, 5), "gravity": (9.8, 9.8), "diameter": (0.012, 0.012)},
-        parameters={name: {"value": value, "std": 0.1} for name, value in (("stiffness", 62.0), ("damping", 0.5))},
-    ).write(tmp_path / "ground.toml")  # fmt: skip
-    told = [
-        [
-            said
-            for said in plan_robot(RobotSettings(**HOPPER, ground=str(law), gravity=gravity)).warnings
-            if "9.8" in said
-        ]
-        for gravity in (9.81, 9.81e-3)
-    ]
-    assert not told[0] and "gravity = 0.00981" in told[1][0]
-
-
 @pytest.mark.parametrize("law", ["hunt-crossley", "power", "power-irreversible", "katsuragi-durian", "bekker", "rft"])
 def test_a_law_whose_parameters_do_not_follow_from_the_surface_says_so_and_its_title_names_none(law, tmp_path):
     """The foot of the hopper has 60 mm, 25 times the area of the spike of 12 mm that the defaults are of."""
@@ -182,7 +163,7 @@ def test_a_law_whose_parameters_do_not_follow_from_the_surface_says_so_and_its_t
     plan = plan_robot(settings)
     (said,) = [said for said in plan.warnings if "ground_parameters" in said]
     assert all(word in said for word in ("12 mm", "'jsc1a'", "ground.toml"))
-    assert float(re.findall(r"up to ([0-9.]+)", said)[0]) == pytest.approx(25, rel=0.02)
+    assert float(re.findall(r"has ([0-9.]+) times", said)[0]) == pytest.approx(25, rel=0.02)
     assert ("nor gravity" in said) == (law != "rft") and not [said for said in plan.warnings if "a guess" in said]
     made = RobotFollowed(settings, plan).run_on_law()
     made.run()
@@ -236,7 +217,7 @@ def test_a_law_of_grains_is_refused_on_hard_ground_and_accepted_it_is_that_of_th
     parts = plan.law_feet(plan.robot()).grounds[0][:8]
     assert sum(float(one.force(2e-3, 0.1)) for one in parts) == pytest.approx(once, rel=1e-9)
     assert not [number.origin for number in plan.numbers.values() if "under a foot" in number.origin]
-    assert [said for said in plan.warnings if "also under a" in said]
+    assert [said for said in plan.warnings if "also under" in said]
 
 
 def test_a_larger_foot_has_more_force_under_a_law_and_its_numbers_say_how_much():

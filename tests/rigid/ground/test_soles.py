@@ -11,7 +11,7 @@ from rigid.ground.laws import GROUNDS, find_law
 from rigid.ground.rft import flat_plate, stress_gradient, tractions
 from rigid.ground.rft_foot import FLAT, LYING, ROUND
 from rigid.ground.rft_table import law_force, mesh_pieces
-from rigid.ground.soles import Sole, diameter_powers, ill_sized, sized_law
+from rigid.ground.soles import Sole, diameter_powers, ill_sized, shape_ratio, sized_law
 
 SAND = {"bulk_density": 1500.0, "friction": 0.6, "gravity": 9.81}
 BALL = Sole.of_spike(0.012)
@@ -174,3 +174,20 @@ def test_a_roundness_there_is_not_and_a_round_foot_without_height_are_refused():
         law.numbers({"roundness": 0.5})
     with pytest.raises(ValueError, match=r"height = 0 m of a round foot"):
         law.numbers({"roundness": 2.0, "height": 0.0})
+
+
+def test_the_ratio_of_shapes_is_that_of_two_forces_of_3d_rft_whatever_size_and_grains():
+    """A flat foot without walls has 0.876 xi A z, a ball of its area the law rft; a shape has itself once."""
+    area, gradient = 3e-3, stress_gradient(bulk_density=1500.0, friction=0.6, gravity=9.80665)
+    radius = math.sqrt(area / math.pi)
+    flat = Sole(area=area, width=radius, perimeter=0.0)
+    law = find_law("rft")
+    for share in (0.05, 0.2, 1.0):
+        depth = 2 * share * radius
+        ball = law.force(depth, 0.0, law.numbers({"radius": radius}))
+        found = shape_ratio(flat, Sole.of_spike(0.012), depth=share)
+        assert found == pytest.approx(flat_plate() * gradient * area * depth / ball, rel=6e-3)  # the series: 0.5 %
+    for tip in (Sole.of_spike(0.012), Sole.of_flat_tip(0.012)):
+        assert shape_ratio(tip, tip, depth=0.3) == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(ValueError, match="depth = 0"):
+        shape_ratio(flat, flat, depth=0.0)

@@ -1,0 +1,75 @@
+"""The law under a robot's feet: for which foot its numbers are, and what a ground file does not go with."""
+
+import pytest
+
+from experiments.robot.plan import plan_robot
+from experiments.robot.settings import RobotSettings
+from rigid.ground.laws import find_law
+from rigid.ground_file import GroundFile
+
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+
+HOPPER = {"model": "hopper", "feet": ("foot",)}
+BALL = """<mujoco><worldbody><body pos="0 0 0.1"><freejoint/><geom name="foot" type="sphere" size="0.04" mass="1"/>
+</body></worldbody></mujoco>"""
+
+
+def ground_file(path, *, material="sand", law="spring-damper", **parameters):
+    """A law of a ball of 12 mm at 1 g in a file; its path."""
+    found = find_law(law).values(parameters)
+    return str(GroundFile(
+        format="hedgebed-ground/1", law=law, material=material, source="a test",
+        foot={"tip": "sphere", "diameter": 0.012},
+        range={"load": (0, 50), "depth": (0, 0.1), "speed": (0, 5), "gravity": (9.8, 9.8), "diameter": (0.012, 0.012)},
+        parameters={name: {"value": value, "std": 0.1} for name, value in found.items()},
+    ).write(path / "ground.toml"))  # fmt: skip
+
+
+def test_a_ground_file_of_another_gravity_is_refused_unless_that_is_accepted(tmp_path):
+    file = ground_file(tmp_path)
+    near = plan_robot(RobotSettings(**HOPPER, ground=file, gravity=9.81))  # MuJoCo's own
+    assert not [said for said in near.warnings if "9.8" in said]
+    low = HOPPER | {"ground": file, "gravity": 9.81e-3}
+    with pytest.raises(ValueError, match=r"ground = .*ground.toml': gravity = 0.00981 m/s2 .* --gravity 0.001g"):
+        plan_robot(RobotSettings(**low))
+    assert [said for said in plan_robot(RobotSettings(**low, accept_gravity=True)).warnings if "0.00981" in said]
+    with pytest.raises(ValueError, match="accept_gravity: only"):
+        RobotSettings(**HOPPER, accept_gravity=True)
+
+
+def test_a_ground_file_of_other_grains_than_the_surface_is_refused_by_both_names(tmp_path):
+    given = HOPPER | {"ground": ground_file(tmp_path)}
+    for surface, made in (("steel", "hard ground"), ("jsc1a", "made of jsc-1a-loose-cut")):
+        with pytest.raises(ValueError, match=f"surface = '{surface}' is {made}, .* is of sand. .*surface = 'sand'"):
+            plan_robot(RobotSettings(**given, surface=surface))
+    own = plan_robot(RobotSettings(**given)), plan_robot(RobotSettings(**given, surface="sand"))
+    assert own[0].surface == own[1].surface and own[0].warnings == own[1].warnings
+    (tmp_path / "other").mkdir()
+    given = HOPPER | {"ground": ground_file(tmp_path / "other", material="beads")}
+    told = [plan_robot(RobotSettings(**given | more)).warnings for more in ({}, {"mu_s": 0.4})]
+    assert [len([said for said in some if "made of beads" in said]) for some in told] == [1, 0]
+    mine = ground_file(tmp_path, material="jsc-1a-loose-cut")
+    assert plan_robot(RobotSettings(**HOPPER, ground=mine)).surface.name == "jsc1a"
+
+
+def test_each_law_states_for_which_foot_its_numbers_are_and_how_far_this_one_is_from_it(tmp_path):
+    """3D-RFT: a flat foot has 2.5 times the force of a ball of its area at 0.2 diameters, a ball that of itself."""
+
+    def told(**given):
+        warnings = plan_robot(RobotSettings(**HOPPER | given)).warnings
+        (said,) = [text for text in warnings if text.startswith("the law ")]
+        return said
+
+    file = ground_file(tmp_path)
+    for given in ({}, {"ground": "katsuragi-durian"}, {"ground": "power-irreversible"}, {"ground": file}):
+        said = told(**given)
+        assert "ball tip of 12 mm" in said and "24.8 times" in said and "2.5 times" in said and "too deep" in said
+    for given in ({"ground": "rft"}, {"ground": "bekker"}, {"ground": ground_file(tmp_path, law="rft")}):
+        assert "24.8 times" in told(**given) and "too deep" not in told(**given)
+    assert "'foot'" in told(surface="brick") and "hard ground" in told(surface="brick")
+    given = {"stiffness": 900.0, "damping": 3.0}
+    assert not [said for said in plan_robot(RobotSettings(**HOPPER | given)).warnings if "law" in said]
+    round_ = tmp_path / "ball.xml"
+    round_.write_text(BALL)
+    said = told(model=str(round_))
+    assert "ball tip of 12 mm" in said and "too" not in said
