@@ -18,6 +18,7 @@ import numpy as np
 
 from rigid.checks import check_above_zero
 from rigid.ground.laws import find_law
+from rigid.ground.specialised import Specialised, specialised
 
 from .body import MujocoRobot
 from .feet import Foot, Part, refuse_missing
@@ -43,7 +44,6 @@ class _Depths:
     now: list[float]  # At the time of the last call
     before: list[float] = field(default_factory=list)  # At the time before that
     time: float = math.inf  # Of the last call [s]
-    until: float = -math.inf  # Where the next step ends at the latest [s]
 
 
 class FootForces(AbstractContextManager["FootForces"]):
@@ -87,7 +87,7 @@ class FootForces(AbstractContextManager["FootForces"]):
         if len(rebounds) > 1:
             raise ValueError(f"under has several values of rebound, {sorted(rebounds)}: all feet must have the same")
         self._rebound = rebounds.pop() if rebounds else 1.0
-        self._kind = mujoco.mjtObj.mjOBJ_BODY
+        self._kind = int(mujoco.mjtObj.mjOBJ_BODY)  # an int takes 0.1 us less than the enumeration
         self._rates, self._force, self._torque = np.zeros(6), np.zeros(3), np.zeros(3)
         self._depths: WeakKeyDictionary[Any, _Depths] = WeakKeyDictionary()
         self._plans: list[tuple[Foot, list[_Group]]] = []
@@ -97,10 +97,12 @@ class FootForces(AbstractContextManager["FootForces"]):
             for part in foot.parts:
                 own = under.get(part.name, given)
                 numbers = found.numbers(own, count=part.share * scales.get(part.name, 1.0))
-                groups += _groups(part, numbers, count)
+                groups += _groups(part, specialised(found, numbers), count)
                 count += len(part.centres)
             self._plans.append((foot, groups))
         self._zeros = [0.0] * count
+        self._forgotten = _Depths(self._zeros, self._zeros)  # of a law without memory
+        self._apply, self._velocity = mujoco.mj_applyFT, mujoco.mj_objectVelocity
 
     def __enter__(self) -> "FootForces":
         self._refuse_unstable()
@@ -139,108 +141,113 @@ class FootForces(AbstractContextManager["FootForces"]):
         if depths is None:
             depths = self._depths[data] = _Depths(self._zeros)
         time = float(data.time)
-        if not depths.time <= time <= depths.until:
-            depths.before = self._zeros
-        elif time > depths.time:
-            depths.before = depths.now
-        depths.now, depths.time = self._zeros.copy(), time
-        depths.until = time + 1.5 * float(model.opt.timestep)
+        if time != depths.time:  # reading the time step takes as long as a point of a foot
+            follows = depths.time < time <= depths.time + 1.5 * float(model.opt.timestep)
+            depths.before, depths.time = depths.now if follows else self._zeros, time
+        depths.now = self._zeros.copy()
         return depths
 
     def __call__(self, model: Any, data: Any) -> None:
         """Add the forces of now to ``data.qfrc_passive``; positions and velocities of bodies must be up to date."""
         if model is not self.model:
             return
-        depths = self._remembered(model, data)
+        depths = self._remembered(model, data) if self._law.has_memory else self._forgotten
+        places, turns = data.xipos, data.xmat
         for foot, groups in self._plans:
             body = foot.body
-            at = data.xipos[body]
-            height = float(at[2])
+            height = places.item(body, 2)
             if height > foot.reach:
                 continue
-            if self._push(data, body, height, data.xmat[body].tolist(), groups, depths):
-                self._mujoco.mj_applyFT(model, data, self._force, self._torque, at, body, data.qfrc_passive)
+            if self._push(data, body, height, turns[body].tolist(), groups, depths):
+                self._apply(model, data, self._force, self._torque, places[body], body, data.qfrc_passive)
 
     def _push(self, data: Any, body: int, height: float, m: list[float], groups: Any, depths: _Depths) -> bool:
         """Force and torque of a foot about its origin into `_force` and `_torque`; whether there are any."""
-        loading, rate_force, mu_d, slow = self._law.loading, self._law.rate_force, self._mu_d, self._slip
-        linear, remembers, rebound = self._law.name == "spring-damper", self._law.has_memory, self._rebound
+        mu_d, slow, remembers, rebound = self._mu_d, self._slip, self._law.has_memory, self._rebound
         before, now, sqrt = depths.before, depths.now, math.sqrt
         m0, m1, m2, m3, m4, m5, m6, m7, m8 = m
         fx = fy = fz = tx = ty = tz = 0.0
         moving = None
-        for gx, gy, gz, reach, numbers, round_, points in groups:
-            if height + m6 * gx + m7 * gy + m8 * gz > reach:
+        for gx, gy, gz, ex, ey, ez, law, radius, spreads, points in groups:
+            if height + m6 * gx + m7 * gy + m8 * gz > abs(m6) * ex + abs(m7) * ey + abs(m8) * ez:
                 continue
             self.points += len(points)
-            for cx, cy, cz, radius, spread, place in points:
-                az = m6 * cx + m7 * cy + m8 * cz - radius
-                if not round_:  # the lowest point of an ellipsoid: c - S S z / |S z|
-                    s0, s1, s2, s3, s4, s5 = spread
+            new_depth, low = law.force, radius - height
+            for cx, cy, cz, place in points:  # tuples of two or more are not assigned: that takes longer
+                depth = low - m6 * cx - m7 * cy - m8 * cz
+                if spreads:  # the lowest point of an ellipsoid: c - S S z / |S z|
+                    s0, s1, s2, s3, s4, s5 = spreads[place]
                     dx, dy, dz = s0 * m6 + s1 * m7 + s2 * m8, s1 * m6 + s3 * m7 + s4 * m8, s2 * m6 + s4 * m7 + s5 * m8
                     size = sqrt(dx * dx + dy * dy + dz * dz)
-                    az -= size
-                depth = -(height + az)
+                    depth += size
                 if depth <= 0.0:
                     continue
-                if not round_:
+                if spreads:
                     size = size if size > 1e-300 else 1.0
-                    cx, cy, cz = (
-                        cx - (s0 * dx + s1 * dy + s2 * dz) / size, cy - (s1 * dx + s3 * dy + s4 * dz) / size,
-                        cz - (s2 * dx + s4 * dy + s5 * dz) / size,
-                    )  # fmt: skip
-                ax, ay = m0 * cx + m1 * cy + m2 * cz, m3 * cx + m4 * cy + m5 * cz
+                    cx -= (s0 * dx + s1 * dy + s2 * dz) / size
+                    cy -= (s1 * dx + s3 * dy + s4 * dz) / size
+                    cz -= (s2 * dx + s4 * dy + s5 * dz) / size
+                ax = m0 * cx + m1 * cy + m2 * cz
+                ay = m3 * cx + m4 * cy + m5 * cz
                 if moving is None:
-                    self._mujoco.mj_objectVelocity(self.model, data, self._kind, body, self._rates, 0)
+                    self._velocity(self.model, data, self._kind, body, self._rates, 0)
                     moving = wx, wy, wz, vx, vy, vz = self._rates.tolist()
                 rate = wy * ax - wx * ay - vz
-                if linear:  # the spring-damper without two calls, a fifth of the time of a foot on many points
-                    load = numbers[0] * depth + (numbers[1] * rate if rate > 0.0 else 0.0)
-                elif not remembers:
-                    load = loading(depth, numbers) + rate_force(depth, rate, numbers)
+                if not remembers:
+                    load = new_depth(depth, rate)
                 elif depth < (top := before[place]):  # `SurfaceLaw.force`, written out as it takes most of the time
                     now[place] = top
                     share = 1.0 - (top - depth) / (rebound * top)
-                    load = (loading(top, numbers) * share if share > 0.0 else 0.0) + rate_force(depth, rate, numbers)
+                    load = (law.loading(top) * share if share > 0.0 else 0.0) + law.rate_force(depth, rate)
                 else:
                     now[place] = depth
-                    load = loading(depth, numbers) + rate_force(depth, rate, numbers)
+                    load = new_depth(depth, rate)
                 if load <= 0.0:
                     continue
-                ux, uy = vx + wy * az - wz * ay, vy + wz * ax - wx * az
+                az = -height - depth
+                ux = vx + wy * az - wz * ay
+                uy = vy + wz * ax - wx * az
                 size = sqrt(ux * ux + uy * uy)
                 share = -mu_d * load / (size if size > slow else slow)
-                px, py = share * ux, share * uy
-                fx, fy, fz = fx + px, fy + py, fz + load
-                tx, ty, tz = tx + ay * load - az * py, ty + az * px - ax * load, tz + ax * py - ay * px
+                px = share * ux
+                py = share * uy
+                fx += px
+                fy += py
+                fz += load
+                tx += ay * load - az * py
+                ty += az * px - ax * load
+                tz += ax * py - ay * px
         force, torque = self._force, self._torque  # one by one: NumPy takes three times as long for a tuple
         force[0], force[1], force[2] = fx, fy, fz
         torque[0], torque[1], torque[2] = tx, ty, tz
         return fz > 0.0
 
 
-_Group = tuple[float, float, float, float, tuple[float, ...], bool, list[tuple[Any, ...]]]
-"""Points of a part. Of all: a middle [m], the radius of a ball about it around them [m], the law's numbers, whether
-they are corners or on balls. Of each: its centre [m], its ball's radius [m] or 0, its S as xx, xy, xz, yy, yz, zz
-[m], its place among all points of the feet."""
+_Group = tuple[
+    float, float, float, float, float, float, Specialised, float, dict[int, list[float]], list[tuple[Any, ...]]
+]
+"""Points of a part. Of all: the middle and half the sides of a box around them [m], the law, the radius of the
+balls that they are the lowest points of [m], or 0. Of each on an ellipsoid: its S as xx, xy, xz, yy, yz, zz [m]. Of
+each: its centre [m], its place among all points of the feet."""
 
 
-def _groups(part: Part, numbers: tuple[float, ...], first: int) -> list[_Group]:
-    """The points of a part, the `first`th and on, in a lower and an upper half: mostly one of them is in the air."""
-    radii = part.spreads[:, 0, 0]
-    round_ = bool(np.array_equal(part.spreads, radii[:, None, None] * np.eye(3)))
+def _groups(part: Part, law: Specialised, first: int) -> list[_Group]:
+    """The points of a part, the `first`th and on, in a lower and an upper half: mostly one of them is in the air.
+
+    A part has balls of one radius, or ellipsoids.
+    """
+    radius = float(part.spreads[0, 0, 0])
+    round_ = bool(np.array_equal(part.spreads, np.broadcast_to(radius * np.eye(3), part.spreads.shape)))
     sides = part.centres[:, 2] < part.centres[:, 2].mean()
     found = []
     for some in (np.flatnonzero(sides), np.flatnonzero(~sides)):
         if not len(some):
             continue
-        middle = part.centres[some].mean(axis=0)
-        sizes = np.linalg.norm(part.spreads[some], 2, axis=(1, 2))
-        reach = float((np.linalg.norm(part.centres[some] - middle, axis=1) + sizes).max())
-        rows = [
-            (*part.centres[k].tolist(), float(radii[k]) if round_ else 0.0,
-             part.spreads[k][np.triu_indices(3)].tolist(), first + int(k))
-            for k in some
-        ]  # fmt: skip
-        found.append((*middle.tolist(), reach * (1 + 1e-12), numbers, round_, rows))
+        sizes = np.linalg.norm(part.spreads[some], axis=2)  # half the sides of a box around each ball or ellipsoid
+        low, high = (part.centres[some] - sizes).min(axis=0), (part.centres[some] + sizes).max(axis=0)
+        middle, half = 0.5 * (low + high), 0.5 * (high - low) * (1 + 1e-12)
+        spreads = {first + int(k): part.spreads[k][np.triu_indices(3)].tolist() for k in some}
+        rows = [(*part.centres[k].tolist(), first + int(k)) for k in some]
+        own = (radius, {}) if round_ else (0.0, spreads)
+        found.append((*middle.tolist(), *half.tolist(), law, *own, rows))
     return found
