@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -12,10 +12,18 @@ from rigid.ground.soles import Sole, sized_law
 
 from .feet import Foot, Part
 
-__all__ = ["law_under_feet", "outline", "plan_area", "sole_of"]
+__all__ = ["FeetLaw", "law_under_feet", "outline", "plan_area", "sole_of"]
 
 LEAST = 1e-3
 """Area of a part over that of the tip below which it counts as that much: of a plate that stands on its edge."""
+
+
+class FeetLaw(TypedDict):
+    """Arguments of `LawFeet` and `FootForces`: a law as each part of the feet has it."""
+
+    law: str
+    under: dict[str, Mapping[str, float]]  # Name of a part -> its parameters
+    scales: dict[str, float]  # Name of a part -> how many times the law it has [1]
 
 
 def plan_area(vertices: Any) -> float:
@@ -71,13 +79,14 @@ def law_under_feet(
     *,
     of: float,
     given: Collection[str] = (),
-) -> dict[str, Any]:
+) -> FeetLaw:
     """A law of a tip of diameter `of` [m] as each part of `feet` has it: arguments of `LawFeet` and `FootForces`.
 
     ``matrices``: rotation of each foot in the posture in which its size counts. ``parameters``, ``given``: as
     `rigid.ground.soles.sized_law` has them. Raises ValueError as it.
     """
-    under, scales = {}, {}
+    under: dict[str, Mapping[str, float]] = {}
+    scales: dict[str, float] = {}
     name = law
     for foot, matrix in zip(feet, matrices, strict=True):
         for part in foot.parts:

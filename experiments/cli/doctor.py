@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from experiments.cli import probes
+from experiments.cli.probes import Answer
 from experiments.runs.memory import cores_there, memory_there
 from experiments.runs.version import __version__
 from hedgebed_taichi import chosen, unknown_processor
@@ -43,7 +43,7 @@ def cache_folder() -> Path:
     return Path(given).expanduser() if given else Path.home() / ".cache" / "hedgebed"
 
 
-def probe(*arguments: str, timeout: float = 90.0) -> dict[str, Any]:
+def probe(*arguments: str, timeout: float = 90.0) -> Answer:
     """What `experiments.cli.probes` says to `arguments`, asked in a process of its own.
 
     A crash, a hang past `timeout` [s] or an exception comes back as ``{"ok": False, "reason": ...}``.
@@ -59,7 +59,8 @@ def probe(*arguments: str, timeout: float = 90.0) -> dict[str, Any]:
     if done.returncode:
         return {"ok": False, "reason": lines[-1] if lines else f"ended with status {done.returncode}"}
     try:
-        return json.loads(lines[-1])
+        found: Answer = json.loads(lines[-1])
+        return found
     except (IndexError, json.JSONDecodeError):
         return {"ok": False, "reason": "gave no answer"}
 
@@ -71,7 +72,7 @@ def _python() -> Finding:
     return Finding("Python", fits, detail, f"use Python {between}", required=True)
 
 
-def _taichi(arch: str, answer: dict[str, Any]) -> Finding:
+def _taichi(arch: str, answer: Answer) -> Finding:
     remedies = {
         "cpu": "pip install taichi",
         "cuda": "needs an NVIDIA card and its driver; the bed runs on the CPU without",
@@ -109,7 +110,7 @@ def _cache() -> Finding:
     return Finding("cache of beds", writable and free >= GIB // 4, detail, "set HEDGEBED_CACHE to a folder with room")
 
 
-def _opengl(answer: dict[str, Any]) -> Finding:
+def _opengl(answer: Answer) -> Finding:
     drawn = f"a picture off screen ({answer.get('renderer') or 'renderer unknown'})"
     detail = drawn if answer["ok"] else answer["reason"]
     remedy = "apt install libegl1 libgl1-mesa-dri (runs work without it; plots stand in for the pictures)"

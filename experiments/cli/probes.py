@@ -5,12 +5,21 @@
 
 import json
 import sys
-from typing import Any
+from typing import NotRequired, TypedDict
 
-__all__ = ["try_opengl", "try_taichi"]
+__all__ = ["Answer", "try_opengl", "try_taichi"]
 
 
-def try_taichi(arch: str) -> dict[str, Any]:
+class Answer(TypedDict):
+    """What a trial found."""
+
+    ok: bool
+    reason: str  # Why it is not ok; "" where it is
+    version: NotRequired[str]  # Of the library
+    renderer: NotRequired[str]  # Of OpenGL
+
+
+def try_taichi(arch: str) -> Answer:
     """Start Taichi on `arch` (cpu, cuda or vulkan), run a kernel, and say whether the sum came out."""
     from hedgebed_taichi import ti
     from hedgebed_taichi import version as taichi_version
@@ -36,7 +45,7 @@ def try_taichi(arch: str) -> dict[str, Any]:
     return {"version": version, "ok": ok, "reason": "" if ok else f"the sum of 0..999 came out as {total}"}
 
 
-def try_opengl() -> dict[str, Any]:
+def try_opengl() -> Answer:
     """Draw a small ball off screen and say whether there is anything in the picture."""
     import pyvista
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict
 
 from coupling.robot import Foot, law_under_feet
+from coupling.robot.soles import FeetLaw
 from dem.grains.materials import material
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import Surface
@@ -41,6 +42,13 @@ class Largest:
     sole: Sole
 
 
+class OneLaw(TypedDict):
+    """Arguments of `LawFeet` where every part has the same law."""
+
+    law: str
+    parameters: Mapping[str, float]
+
+
 @dataclass(frozen=True, kw_only=True)
 class UnderFeet:
     """A law, and the tip that its parameters are of."""
@@ -50,7 +58,7 @@ class UnderFeet:
     of: float | None  # Diameter of the tip [m]; None where they are not scaled to the size of a foot
     given: Collection[str] = ()  # Names of parameters that are of one foot already
 
-    def options(self, feet: Sequence[Foot], matrices: Sequence[Any]) -> dict[str, Any]:
+    def options(self, feet: Sequence[Foot], matrices: Sequence[Any]) -> FeetLaw | OneLaw:
         """Arguments of `LawFeet` for `feet`, turned by `matrices`."""
         if self.of is None:
             return {"law": self.law, "parameters": self.parameters}

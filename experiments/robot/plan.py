@@ -191,7 +191,7 @@ def _beyond_gravity(settings: RobotSettings, fitted: GroundFile, gravity: float)
     low, high = fitted.range["gravity"]
     near = min(max(gravity, low), high)  # MuJoCo's own 9.81 m/s2 are as good as 9.80665
     found = fitted.beyond(gravity=near if abs(near - gravity) < 0.01 * near else gravity)
-    if found and not settings.accept_gravity:
+    if found and not settings.ignore_gravity_range:
         here = gravity / STANDARD_GRAVITY
         raise ValueError(say("other_gravity", s=settings, sentence=found[0], here=here))
     return [say("beyond_range", sentence=sentence, file=fitted) for sentence in found]

@@ -49,6 +49,8 @@ def test_every_kind_of_run_has_limits(kind):
         ({"experiment": "tumble", "ground": "bed", "grains": {}}, "platform on grains"),
         ({"experiment": "tumble", "ground": "spring-damper"}, "planar model"),
         ({"experiment": "tumble spatial", "ground": "bed"}, "platform on grains"),
+        ({"experiment": "mujoco", "ground": "bed", "grains": {}}, "robot on grains"),
+        ({"experiment": "mujoco", "ground": "rft"}, "robot on a law"),
         ({"experiment": "paper"}, "planar model"),
         ({"experiment": "bed test cone"}, "bed"),
         ({"experiment": "diagnose"}, "diagnosis"),

@@ -19,7 +19,7 @@ MOST_ROWS = 6
 _FINDINGS = 3
 _ERRORS = ("± chance", "± grain size", "± bed, softness, speed")
 _SPREAD = re.compile(r"^(?P<mean>[^±]+?)\s±\s(?P<error>\S+)(?P<unit>\s.*)?$")
-_ON_GRAINS = ("spike on grains", "platform on grains", "bed")
+_ON_GRAINS = ("spike on grains", "platform on grains", "robot on grains", "bed")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,9 @@ from .marks import insert
 
 __all__ = ["KINDS", "Limit", "all_limits", "kind_of", "limits_lines", "limits_words", "put_lines"]
 
-KINDS = ("spike on grains", "platform on grains", "bed", "planar model", "diagnosis")
+KINDS = (
+    "spike on grains", "platform on grains", "robot on grains", "robot on a law", "bed", "planar model", "diagnosis",
+)  # fmt: skip
 """Kinds of runs that limits concern."""
 _MARKS = ("<!-- limits: begin -->", "<!-- limits: end -->")
 _GROUPS = {
@@ -64,6 +66,8 @@ def kind_of(result: Mapping[str, Any]) -> str | None:
     on_grains = result.get("ground") == "bed" or "grains" in result
     if experiment.startswith("tumble"):
         return "platform on grains" if on_grains else "planar model"
+    if experiment == "mujoco":
+        return "robot on grains" if on_grains else "robot on a law"
     if experiment in ("hop", "paper", "campaign"):
         return "planar model"
     if experiment.startswith("bed"):

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from .rivals import LEAD, Predicted, Rival
 from .scatter_gap import ScatterGap, gap_with_scatter, weighed_residuals
 from .search import Choice
 
-__all__ = ["Diagnosis", "Known", "finish"]
+__all__ = ["Diagnosis", "Estimated", "Known", "finish"]
 
 say = Sentences(__package__)
 
@@ -44,6 +44,14 @@ class Known:
     jitters: tuple[Jitter, ...]
     colours: Mapping[str, Colour]
     model_std: Mapping[str, float]  # the scatter of replicates beyond the sensors, by kind
+
+
+class Estimated(TypedDict):
+    """A parameter in diagnosis.json, in its unit."""
+
+    value: float
+    std: float  # Standard error
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -203,7 +211,7 @@ class Diagnosis(Known):
             is_scatter=bool(self.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
         )  # fmt: skip
 
-    def base_parameters(self, one: Fit) -> dict[str, dict[str, Any]]:
+    def base_parameters(self, one: Fit) -> dict[str, Estimated]:
         """The base model's shared numbers in one of the fits: name -> value, std (standard error), unit."""
         variance = np.diag(one.covariance(inflation=inflation(one)))
         names = [p.name for p in one.model.parameters]
@@ -213,9 +221,9 @@ class Diagnosis(Known):
             for p in self.problem.base if p.trial is None and p.name in names
         }  # fmt: skip
 
-    def parameters(self, effect: str) -> dict[str, dict[str, Any]]:
+    def parameters(self, effect: str) -> dict[str, Estimated]:
         """An effect in diagnosis.json: name -> value, std, unit."""
-        found: dict[str, dict[str, Any]] = {}
+        found: dict[str, Estimated] = {}
         parameters = self.best.model.parameters
         covariance = self.best.covariance(inflation=inflation(self.best))
         for form in (form for form in self.forms if form.effect == effect):

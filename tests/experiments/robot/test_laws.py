@@ -32,9 +32,9 @@ def test_a_ground_file_of_another_gravity_is_refused_unless_that_is_accepted(tmp
     low = HOPPER | {"ground": file, "gravity": 9.81e-3}
     with pytest.raises(ValueError, match=r"ground = .*ground.toml': gravity = 0.00981 m/s2 .* --gravity 0.001g"):
         plan_robot(RobotSettings(**low))
-    assert [said for said in plan_robot(RobotSettings(**low, accept_gravity=True)).warnings if "0.00981" in said]
-    with pytest.raises(ValueError, match="accept_gravity: only"):
-        RobotSettings(**HOPPER, accept_gravity=True)
+    assert [said for said in plan_robot(RobotSettings(**low, ignore_gravity_range=True)).warnings if "0.00981" in said]
+    with pytest.raises(ValueError, match="ignore_gravity_range: only"):
+        RobotSettings(**HOPPER, ignore_gravity_range=True)
 
 
 def test_a_ground_file_of_other_grains_than_the_surface_is_refused_by_both_names(tmp_path):
