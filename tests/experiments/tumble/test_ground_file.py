@@ -43,9 +43,18 @@ def test_a_tumble_on_a_file_of_one_spike_is_that_on_twice_its_k_and_c(written, t
 
 
 def test_another_law_of_a_file_is_that_of_the_same_parameters(written):
-    fitted = plan_tumble(tumble.Settings(ground=written("hunt-crossley", CROSSLEY), surface="brick")).trial
+    fitted = plan_tumble(tumble.Settings(ground=written("hunt-crossley", CROSSLEY), surface="sand")).trial
     given = tuple(f"{name}={value}" for name, value in CROSSLEY.items())
-    assert fitted == plan_tumble(tumble.Settings(ground="hunt-crossley", ground_parameters=given)).trial
+    named = tumble.Settings(ground="hunt-crossley", ground_parameters=given, surface="sand")
+    assert fitted == plan_tumble(named).trial
+
+
+def test_a_file_of_other_grains_than_the_surface_is_refused_by_both_names(written):
+    for surface, made in (("brick", "hard ground"), ("jsc1a", "made of jsc-1a-loose-cut")):
+        with pytest.raises(ValueError, match=f"surface = '{surface}' is {made}, .* of sand"):
+            plan_tumble(tumble.Settings(ground=written(), surface=surface))
+    own = tumble.Settings(ground=written(), mu_s=0.2, mu_d=0.1)  # another friction
+    assert plan_tumble(own).trial.mu_s == 0.2
 
 
 def test_a_tumble_that_leaves_the_range_says_which_number_and_how_far(written, tmp_path):
