@@ -156,7 +156,7 @@ def _parameters(right: Sequence[Case]) -> Json:
         for name, true in case.get("true_parameters", {}).items():
             effect, _, short = name.partition(".")
             said = case["found_parameters"].get(effect, {}).get(short)
-            if said is not None:
+            if said is not None and said["std"] is not None:
                 away = abs(said["value"] - true)
                 size = abs(true - 1) if name == "camera-scale.scale" else abs(true)
                 rows[name].append((away / max(size, 1e-12), away / max(said["std"], 1e-300)))
@@ -179,7 +179,8 @@ def _base_parameters(cases: Sequence[Case]) -> Json:
     rows: dict[str, list[float]] = defaultdict(list)
     for case in cases:
         for name, true in ((case.get("hidden") or {}).get("base") or {}).items():
-            if (told := case.get("base_parameters", {}).get(name)) is not None:
+            told = case.get("base_parameters", {}).get(name)
+            if told is not None and told["std"] is not None:
                 rows[name].append(abs(told["value"] - true) / max(told["std"], 1e-300))
 
     def held(own: Sequence[float]) -> Json:

@@ -98,7 +98,9 @@ run, resume = computed_run("diagnose", DiagnoseSettings, _compute, check=lambda 
 
 
 def _quantity(entry: Json, *, at_end: bool) -> Json:
-    """A fitted number with its standard error; at the end of its range it has none."""
+    """A fitted number with its standard error; at the end of its range, or where it is not determined, it has none."""
+    if entry["std"] is None and not at_end:
+        return {**entry, "note": "these trials do not determine it: no standard error"}
     if at_end:
         return {**entry, "std": None, "note": "at the end of its range: no standard error"}
     return {**entry, "note": "standard error of the fit, right if the model is and the noise is as it was found"}

@@ -260,7 +260,9 @@ def _numbers(diagnosis: Result) -> list[Block]:
     }
 
     def error(entry: Result, name: str, stage: str) -> str:
-        return "at its end" if name in ends.get(stage, ()) else short(entry["std"], 2)
+        if name in ends.get(stage, ()):
+            return "at its end"
+        return "not determined" if entry["std"] is None else short(entry["std"], 2)
 
     effects = [
         (effect["id"], name, short(entry["value"], 4), error(entry, f"{effect['id']}.{name}", "after"),

@@ -13,7 +13,7 @@ from experiments.diagnose.fit.evidence import SMALL, held_out_fit, inflation
 from experiments.diagnose.fit.fitting import Fit, fit, settled
 from experiments.diagnose.fit.gate import Verdict
 from experiments.diagnose.fit.localise import Place, depends_on, latent_table, places
-from experiments.diagnose.fit.problem import Finding, Form, Planned, Problem
+from experiments.diagnose.fit.problem import Array, Finding, Form, Planned, Problem
 from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
 from experiments.diagnose.noise.spectrum import Line, lines_of
@@ -212,17 +212,18 @@ class Diagnosis(Known):
         )  # fmt: skip
 
     def base_parameters(self, one: Fit) -> dict[str, Estimated]:
-        """The base model's shared numbers in one of the fits: name -> value, std (standard error), unit."""
-        variance = np.diag(one.covariance(inflation=inflation(one)))
-        names = [p.name for p in one.model.parameters]
+        """The base model's shared numbers in one of the fits: name -> value, std (standard error; None where data and
+        priors do not determine it), unit."""
+        covariance = one.covariance(inflation=inflation(one))
+        places = {p.name: k for k, p in enumerate(one.model.parameters)}
+        ways = np.eye(len(places))
         return {
-            p.name: {"value": one.values[p.name], "std": math.sqrt(max(float(variance[names.index(p.name)]), 0.0)),
-                     "unit": p.unit}
-            for p in self.problem.base if p.trial is None and p.name in names
+            p.name: {"value": one.values[p.name], "std": _error(one, covariance, ways[places[p.name]]), "unit": p.unit}
+            for p in self.problem.base if p.trial is None and p.name in places
         }  # fmt: skip
 
     def parameters(self, effect: str) -> dict[str, Estimated]:
-        """An effect in diagnosis.json: name -> value, std, unit."""
+        """An effect in diagnosis.json: name -> value, std (None where data and priors do not determine it), unit."""
         found: dict[str, Estimated] = {}
         parameters = self.best.model.parameters
         covariance = self.best.covariance(inflation=inflation(self.best))
@@ -236,10 +237,15 @@ class Diagnosis(Known):
                 for name in here:
                     slopes[name][k] = (moved[name][0] - here[name][0]) / step
             for name, (value, unit) in here.items():
-                variance = float(slopes[name] @ covariance @ slopes[name]) + (loose.get(name, 0.0) * value) ** 2
-                std = math.sqrt(max(variance, 0.0))
-                found[name] = {"value": float(value), "std": std if math.isfinite(std) else 0.0, "unit": unit}
+                std = _error(self.best, covariance, slopes[name], loose.get(name, 0.0) * value)
+                found[name] = {"value": float(value), "std": std, "unit": unit}
         return found
+
+
+def _error(found: Fit, covariance: Array, slope: Array, more: float = 0.0) -> float | None:
+    """Standard error of a number by its derivatives, shape [p], and by `more`; None where it is not determined."""
+    std = math.hypot(math.sqrt(max(float(slope @ covariance @ slope), 0.0)), more)
+    return std if math.isfinite(std) and not found.leaves_open(slope) else None
 
 
 def finish(

@@ -26,6 +26,8 @@ __all__ = ["SCAN", "SEARCH", "Fit", "Linear", "Model", "Rule", "Whitener", "by_b
 _SETTLING = 3  # rounds in which the steps of a settled Jacobian are found
 SCAN = np.linspace(-3.0, 3.0, 25)  # standard deviations of a trial's own number that are looked at for another valley
 _PASSES = 3
+_OPEN, _PART = 1e6, 1e-3
+"""Scales beyond which a number is not determined; share of a number's change by which it depends on such a one."""
 _BEGINNINGS = (0.3, 0.5, 0.7, 0.85)  # shares of their time that are looked at one after the other (`by_beginnings`)
 
 T = TypeVar("T")
@@ -114,6 +116,25 @@ class Fit:
         size = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
         inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-12, hermitian=True)
         return inverse / np.outer(size, size) * np.outer(scales, scales)
+
+    def leaves_open(self, slope: Array) -> bool:
+        """Whether data and priors leave a number open.
+
+        `slope`: its derivatives by the parameters, shape [p], in their units. It is open where it depends on a
+        direction in which the objective does not rise: along a parameter by less than 1 over `_OPEN` of its scales, or
+        along one that `covariance` takes for singular. Such a number has no standard error.
+        """
+        moved = slope * np.array([p.scale for p in self.model.parameters])
+        hessian = self.hessian()
+        lost = np.diag(hessian) <= _OPEN**-2
+        if np.abs(moved[lost]).sum() > _PART * np.abs(moved).sum():
+            return True
+        kept = ~lost
+        size = np.sqrt(np.diag(hessian)[kept])
+        along = moved[kept] / size
+        values, axes = np.linalg.eigh(hessian[np.ix_(kept, kept)] / np.outer(size, size))
+        flat = axes[:, values <= 1e-12 * values.max(initial=0.0)]
+        return bool(np.linalg.norm(flat.T @ along) > _PART * np.linalg.norm(along))
 
 
 def fit(model: Model, start: Values | None = None, *, rounds: int = Rule.rounds) -> Fit:

@@ -186,8 +186,10 @@ def _numbers(leading: Mapping[str, Any]) -> list[str]:
     parts = []
     for effect, parameters in leading.get("parameters", {}).items():
         for name, told in parameters.items() if effect not in leading["certain"] else ():
-            error = f" ± {told['std']:.2g}" if told["std"] > 0 else ""
-            lost = told["std"] > _LOST * abs(told["value"]) > 0  # nothing that was seen changes with it there
+            std = told["std"]
+            error = f" ± {std:.2g}" if std else ""
+            # nothing that was seen changes with it there
+            lost = std is None or std > _LOST * abs(told["value"]) > 0
             value = f"{effect} {name} {told['value']:.4g}{'' if lost else error} {told['unit']}".removesuffix(" 1")
             parts.append(f"{value} (no standard error: small changes of it have no effect)" if lost else value)
     return [f"Its parameters, if it is the cause: {', '.join(parts)}."] if parts else []
