@@ -420,6 +420,8 @@ class PenetrationProblem(Problem):
         notes: dict[str, Any] = dict(self.tables.notes)
         if len(pairs) > 1:
             notes["fitted_by_diameter"] = pairs
+        if beside := {name: values[name] for name in ("loose_depth", "frame_compliance") if values.get(name)}:
+            notes["fitted_beside"] = beside  # which the format has no place for
         effects = tuple(
             EffectTable(id=form.effect, parameters={
                 **({} if self._file(form) else {"reference": self._scales.depth}),

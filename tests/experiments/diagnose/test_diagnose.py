@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from importlib.resources import files
 
 import jsonschema
@@ -19,6 +20,7 @@ from experiments.diagnose.fit.problem import TrialInfo
 from experiments.diagnose.noise.replicates import odd_trials, split_trials
 from experiments.diagnose.push.problem import make_problem
 from experiments.diagnose.report.document import document
+from vis.diagnose.report import _numbers as numbers_of
 
 SCHEMA = json.loads(files("experiments.diagnose").joinpath("diagnosis.schema.json").read_text(encoding="utf-8"))
 SPEEDS = (0.01, 0.03, 0.1)
@@ -77,6 +79,23 @@ def test_parameters_that_are_off_within_their_uncertainty_are_no_effect():
     found = diagnosed(pushes(base), stiffness=0.85 * STIFFNESS, damping=1.3 * DAMPING)
     assert (found.verdict, found.effects, found.where) == ("none", (), ())
     assert found.after == found.before
+
+
+def test_a_number_that_neither_data_nor_prior_determine_has_no_standard_error():
+    """C is free here, and by these slopes no reading depends on it; K + C alone is determined by equal slopes."""
+    found = diagnosed(pushes(base, count=4), doubt=(2.0, 2.0))
+    names = [p.name for p in found.base.model.parameters]
+    assert all(entry["std"] > 0 for entry in found.base_parameters(found.base).values())
+    k, c = names.index("stiffness"), names.index("damping")
+    for column in (0.0, 1e-140, found.base.jacobian[:, k]):
+        slopes = found.base.jacobian.copy()
+        slopes[:, c] = column
+        lost = replace(found.base, jacobian=slopes)
+        said = document(replace(found, base=lost, best=lost))
+        jsonschema.validate(said, SCHEMA)
+        assert said["base"]["after"]["damping"]["std"] is None
+        assert (said["base"]["after"]["stiffness"]["std"] is None) == (np.ndim(column) > 0)
+        assert any("not determined" in str(block) for block in numbers_of(said))
 
 
 @pytest.mark.parametrize(("force", "name"), [(crater, "plastic-sinkage"), (rubbed, "shaft-friction")])
