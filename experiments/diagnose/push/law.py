@@ -1,13 +1,15 @@
 """The force of a bed on a spike that goes straight down, with every effect of the library, compiled by Taichi.
 
 Base: F = K z + C max(0, v) for depth z > 0, and 0 above; v = dz/dt, downwards positive; F positive upwards. A drop
-obeys m z'' = m g - F. The first grains of a bed may be loose, over a depth `loose`: with the share S = 1 - e^(-z / loose)
-the spring is K (z - loose S) and the damper C S. Between the drive, where depth is read, and the tip the frame may yield
-by `compliance` times the force: a push's tip is less deep by that. Each effect adds to the loading curve h(z), which is K z in the base model, to what is left of it
-when the spike comes back (`top` is the deepest depth since it last entered, `deepest` the deepest ever), or to what
-depends on the rate; the effects' own files say how (`rigid.terms.candidate.Push`), and the sum over them is written out
-as text. At amplitude 0 an effect changes nothing. `SLOTS` names the numbers of a lane; D is `reference`, a depth
-typical of the campaign, so that amplitudes of one effect's forms compare.
+obeys m z'' = m g - F. The first grains may be loose, over a depth l = `loose`: with the share S = 1 - e^(-z / l) the
+spring is K (z - l S) and the damper C S. The frame between the drive, where depth is read, and the tip may yield: the
+tip of a push is less deep by `compliance` times the force.
+
+Each effect adds to the loading curve h(z), which is K z in the base model, to what is left of it when the spike comes
+back (`top` is the deepest depth since it last entered, `deepest` the deepest ever), or to what depends on the rate; the
+effects' own files say how (`rigid.terms.candidate.Push`), and the sum over them is written out as text. At amplitude 0
+an effect changes nothing. `SLOTS` names the numbers of a lane; D is `reference`, a depth typical of the campaign, so
+that amplitudes of one effect's forms compare.
 
 A drop is integrated by the classical Runge-Kutta method, each step cut where the spike turns, leaves or comes back
 (found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
