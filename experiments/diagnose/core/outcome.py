@@ -50,7 +50,7 @@ class Estimated(TypedDict):
     """A parameter in diagnosis.json, in its unit."""
 
     value: float
-    std: float  # Standard error
+    std: float | None  # Standard error; None: not determined
     unit: str
 
 
