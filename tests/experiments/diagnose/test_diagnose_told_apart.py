@@ -87,8 +87,8 @@ def test_a_prediction_counts_the_errors_of_what_was_learned_as_noise():
 def test_the_further_push_that_separates_two_effects_is_made_at_another_speed():
     # f sign(v) and b v^2 are one number f at v_0 = 0.05 m/s. At v they differ by f ((v / v_0)^2 - 1) = 8 N on the way
     # in. C is stated to 5 %, and C v_0 + f is known: an error c of C changes the predictions by c (v - v_0) and
-    # c v (1 - v / v_0). All rows of a push have these errors in common, so they bound what it tells. Loose grains, of a
-    # depth not known, lessen f; here they are left out first.
+    # c v (1 - v / v_0). All rows of a push have these errors in common, so they bound what it tells. Loose grains
+    # lessen f by an unknown depth; here they are left out first.
     base, friction, drag = fitted((0.05, 0.05), sharp=True)
     plan = base.model.problem.planned(friction.fit, drag.fit)
     assert plan.settings["speed_m_s"] == pytest.approx(0.15, rel=0.02)
