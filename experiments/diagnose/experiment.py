@@ -99,11 +99,12 @@ run, resume = computed_run("diagnose", DiagnoseSettings, _compute, check=lambda 
 
 def _quantity(entry: Json, *, at_end: bool) -> Json:
     """A fitted number with its standard error; at the end of its range, or where it is not determined, it has none."""
-    if entry["std"] is None and not at_end:
-        return {**entry, "note": "these trials do not determine it: no standard error"}
+    number = {key: value for key, value in entry.items() if key != "determined"}
     if at_end:
-        return {**entry, "std": None, "note": "at the end of its range: no standard error"}
-    return {**entry, "note": "standard error of the fit, right if the model is and the noise is as it was found"}
+        return {**number, "std": None, "note": "at the end of its range: no standard error"}
+    if entry["std"] is None or not entry.get("determined", True):
+        return {**number, "std": None, "note": "these trials do not determine it: no standard error"}
+    return {**number, "note": "standard error of the fit, right if the model is and the noise is as it was found"}
 
 
 _UNITS = {"force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",

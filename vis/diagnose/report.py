@@ -262,7 +262,8 @@ def _numbers(diagnosis: Result) -> list[Block]:
     def error(entry: Result, name: str, stage: str) -> str:
         if name in ends.get(stage, ()):
             return "at its end"
-        return "not determined" if entry["std"] is None else short(entry["std"], 2)
+        lost = entry["std"] is None or not entry.get("determined", True)
+        return "not determined" if lost else short(entry["std"], 2)
 
     effects = [
         (effect["id"], name, short(entry["value"], 4), error(entry, f"{effect['id']}.{name}", "after"),

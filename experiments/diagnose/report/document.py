@@ -10,6 +10,7 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
-from experiments.diagnose.core.outcome import Diagnosis
+from experiments.diagnose.core.outcome import Diagnosis, Estimated
 from experiments.diagnose.core.scatter_gap import scatter_std
 from experiments.diagnose.fit.evidence import excess, held_out_fit
 from experiments.diagnose.fit.fitting import Fit, fit
@@ -38,7 +39,7 @@ _SIGNALS = ("force", "accel", "ax", "ay")  # channels that read 0 where nothing 
 
 def document(found: Diagnosis) -> dict[str, Any]:
     """diagnosis.json."""
-    effects = [{"id": effect, "parameters": found.parameters(effect)} for effect in found.effects]
+    effects = [{"id": effect, "parameters": _numbers(found.parameters(effect))} for effect in found.effects]
     settings = {trial.id: dict(trial.settings) for trial in found.problem.trials}
     diagnosis: dict[str, Any] = {
         "format": "hedgehog-diagnosis/1",
@@ -82,6 +83,15 @@ def document(found: Diagnosis) -> dict[str, Any]:
     if (plan := found.planned) is not None:
         diagnosis["planned"] = {**plan.settings, "expected_nats": plan.nats, "tried": plan.tried}
     return diagnosis
+
+
+def _numbers(found: Mapping[str, Estimated]) -> dict[str, Any]:
+    """An effect's numbers by the contract, where `std` is a number: of one that the trials do not determine it is the
+    number's own size, and `determined` is false."""
+    return {
+        name: {**told, "std": abs(told["value"]), "determined": False} if told["std"] is None else dict(told)
+        for name, told in found.items()
+    }
 
 
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:

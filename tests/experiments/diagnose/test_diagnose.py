@@ -98,6 +98,18 @@ def test_a_number_that_neither_data_nor_prior_determine_has_no_standard_error():
         assert any("not determined" in str(block) for block in numbers_of(said))
 
 
+def test_an_effects_number_that_nothing_determines_keeps_the_contract_and_says_so(monkeypatch):
+    found = diagnosed(pushes(rubbed))
+    lost = {"shaft": {"value": -0.6, "std": None, "unit": "N"}, "growth": {"value": 1.0, "std": 0.1, "unit": "1"}}
+    monkeypatch.setattr(type(found), "parameters", lambda self, effect: lost)
+    said = document(found)
+    jsonschema.validate(said, SCHEMA)
+    numbers = said["effects"][0]["parameters"]
+    assert numbers["shaft"] == {"value": -0.6, "std": 0.6, "unit": "N", "determined": False}
+    assert numbers["growth"] == lost["growth"]
+    assert sum("not determined" in str(block) for block in numbers_of(said)) == 1
+
+
 @pytest.mark.parametrize(("force", "name"), [(crater, "plastic-sinkage"), (rubbed, "shaft-friction")])
 def test_a_hidden_effect_of_another_form_than_the_librarys_is_named_and_the_gap_closes(force, name):
     found = diagnosed(pushes(force))
