@@ -1,5 +1,5 @@
 """The command line: `hedgebed <experiment>`, `resume`, `render`, `bench`, `doctor`.
 
 Imports `coupling.lammps`, `dem`, `experiments.bed`, `experiments.campaign`, `experiments.fmu`, `experiments.penetrate`,
-`experiments.runs`, `experiments.suite`, `experiments.tumble`, `rigid`, `vis`.
+`experiments.pool`, `experiments.runs`, `experiments.suite`, `experiments.tumble`, `rigid`, `vis`.
 """

@@ -49,10 +49,13 @@ def carry_out(
             return STOPPED
         except RuntimeError as error:
             from coupling.lammps.process import LammpsEndedError  # loads Taichi
+            from experiments.pool.workers import SchedulerGoneError
 
             again = "the same settings would fail the same way again"
             if isinstance(error, LammpsEndedError) and not error.refused:
                 again = _goes_on(folder)
+            if isinstance(error, SchedulerGoneError):
+                again = f"`HEDGEBED_SCHEDULER=tcp://... hedgebed resume {folder.path}` goes on with another scheduler"
             say(f"failed: {error}")
             say(f"what was finished is kept in {folder.path}; {again}")
             return FAILED

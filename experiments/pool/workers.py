@@ -24,7 +24,7 @@ from experiments.runs.stopping import request_stop, stop_requested
 from .tasks import Outcome, Task, carry_out
 from .tools import required
 
-__all__ = ["OnOutcome", "OnShare", "carry_out_all"]
+__all__ = ["OnOutcome", "OnShare", "SchedulerGoneError", "carry_out_all"]
 
 OnOutcome = Callable[[Outcome], None]
 OnShare = Callable[[str, float], None]
@@ -99,6 +99,10 @@ def carry_out_all(
             raise
 
 
+class SchedulerGoneError(RuntimeError):
+    """The scheduler has ended while tasks were with it: another one can go on."""
+
+
 def _outcome(name: str, future: Any, scheduler: str | None) -> Outcome:
     """What a future that has ended holds, or why it holds nothing."""
     if future.status == "finished":
@@ -106,7 +110,7 @@ def _outcome(name: str, future: Any, scheduler: str | None) -> Outcome:
     if future.status == "error":  # a task reports its own faults: this is its worker's
         return Outcome(name, fault=f"its worker died: {future.exception()}")
     where = f"scheduler = {scheduler!r}" if scheduler else "the scheduler here"
-    raise RuntimeError(f"{where} has gone away ({future.status}); what was done is kept")
+    raise SchedulerGoneError(f"{where} has gone away ({future.status})")
 
 
 @contextmanager
@@ -122,11 +126,15 @@ def _client(distributed: Any, scheduler: str | None, workers: int) -> Iterator[A
         ):  # fmt: skip
             yield client
         return
+    if "://" not in scheduler and ("/" in scheduler or scheduler.endswith(".json")) and not Path(scheduler).is_file():
+        raise ValueError(f"scheduler = {scheduler!r}: there is no such file")
     given = {"scheduler_file": scheduler} if Path(scheduler).is_file() else {"address": scheduler}
     try:
         client = distributed.Client(**given, timeout=_CONNECT)
     except (OSError, ValueError, json.JSONDecodeError) as error:
-        raise ValueError(f"scheduler = {scheduler!r} cannot be reached: {error}") from None
+        raise ValueError(
+            f"scheduler = {scheduler!r} cannot be reached: {error}. The variable HEDGEBED_SCHEDULER names another one"
+        ) from None
     with client:
         yield client
 

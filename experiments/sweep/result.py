@@ -197,6 +197,11 @@ def _sensitivities(
         return [], [f"samples = {settings.samples} are too few for sensitivities: {FEWEST_SAMPLES} are needed"]
     found: list[Mapping[str, object]] = []
     warnings, problem = [], problem_of(design.sampled)
+    if settings.samples < FEWEST_SAMPLES:
+        warnings.append(
+            f"samples = {settings.samples} are few for Sobol' indices, which may lie outside 0 to 1: "
+            f"{FEWEST_SAMPLES} or more would do"
+        )
     for column in columns:
         means = column.values.reshape(len(design.shares), -1).mean(axis=1)
         whole = np.isfinite(means)

@@ -51,6 +51,7 @@ def test_every_kind_of_run_has_limits(kind):
         ({"experiment": "tumble spatial", "ground": "bed"}, "platform on grains"),
         ({"experiment": "mujoco", "ground": "bed", "grains": {}}, "robot on grains"),
         ({"experiment": "mujoco", "ground": "rft"}, "robot on a law"),
+        ({"experiment": "mujoco", "ground": "spring-damper", "surface": "brick"}, None),
         ({"experiment": "paper"}, "planar model"),
         ({"experiment": "bed test cone"}, "bed"),
         ({"experiment": "diagnose"}, "diagnosis"),

@@ -35,7 +35,6 @@ _SURE = 2.0  # nats of evidence and prediction together below which effects whos
 _MOST_FOLDS = 4
 _ROUNDS = 4
 _WEAKEST = 1e-3  # of what all trials say of a number, what the others are taken to say at least
-_FLAT = 1e-9  # share of the Hessian's diagonal below which a direction is flat
 
 
 @dataclass(frozen=True)
@@ -94,12 +93,9 @@ class Rival:
 
 
 def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Rival:
-    """`other`, which has `effect` in the place of the best's first one, against `best`; `rest` has neither.
-
-    What the base parameters take up is no part of a signature, but for those that a bound holds without the effect.
-    """
+    """`other`, which has `effect` in the place of the best's first one, against `best`; `rest` has neither."""
     names = [p.name for p in best.fit.model.parameters]
-    shared = [p for p, free in zip(rest.model.parameters, rest.free, strict=True) if free and p.name in names]
+    shared = [p for p in rest.model.parameters if p.name in names]
     columns = [names.index(p.name) for p in shared]
     weights = np.array([0.0 if math.isinf(p.std) else 1 / p.std for p in shared])
     scales = np.array([p.scale for p in shared])
@@ -163,10 +159,7 @@ def _left_of(part: Model, values: Values, learned: Fit, found: Fit, silent: set[
     """What a prediction of the trials of `part` leaves, the errors of what was `learned` counted as noise; half the
     log of the factor by which these errors widen it; number of samples. `silent`: what the others say nothing of."""
     there = Linear.of(part, values)
-    # Of numbers that are next to the same, such as K and a frame's compliance, the trials say little one by one.
-    whole = found.hessian()
-    alone = 1 / np.diag(np.linalg.inv(whole + np.diag(_FLAT * np.diag(whole) + 1e-300)))
-    full = {p.name: row for p, row in zip(found.model.parameters, alone, strict=True)}
+    full = {p.name: row for p, row in zip(found.model.parameters, np.diag(found.hessian()), strict=True)}
     names = [p.name for p in learned.model.parameters]
     weak = np.array([_WEAKEST * full[name] for name in names])
     covariance = np.linalg.inv(learned.hessian() + np.diag(np.maximum(weak, 1e-300)))

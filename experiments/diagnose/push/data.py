@@ -58,12 +58,6 @@ class Prepared:
         return self.table.mode == "driven"
 
     @property
-    def load(self) -> Array:
-        """Force by which a push loads its frame at every row [N], shape [n]: as measured, gaps bridged."""
-        known = np.isfinite(self.other)
-        return self.other if known.all() else np.interp(self.time, self.time[known], self.other[known])
-
-    @property
     def path(self) -> SmoothDepth:
         """The smoothed depth of a driven trial."""
         assert self.smooth is not None

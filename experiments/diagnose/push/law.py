@@ -1,15 +1,11 @@
 """The force of a bed on a spike that goes straight down, with every effect of the library, compiled by Taichi.
 
 Base: F = K z + C max(0, v) for depth z > 0, and 0 above; v = dz/dt, downwards positive; F positive upwards. A drop
-obeys m z'' = m g - F. The first grains may be loose, over a depth l = `loose`: with the share S = 1 - e^(-z / l) the
-spring is K (z - l S) and the damper C S. The frame between the drive, where depth is read, and the tip may yield: the
-tip of a push is less deep by `compliance` times the force.
-
-Each effect adds to the loading curve h(z), which is K z in the base model, to what is left of it when the spike comes
-back (`top` is the deepest depth since it last entered, `deepest` the deepest ever), or to what depends on the rate; the
-effects' own files say how (`rigid.terms.candidate.Push`), and the sum over them is written out as text. At amplitude 0
-an effect changes nothing. `SLOTS` names the numbers of a lane; D is `reference`, a depth typical of the campaign, so
-that amplitudes of one effect's forms compare.
+obeys m z'' = m g - F. Each effect adds to the loading curve h(z), which is K z in the base model, to what is left of it
+when the spike comes back (`top` is the deepest depth since it last entered, `deepest` the deepest ever), or to what
+depends on the rate; the effects' own files say how (`rigid.terms.candidate.Push`), and the sum over them is written out
+as text. At amplitude 0 an effect changes nothing. `SLOTS` names the numbers of a lane; D is `reference`, a depth
+typical of the campaign, so that amplitudes of one effect's forms compare.
 
 A drop is integrated by the classical Runge-Kutta method, each step cut where the spike turns, leaves or comes back
 (found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
@@ -61,12 +57,12 @@ _LIBRARY = tuple(
 SLOTS = (
     "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
     *(slot for effect in _LIBRARY for slot in _slots_of(effect)), "shift_depth", "shift_row", "shift_speed",
-    "given_way", "loose", "compliance",
+    "given_way",
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
 direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
 depth of each row alone, all that came before it as it was); `given_way`: what a bed has given way beforehand [m], which
-stays; `loose` [m] and `compliance` [m/N]: see above."""
+stays."""
 PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
@@ -75,9 +71,6 @@ _HELD, _REACH = next(effect.turning for effect in _LIBRARY if effect.turning is 
 _STEP, _TURN = 1.25e-3, 0.1
 """Longest step of a drop [s], and over sqrt(m / K), which is tens of ms for a spike on sand. With these what is off
 stays below 0.004 of the sensors' noise for every form of the library."""
-
-_SET_IN, _SETS_IN = 0.25, 6.0
-"""Way of a step of a drop through loose first grains, and depth down to which steps are so short, over `loose`."""
 
 _SETTLED = 1e-3
 """Speed [m/s] at which a spike that comes back to a surface that supports it stays there: it would hop by 5e-8 m."""
@@ -109,24 +102,20 @@ def slot_table(count: int, own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]
 
 def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
          depth: NDArray[np.float64], speed: NDArray[np.float64], own: tuple[OwnEffect, ...] = (),
-         times: NDArray[np.float64] | None = None,
-         loads: NDArray[np.float64] | None = None) -> NDArray[np.float64]:  # fmt: skip
+         times: NDArray[np.float64] | None = None) -> NDArray[np.float64]:  # fmt: skip
     """Forces [N] of driven spikes along given paths, shape [lane_count, longest path]; 0 beyond a path's end.
 
     `numbers`: shape [lane_count, slot_count]. `lane_path`: which path a lane follows, shape [lane_count]. `starts`:
     first row of each path and the row after the last, shape [path_count + 1]. `depth`, `speed`: the paths [m, m/s], one
     after another. `own`: effects from files, whose parameters `numbers` holds. `times`: of the paths [s]; without
-    them no time passes, so that nothing gives way. `loads`: forces by which the frame is loaded along the paths [N];
-    without them it does not yield.
+    them no time passes, so that nothing gives way.
     """
     ensure()
     longest = int(np.diff(starts).max())
     out = np.zeros((len(numbers), longest))
     kernel = _kernels(tuple((effect.term, effect.push) for effect in own))[0]
     times = np.zeros(len(depth)) if times is None else times
-    loads = np.zeros(len(depth)) if loads is None else loads
-    paths = (lane_path.astype(np.int32), starts.astype(np.int32))
-    kernel(np.ascontiguousarray(numbers), *paths, times, depth, speed, loads, out)
+    kernel(np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), times, depth, speed, out)
     return out
 
 
@@ -270,20 +259,11 @@ def _functions(own: _Own) -> tuple[int, Any, Any, Any, Any]:
     OWN = any(law is None for _, law in own)
     MASS, GRAVITY, STIFFNESS, DAMPING = (_SLOT[name] for name in ("mass", "gravity", "stiffness", "damping"))
     REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
-    LOOSE = _SLOT["loose"]
-
-    @ti.func
-    def set_in(depth: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
-        share = 1.0
-        if n[k, LOOSE] > 0.0:
-            share = 1.0 - ti.exp(-depth / n[k, LOOSE])
-        return share
 
     @ti.func
     def loading(z: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
         depth = ti.max(z, 0.0)
-        firm = depth - n[k, LOOSE] * set_in(depth, n, k)
-        grown = loading_changed(n[k, STIFFNESS] * firm, depth, depth / n[k, REFERENCE], n, k)
+        grown = loading_changed(n[k, STIFFNESS] * depth, depth, depth / n[k, REFERENCE], n, k)
         return grown if depth > 0.0 else 0.0
 
     @ti.func
@@ -306,7 +286,7 @@ def _functions(own: _Own) -> tuple[int, Any, Any, Any, Any]:
                 s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
                 spring = own_spring(s, z, spring, n, k)
             total = spring
-            total += n[k, DAMPING] * ti.max(v, 0.0) * damper_changed(spring, n, k) * set_in(z, n, k)
+            total += n[k, DAMPING] * ti.max(v, 0.0) * damper_changed(spring, n, k)
             share = 0.0
             if n[k, HELD] != 0.0:
                 share = taken(z, way, turn_z, turn_w, n, k)
@@ -332,9 +312,8 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
     from hedgebed_taichi import ti
 
     settling, force, taken, settled, carried = _functions(own)
-    GIVEN_WAY, LOOSE, COMPLIANCE = (_SLOT[name] for name in ("given_way", "loose", "compliance"))
+    GIVEN_WAY = _SLOT["given_way"]
     MASS, GRAVITY, SPEED_SCALE, SETTLED = _SLOT["mass"], _SLOT["gravity"], _SLOT["speed_scale"], _SETTLED
-    SET_IN, SETS_IN = _SET_IN, _SETS_IN
     SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (_SLOT[name] for name in ("shift_depth", "shift_row", "shift_speed"))
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
@@ -343,8 +322,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
 
     @ti.kernel
     def push_all(
-        numbers: Table, lane_path: Whole, starts: Whole, times: Line, depth: Line, speed: Line, loads: Line,
-        out: Table,
+        numbers: Table, lane_path: Whole, starts: Whole, times: Line, depth: Line, speed: Line, out: Table
     ):  # fmt: skip
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
@@ -353,7 +331,6 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
             gone = ti.Vector([0.0 for _ in ti.static(range(settling))])
             for row in range(starts[path], starts[path + 1]):
                 z, v = depth[row] + numbers[k, SHIFT_DEPTH], speed[row] + numbers[k, SHIFT_SPEED]
-                z -= numbers[k, COMPLIANCE] * loads[row]
                 if z <= 0.0:
                     top, before, share = 0.0, 0.0, 0.0
                     gone.fill(0.0)
@@ -393,9 +370,6 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                         dt = 0.5 * (low + high)
                         if halvings == 0:
                             dt = ti.min(steps[k], until - t)
-                            loose = numbers[k, LOOSE]
-                            if inside == 1 and v > 0.0 and z < SETS_IN * loose:
-                                dt = ti.min(dt, SET_IN * loose / v)
                         elif halvings > 40:
                             dt = high
                         # One Runge-Kutta step.

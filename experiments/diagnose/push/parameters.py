@@ -11,15 +11,10 @@ from experiments.diagnose.fit.problem import Array, Parameter
 from .data import Prepared, stds
 from .forms import Scales
 
-__all__ = ["base_parameters", "comes_back", "diameters_of", "named", "scatter_parameters", "speeds_of"]
+__all__ = ["base_parameters", "comes_back", "diameters_of", "find_scales", "named", "scatter_parameters", "speeds_of"]
 
 _ZERO_DEPTH = 0.1  # how far a depth's zero may differ between pushes while it is asked whether it does, over D
 _LEAST_ZERO = 0.2  # zeros that differ by less than this share of the noise are negligible
-_LOOSE, _YIELDS = 0.005, 0.01
-"""What no campaign states, one sigma: the depth of loose first grains, over the deepest depth, and how much a frame
-yields, over the bed. A frame of 100 K is usual for a test stand of sand."""
-_OF_DEEPEST = 0.75  # D over the deepest depth
-_FAR = 6.0  # of these, the most
 _BED_STD = 0.5  # how far the bed may differ between replicates while it is asked whether it does [1]
 
 
@@ -33,14 +28,7 @@ def named(name: str, diameter: float, diameters: Sequence[float]) -> str:
     return name if len(diameters) == 1 else f"{name}@{diameter:g}"
 
 
-def base_parameters(tables: PenetrationCampaign, trials: Sequence[Prepared]) -> tuple[tuple[Parameter, ...], Scales]:
-    """What the base model fits, and what is typical of the campaign."""
-    base = _spring_and_damper(tables, trials)
-    scales = _find_scales(tables, trials, base)
-    return base + _apparatus(tables, trials, scales), scales
-
-
-def _spring_and_damper(tables: PenetrationCampaign, trials: Sequence[Prepared]) -> tuple[Parameter, ...]:
+def base_parameters(tables: PenetrationCampaign, trials: Sequence[Prepared]) -> tuple[Parameter, ...]:
     """K and C of each diameter, where they are uncertain."""
     surface, doubt, diameters = tables.surface, tables.uncertainty, diameters_of(trials)
     guess_k, guess_c = max(surface.stiffness, 1e-9), max(surface.damping, 1e-9)
@@ -63,24 +51,6 @@ def _spring_and_damper(tables: PenetrationCampaign, trials: Sequence[Prepared]) 
                 step=1e-4 * max(start, size),
             ))  # fmt: skip
     return tuple(found)
-
-
-def _apparatus(tables: PenetrationCampaign, trials: Sequence[Prepared], scales: Scales) -> tuple[Parameter, ...]:
-    """The depth of loose first grains [m] and, of pushes, the frame's compliance [m/N]: never below zero.
-
-    Nobody states them, and no surface is sharp and no frame rigid: left out, they would pass for a layer, for another
-    damper in drops, and for a K that pushes and drops do not share.
-    """
-    driven = any(trial.driven for trial in trials)
-    noise = stds(tables, driven)[0]
-    sizes = {"loose_depth": ("m", math.hypot(noise, _LOOSE * scales.depth / _OF_DEEPEST))}
-    if driven:
-        sizes["frame_compliance"] = ("m/N", _YIELDS * scales.depth / scales.force)
-    return tuple(
-        Parameter(name=name, unit=unit, value=0.0, std=std, scale=0.1 * std, lowest=0.0, highest=_FAR * std,
-                  step=0.02 * std)
-        for name, (unit, std) in sizes.items()
-    )  # fmt: skip
 
 
 def scatter_parameters(
@@ -132,10 +102,10 @@ def _straight_stiffness(tables: PenetrationCampaign, trials: Sequence[Prepared],
     return float(np.median(found)) if found else max(tables.surface.stiffness, 1e-9)
 
 
-def _find_scales(tables: PenetrationCampaign, trials: Sequence[Prepared], base: Sequence[Parameter]) -> Scales:
+def find_scales(tables: PenetrationCampaign, trials: Sequence[Prepared], base: Sequence[Parameter]) -> Scales:
     """What is typical of the campaign."""
     deepest = [float((t.smooth.depth if t.smooth is not None else t.depth[t.has_depth]).max()) for t in trials]
-    depth = max(_OF_DEEPEST * max(deepest), 1e-9)
+    depth = max(0.75 * max(deepest), 1e-9)
     speed = max(max(speeds_of(trial).max() for trial in trials), 1e-9)
     diameters = diameters_of(trials)
     middle = named("stiffness", diameters[len(diameters) // 2], diameters)

@@ -41,7 +41,7 @@ from .design import best_push
 from .doubt import off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
-from .parameters import base_parameters, comes_back, diameters_of, named, scatter_parameters, speeds_of
+from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, scatter_parameters, speeds_of
 from .remarks import Push, remarks
 from .zeros import find_force_zeros
 
@@ -99,7 +99,8 @@ class PenetrationProblem(Problem):
         if self._zeros is not None:
             self.findings = (*self.findings, self._zeros.finding)
             self.known_std = {"force zero": self._zeros.std}
-        self.base, self._scales = base_parameters(tables, prepared)
+        self.base = base_parameters(tables, prepared)
+        self._scales = find_scales(tables, prepared, self.base)
         self.rough = tuple(trial.info.id for trial in prepared if not trial.driven)
         self.scatter = scatter_parameters(tables, prepared, self._scales)
         parts: list[object] = [repr(tables.uncertainty), repr(tables.sensors), repr(tables.surface)]
@@ -138,9 +139,7 @@ class PenetrationProblem(Problem):
             bed, damper, zero = (values.get(name, 0.0) for name in own)
             lane[_SLOT["stiffness"]] = stiffness = values.get(k, stated_k) * (1.0 + bed)
             lane[_SLOT["damping"]] = values.get(c, stated_c) * (1.0 + bed) * (1.0 + damper)
-            lane[_SLOT["loose"]] = values.get("loose_depth", 0.0)
             if trial.smooth is not None:
-                lane[_SLOT["compliance"]] = values.get("frame_compliance", 0.0)
                 lane[_SLOT["shift_depth"]] = -zero
             for form in forms:
                 for parameter in form.parameters:
@@ -187,8 +186,7 @@ class PenetrationProblem(Problem):
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth, speed = (np.concatenate([getattr(t.path, name) for t in trials]) for name in ("depth", "speed"))
-            time, loads = (np.concatenate(one) for one in ([t.time for t in trials], [t.load for t in trials]))
-            out = push(numbers, lanes, starts, depth, speed, own, time, loads)
+            out = push(numbers, lanes, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
             for place, trial in enumerate(trials):
                 zeros = np.array([values.get(f"force zero[{trial.info.id}]", 0.0) for values, _ in points])
                 if zeros.any():
@@ -420,8 +418,6 @@ class PenetrationProblem(Problem):
         notes: dict[str, Any] = dict(self.tables.notes)
         if len(pairs) > 1:
             notes["fitted_by_diameter"] = pairs
-        if beside := {name: values[name] for name in ("loose_depth", "frame_compliance") if values.get(name)}:
-            notes["fitted_beside"] = beside  # which the format has no place for
         effects = tuple(
             EffectTable(id=form.effect, parameters={
                 **({} if self._file(form) else {"reference": self._scales.depth}),
@@ -463,8 +459,7 @@ class PenetrationProblem(Problem):
         ) -> Array:
             none = np.zeros((len(time), 0))
             like = next(trial for trial in driven if trial.diameter == diameter)
-            planned = replace(like, time=time, other=np.zeros(len(time)), smooth=SmoothDepth(z, v, none, none))
-            return self._run_each(points, [planned])[0]
+            return self._run_each(points, [replace(like, time=time, smooth=SmoothDepth(z, v, none, none))])[0]
 
         return best_push(
             one, other, predict, diameters=sorted({trial.diameter for trial in driven}),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from penetration_campaigns import FORCE_STD, campaign_of, driven_trial
+from penetration_campaigns import campaign_of, driven_trial
 
 from experiments.check.replicas import pace_of
 from experiments.diagnose.core import matters
@@ -19,9 +19,9 @@ def base(z, v, top):
     return STIFFNESS * z + DAMPING * max(v, 0.0)
 
 
-def wavy(z, v, top):
-    """The same with a wave of 4 mm, half a noise high: no effect of the library has it."""
-    return base(z, v, top) + 0.5 * FORCE_STD * np.sin(2 * np.pi * z / 0.004)
+def toe(z, v, top):
+    """The same, but the first grains are loose: 1.1 noises at most, over half a millimetre."""
+    return base(z, v, top) - STIFFNESS * 6e-5 * (1.0 - np.exp(-max(z, 0.0) / 5e-4))
 
 
 def pushes(force, speeds, **more):
@@ -46,7 +46,7 @@ def test_speeds_that_change_the_force_by_less_than_its_noise_make_one_condition(
 
 
 def test_a_structural_residue_too_small_to_matter_is_no_verdict_of_unknown():
-    found = diagnose(make_problem(pushes(wavy, [0.01, 0.01, 0.05, 0.05, 0.01, 0.05])))
+    found = diagnose(make_problem(pushes(toe, [0.01, 0.01, 0.05, 0.05, 0.01, 0.05])))
     assert not found.gate_before.passed  # the sensors can tell
     assert (found.verdict, found.effects) == ("none", ())
     assert 1.0 < found.before.fit <= matters.MOST

@@ -95,6 +95,14 @@ def test_ctrl_c_in_one_command_takes_back_only_what_has_not_begun_and_the_other_
     assert carried == ["quick", "slow", "shared"]
 
 
+def test_a_scheduler_that_is_no_file_is_named_and_one_that_goes_away_is_told_apart():
+    with pytest.raises(ValueError, match="no such file"), workers._client(distributed, "/nowhere/s.json", 1):
+        pass
+    lost = type("Future", (), {"status": "lost"})()
+    with pytest.raises(workers.SchedulerGoneError, match="gone away"):
+        workers._outcome("a", lost, "tcp://a:1")
+
+
 def test_processes_here_leave_the_port_of_dask_s_dashboard_alone():
     """With the port taken nothing is said, and the scheduler listens on this machine alone."""
     with socket.socket() as taken, warnings.catch_warnings():

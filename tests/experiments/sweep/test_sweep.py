@@ -273,8 +273,11 @@ def test_sensitivities_are_those_of_the_closed_form():
             assert [entry["total"] for entry in entries] == pytest.approx([0.558, 0.442, 0.244], abs=room)
 
 
-def test_too_few_samples_have_no_sensitivities(tmp_path):
+def test_too_few_samples_have_no_sensitivities_and_few_of_saltelli_s_design_are_warned_of(tmp_path):
     pytest.importorskip("SALib")
+    assert sweep("few", "--over", "torque=0.15:0.2", "--samples", "4", "--sampling", "sobol") == 0
+    few = json.loads((tmp_path / "few" / "result.json").read_text())
+    assert few["sensitivities"] and any("samples = 4" in text for text in few["warnings"])
     assert sweep("swept", "--over", "torque=0.15:0.2", "--samples", "4") == 0
     found = json.loads((tmp_path / "swept" / "result.json").read_text())
     assert found["sensitivities"] == [] and any("samples = 4" in text for text in found["warnings"])
