@@ -1,6 +1,7 @@
 """The first lines of a diagnosis: what is missing, how far that closes the gap, how sure it is, what is left, and what
 to do next; a few sentences made of diagnosis.json alone."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,6 +27,7 @@ __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 _WORTH_SAYING = 0.5  # share of the excess that a candidate without the best evidence closes to be called likeliest
 _AS_LIKELY = 1.0  # nats within which another effect is reported beside the likeliest
 _SHOWN = 3  # candidates that are reported where none is certain
+_LOUD = 4.0  # a gap of the fitted trials past which noise alone is no comfort: twice what is stated
 _LOST = 100.0  # a standard error over the value itself past which it is none: the curvature there is round-off
 
 
@@ -51,6 +53,11 @@ def title_words(diagnosis: Mapping[str, Any]) -> str:
     names = " and ".join([effect["id"] for effect in diagnosis["effects"] if effect["id"] not in small]
                          + [f"{name} (small: {size})" for name, size in small.items()])  # fmt: skip
     if diagnosis["verdict"] == "none":
+        if (gap := diagnosis["gap"]["after"]["fit"]) > _LOUD:
+            return (
+                f"No effect is named: the readings are {numeral(math.sqrt(gap), 2)} times as noisy as campaign.toml "
+                f"states; check the std that it gives, and the unit"
+            )
         return "Nothing is missing: the model with its fitted parameters explains the trials"
     if diagnosis["verdict"] == "named":
         return f"Missing: {names}"
