@@ -163,7 +163,7 @@ def command(*tokens, log):
 def test_ctrl_c_ends_processes_and_command_in_words_and_resume_makes_the_same_table(tmp_path):
     """Ctrl-C of a terminal reaches the processes too."""
     pytest.importorskip("distributed")
-    tokens = ["sweep", "--experiment", "tumble", "--fixed", "duration=6", "--over", "torque=0.14:0.2:0.01"]
+    tokens = ["sweep", "--experiment", "tumble", "--fixed", "duration=6", "--over", "torque=0.14:0.2:0.002"]
     out, log = tmp_path / "out", tmp_path / "log"
     process = command(*tokens, "--workers", "2", "--out", out, log=log)
     until = time.monotonic() + 120
