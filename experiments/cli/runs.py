@@ -54,7 +54,7 @@ def carry_out(
             again = "the same settings would fail the same way again"
             if isinstance(error, LammpsEndedError) and not error.refused:
                 again = _goes_on(folder)
-            if isinstance(error, SchedulerGoneError):
+            elif isinstance(error, SchedulerGoneError):
                 again = f"`HEDGEBED_SCHEDULER=tcp://... hedgebed resume {folder.path}` goes on with another scheduler"
             say(f"failed: {error}")
             say(f"what was finished is kept in {folder.path}; {again}")

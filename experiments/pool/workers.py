@@ -126,9 +126,10 @@ def _client(distributed: Any, scheduler: str | None, workers: int) -> Iterator[A
         ):  # fmt: skip
             yield client
         return
-    if "://" not in scheduler and ("/" in scheduler or scheduler.endswith(".json")) and not Path(scheduler).is_file():
+    is_file = Path(scheduler).is_file()
+    if not is_file and "://" not in scheduler and ("/" in scheduler or scheduler.endswith(".json")):
         raise ValueError(f"scheduler = {scheduler!r}: there is no such file")
-    given = {"scheduler_file": scheduler} if Path(scheduler).is_file() else {"address": scheduler}
+    given = {"scheduler_file" if is_file else "address": scheduler}
     try:
         client = distributed.Client(**given, timeout=_CONNECT)
     except (OSError, ValueError, json.JSONDecodeError) as error:

@@ -67,8 +67,9 @@ def kind_of(result: Mapping[str, Any]) -> str | None:
     if experiment.startswith("tumble"):
         return "platform on grains" if on_grains else "planar model"
     if experiment == "mujoco":
-        hard = result.get("surface") in ("steel", "brick")
-        return "robot on grains" if on_grains else None if hard else "robot on a law"
+        if on_grains:
+            return "robot on grains"
+        return None if result.get("surface") in ("steel", "brick") else "robot on a law"
     if experiment in ("hop", "paper", "campaign"):
         return "planar model"
     if experiment.startswith("bed"):
