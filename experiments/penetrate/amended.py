@@ -35,7 +35,7 @@ from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
 from .findings import mean_of, returned_work
-from .on_law import law_step
+from .on_law import law_step, without_rest
 from .settings import PenetrateSettings, say
 from .units import Unit, make_run, make_spike, plan_units
 
@@ -95,6 +95,19 @@ def _own(path: Path, number: int, effect: EffectTable) -> OwnEffect:
     return own
 
 
+def _at(size: float, known: Mapping[float, float]) -> float:
+    """A number at a diameter, from those at two or more `known` ones: diameter -> number, rising. Where one of the
+    nearest two is 0 there is no power law: the number at the nearer one."""
+    sizes = list(known)
+    high = min(max(int(np.searchsorted(sizes, size)), 1), len(sizes) - 1)
+    near = sizes[high - 1 : high + 1]
+    values = [known[one] for one in near]
+    if min(values) <= 0:
+        return known[min(near, key=lambda one: abs(math.log(one / size)))]
+    power = math.log(values[1] / values[0]) / math.log(near[1] / near[0])
+    return values[0] * (size / near[0]) ** power
+
+
 def _range(speeds: Sequence[float]) -> str:
     low, high = min(speeds), max(speeds)
     return f"{low:g}" if math.isclose(low, high) else f"{low:g} to {high:g}"
@@ -120,23 +133,42 @@ class AmendedLaw:
         return " and ".join(self.effects) or "nothing added"
 
     @cached_property
-    def pair(self) -> tuple[float, float]:
-        """K [N/m] and C [N s/m]: those that were fitted to this diameter where the model has several, else its own."""
+    def by_diameter(self) -> dict[float, tuple[float, float]]:
+        """K [N/m] and C [N s/m] of each diameter [m] that was fitted, rising; empty where the model has only one."""
         fitted = self.model.notes.get("fitted_by_diameter")
-        found = fitted.get(f"{self.settings.tip_diameter:g}") if isinstance(fitted, Mapping) else None
-        if isinstance(found, Mapping):
-            return float(found["stiffness"]), float(found["damping"])
-        return self.model.surface.stiffness, self.model.surface.damping
+        if not isinstance(fitted, Mapping):
+            return {}
+        return {float(size): (float(fitted[size]["stiffness"]), float(fitted[size]["damping"]))
+                for size in sorted(fitted, key=float)}  # fmt: skip
+
+    @cached_property
+    def pair(self) -> tuple[float, float]:
+        """K [N/m] and C [N s/m] of this diameter. Of a model with several: those that were fitted to it; between and
+        beyond them a power law of the diameter, which is a straight line through the nearest two in logarithms. Of a
+        model with one diameter: its own."""
+        own, fitted = self.settings.tip_diameter, self.by_diameter
+        for size, pair in fitted.items():
+            if math.isclose(size, own, rel_tol=1e-6):
+                return pair
+        if len(fitted) < 2:
+            return self.model.surface.stiffness, self.model.surface.damping
+        stiffness, damping = (_at(own, {size: pair[k] for size, pair in fitted.items()}) for k in (0, 1))
+        return stiffness, damping
 
     def warnings(self) -> list[str]:
         """What a reader must know: a spike that is not the model's, and speeds that it was not fitted to."""
         own, spike = self.settings, self.model.spike
         said = []
         if spike.diameter is not None and not math.isclose(spike.diameter, own.tip_diameter, rel_tol=0.01):
-            several = self.pair != (self.model.surface.stiffness, self.model.surface.damping)
-            of_k = "K and C are those fitted to this diameter" if several else "K and C are those of that tip"
-            sizes = {"model_mm": 1e3 * spike.diameter, "own_mm": 1e3 * own.tip_diameter}
-            said.append(say("other_tip", **sizes, of_k=of_k, spike=spike))
+            sizes, of_k = list(self.by_diameter), "K and C are those of that tip"
+            if any(math.isclose(size, own.tip_diameter, rel_tol=1e-6) for size in sizes):
+                of_k = "K and C are those fitted to this diameter"
+            elif len(sizes) > 1:
+                between = sizes[0] < own.tip_diameter < sizes[-1]
+                of_k = say("k_between" if between else "k_beyond", stiffness=self.pair[0],
+                           listed=" and ".join(f"{1e3 * size:g}" for size in sizes))  # fmt: skip
+            sizes_mm = {"model_mm": 1e3 * spike.diameter, "own_mm": 1e3 * own.tip_diameter}
+            said.append(say("other_tip", **sizes_mm, of_k=of_k, spike=spike))
         if spike.tip != own.tip:
             said.append(f"the model is of a {spike.tip} tip, this one is a {own.tip}; --tip {spike.tip} is its own")
         drops = (*own.drop_speeds, *own.other_drop_speeds)
@@ -350,7 +382,11 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             spike=asdict(make_spike(settings)) | {"load": settings.weight},
             model={"file": settings.model, "effects": list(law.effects)},
             departures={"sentences": [spike, *fitted]},
-            warnings=law.warnings(),
+            warnings=[
+                *law.warnings(),
+                *without_rest(settings, units, plain, "the spring-damper"),
+                *without_rest(settings, units, runs, f"the law with {law.words}"),
+            ],
         )
         return publish(folder, made, progress)
 

@@ -1,5 +1,6 @@
 """`hedgebed penetrate --ground ground.toml`: the runs of one seed on the law in a ground file, without a bed."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
 from coupling import Penetration
@@ -15,7 +16,7 @@ from .findings import mean_of, returned_work
 from .settings import PenetrateSettings, say
 from .units import Unit, make_run, make_spike, plan_units
 
-__all__ = ["law_step", "run_on_law"]
+__all__ = ["law_step", "run_on_law", "without_rest"]
 
 _ROWS = 400
 """Macro steps in which the fastest run passes the driven depth, where no bed says how long a step is."""
@@ -98,9 +99,20 @@ def _warnings(
         said += [f"{name}: {text}" for text in fitted.beyond(**{key: max(value, fitted.range[key][0])})]
     slowest, name = min((fastest[unit.id], unit.id) for unit in units if unit.kind == "driven")
     said += [f"{name}: {text}" for text in fitted.beyond(speed=min(slowest, fitted.range["speed"][1]))]
-    if any(unit.kind == "set_down" and runs[unit.id].resting_depth is None for unit in units):
-        said.append("the spike set down did not come to rest: there is no sinkage_law")
-    return said
+    return [*said, *without_rest(settings, units, runs, "the law")]
+
+
+def without_rest(
+    settings: PenetrateSettings, units: Sequence[Unit], runs: Mapping[str, Penetration], law: str
+) -> list[str]:
+    """Why a set-down on `law` has no sinkage, a sentence each; none where all came to rest."""
+    found = []
+    for unit in units:
+        run = runs[unit.id]
+        if unit.kind == "set_down" and run.resting_depth is None:
+            how = "deep" if run.ended == "max_depth" else "slow"
+            found.append(say(f"no_rest_{how}", law=law, s=settings, reached=1e3 * run.max_depth, lasted=run.time[-1]))
+    return found
 
 
 def _speed(run: Penetration) -> float:

@@ -27,6 +27,8 @@ __all__ = [
     "preparation_time",
 ]  # fmt: skip
 
+_FAR_DOWN = 20.0
+"""Tip diameters, or driven depths, past which a run on a law without a bed is ended [1]: it would not come to rest."""
 _TIMES_TO_REST = 2.4
 """Of load / (lowering_speed K), until a set-down shows no sign of motion: 1.8 to 3.3 in six [1]."""
 
@@ -120,8 +122,11 @@ def _set_down_time(settings: PenetrateSettings, unit: Unit) -> float:
 
 
 def deepest(settings: PenetrateSettings) -> float:
-    """Where a drop is stopped, one tip's diameter above the floor [m]."""
-    return settings.bed_size[2] - settings.tip_diameter
+    """Where a drop or a set-down is stopped [m]: one tip's diameter above the floor of the bed. A law has no floor, and
+    the size of a bed that is not there bounds nothing: then `_FAR_DOWN` times the tip or the driven depth."""
+    if settings.on_grains:
+        return settings.bed_size[2] - settings.tip_diameter
+    return _FAR_DOWN * max(settings.tip_diameter, settings.depth)
 
 
 def expected_time(settings: PenetrateSettings, unit: Unit, stiffness: float, *, held: float = 0.0) -> float:

@@ -92,6 +92,31 @@ def test_a_legend_says_measured_only_of_trials_that_hedgebed_did_not_make(tmp_pa
     assert f"trials, {source};" in write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(("phases", "over"), [(["in"] * 4, "depth [mm]"), (["in", "in", "out", "out"], "time [s]")])
+def test_the_force_of_a_push_is_drawn_over_its_depth_and_what_is_left_too_where_it_only_goes_in(phases, over):
+    one, depth = np.ones(4), np.array([0.001, 0.002, 0.0015, 0.0005])
+    channel = Channel("a", "force", np.arange(4.0), one, one, one, one, one, np.array(phases), None, depth)
+    drawing = draw_trajectories([channel], set(), ("base", "best"), "measured")
+    left, right = drawing.axes
+    assert (left.get_xlabel(), right.get_xlabel()) == ("depth [mm]", over)
+    assert left.lines[0].get_xdata() == pytest.approx(1e3 * depth)
+
+
+def test_a_trial_that_was_set_aside_has_a_table_of_its_own_and_no_curve(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(
+        "vis.diagnose.report.draw_trajectories", lambda shown, *more: drawn.extend(c.trial for c in shown)
+    )
+    write_folder(tmp_path, trials={"a": 3.0, "b": 30.0, "d": 2.0})
+    said = json.loads((tmp_path / "diagnosis.json").read_text())
+    said["set_aside"] = [{"trial": "b", "channel": "force", "unit": "N", "samples": 60, "rms_before": 1.5,
+                          "rms_after": 0.75}]  # fmt: skip
+    (tmp_path / "diagnosis.json").write_text(json.dumps(said))
+    page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
+    assert "were set aside" in page and "0.75" in page
+    assert drawn == ["a", "d"]
+
+
 def test_the_worst_channels_are_drawn_and_held_out_ones_among_them(tmp_path):
     write_folder(tmp_path, trials={name: float(size) for name, size in zip("abcdefgh", range(9, 1, -1), strict=True)})
     channels = [read_channel(path) for path in sorted((tmp_path / "series").glob("*.csv"))]

@@ -50,6 +50,8 @@ _FACTORS = {"mm": 1e3, "degrees": 180 / math.pi}
 _NARROW = 3.0
 """Range of chi-square up to which its axis is linear."""
 _BINS = 20
+_GOES_IN = 0.95
+"""Share of the rows of a push above the surface or on the way in, from which on it only goes in."""
 _APART = 0.005
 """Share of the range within which bins lie at one place."""
 
@@ -70,10 +72,17 @@ class Channel:
     phase: NDArray[np.str_]
     scatter: Array | None = None
     """What replicates differ by beyond the sensors, beside the best model; None where they differ by no more."""
+    depth: Array | None = None
+    """Of a push at these readings [m]; None of other channels."""
 
     def model(self, stage: str) -> Array:
         """The prediction of the model "before" or "after"."""
         return self.before if stage == "before" else self.after
+
+    @property
+    def goes_in(self) -> bool:
+        """Whether it is a push that only goes in: then its depth orders its rows as the time does."""
+        return self.depth is not None and bool(np.mean(np.isin(self.phase, ("free", "in"))) >= _GOES_IN)
 
     def residual(self, stage: str) -> Array:
         """(measured - model) / std."""
@@ -91,7 +100,8 @@ def read_channel(path: Path) -> Channel:
 
     return Channel(trial, name, numbers("t_s"), numbers("measured"), numbers("before"), numbers("after"),
                    numbers("std"), numbers("std_after" if "std_after" in columns else "std"),
-                   columns.get("phase", np.full(len(none), "")), columns.get("scatter"))  # fmt: skip
+                   columns.get("phase", np.full(len(none), "")), columns.get("scatter"),
+                   columns.get("depth_m"))  # fmt: skip
 
 
 def source_of(folder: Path) -> str:
@@ -149,21 +159,28 @@ def draw_trajectories(
         what, unit = _QUANTITIES.get(c.name, (c.name, "SI"))
         factor = _FACTORS.get(unit, 1.0)
         quick = np.ptp(c.time) < 0.5
-        time = c.time * (1e3 if quick else 1.0)
+        time, over_time = c.time * (1e3 if quick else 1.0), "time [ms]" if quick else "time [s]"
+        # The force of a push is a curve over its depth; what is left of one that comes back or holds, over the time.
+        depth = None if c.depth is None else 1e3 * c.depth
+        place = time if depth is None else depth
+        if depth is not None and c.goes_in:
+            time, over_time = depth, "depth [mm]"
         step = max(1, len(time) // 160)
         if c.scatter is not None:
             wide = 2 * np.hypot(1.0, c.scatter / c.std_after)
             right.fill_between(time, -wide, wide, color="#f1ead8", lw=0, zorder=0)
         right.axhspan(-2, 2, color="#e3e8ec", lw=0)
         for stage, colour, dash, _ in models:
-            left.plot(time, factor * c.model(stage), color=colour, ls=dash, lw=1.4, zorder=3)
+            left.plot(place, factor * c.model(stage), color=colour, ls=dash, lw=1.4, zorder=3)
             right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
-        left.plot(time[::step], factor * c.measured[::step], ".", color=INK, ms=2.4, zorder=2)
+        left.plot(place[::step], factor * c.measured[::step], ".", color=INK, ms=2.4, zorder=2)
         for axis in (left, right):
             low, high = axis.get_ylim()
             axis.set_ylim(low, high + 0.07 * (high - low))  # the band along the top hides nothing
-            _strip(axis, time, c.phase)
-            axis.set_xlabel("time [ms]" if quick else "time [s]", labelpad=1)
+            if axis is right or place is time:
+                _strip(axis, time, c.phase)
+            over_place = "depth [mm]" if depth is not None else over_time
+            axis.set_xlabel(over_place if axis is left else over_time, labelpad=1)
         left.set_title(f"trial {c.trial}, {what}" + (" (held out)" if c.trial in held else ""))
         left.set_ylabel(f"{what.split(',')[0]} [{unit}]", fontsize=8.5)
         right.set_ylabel("left over [std]", fontsize=8.5)

@@ -45,7 +45,8 @@ def write_diagnosis_report(report: Report) -> Path:
         Tile("Gap after", _gap(gap["after"]), which + _weighed(diagnosis, "after")),
     ]
     departures, following = result["departures"]["sentences"], diagnosis.get("next_experiment")
-    left = [_gap_table(diagnosis), *_in_units(diagnosis), *drawn["residuals"], *_phase_table(diagnosis)]
+    left = [_gap_table(diagnosis), *_in_units(diagnosis), *drawn["residuals"], *_phase_table(diagnosis),
+            *_set_aside(diagnosis)]  # fmt: skip
     sections = [
         Section("", [listing(result.get("summary", [])), *drawn["trajectories"]]),
         Section("Remaining misfit", [*left, *drawn["latent"]]),
@@ -66,8 +67,8 @@ def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
     """Each of the figures that has something to show."""
     channels = [read_channel(path) for path in sorted((report.folder / "series").glob("*.csv"))]
     held, labels = set(diagnosis["gap"]["held_out_trials"]), _labels(diagnosis)
-    source = source_of(report.folder)
-    shown = worst([channel for channel in channels if len(channel.time)], held)
+    source, aside = source_of(report.folder), {row["trial"] for row in diagnosis.get("set_aside", [])}
+    shown = worst([channel for channel in channels if len(channel.time) and channel.trial not in aside], held)
     drawings = {
         "trajectories": draw_trajectories(shown, held, labels, source),
         "residuals": draw_phases(diagnosis.get("by_phase", []), labels),
@@ -170,6 +171,17 @@ def _phase_table(diagnosis: Result) -> list[Block]:
     head = ("phase", "channel", "samples fitted", "before", "after", "samples held out", "before", "after")
     body = [(*key, *cells(parts.get(False)), *cells(parts.get(True))) for key, parts in rows.items()]
     return table_of(head, body, title="Chi-square per sample by phase and channel")
+
+
+def _set_aside(diagnosis: Result) -> list[Block]:
+    """What the models leave of trials that took no part, which no other table counts."""
+    rows = [
+        (row["trial"], row["channel"], row["unit"], str(row["samples"]),
+         *(_DASH if row[f"rms_{stage}"] is None else short(row[f"rms_{stage}"], 3) for stage in ("before", "after")))
+        for row in diagnosis.get("set_aside", [])
+    ]  # fmt: skip
+    head = ("trial", "channel", "unit", "samples", "before", "after")
+    return table_of(head, rows, title=say("set_aside"))
 
 
 def _where(diagnosis: Result) -> list[Block]:

@@ -17,6 +17,10 @@ __all__ = ["PENETRATION", "SYMBOLS", "TUMBLE", "advice", "confirmation", "equati
            "push_advice", "with_comments"]  # fmt: skip
 
 _TABLE, _WIDE = "[[effect]]\n", 118
+_BY_DIAMETER = '"fitted_by_diameter" = '
+_OF_DIAMETERS = """\
+# K [N/m] and C [N s/m] of each diameter [m]; [surface] has those of the diameter in [spike]. `hedgebed penetrate
+# --model` uses the entry of its --tip-diameter, or a power law through the nearest two."""
 
 
 def _equations(form: str, text: str, plain: str, bends: Sequence[Bend]) -> dict[str, str]:
@@ -113,7 +117,8 @@ def equations_of(kind: str, forms: Sequence[Form], units: Callable[[Form], Mappi
 
 
 def with_comments(model: str, rows: Sequence[Mapping[str, Any]], kind: str) -> str:
-    """model.toml with the equation of each ``[[effect]]`` in a comment above it."""
+    """model.toml with the equation of each ``[[effect]]``, and what K by diameter is, in comments above them."""
+    model = model.replace(_BY_DIAMETER, f"{_OF_DIAMETERS}\n{_BY_DIAMETER}", 1)
     head, *tables = model.split(_TABLE)
     if len(tables) != len(rows):
         return model

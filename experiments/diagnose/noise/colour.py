@@ -73,6 +73,8 @@ def _fitted(channel: str, modes: Sequence[Array], residuals: Sequence[Array]) ->
     def twice(numbers: Array) -> float:
         std = float(np.exp(numbers[1])) if len(numbers) > 1 else 1.0
         law = Colour(channel, std, float(np.tanh(numbers[0]))).power(frequency)
+        if not law.min() > 0:  # a correlation that rounds to 1: such a law has no power, and no reading is likely
+            return math.inf
         return float((np.log(law) + power / law).sum())
 
     white = float(power.sum())

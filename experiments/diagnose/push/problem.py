@@ -409,7 +409,8 @@ class PenetrationProblem(Problem):
 
     def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
         """model.toml. The slots of `penetration_law` are the parameters of an effect; where trials have several
-        diameters the middle one's K and C stand in [surface], all of them in [notes]."""
+        diameters the middle one's K and C stand in [surface] and its diameter in [spike], all of them in [notes]. A
+        trial without a diameter of its own gets that of the campaign's [spike]."""
         pairs = {
             f"{diameter:g}": {name: float(self._number(values, name, diameter)) for name in ("stiffness", "damping")}
             for diameter in self._diameters
@@ -425,11 +426,12 @@ class PenetrationProblem(Problem):
             }, file=self._file(form))
             for form in forms
         )  # fmt: skip
-        tables = {
-            name: getattr(self.tables, name) for name in ("format", "kind", "name", "spike", "uncertainty", "sensors")
-        }
-        surface = self.tables.surface.model_copy(update=own)
-        model = PenetrationModel(**tables, surface=surface, notes=notes, trial=self.tables.trial, effect=effects)
+        tables = {name: getattr(self.tables, name) for name in ("format", "kind", "name", "uncertainty", "sensors")}
+        surface, spike, trials = self.tables.surface.model_copy(update=own), self.tables.spike, self.tables.trial
+        if spike.diameter != self._middle:
+            trials = tuple(trial.model_copy(update={"diameter": self.tables.diameter_of(trial)}) for trial in trials)
+            spike = spike.model_copy(update={"diameter": self._middle})
+        model = PenetrationModel(**tables, spike=spike, surface=surface, notes=notes, trial=trials, effect=effects)
         write_model(Path(path), model)
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> list[str]:

@@ -5,7 +5,7 @@ diagnosis.json       the contract (diagnosis.schema.json beside this file), and 
 model.toml           the model with what was added: `hedgebed tumble --model` and `penetrate --model` run it
 latent.csv           where the verdict is unknown: what the model lacks, row by row
 evidence.csv         every candidate: its score, and the chi-square a sample that it leaves beyond what noise makes
-series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (as the gap takes it) and scatter
+series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (as the gap takes it), scatter, depth_m
 ```
 """
 
@@ -24,7 +24,7 @@ from experiments.diagnose.fit.evidence import excess, held_out_fit
 from experiments.diagnose.fit.fitting import Fit, fit
 from experiments.diagnose.fit.gaps import unit_of
 from experiments.diagnose.fit.localise import phases_of
-from experiments.diagnose.fit.problem import Form, Values
+from experiments.diagnose.fit.problem import Array, Form, Values
 from experiments.diagnose.noise.spectrum import line_rows
 from experiments.runs.folder import write_json, write_series, write_text
 
@@ -176,7 +176,7 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             "candidate": [r["candidate"] for r in rows], "effects": [" + ".join(r["effects"]) for r in rows],
             "score": [r["score"] for r in rows], "excess_per_sample": [r["left"] for r in rows],
         })  # fmt: skip
-    gaps = Gaps()
+    gaps, used, aside = Gaps(), {*found.fitted, *found.held_out}, []
     for trial in problem.trials:
         before = problem.compare(found.base_values, (), trial.id)
         after = problem.compare(found.best_values, found.forms, trial.id)
@@ -196,14 +196,31 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
                 if found.model_std:
                     columns["scatter"] = wide[channel]
                 rest, rest_after = (columns["measured"] - columns[stage] for stage in ("before", "after"))
-                gaps.add(trial.id, channel, columns["t_s"], rest, rest_after, std[channel], std_after[channel],
-                         phases=phases[own], settings=trial.settings, held_out=trial.id in found.held_out)  # fmt: skip
+                if trial.id in used:
+                    gaps.add(
+                        trial.id, channel, columns["t_s"], rest, rest_after, std[channel], std_after[channel],
+                        phases=phases[own], settings=trial.settings, held_out=trial.id in found.held_out,
+                    )  # fmt: skip
+                else:
+                    aside.append(_set_aside(trial.id, channel, rest, rest_after))
+            if "depth_m" in before[channel]:
+                columns["depth_m"] = before[channel]["depth_m"]
             write_series(folder / "series" / f"{trial.id}.{channel}.csv", columns)
     diagnosis["by_phase"], diagnosis["by_channel"] = gaps.by_phase, gaps.by_channel
     diagnosis["by_condition"], diagnosis["parted"] = gaps.by_condition, gaps.parted
-    diagnosis["residue"] = gaps.residue
+    diagnosis["residue"], diagnosis["set_aside"] = gaps.residue, aside
     write_json(folder / "diagnosis.json", diagnosis)
     return diagnosis
+
+
+def _set_aside(trial: str, channel: str, before: Array, after: Array) -> dict[str, Any]:
+    """One channel of a trial that took no part: its readings, and measured less modelled of both models, root mean
+    square in `unit`, over those readings that a model has."""
+    unit, factor = unit_of(channel)
+    rms = [factor * math.sqrt(float(np.nanmean(rest**2))) if np.isfinite(rest).any() else None
+           for rest in (before, after)]  # fmt: skip
+    return {"trial": trial, "channel": channel, "unit": unit, "samples": len(before), "rms_before": rms[0],
+            "rms_after": rms[1]}  # fmt: skip
 
 
 def _noise(found: Diagnosis) -> dict[str, dict[str, float]]:

@@ -213,6 +213,14 @@ def told_tables(diagnosis: Row) -> list[dict[str, Any]]:
             "title": "chi-square per sample by phase and channel", "head": ["phase", "channel", *_STAGES],
             "rows": _by_stage(diagnosis["by_phase"], ("phase", "channel"), "", numeral),
         })  # fmt: skip
+    if aside := diagnosis.get("set_aside", []):
+        tables.append({
+            "title": "set aside, in none of the other tables: recorded less modelled, root mean square",
+            "head": ["trial", "channel", "unit", "before", "after"],
+            "rows": [[row["trial"], row["channel"], row["unit"],
+                      *("-" if row[f"rms_{stage}"] is None else f"{row[f'rms_{stage}']:.3g}"
+                        for stage in ("before", "after"))] for row in aside],
+        })  # fmt: skip
     rows = candidate_rows(diagnosis)
     if rows:
         worse = no_better(rows)

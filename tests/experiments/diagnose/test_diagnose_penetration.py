@@ -392,6 +392,19 @@ def test_a_fitted_model_file_reads_back_with_its_effects(tmp_path):
     assert [(effect.id, effect.parameters["hardening_power"]) for effect in model.effect] == [("depth-hardening", 0.2)]
 
 
+def test_in_a_model_of_several_diameters_spike_and_surface_are_of_one_of_them(tmp_path):
+    wide = {"diameter": 0.024}
+    trials = [("n", "driven", 0.01, driven_trial(base, speed=0.01)),
+              ("w", "driven", 0.01, driven_trial(lambda z, v, top: 2 * base(z, v), speed=0.01), wide)]  # fmt: skip
+    problem = make_problem(campaign_of(trials))
+    problem.write_model(str(tmp_path / "model.toml"), {"stiffness@0.012": 800.0, "stiffness@0.024": 1900.0}, ())
+    model = read_model(tmp_path / "model.toml")
+    fitted = model.notes["fitted_by_diameter"]
+    assert {size: pair["stiffness"] for size, pair in fitted.items()} == {"0.012": 800.0, "0.024": 1900.0}
+    assert model.surface.stiffness == fitted[f"{model.spike.diameter:g}"]["stiffness"]
+    assert [trial.diameter for trial in model.trial] == [0.012, 0.024]  # as they were pushed
+
+
 def test_drops_of_which_only_the_depth_was_read_have_one_channel_in_what_is_told_of_them():
     def knocked(z, v):
         return base(z, v) + (6.0 if 0.004 < z < 0.006 and v > 0 else 0.0)

@@ -102,7 +102,7 @@ def test_on_another_tip_a_section_goes_with_the_square_of_the_diameter_and_a_sha
     assert wide.pair == (K, C)
     (said,) = wide.warnings()
     assert "12 mm" in said and "18 mm" in said
-    fitted = MODEL + '[notes.fitted_by_diameter."0.018"]\nstiffness = 300.0\ndamping = 2.0\n'
+    fitted = MODEL + fitted_at(0.018, 300.0, 2.0)
     assert law(model=fitted, tip_diameter=0.018).pair == (300.0, 2.0)
     assert law(effects).warnings() == []
 
@@ -160,6 +160,50 @@ def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
     assert numbers["sinkage_amended"] == pytest.approx(0.1 / K, rel=0.01)
     assert numbers["work_returned_amended"] < 0.2 * numbers["work_returned_spring_damper"]
     assert "plastic-sinkage" in (tmp_path / "run" / "report.html").read_text()
+
+
+def fitted_at(diameter, stiffness, damping):
+    """The table of one diameter [m] in the notes of a model."""
+    return f'[notes.fitted_by_diameter."{diameter}"]\nstiffness = {stiffness}\ndamping = {damping}\n'
+
+
+@pytest.mark.parametrize("diameter, size", [(0.06, "0.06"), (0.08, "0.08")])
+def test_without_a_bed_there_is_no_floor_for_a_wide_plate(tmp_path, diameter, size):
+    """F = K z (z / D)^p, so that at rest z = D (W / (K D))^(1 / (1 + p)). The plate is wider than the bed is deep."""
+    pairs = {"0.06": (5900.0, 5.0), "0.08": (9900.0, 6.0)}
+    notes = "".join(fitted_at(d, *pair) for d, pair in pairs.items())
+    power = '[[effect]]\nid = "depth-hardening"\nparameters = {reference = 0.0075, hardening_power = 0.3}\n'
+    (tmp_path / "model.toml").write_text(MODEL.replace("0.012", "0.08").replace("120.0", "9900.0") + notes + power)
+    settings = PenetrateSettings(
+        ground="spring-damper", model=str(tmp_path / "model.toml"), tip="flat", tip_diameter=diameter, load=20.0,
+        speeds=(0.1,), other_speeds=(0.1,), drop_speeds=(), other_drop_speeds=(), frame_count=0,
+    )  # fmt: skip
+    result = penetrate.run(settings, tmp_path / "run")
+    own, d = pairs[size][0], 0.0075
+    assert result["quantities"]["stiffness"]["value"] == own
+    closed = d * (20 / (own * d)) ** (1 / 1.3)
+    assert result["quantities"]["sinkage_amended"]["value"] == pytest.approx(closed, rel=0.01)
+
+
+def test_k_of_a_diameter_that_was_not_fitted_is_a_power_law_and_is_said(law):
+    two = MODEL + "".join(fitted_at(d, 2e6 * d**1.5, c) for d, c in ((0.02, 1.0), (0.05, 0.0)))
+    for diameter, word in ((0.03, "interpolated"), (0.1, "extrapolated")):
+        found = law(model=two, tip_diameter=diameter, bed_size=(0.4, 0.4, 0.3), shaft_length=0.3)
+        stiffness, damping = found.pair
+        assert stiffness == pytest.approx(2e6 * diameter**1.5)
+        assert damping == (1.0 if diameter < 0.0316 else 0.0)  # no power law through 0: that of the nearer tip
+        assert any(word in said for said in found.warnings())
+
+
+def test_a_set_down_that_does_not_come_to_rest_says_why(tmp_path):
+    (tmp_path / "model.toml").write_text(MODEL)
+    settings = PenetrateSettings(
+        ground="spring-damper", model=str(tmp_path / "model.toml"), load=2 * 20 * 0.012 * K, speeds=(0.2,),
+        other_speeds=(0.2,), drop_speeds=(), other_drop_speeds=(), frame_count=0, substeps=40,
+    )  # fmt: skip
+    result = penetrate.run(settings, tmp_path / "run")
+    assert result["quantities"]["sinkage_amended"]["value"] is None
+    assert sum("smaller load" in said for said in result["warnings"]) == 2
 
 
 def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(tmp_path, monkeypatch):
