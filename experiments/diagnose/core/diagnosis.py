@@ -19,7 +19,7 @@ from experiments.diagnose.noise.lone_beds import lone_finding
 from experiments.diagnose.noise.replicates import Scatter, exchanged, groups_of, odd_trials, split_trials, trends
 from experiments.diagnose.noise.wander import Wander
 
-from . import deciding, matters, renoised
+from . import deciding, matters, renoised, too_noisy
 from .outcome import Diagnosis, Known, finish
 from .search import Choice, Search
 
@@ -39,7 +39,8 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose a campaign; the same campaign gives the same answer. `tell(what, share done)` reports progress.
     `thorough`: nulls by full refits, which takes long; they are kept in the folder `gates`, if given."""
-    return _Course(problem, _Asked(thorough, seed, tell or (lambda what, done: None), gates)).run()
+    course = _Course(problem, _Asked(thorough, seed, tell or (lambda what, done: None), gates))
+    return too_noisy.as_contract(course.run())
 
 
 @dataclass(frozen=True)
@@ -471,10 +472,9 @@ class _Course:
 
     def _nothing(self, last: Verdict | None = None) -> Diagnosis:
         """No effect is missing by the fitted trials; once more with others held out where these show more."""
-        asked = self.asked
-        if others := () if asked.looked_at else deciding.missed(self.base, self.held_out, asked.seed):
+        if others := () if self.asked.looked_at else deciding.missed(self.base, self.held_out, self.asked.seed):
             return self._looking_at(others)
-        self.findings += deciding.held_out_divergences(self.base, self.held_out, asked.seed)
+        self.findings += deciding.held_out_divergences(self.base, self.held_out, self.asked.seed)
         return finish(self._known(self.model_std), self.base, None, "none", alone=self.alone, last=last)
 
     def _known(self, model_std: Mapping[str, float]) -> Known:

@@ -195,8 +195,10 @@ class Diagnosis(Known):
     @cached_property
     def next_experiment(self) -> str:
         """The experiment that separates two effects, confirms one, or follows up what is unknown."""
-        if self.verdict == "none" or self.choice is None:
+        if self.verdict == "none":
             return "None is needed: the base model explains what these sensors can see."
+        if self.choice is None:  # unknown for the readings' noise alone
+            return say("measure_noise")
         if self.verdict == "named":
             return confirmation(self.choice.best.effects[0])
         if self.verdict == "ambiguous":

@@ -2,7 +2,7 @@
 
 import math
 
-__all__ = ["numeral", "size_words", "unit_of"]
+__all__ = ["numeral", "si_unit_of", "size_words", "unit_of"]
 
 #: channel -> (unit, factor on SI)
 _UNITS: dict[str, tuple[str, float]] = {
@@ -15,6 +15,12 @@ _UNITS: dict[str, tuple[str, float]] = {
 def unit_of(channel: str) -> tuple[str, float]:
     """The unit in which a channel is reported, and its size in SI units."""
     return _UNITS.get(channel, ("SI", 1.0))
+
+
+def si_unit_of(channel: str) -> str:
+    """The channel's unit in campaign.toml."""
+    unit = unit_of(channel)[0]
+    return {"mm": "m", "degrees": "rad"}.get(unit, unit)
 
 
 def size_words(kind: str, size: float) -> str:

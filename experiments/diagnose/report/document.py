@@ -20,9 +20,10 @@ import numpy as np
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
 from experiments.diagnose.core.scatter_gap import scatter_std
+from experiments.diagnose.core.too_noisy import noise_found
 from experiments.diagnose.fit.evidence import excess, held_out_fit
 from experiments.diagnose.fit.fitting import Fit, fit
-from experiments.diagnose.fit.gaps import unit_of
+from experiments.diagnose.fit.gaps import si_unit_of, unit_of
 from experiments.diagnose.fit.localise import phases_of
 from experiments.diagnose.fit.problem import Array, Form, Values
 from experiments.diagnose.noise.spectrum import line_rows
@@ -60,6 +61,10 @@ def document(found: Diagnosis) -> dict[str, Any]:
         words, shares = found.dependence
         diagnosis["latent"] = {"file": "latent.csv", "depends_on": words, "explained": shares,
                           "lines": line_rows(found.lines)}  # fmt: skip
+    if noise := noise_found(found):
+        diagnosis["noise_found"] = {
+            name: {"stated": one.stated, "found": one.found, "unit": si_unit_of(name)} for name, one in noise.items()
+        }
     diagnosis["base"] = {"before": found.base_parameters(found.base), "after": found.base_parameters(found.best)}
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
     diagnosis["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}

@@ -1,7 +1,6 @@
 """The first lines of a diagnosis: what is missing, how far that closes the gap, how sure it is, what is left, and what
 to do next; a few sentences made of diagnosis.json alone."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -27,7 +26,6 @@ __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 _WORTH_SAYING = 0.5  # share of the excess that a candidate without the best evidence closes to be called likeliest
 _AS_LIKELY = 1.0  # nats within which another effect is reported beside the likeliest
 _SHOWN = 3  # candidates that are reported where none is certain
-_LOUD = 4.0  # a gap of the fitted trials past which noise alone is no comfort: twice what is stated
 _LOST = 100.0  # a standard error over the value itself past which it is none: the curvature there is round-off
 
 
@@ -52,12 +50,11 @@ def title_words(diagnosis: Mapping[str, Any]) -> str:
     small = small_names(diagnosis)
     names = " and ".join([effect["id"] for effect in diagnosis["effects"] if effect["id"] not in small]
                          + [f"{name} (small: {size})" for name, size in small.items()])  # fmt: skip
+    if "noise_found" in diagnosis:
+        times = numeral(max(row["found"] / row["stated"] for row in diagnosis["noise_found"].values()), 2)
+        stds = ", ".join(f"{row['found']:.2g} {row['unit']} for {name}" for name, row in _noisier(diagnosis).items())
+        return say("noisy_title", times=times, stds=stds)
     if diagnosis["verdict"] == "none":
-        if (gap := diagnosis["gap"]["after"]["fit"]) > _LOUD:
-            return (
-                f"No effect is named: the readings are {numeral(math.sqrt(gap), 2)} times as noisy as campaign.toml "
-                f"states; check the std that it gives, and the unit"
-            )
         return "Nothing is missing: the model with its fitted parameters explains the trials"
     if diagnosis["verdict"] == "named":
         return f"Missing: {names}"
@@ -72,6 +69,12 @@ def title_words(diagnosis: Mapping[str, Any]) -> str:
     return f"Unknown: something is missing that no effect of the library explains{also}"
 
 
+def _noisier(diagnosis: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """The channels whose noise exceeds the stated one by what matters."""
+    rows = diagnosis["noise_found"].items()
+    return {name: row for name, row in rows if (row["found"] / row["stated"]) ** 2 > SMALL}
+
+
 def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     """What stands first in the report and on the terminal."""
     ask = diagnosis["next_experiment"]
@@ -82,6 +85,11 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     elif wrong := _only_stated_wrong(diagnosis):
         off = [f"{bound['parameter']} {bound['sigmas']:+.1f} sigma off" for bound in _strained(diagnosis, "before")]
         first, ask = [say("stated_wrong", said_so="; ".join(off), wrong=wrong)], say("check_units", wrong=wrong)
+    elif "noise_found" in diagnosis:
+        rows = _noisier(diagnosis).items()
+        stds = ", ".join(f"{name} {row['found']:.2g} {row['unit']} (stated {row['stated']:.2g})" for name, row in rows)
+        gap = {key: "-" if value is None else numeral(value) for key, value in diagnosis["gap"]["after"].items()}
+        first = [say("noisy", gap=gap, stds=stds)]
     elif diagnosis["verdict"] == "unknown":
         first = [*_candidates(diagnosis), *_left(diagnosis), *worse_sentences(diagnosis)]
     else:

@@ -1,16 +1,19 @@
 """What matters decides: replicates by what the base model tells apart, small residues, numbers that went far."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from penetration_campaigns import campaign_of, driven_trial
+from penetration_campaigns import DEPTH_STD, FORCE_STD, campaign_of, driven_trial
 
 from experiments.check.replicas import pace_of
 from experiments.diagnose.core import matters
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
 from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.report.document import document
 from experiments.diagnose.report.gaps import Gaps
-from experiments.diagnose.report.summary import _residue
+from experiments.diagnose.report.summary import _residue, summary_sentences, title_words
 
 STIFFNESS, DAMPING = 900.0, 4.0
 
@@ -78,3 +81,52 @@ def test_what_is_left_is_reported_with_its_size_and_numbers_that_absorb_it():
     bound = {"parameter": "mu_s", "value": 0.4, "unit": "1", "sigmas": -6.0, "at_bound": True}
     words = " ".join(_residue({"residue": gaps.residue, "at_bounds": {"after": [bound]}}))
     assert "mm in y" in words and "mu_s (-6.0 sigma)" in words
+
+
+def stated(campaign, share):
+    """The same recordings, the noise of every sensor stated as this share of what it is."""
+    sensors = campaign.tables.sensors
+    smaller = {name: table.model_copy(update={"std": tuple(share * std for std in table.std)})
+               for name, table in sensors if table is not None}  # fmt: skip
+    tables = campaign.tables.model_copy(update={"sensors": sensors.model_copy(update=smaller)})
+    return replace(campaign, tables=tables)
+
+
+SPEEDS = (0.01, 0.01, 0.05, 0.05, 0.01, 0.05)
+
+
+@pytest.mark.parametrize(("share", "times"), [(0.97, None), (1 / 1.4, 1.4), (0.03, 33), (1e-3, 1e3)])
+def test_readings_noisier_than_stated_are_no_proof_that_nothing_is_missing(share, times):
+    """The gap takes the stated noise: 1 / share^2, and `none` asks for 1.2 at most."""
+    found = diagnose(make_problem(stated(pushes(base, SPEEDS), share)))
+    assert found.effects == ()
+    if share > 1e-2:  # below, the error of the depth, itself far larger than stated, leaves K nearly open
+        assert found.before.fit == pytest.approx(share**-2, rel=0.12)
+    told = document(found)
+    if times is None:
+        assert found.verdict == "none" and "noise_found" not in told
+        return
+    assert found.verdict == "unknown" and told["latent"]["file"] == "latent.csv"
+    row = told["noise_found"]["force"]
+    assert row["unit"] == "N" and row["stated"] == pytest.approx(share * FORCE_STD)
+    assert row["found"] == pytest.approx(FORCE_STD, rel=0.1)
+    words = title_words(told)
+    assert float(words.split(" times")[0].split()[-1].replace(",", "")) == pytest.approx(times, rel=0.06)
+    assert f"std = {row['found']:.2g} N" in words and f"stated {row['stated']:.2g}" in " ".join(summary_sentences(told))
+
+
+def test_beds_that_differ_excuse_a_gap_and_do_not_excuse_a_noisier_sensor():
+    """K of each bed is off by some percent: replicates show that, and it counts as noise; a sensor's noise does not."""
+    factors = (1.0, 1.04, 0.97, 1.01, 0.96, 1.03)
+
+    def beds(noise):
+        trials = []
+        for k, (speed, factor) in enumerate(zip(SPEEDS, factors, strict=True)):
+            made = driven_trial(lambda z, v, top, f=factor: f * base(z, v, top), speed=speed, seed=k, force_std=noise)
+            trials.append((f"{k}", "driven", speed, made))
+        return campaign_of(trials, depth_std=DEPTH_STD)
+
+    found = diagnose(make_problem(beds(FORCE_STD)))
+    assert found.verdict == "none" and "bed" in found.model_std and min(found.before.fit, found.before.held_out) > 2
+    found = diagnose(make_problem(beds(4 * FORCE_STD)))
+    assert found.verdict == "unknown" and document(found)["noise_found"]["force"]["found"] > 3.5 * FORCE_STD

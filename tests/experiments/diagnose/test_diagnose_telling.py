@@ -223,12 +223,6 @@ def test_the_first_lines_of_an_unknown_name_what_leads_how_far_it_goes_and_what_
     golden("diagnose/telling_unknown", {"title": title_words(unknown()), "summary": lines})
 
 
-@pytest.mark.parametrize(("gap", "said"), [(1.1, "Nothing is missing"), (499000.0, "710 times as noisy")])
-def test_nothing_named_beside_readings_far_noisier_than_stated_is_said_first(gap, said):
-    told = unknown(verdict="none", effects=[], gap={"before": {}, "after": {"fit": gap, "held_out": None}})
-    assert said in title_words(told)
-
-
 def test_where_nothing_is_certain_the_candidates_are_said_with_what_each_would_close():
     leading = {"effects": ["adhesion"], "certain": [], "nearest": None}
     likely = summary_sentences(unknown(effects=[], leading=leading))
