@@ -21,6 +21,9 @@ from experiments.runs.folder import write_series
 __all__ = ["Recording", "read_recording", "write_recording"]
 
 _DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
+_TIME_OF_A_PUSH = (
+    ". A push at one constant speed has the time depth / speed: add the column t_s = depth_m / speed, the speed in m/s"
+)
 _MOST_REPORTED = 5  # faults of one kind of one file; of the rest the number
 
 Conversion = Callable[[float], float]
@@ -171,7 +174,8 @@ def _find_column(path: Path, header: list[str], name: str, unit: str) -> tuple[i
     found = [column for column in header if column in known]
     if not found:
         held = ", ".join(column for column in header if column)
-        return f"{path}, line 1: column {' or '.join(known)} is missing; found {held}"
+        made = _TIME_OF_A_PUSH if name == "t" and any(column.lower().startswith("depth") for column in header) else ""
+        return f"{path}, line 1: column {' or '.join(known)} is missing; found {held}{made}"
     if len(found) > 1:
         return f"{path}, line 1: columns {' and '.join(found)} are the same quantity, one was expected"
     return header.index(found[0]), known[found[0]]

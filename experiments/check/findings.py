@@ -10,6 +10,7 @@ from experiments.campaign import Campaign, PenetrationCampaign, TumbleCampaign
 from experiments.campaign.tables import PenetrationTrial, TumbleTrial
 
 from .pushes import depth_zeros, force_units, penetration_oddities
+from .shifted import shifted_depths
 from .tumbles import tumble_oddities
 from .words import Finding, row_noise, say, times, unit_words
 
@@ -73,6 +74,11 @@ def _each_implausible(campaign: Campaign) -> list[Finding]:
             Finding(trial=trial, channel="depth", what=f"trial {trial}: {what}" if trial else what, doubt=True)
             for trial, what in depth_zeros(campaign)
         ]
+        known = {finding.trial for finding in found if finding.channel == "depth"}
+        found += [
+            Finding(trial=trial, channel="depth", what=f"trial {trial}: {what}", doubt=True)
+            for trial, what in shifted_depths(campaign) if trial not in known and "" not in known
+        ]  # fmt: skip
         units = [Finding(trial="", channel="force", what=what, doubt=True) for what in force_units(campaign)]
         if units:  # more than that the force is off scale
             found = [f for f in found if f.channel != "force" or _OFF_SCALE not in f.what] + units

@@ -17,6 +17,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
+from vis.diagnose.usable import has_numbers_to_use
 
 from .core.diagnosis import diagnose
 from .core.outcome import Diagnosis
@@ -130,13 +131,20 @@ def _result(found: Diagnosis, diagnosis: Json) -> Result:
         stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
         for stage, bounds in diagnosis["at_bounds"].items()
     }
-    for stage in ("before", "after"):
-        for name, entry in diagnosis["base"][stage].items():
-            quantities[f"{name}_{stage}"] = _quantity(entry, at_end=name in at_end[stage])
-    for effect in diagnosis["effects"]:
-        for name, entry in effect["parameters"].items():
-            quantities[f"{effect['id']}.{name}"] = _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
-    sentences = [*where_sentences(diagnosis), *found.problem.remarks(found.best_values, found.forms)]
+    base: dict[str, Json] = {
+        stage: {f"{name}_{stage}": _quantity(entry, at_end=name in at_end[stage])
+                for name, entry in diagnosis["base"][stage].items()}
+        for stage in ("before", "after")
+    }  # fmt: skip
+    effects: Json = {
+        f"{effect['id']}.{name}": _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
+        for effect in diagnosis["effects"] for name, entry in effect["parameters"].items()
+    }  # fmt: skip
+    if has_numbers_to_use(diagnosis):  # these first
+        quantities = base["after"] | effects | quantities | base["before"]
+    else:
+        quantities |= base["before"] | base["after"] | effects
+    sentences = [*where_sentences(diagnosis), *found.remarks, *found.facts]
     noises = [together([colour]) for colour in found.colours.values()]
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
     whose = "the bed's" if found.problem.granular else "the surface's, the rig's or the start's"

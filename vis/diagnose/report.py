@@ -15,6 +15,7 @@ from vis.diagnose.figures import (
     source_of,
     worst,
 )
+from vis.diagnose.usable import has_numbers_to_use
 from vis.page.numbers import plain, short
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.report import Report, Result, again, report_of, unit_text
@@ -48,7 +49,7 @@ def write_diagnosis_report(report: Report) -> Path:
     left = [_gap_table(diagnosis), *_in_units(diagnosis), *drawn["residuals"], *_phase_table(diagnosis),
             *_set_aside(diagnosis)]  # fmt: skip
     sections = [
-        Section("", [listing(result.get("summary", [])), *drawn["trajectories"]]),
+        Section("", [*_to_use(diagnosis), listing(result.get("summary", [])), *drawn["trajectories"]]),
         Section("Remaining misfit", [*left, *drawn["latent"]]),
         Section("Where the base model fails", [*([listing(departures)] if departures else []), *_where(diagnosis)]),
         Section("Candidates", [*drawn["evidence"], *_evidence(diagnosis)]),
@@ -265,27 +266,39 @@ def _sizes(diagnosis: Result) -> list[Block]:
     return table_of(head, rows, title=say("sizes"))
 
 
-def _numbers(diagnosis: Result) -> list[Block]:
-    ends = {
-        stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
-        for stage, bounds in diagnosis.get("at_bounds", {}).items()
-    }
+def _error(diagnosis: Result, entry: Result, name: str, stage: str) -> str:
+    """The standard error of a number, or why it has none."""
+    if any(bound["parameter"] == name and bound["at_bound"] for bound in diagnosis.get("at_bounds", {}).get(stage, [])):
+        return "at its end"
+    lost = entry["std"] is None or not entry.get("determined", True)
+    return "not determined" if lost else short(entry["std"], 2)
 
-    def error(entry: Result, name: str, stage: str) -> str:
-        if name in ends.get(stage, ()):
-            return "at its end"
-        lost = entry["std"] is None or not entry.get("determined", True)
-        return "not determined" if lost else short(entry["std"], 2)
 
-    effects = [
-        (effect["id"], name, short(entry["value"], 4), error(entry, f"{effect['id']}.{name}", "after"),
+def _effects(diagnosis: Result) -> list[tuple[str, str, str, str, str]]:
+    """A row for each parameter of the effects that were added: effect, parameter, value, standard error, unit."""
+    return [
+        (effect["id"], name, short(entry["value"], 4), _error(diagnosis, entry, f"{effect['id']}.{name}", "after"),
          unit_text(entry["unit"]))
         for effect in diagnosis["effects"] for name, entry in effect["parameters"].items()
     ]  # fmt: skip
-    after = diagnosis["base"]["after"]
+
+
+def _to_use(diagnosis: Result) -> list[Block]:
+    """The numbers of the best model in one table, where there is a K to use."""
+    if not has_numbers_to_use(diagnosis):
+        return []
+    rows = [
+        (name, short(entry["value"], 4), _error(diagnosis, entry, name, "after"), unit_text(entry["unit"]))
+        for name, entry in diagnosis["base"]["after"].items()
+    ] + [(f"{effect} {name}", *numbers) for effect, name, *numbers in _effects(diagnosis)]  # fmt: skip
+    return table_of(("number to use", "value", "standard error (random)", "unit"), rows, title=say("to_use"))
+
+
+def _numbers(diagnosis: Result) -> list[Block]:
+    effects, after = _effects(diagnosis), diagnosis["base"]["after"]
     base = [
-        (name, short(entry["value"], 4), error(entry, name, "before"), short(after[name]["value"], 4),
-         error(after[name], name, "after"), unit_text(entry["unit"]))
+        (name, short(entry["value"], 4), _error(diagnosis, entry, name, "before"), short(after[name]["value"], 4),
+         _error(diagnosis, after[name], name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["before"].items() if name in after
     ]  # fmt: skip
     added = table_of(("effect", "parameter", "value", "standard error", "unit"), effects, title="Added effects")

@@ -65,11 +65,13 @@ def meaning(effect: str) -> str:
     return f"{effect}: {found.meaning}." if found is not None else ""
 
 
-def confirmation(effect: str) -> str:
-    """One sentence: the trial or bench measurement that would show the effect by itself."""
+def confirmation(effect: str, kind: str) -> str:
+    """One sentence: the trial or bench measurement that would show the effect by itself. In trials of penetration the
+    body is whatever goes down: a tip."""
     found = find_candidate(effect)
     otherwise = "change what is thought to cause it and repeat a trial: the effect should follow"
-    return f"To confirm {effect}: {found.confirm if found is not None else otherwise}."
+    said = f"To confirm {effect}: {found.confirm if found is not None else otherwise}."
+    return said.replace("one spike", "the tip").replace("spike", "tip") if kind == "penetration" else said
 
 
 def advice(first: str, second: str) -> str:
@@ -89,7 +91,7 @@ def push_advice(first: str, second: str) -> str:
         if found is not None and found.push is not None and other in found.push.apart:
             return found.push.apart[other]
     return (
-        f"Drive the spike in and out at two speeds a factor of ten apart, to twice the depth reached here: {first} and "
+        f"Drive the tip in and out at two speeds a factor of ten apart, to twice the depth reached here: {first} and "
         f"{second} part where speed, direction and depth change one at a time."
     )
 

@@ -192,15 +192,30 @@ class Diagnosis(Known):
             return None
         return self.problem.planned(self.best, smallest(self.choice)[0].fit)
 
+    @property
+    def facts(self) -> tuple[str, ...]:
+        """What the trials that took part show of the base model's numbers, a sentence each."""
+        return tuple(self.problem.facts(self.best.values, self.forms, (*self.fitted, *self.held_out)))
+
+    @cached_property
+    def undetermined(self) -> tuple[str, ...]:
+        """Base parameters that these trials leave open although the fit has a standard error for them."""
+        return tuple(self.problem.undetermined(self.best.values, self.forms, (*self.fitted, *self.held_out)))
+
     @cached_property
     def next_experiment(self) -> str:
-        """The experiment that separates two effects, confirms one, or follows up what is unknown."""
+        """The experiment that separates two effects, confirms one, or follows up what is unknown; and the one that
+        determines what is `undetermined`."""
+        return " ".join([self._next_for_effects, *([self.problem.how_to_determine] if self.undetermined else [])])
+
+    @property
+    def _next_for_effects(self) -> str:
         if self.verdict == "none":
             return "None is needed: the base model explains what these sensors can see."
         if self.choice is None:  # unknown for the readings' noise alone
             return say("measure_noise")
         if self.verdict == "named":
-            return confirmation(self.choice.best.effects[0])
+            return confirmation(self.choice.best.effects[0], self.problem.kind)
         if self.verdict == "ambiguous":
             told = self.problem.next_experiment(self.forms[0], self.rivals[0], self.best.values)
             if (plan := self.planned) is None:

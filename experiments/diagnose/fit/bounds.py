@@ -28,6 +28,8 @@ class Bound:
     unit: str
     sigmas: float | None  # standard deviations from what was stated; None where nothing was (a parameter of an effect)
     at_bound: bool
+    stated: float | None = None  # the value in campaign.toml, where there is one
+    stated_std: float | None = None
 
     @property
     def strains(self) -> bool:
@@ -84,7 +86,7 @@ def bounds_met(found: Fit) -> tuple[Bound, ...]:
         if p.name in base and math.isfinite(p.std):
             sigmas = (value - p.value) / p.std
             if abs(sigmas) >= _FAR:
-                shown.append(Bound(p.name, value, p.unit, sigmas, at))
+                shown.append(Bound(p.name, value, p.unit, sigmas, at, p.value, p.std))
         elif p.name not in base and "." in p.name and at and abs(value) > near:
             shown.append(Bound(p.name, value, p.unit, None, True))
     return tuple(shown)

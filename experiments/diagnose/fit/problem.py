@@ -198,6 +198,7 @@ class Problem(Protocol):
     zero_scatter: tuple[str, ...] = ()
     """Kinds that are asked for by themselves where the others do not explain what is left."""
     force_scatter: tuple[str, ...] = ()  # and after these; they count where they explain all
+    how_to_determine: str = ""  # one sentence: the trial that would determine what is `undetermined`
     own_base: str = ""  # the setting each value of which has base parameters of its own
     lone_scatter: tuple[tuple[str, ...], ...] = ()
     """What is asked for, one after the other, where no trial repeats another (`lone_beds`)."""
@@ -281,7 +282,15 @@ class Problem(Protocol):
         return False
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> Sequence[str]:
-        """Remarks on the forms' numbers, a sentence each."""
+        """What is hard to believe of the forms' numbers, a sentence each."""
+        return ()
+
+    def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> Sequence[str]:
+        """What `trials` show of the base model's numbers, a sentence each."""
+        return ()
+
+    def undetermined(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> Sequence[str]:
+        """Base parameters that `trials` leave open although a fit has a standard error for them, by name."""
         return ()
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:

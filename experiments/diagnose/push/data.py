@@ -1,5 +1,6 @@
 """Trials of penetration made ready for fits: gaps left out, faults found and set aside, depth smoothed."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from scipy.ndimage import median_filter
 from scipy.stats import norm
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
-from experiments.campaign.tables import PenetrationTrial
+from experiments.campaign.tables import PenetrationTrial, SpikeTable
 from experiments.check.replicas import pace_of
 from experiments.diagnose.fit.problem import Array, Finding, TrialInfo
 from experiments.diagnose.noise.colour import Colour, colour_of, together
@@ -21,7 +22,7 @@ from experiments.grains.spells import spells
 from .depth import SmoothDepth, smooth_depth
 from .drive import Holds, Weights
 
-__all__ = ["Prepared", "prepare"]
+__all__ = ["Prepared", "prepare", "stds", "tip_depth"]
 
 _FEWEST = 12  # rows that a trial must have to be used
 _AROUND = 20  # rows on either side of a gap that show whether the clock has jumped
@@ -432,3 +433,12 @@ def _held(values: Array) -> NDArray[np.bool_] | None:
     fresh = np.concatenate([[True], np.diff(values) != 0])
     known = np.isfinite(values)
     return fresh if known.sum() > 20 and fresh[known].mean() < 0.6 else None
+
+
+def tip_depth(spike: SpikeTable, diameter: float) -> float:
+    """Depth at which the tip is wholly in [m]."""
+    if spike.tip == "sphere":
+        return 0.5 * diameter
+    if spike.tip == "cone":
+        return 0.5 * diameter / math.tan(math.radians(spike.cone_angle) / 2)
+    return 1e-4 * diameter

@@ -35,14 +35,14 @@ from experiments.diagnose.fit.problem import (
 )
 from experiments.diagnose.noise.jitter import Shaken
 
-from .data import Prepared, prepare, stds
+from .data import Prepared, prepare, stds, tip_depth
 from .depth import SmoothDepth
 from .design import best_push
 from .doubt import off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, scatter_parameters, speeds_of
-from .remarks import Push, remarks
+from .remarks import Push, damping_is_open, facts
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
@@ -73,6 +73,7 @@ class PenetrationProblem(Problem):
     lone_scatter = (("bed", "depth zero"), ("bed", "bed damping"), ("force zero",))  # K may differ, and not C
     own_base = "diameter_m"
     special_scatter = ("depth zero", "force zero")
+    how_to_determine = "To determine C: drop the tip, or push at a tenth and at ten times the speed."
 
     def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> None:
         tables = campaign.tables
@@ -128,7 +129,7 @@ class PenetrationProblem(Problem):
         into[:, _SLOT["mass"]] = self.tables.spike.mass or 1.0
         into[:, _SLOT["gravity"]] = trial.table.gravity
         into[:, _SLOT["reference"]] = self._scales.depth
-        into[:, _SLOT["radius_depth"]] = _tip_depth(self.tables.spike, trial.diameter)
+        into[:, _SLOT["radius_depth"]] = tip_depth(self.tables.spike, trial.diameter)
         if trial.smooth is not None:
             fast = float(np.abs(trial.smooth.speed).max())
             into[:, _SLOT["speed_scale"]] = max(0.02 * fast, 2 * float(np.median(trial.smooth.speed_std)), 1e-12)
@@ -434,17 +435,27 @@ class PenetrationProblem(Problem):
         model = PenetrationModel(**tables, spike=spike, surface=surface, notes=notes, trial=trials, effect=effects)
         write_model(Path(path), model)
 
-    def remarks(self, values: Values, forms: Sequence[Form]) -> list[str]:
+    def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> list[str]:
         """Sentences on K, its spread, and whether C can be determined, where it was not known; none with drops."""
+        return facts(self._pushes(values, forms, trials), tuple(dict.fromkeys(form.effect for form in forms)))
+
+    def undetermined(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> tuple[str, ...]:
+        """C of each diameter where these pushes leave it open; see `Problem`."""
+        pushes = self._pushes(values, forms, trials)
+        if not damping_is_open(pushes, tuple(form.effect for form in forms)):
+            return ()
+        return tuple(named("damping", diameter, self._diameters) for diameter in self._diameters)
+
+    def _pushes(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> list[Push]:
+        """The pushes among `trials`; none where C was known beforehand, or drops show it."""
         if self.tables.uncertainty.damping < 1 or not all(trial.driven for trial in self._trials.values()):
             return []
         still = {**values, **{named("damping", diameter, self._diameters): 0.0 for diameter in self._diameters}}
-        pushes = [
+        return [
             Push(trial.diameter, *(column[trial.has_other] for column in (
                 trial.path.depth, trial.path.speed, trial.other, self._run([still], forms, [trial])[0][0])))
-            for trial in self._trials.values()
+            for trial in (self._trials[id] for id in trials)
         ]  # fmt: skip
-        return remarks(pushes, tuple(dict.fromkeys(form.effect for form in forms)))
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """See `Problem`."""
@@ -469,15 +480,6 @@ class PenetrationProblem(Problem):
             depth=max(float(trial.path.depth.max()) for trial in driven),
             rows=int(np.median([trial.has_other.sum() for trial in driven])),
         )  # fmt: skip
-
-
-def _tip_depth(spike: Any, diameter: float) -> float:
-    """Depth at which the tip is wholly in [m]."""
-    if spike.tip == "sphere":
-        return 0.5 * diameter
-    if spike.tip == "cone":
-        return 0.5 * diameter / math.tan(math.radians(spike.cone_angle) / 2)
-    return 1e-4 * diameter
 
 
 def _of_drop(trial: Prepared, depth: Array, acceleration: Array, tables: PenetrationCampaign) -> Array:

@@ -1,4 +1,4 @@
-"""Remarks on driven trials: K and its spread, how it depends on the diameter, whether C can be determined."""
+"""Facts of driven trials: K and its spread, how it depends on the diameter, whether C can be determined."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array
 
-__all__ = ["Push", "remarks"]
+__all__ = ["Push", "damping_is_open", "facts"]
 
 
 @dataclass(frozen=True)
@@ -22,23 +22,40 @@ class Push:
     spring: Array  # force of the best model with C = 0 [N]
 
 
-def remarks(pushes: Sequence[Push], added: Sequence[str]) -> list[str]:
+def facts(pushes: Sequence[Push], added: Sequence[str]) -> list[str]:
     """Sentences. `added`: names of what the best model has beyond the base."""
     if not pushes:
         return []
     sentences = _stiffness(pushes)
-    straight = [_two(push, lambda p: np.maximum(p.depth, 0.0)) for push in pushes]
-    bent = [_two(push, lambda p: p.spring) for push in pushes] if added else []
-    unsure = len({c > 0 for _, c, _ in straight + bent}) > 1 or any(abs(c) < 2 * s for _, c, s in straight + bent)
-    if not unsure:
+    straight, bent = _each(pushes, added)
+    if not _open(straight, bent):
         return sentences
     sentences.append(
         "C cannot be determined from these pushes: fitted to each alone with a straight spring it is "
         + _range([c for _, c, _ in straight])
         + (f", and with {' and '.join(added)} {_range([c for _, c, _ in bent])}" if bent else "")
-        + ". A drop, or the same push at a tenth and at ten times the speed, would show it."
+        + "."
     )
     return sentences
+
+
+def damping_is_open(pushes: Sequence[Push], added: Sequence[str]) -> bool:
+    """Whether these pushes leave C open: fitted to each alone, it has either sign or is no more than 2 errors off 0."""
+    return bool(pushes) and _open(*_each(pushes, added))
+
+
+_Fitted = list[tuple[float, float, float]]
+
+
+def _each(pushes: Sequence[Push], added: Sequence[str]) -> tuple[_Fitted, _Fitted]:
+    """`_two` of each push with a straight spring, and with the best model's where that has more."""
+    straight = [_two(push, lambda p: np.maximum(p.depth, 0.0)) for push in pushes]
+    return straight, [_two(push, lambda p: p.spring) for push in pushes] if added else []
+
+
+def _open(straight: _Fitted, bent: _Fitted) -> bool:
+    found = straight + bent
+    return len({c > 0 for _, c, _ in found}) > 1 or any(abs(c) < 2 * s for _, c, s in found)
 
 
 def _stiffness(pushes: Sequence[Push]) -> list[str]:
@@ -50,7 +67,10 @@ def _stiffness(pushes: Sequence[Push]) -> list[str]:
     for size, found in sorted(by_size.items()):
         spread = f" ± {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
         parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m at {1e3 * size:g} mm ({len(found)})")
-    sentences = [f"K of a straight spring, push by push (number of pushes): {', '.join(parts)}."]
+    sentences = [
+        f"K of a straight spring, fitted to each push alone (number of pushes): {', '.join(parts)}. This shows how "
+        f"much pushes differ; it is not the K of the model."
+    ]
     if len(by_size) > 2:
         sizes = np.log(sorted(by_size))
         means = np.log([max(float(np.mean(by_size[size])), 1e-300) for size in sorted(by_size)])

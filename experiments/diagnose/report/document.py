@@ -19,6 +19,7 @@ import numpy as np
 
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
+from experiments.diagnose.core.rivals import LEAD, Rival
 from experiments.diagnose.core.scatter_gap import scatter_std
 from experiments.diagnose.core.too_noisy import noise_found
 from experiments.diagnose.fit.evidence import excess, held_out_fit
@@ -65,7 +66,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
         diagnosis["noise_found"] = {
             name: {"stated": one.stated, "found": one.found, "unit": si_unit_of(name)} for name, one in noise.items()
         }
-    diagnosis["base"] = {"before": found.base_parameters(found.base), "after": found.base_parameters(found.best)}
+    diagnosis["kind"] = found.problem.kind
+    diagnosis["base"] = {"before": _base(found, found.base), "after": _base(found, found.best)}
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
     diagnosis["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
     bounds = {"before": found.bounds_before, "after": found.bounds_after}
@@ -73,7 +75,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
     diagnosis["evidence"] = _evidence(found)
     diagnosis["evidence_base"] = _evidence_base(found)
     diagnosis["sizes"] = _sizes(found)
-    diagnosis["remarks"] = list(found.remarks)
+    diagnosis["remarks"], diagnosis["facts"] = list(found.remarks), list(found.facts)
     diagnosis["equations"] = equations_of(
         found.problem.kind, found.forms,
         lambda form: {name: unit for name, (_, unit) in found.problem.reported(found.best_values, form).items()},
@@ -99,6 +101,12 @@ def _numbers(found: Mapping[str, Estimated]) -> dict[str, Any]:
     }
 
 
+def _base(found: Diagnosis, one: Fit) -> dict[str, Any]:
+    """The base model's numbers in one of the fits; what the trials leave open has no standard error."""
+    return {name: {**told, "std": None} if name in found.undetermined else dict(told)
+            for name, told in found.base_parameters(one).items()}  # fmt: skip
+
+
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
     """The first effect against the nearest others: evidence, signatures and cross-validation."""
     if not found.equivalence:
@@ -109,14 +117,19 @@ def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
     for rival in found.equivalence:
         form = next(f for f in rival.hypothesis.forms if f.effect == rival.effect)
         rows.append({
-            "effect": rival.effect, "told_apart": not rival.same and rival.effect not in found.alternatives,
-            "evidence_behind": rival.behind,
+            "effect": rival.effect, "told_apart": _told_apart(rival) and rival.effect not in found.alternatives,
+            "evidence_behind": rival.behind, "lead": rival.lead,
             "left_out_behind": rival.behind_left_out,
             "left_out": None if rival.predicted is None else rival.predicted.per_sample,
             "angle_deg": rival.angle, "distance": rival.distance, "expected": rival.expected,
             "what_would_tell": found.problem.next_experiment(first, form, found.best.values),
         })  # fmt: skip
     return rows
+
+
+def _told_apart(rival: Rival) -> bool:
+    """Whether these trials distinguish a rival from the first effect, by the rule of the verdict."""
+    return not rival.same and rival.lead >= LEAD
 
 
 def _sizes(found: Diagnosis) -> list[dict[str, Any]]:
@@ -271,11 +284,11 @@ def _leading(found: Diagnosis) -> dict[str, Any]:
     if found.choice is None or not found.choice.best.effects:
         return {"effects": [], "certain": [], "nearest": None}
     rivals = found.choice.rivals
-    near = min(rivals, key=lambda rival: rival.behind) if rivals else None
+    near = min(rivals, key=lambda rival: rival.lead) if rivals else None
     return {
         "effects": list(found.choice.best.effects), "certain": list(found.effects),
         "parameters": {effect: found.parameters(effect) for effect in found.choice.best.effects},
         "nearest": None if near is None else {
-            "effect": near.effect, "evidence_behind": near.behind, "angle_deg": near.angle,
-            "told_apart": not near.same},
+            "effect": near.effect, "evidence_behind": near.behind, "left_out_behind": near.behind_left_out,
+            "angle_deg": near.angle, "told_apart": _told_apart(near)},
     }  # fmt: skip

@@ -7,13 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 from experiments.diagnose.core.effect_texts import meaning
+from experiments.diagnose.core.rivals import LEAD
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Finding
 from vis.diagnose.held_out import worsens_held_out
 from vis.page.sentences import Sentences
 
 __all__ = [
-    "candidate_rows", "findings_in_words", "remark_sentences", "say", "setting_words", "shares_words",
+    "behind_words", "candidate_rows", "findings_in_words", "remark_sentences", "say", "setting_words", "shares_words",
     "size_sentences", "small_names", "sure_sentences", "told_tables", "unnamed_sentence",
     "where_sentences", "worse_sentences",
 ]  # fmt: skip
@@ -59,13 +60,24 @@ def sure_sentences(diagnosis: Row) -> list[str]:
                      "(1 is noise)")  # fmt: skip
     sure = f"Confidence: {'; '.join(parts)}" if parts else ""
     if rivals := diagnosis["equivalence"][1:]:
-        near = min(rivals, key=lambda row: row["evidence_behind"])
+        near = min(rivals, key=lambda row: row.get("lead", row["evidence_behind"]))
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         if sure:
-            sure += f"; the nearest other name, {near['effect']}, is {near['evidence_behind']:.0f} nats behind, "
+            sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)}, "
         sure += f"and its change of the data is {near['angle_deg']:.0f} degrees away (0: the same): {apart}"
     return [*sentences, *size_sentences(diagnosis), *remark_sentences(diagnosis), *([f"{sure}."] if sure else []),
             *unnamed_sentence(diagnosis)]  # fmt: skip
+
+
+def behind_words(rival: Row) -> str:
+    """33 nats behind; where prediction says more, both numbers, since the larger of the two decides."""
+    evidence, left_out = rival["evidence_behind"], rival.get("left_out_behind")
+    if left_out is None or left_out <= evidence:
+        return f"{evidence:.0f} nats behind"
+    return (
+        f"{evidence:.0f} nats behind by evidence and {left_out:.0f} in predicting conditions left out (the larger "
+        f"decides; {LEAD:.0f} are needed)"
+    )
 
 
 def size_sentences(diagnosis: Row) -> list[str]:

@@ -11,6 +11,7 @@ from experiments.diagnose.noise.spectrum import line_sentence
 from vis.diagnose.held_out import worsens_held_out
 
 from .sentences import (
+    behind_words,
     remark_sentences,
     say,
     shares_words,
@@ -20,6 +21,7 @@ from .sentences import (
     unnamed_sentence,
     worse_sentences,
 )
+from .to_use import use_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
@@ -96,7 +98,28 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         first = [*sure_sentences(diagnosis), *worse_sentences(diagnosis)]
     if diagnosis["verdict"] != "unknown":
         first += _residue(diagnosis)
-    return [*_doubts(diagnosis), *first, *scatter_sentence(diagnosis), f"Next experiment: {ask}"]
+    aside = list(dict.fromkeys(row["trial"] for row in diagnosis.get("set_aside", [])))
+    apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
+    return [*_doubts(diagnosis), *_stated_far(diagnosis), *use_sentences(diagnosis), *apart, *first,
+            *scatter_sentence(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
+
+
+def _stated_far(diagnosis: Mapping[str, Any]) -> list[str]:
+    """Which numbers of the best model are far from what campaign.toml states, and what to do about it: a stated value
+    may be wrong, a template's for example. None where the verdict is about just that."""
+    far = _strained(diagnosis, "after")
+    if not far or _only_stated_wrong(diagnosis):
+        return []
+    listed = "; ".join(_far_words(bound) for bound in far)
+    kind = diagnosis.get("kind", "tumble")
+    return [say("check_stated", listed=listed, widen=say(f"widen_{kind}"))]
+
+
+def _far_words(bound: Mapping[str, Any]) -> str:
+    """stiffness = 2275 N/m is +15.3 sigma from the stated 900 ± 90"""
+    unit = "" if bound["unit"] == "1" else f" {bound['unit']}"
+    stated = f"{bound['stated']:.4g} ± {bound['stated_std']:.2g}" if bound.get("stated_std") else "value"
+    return f"{bound['parameter']} = {bound['value']:.4g}{unit} is {bound['sigmas']:+.1f} sigma from the stated {stated}"
 
 
 def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -113,7 +136,8 @@ def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
 
 def _doubts(diagnosis: Mapping[str, Any]) -> list[str]:
     """Faults of the recordings that may be all there is behind an effect."""
-    doubts = [finding for finding in diagnosis.get("findings", []) if finding.get("doubt")]
+    aside = {row["trial"] for row in diagnosis.get("set_aside", [])}  # what took no part causes nothing
+    doubts = [f for f in diagnosis.get("findings", []) if f.get("doubt") and not (f["trial"] and f["trial"] in aside)]
     doubts.sort(key=lambda finding: finding.get("maybe_effect", False))  # sure faults first
     found = [finding["what"] for finding in doubts]
     if not found or (diagnosis["verdict"] == "none" and diagnosis["gap"]["after"]["fit"] <= SMALL):
@@ -186,7 +210,7 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
     near = leading["nearest"]
     if near is not None:
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
-        first += say("nearest", near=near, apart=apart)
+        first += say("nearest", near=near, behind=behind_words(near), apart=apart)
     sentences.append(f"{first}.")
     sentences += [*_numbers(leading), *size_sentences(diagnosis), *remark_sentences(diagnosis)]
     sentences += unnamed_sentence(diagnosis)

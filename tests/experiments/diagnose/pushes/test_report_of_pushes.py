@@ -1,0 +1,157 @@
+"""Pushes of two plates, one of them with another zero of the depth: what is said of it, of K and C, and what next."""
+
+import json
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from golden import golden
+from penetration_campaigns import FORCE_STD, campaign_of, saved
+
+from experiments.campaign import Recording, read_campaign
+from experiments.check import find_implausible
+from experiments.check.shifted import shifted_depths
+from experiments.diagnose.experiment import diagnose_campaign, run
+from experiments.diagnose.report.document import document
+from experiments.diagnose.report.sentences import behind_words
+from experiments.diagnose.report.summary import summary_sentences
+from experiments.diagnose.report.to_use import use_sentences
+from experiments.diagnose.settings import DiagnoseSettings
+
+OFF = 0.4e-3
+"""By which the depth of trial n2 is too large [m]."""
+STIFFNESS = {0.06: 5500.0, 0.08: 9000.0}
+"""K at the reference depth of 7.5 mm [N/m]: F = K z (z / 7.5 mm)^0.3."""
+
+
+def pushed(diameter, *, zero=0.0, seed=0, power=0.3, stiffness=None, force_zero=0.0):
+    """10 mm in 2 s into F = K z (z / 7.5 mm)^power; `zero` [m]: what the depth's sensor adds."""
+    random = np.random.default_rng(seed)
+    time = np.linspace(0.0, 2.0, 101)
+    depth = 0.005 * time
+    z = np.maximum(depth - zero, 0.0)
+    force = (stiffness or STIFFNESS[diameter]) * z * (np.maximum(z, 1e-9) / 0.0075) ** power + force_zero
+    return Recording({"t_s": time, "depth_m": depth, "force_N": force + FORCE_STD * random.standard_normal(101)})
+
+
+def plates(**changes):
+    """Three pushes of each plate; `changes`: id -> what is other about it."""
+    trials = []
+    for k, (letter, d) in product((1, 2, 3), (("n", 0.06), ("w", 0.08))):
+        own = {"seed": 10 * k + round(100 * d)} | changes.get(f"{letter}{k}", {})
+        trials.append((f"{letter}{k}", "driven", 0.005, pushed(d, **own), {"diameter": d}))
+    return campaign_of(trials, stiffness=6000.0, doubt=(1.0, 1.0), diameter=0.06, depth_std=1e-5)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """The result and diagnosis.json of the plates, n2 being off by `OFF`."""
+    folder = tmp_path_factory.mktemp("plates")
+    campaign = saved(folder / "campaign", plates(n2={"zero": OFF}))
+    found = run(DiagnoseSettings(campaign=str(campaign)), folder / "run")
+    return found, json.loads((folder / "run" / "diagnosis.json").read_text()), folder / "run"
+
+
+def test_a_depth_zero_of_one_push_is_found_from_its_replicates():
+    found = dict(shifted_depths(plates(n2={"zero": OFF})))
+    assert set(found) == {"n2"} and f"{-1e3 * OFF:+.2g} mm" in found["n2"]
+    assert list(shifted_depths(plates())) == []
+    both = {"n2": {"zero": OFF}, "w3": {"zero": -0.3e-3}}
+    assert {id for id, _ in shifted_depths(plates(**both))} == {"n2", "w3"}
+    (finding,) = find_implausible(plates(n2={"zero": OFF}))
+    assert finding.trial == "n2" and finding.channel == "depth" and finding.doubt
+
+
+def test_a_stiffer_bed_and_pushes_that_all_differ_are_no_zero_of_the_depth():
+    assert list(shifted_depths(plates(n2={"stiffness": 1.1 * STIFFNESS[0.06]}))) == []
+    for zeros in ((0.2e-3, -0.5e-3, 0.6e-3), (0.1e-3, 0.05e-3, 0.9e-3)):
+        assert list(shifted_depths(plates(**{f"n{k}": {"zero": zero} for k, zero in enumerate(zeros, 1)}))) == []
+
+
+def test_on_a_straight_spring_the_zero_of_the_force_would_do_as_well():
+    """K (z + d) = K z + K d, where every row is below the surface."""
+    straight = {f"n{k}": {"power": 0.0, "force_zero": 3.0} for k in (1, 3)}
+    ((id, said),) = shifted_depths(plates(**straight, n2={"power": 0.0, "force_zero": 3.0 + STIFFNESS[0.06] * OFF}))
+    assert id == "n2"
+    golden("diagnose/moved_depth", said)
+
+
+def test_what_was_set_aside_is_in_no_gap_and_in_a_table_of_its_own(result):
+    _, said, _ = result
+    (aside,) = said["set_aside"]
+    assert (aside["trial"], aside["channel"], aside["unit"]) == ("n2", "force", "N")
+    assert aside["rms_after"] > 10 * FORCE_STD
+    for rows in (said["by_phase"], said["by_condition"]):
+        assert max(row["after"] for row in rows) < 1.3
+    assert "n2" not in {trial for row in said["by_condition"] for trial in row["trials"]}
+    assert said["residue"] == []
+
+
+def test_there_is_one_k_to_use_for_each_plate_before_all_else(result):
+    found, said, folder = result
+    first = list(found["quantities"])[:5]
+    assert [name for name in first if name.startswith("stiffness")] == ["stiffness@0.06_after", "stiffness@0.08_after"]
+    assert "number to use" in (folder / "report.html").read_text(encoding="utf-8")
+    for diameter, stiffness in STIFFNESS.items():
+        assert said["base"]["after"][f"stiffness@{diameter:g}"]["value"] == pytest.approx(stiffness, rel=0.005)
+    after = {
+        "stiffness@0.06": {"value": 5500.0, "std": 7.0, "unit": "N/m"},
+        "damping@0.06": {"value": 6.0, "std": None, "unit": "N s/m"},
+        "stiffness@0.08": {"value": 9000.0, "std": None, "unit": "N/m"},
+    }
+    told = said | {"base": {"after": after}, "at_bounds": {"after": []}}
+    golden("diagnose/numbers_to_use", use_sentences(told))
+    assert use_sentences(told | {"verdict": "unknown"}) == []
+    assert use_sentences(told | {"kind": "tumble"}) == []
+
+
+def test_a_c_that_these_pushes_leave_open_has_no_error_and_an_experiment(result):
+    found, said, _ = result
+    for stage in ("before", "after"):
+        assert said["base"][stage]["damping@0.06"]["std"] is None
+        assert found["quantities"][f"damping@0.08_{stage}"]["std"] is None
+    assert "To determine C" in said["next_experiment"]
+    assert "spike" not in said["next_experiment"]
+
+
+def test_stated_values_that_are_far_off_are_said_first_with_what_to_do():
+    """The template's K and C left as they are: 900 ± 90 N/m for plates of 5500 and 9000 N/m."""
+    bounds = [
+        {"parameter": "stiffness@0.06", "value": 2275.0, "unit": "N/m", "sigmas": 15.28, "at_bound": False,
+         "stated": 900.0, "stated_std": 90.0},
+        {"parameter": "mu_s", "value": 0.8, "unit": "1", "sigmas": 6.0, "at_bound": True, "stated": 0.5,
+         "stated_std": 0.05},
+    ]  # fmt: skip
+    said = {"kind": "penetration", "verdict": "named", "effects": [], "at_bounds": {"before": [], "after": bounds[:1]},
+            "next_experiment": "none"}  # fmt: skip
+    tumble = said | {"kind": "tumble", "at_bounds": {"before": [], "after": bounds[1:]}}
+    golden("diagnose/stated_far", [summary_sentences(said)[0], summary_sentences(tumble)[0]])
+
+
+def test_a_rival_is_distinguished_where_evidence_or_prediction_leads_by_ten_nats_and_both_are_said(tmp_path):
+    found = diagnose_campaign(saved(tmp_path / "c", plates()))
+    assert found.choice is not None
+    rival = found.choice.rivals[0]
+    for evidence, left_out, apart in ((5.9, 10.4, True), (5.9, 7.0, False), (12.0, None, True), (9.0, None, False)):
+        other = replace(rival, behind=evidence, behind_left_out=left_out)
+        one = replace(found, choice=replace(found.choice, rivals=(other,)))
+        row = document(one)["equivalence"][1]
+        assert row["told_apart"] is apart and row["lead"] == max(evidence, left_out or 0.0)
+    golden("diagnose/behind", [behind_words({"evidence_behind": e, "left_out_behind": p}) for e, p in
+                               ((33.0, None), (33.0, 12.0), (5.9, 10.4))])  # fmt: skip
+
+
+def test_a_push_without_a_clock_is_refused_with_how_to_make_its_time(tmp_path):
+    folder = saved(tmp_path / "c", plates())
+    path = folder / "n1.csv"
+    path.write_text("\n".join(line.partition(",")[2] for line in path.read_text().splitlines()))
+    with pytest.raises(ValueError, match="t_s = depth_m / speed") as refused:
+        read_campaign(folder)
+    assert "n1.csv, line 1" in str(refused.value)
+
+
+def test_the_shipped_plates_have_no_push_with_another_zero():
+    from experiments.campaign.files import TEMPLATES
+
+    assert list(shifted_depths(read_campaign(TEMPLATES / "cmu-plate-sinkage"))) == []
