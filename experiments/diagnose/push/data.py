@@ -440,5 +440,6 @@ def tip_depth(spike: SpikeTable, diameter: float) -> float:
     if spike.tip == "sphere":
         return 0.5 * diameter
     if spike.tip == "cone":
+        assert spike.cone_angle is not None  # the tables see to it
         return 0.5 * diameter / math.tan(math.radians(spike.cone_angle) / 2)
     return 1e-4 * diameter

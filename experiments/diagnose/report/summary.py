@@ -137,7 +137,7 @@ def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
 def _doubts(diagnosis: Mapping[str, Any]) -> list[str]:
     """Faults of the recordings that may be all there is behind an effect."""
     aside = {row["trial"] for row in diagnosis.get("set_aside", [])}  # what took no part causes nothing
-    doubts = [f for f in diagnosis.get("findings", []) if f.get("doubt") and not (f["trial"] and f["trial"] in aside)]
+    doubts = [f for f in diagnosis.get("findings", []) if f.get("doubt") and f.get("trial") not in aside]
     doubts.sort(key=lambda finding: finding.get("maybe_effect", False))  # sure faults first
     found = [finding["what"] for finding in doubts]
     if not found or (diagnosis["verdict"] == "none" and diagnosis["gap"]["after"]["fit"] <= SMALL):
