@@ -14,8 +14,10 @@ import pytest
 
 from coupling import BedGround, CoupledTumble, platform_members
 from coupling.lammps import LammpsBed, LammpsEndedError, LammpsGround, LammpsMissingError, find_lammps
+from coupling.lammps.law import OVERLAP
 from coupling.members import Member
-from dem import Ball, Bed, Cylinder, Material
+from dem import Ball, Bed, Cylinder, Facing, Material
+from dem.contact.law import pair_row
 from dem.grains.materials import material
 from rigid import Trial
 
@@ -105,6 +107,41 @@ def test_a_spike_feels_the_force_of_our_bed_within_one_percent_in_the_first_mill
     assert mean[0][2] > 0.05
     np.testing.assert_allclose(mean[1][2], mean[0][2], rtol=0.01)
     assert np.abs(forces[0][:, 2] - forces[1][:, 2]).max() < 0.02 * forces[0][:, 2].max()
+
+
+def times_to_rock_back(weight):
+    """Time until a grain on the floor has rocked to and fro on its rolling spring [s], in our bed and in LAMMPS.
+
+    ``weight``: of the grain, over that which presses it into the floor by the overlap of `MeanContact`.
+    """
+    stuff, r = replace(material("sand"), young=3e7, restitution=0.8), 0.5 * GRAIN
+    two_e, eight_g = pair_row(stuff, Facing())[:2]
+    mass, overlap = stuff.density * 4 / 3 * math.pi * r**3, OVERLAP * r * weight ** (2 / 3)
+    a = math.sqrt(r * overlap)
+    turns = math.sqrt(eight_g * a / (1.4 * mass))  # [rad/s] of a ball that rolls without slip, I = 7/5 m R^2
+    # A fifth of the angle at which the spring would be at its bound mu_r F R
+    spin = 0.2 * stuff.rolling_friction * (2 / 3) * two_e * overlap / (eight_g * r) * turns
+    bed = Bed.from_grains(
+        stuff, positions=[(0.015, 0.015, r - overlap)], velocities=[(spin * (r - overlap), 0.0, 0.0)],
+        spins=[(0.0, spin, 0.0)], radii=[r], size=SIZE, height=0.06, gravity=2 / 3 * two_e * a * overlap / mass,
+    )  # fmt: skip
+    theirs, found = LammpsBed(bed, ranks=1), []
+    for each in (bed, theirs):
+        steps, speeds = max(1, round(0.3 / turns / bed.time_step)), [1.0]
+        while speeds[-1] < 0 or len(speeds) < 12:
+            each.advance(steps)
+            speeds.append(each.grains(contacts=False).velocity[0, 0])
+        before, after = speeds[-2:]
+        found.append((len(speeds) - 1 - after / (after - before)) * steps * bed.time_step)
+    theirs.close()
+    return found
+
+
+def test_a_grain_rolls_on_the_spring_of_our_law_at_the_load_of_the_mean_contact_and_at_no_other():
+    ours, theirs = times_to_rock_back(1.0)
+    assert theirs == pytest.approx(ours, rel=0.02)
+    ours, theirs = times_to_rock_back(8.0)  # the contact radius is twice as large, and LAMMPS' spring is the same
+    assert theirs > 1.15 * ours
 
 
 def test_grains_rebound_from_floor_bodies_and_grains_as_fast_as_their_restitution_says():
