@@ -174,7 +174,11 @@ def _foot(
         errors = {"law_error": size_of_law, "shape_errors": found.shape_errors, "speed": found.speed}
         print(json_module.dumps(numbers | errors | {"unit": "N", "warnings": warnings}, indent=2))
         return 0
+    least = 1e-9 * float(np.linalg.norm(force))  # below it: round-off of forces that cancel
     for axis, value, spread in zip("xyz", force, std, strict=True):
+        if abs(value) <= least and (math.isnan(spread) or spread <= least):
+            print(f"force {axis} = 0 N")
+            continue
         print(f"force {axis} = {value:.4g}" + ("" if math.isnan(spread) else f" ± {spread:.2g}") + " N")
     print(f"± is one standard deviation between beds; the law missed unseen plates by {100 * found.unseen:.0f} % (rms)")
     if found.shape_errors is not None:

@@ -46,7 +46,10 @@ UNSURE = 2.0
 
 
 def friction_angle(material: Material) -> float:
-    """The friction angle of the grains of a material at large strain [degrees], by their rolling friction."""
+    """The friction angle of a material at large strain [degrees]: as measured on it, or by its rolling friction."""
+    measured = recipe_of(material).angle
+    if measured is not None:
+        return measured
     rolling, angles = zip(*_ANGLES, strict=True)
     return float(np.interp(material.rolling_friction, rolling, angles))
 

@@ -20,6 +20,9 @@ class Recipe:
 
     stages: tuple[str, ...] | None = None  # None: rained and levelled
     cohesion: float | None = None  # [Pa]; None: not known
+    cohesion_std: float | None = None  # [Pa]; None: not known
+    angle: float | None = None  # Friction angle at large strain [degrees]; None: as of the rolling friction
+    circle: float | None = None  # Peak angle of the Mohr's circle that gave the cohesion [degrees]; None: not known
     resistance: float | None = None  # What a tip meets for the cohesion alone [Pa]; None: not known
     rained: float | None = None  # Packing fraction of one size, rained and levelled; graded beds get it too [1]
     source: str = ""

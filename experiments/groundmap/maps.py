@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from dem.grains.materials import MATERIALS
+from vis.page.numbers import foldable, quote
 
 from .settings import say
 
@@ -122,7 +123,8 @@ class GroundMap:
         of_factor, of_exponent = factor.std / factor.value / exponent, math.log(share) * scatter / exponent**2
         sinkage = _times(scaled["sinkage"], Number(more, more * math.hypot(of_factor, of_exponent)))
         if sinkage.value > diameter:
-            raise ValueError(say("beyond_load", load=load, sinkage=1e3 * sinkage.value, diameter=1e3 * diameter))
+            about = foldable(quote(sinkage.value, None, "m", significant=2))
+            raise ValueError(say("beyond_load", load=load, sinkage=about, diameter=1e3 * diameter))
         if load < own_load and sinkage.value < grain:
             raise ValueError(say("below_load", load=load, sinkage=1e3 * sinkage.value, grain=1e3 * grain))
         speed = self.reference["speed"] * (g * size) ** 0.5

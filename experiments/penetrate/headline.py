@@ -11,6 +11,8 @@ from typing import Any
 from experiments.runs.registry import Headline
 from vis.page.numbers import foldable, quote
 
+from .sure import in_words
+
 __all__ = ["penetrate_headline"]
 
 _SAID, _OF_FINDINGS = 4, 2
@@ -26,6 +28,7 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     rows = [(f"sinkage at rest{load}", *(_quoted(numbers[f"sinkage_{side}"]) for side in ("dem", "spring_damper")))]
     if "depth_to_rest" in numbers:
         rows[0] = (f"would rest{load} at about", _quoted(numbers["depth_to_rest"]), rows[0][2])
+    rows += _with_errors(result.get("sure", {}))
     rows += _drag(result.get("departures", {}).get("table", []))
     rows += _fastest_drop(result.get("runs", []))
     given, back = (numbers.get(f"work_returned_{side}") for side in ("dem", "spring_damper"))
@@ -53,6 +56,15 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
         ("", "bed", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
         tuple(map(foldable, warnings)), tuple(map(foldable, shown)), left,
     )  # fmt: skip
+
+
+def _with_errors(sure: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """The sinkage among real grains with the ends of its interval, or the depth to rest; as far as they are known."""
+    for name, words in (("depth_to_rest", "the same with its errors"), ("sinkage_dem", "among real grains, 95 %")):
+        if name in sure:
+            low, high = sure[name]["low"], sure[name]["high"]
+            return [(words, "not known" if low is None else in_words(low, high, "m"), "")]
+    return []
 
 
 def _drag(table: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:

@@ -10,18 +10,23 @@ found) and made metres hundreds of metres.
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
-from experiments.grains.bearing import COHESIONS, bearing_capacity, friction_angle, strength
+from dem.grains.materials import MATERIALS
+from experiments.grains.bearing import COHESIONS, bearing_capacity, bearing_of, friction_angle, strength
+from experiments.grains.recipes import recipe_of
 from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
+from vis.penetrate.summary import REAL_GRAINS
 
 from . import beds
 from .findings import Findings
 from .settings import PenetrateSettings, say
+from .sure import Interval, in_words, interval_of_rest, interval_of_sinkage, interval_of_stiffness
 from .units import Unit
 
-__all__ = ["answer", "made_units"]
+__all__ = ["answer", "how_sure", "made_units", "sinkage_interval"]
 
 _BESIDE = "jsc-1a-loose-cut"
 """The material to try where grains without cohesion do not bear."""
@@ -56,20 +61,105 @@ def answer(findings: Findings, material: Any) -> Json | None:
     told: Json = {
         "s": settings, "depth": _length(depths[0]), "foot": 1e3 * settings.foot, "floor": 1e3 * settings.bed_size[2],
         "plate": _length(depths[1]),
-        "angle": angle, "enough": f"{enough:.2g}", "g": settings.gravity / STANDARD_GRAVITY, "beside": _BESIDE,
+        "angle": angle, "enough": f"{enough:.2g}", "g": settings.gravity / STANDARD_GRAVITY,
         "driven": 1e3 * settings.depth, "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the K expected",
     }  # fmt: skip
-    cohesionless = material.cohesion == "none"
+    beside = _beside(settings, material, stiffness) if material.cohesion == "none" else None
     sentences = [say("rests_never" if never else "rests_below_the_bed", **told)]
     sentences += [say("left_out")] if not stood else []
-    sentences += [say("with_cohesion", **told)] + ([say("try_cohesive", **told)] if cohesionless else [])
+    sentences += [say("with_cohesion", **told)] + ([] if beside is None else [beside.pop("sentence")])
     return {
         "comes_to_rest": False, "at_any_depth_of_the_foot": not never, "load": load, "foot": settings.foot,
         "depth": depths[0], "depth_range": [low, high], "stiffness": stiffness,
         "stiffness_plate": plate,
         "friction_angle": angle, "cohesion_enough": enough, "cohesions": rows, "sentences": sentences,
-        "source": say("terzaghi"),
+        "source": say("terzaghi"), **({} if beside is None else {"beside": beside}),
     }  # fmt: skip
+
+
+def _beside(settings: PenetrateSettings, material: Any, stiffness: float) -> Json:
+    """What `_BESIDE` would do: the cohesion that it needs by either of its angles, and how deep the foot would rest.
+
+    Its friction angle is its own, not that of these grains: N_c grows from 32 at 31 degrees to 55 at 37. K is the one
+    of this bed times the expected ratio of the two materials.
+    """
+    other = MATERIALS[_BESIDE]
+    recipe, area = recipe_of(other), math.pi * settings.tip_diameter**2 / 4
+    assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
+    load, angle = settings.weight, friction_angle(other)
+    needs = [load / (bearing_capacity(1.0, phi) * area) for phi in (angle, recipe.circle)]
+    facts = {"grain": settings.grain, "gravity": settings.gravity, "area": area}
+    of_it = stiffness * bearing_of(other, **facts).stiffness / bearing_of(material, **facts).stiffness
+    least, most = max(0.0, recipe.cohesion - recipe.cohesion_std), recipe.cohesion + recipe.cohesion_std
+    shares = [max(0.0, 1.0 - most / min(needs)), max(0.0, 1.0 - least / max(needs))]
+    low, high = (load * share / of_it for share in shares)
+    verdict = "beside_holds" if high == 0 else "beside_sinks" if low > 0 else "beside_open"
+    sentence = say(
+        "try_cohesive", beside=_BESIDE, cohesion=recipe.cohesion, std=recipe.cohesion_std, angle=angle,
+        circle=recipe.circle, large=f"{needs[0]:.2g}", peak=f"{needs[1]:.2g}",
+        verdict=say(verdict, low=_length(low), high=_length(high)),
+    )  # fmt: skip
+    return {
+        "material": _BESIDE, "cohesion": recipe.cohesion, "cohesion_std": recipe.cohesion_std,
+        "friction_angles": [angle, recipe.circle], "cohesions_enough": needs, "depth_range": [low, high],
+        "sentence": sentence,
+    }  # fmt: skip
+
+
+def sinkage_interval(findings: Findings, material: Any) -> Interval | None:
+    """How sure the depth at rest is; None where no set-down came to rest."""
+    settings = findings.settings
+    return interval_of_sinkage(
+        findings.sinkages(findings.beds), tip=settings.tip, grain=settings.grain,
+        real=REAL_GRAINS.get(material.name, 0.0), cohesive=material.cohesion != "none",
+    )  # fmt: skip
+
+
+def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
+    """The entry "sure" of result.json: sinkage, K and depth to rest with the ends of their 95 % intervals.
+
+    `rest` gets the sentence on its depth.
+    """
+    settings, sunk = findings.settings, sinkage_interval(findings, material)
+    stiffness = interval_of_stiffness(
+        findings.fit.stiffness, [fit.stiffness for fit in findings.seed_fits.values()], tip=settings.tip,
+        grain=settings.grain, real=REAL_GRAINS.get(material.name, 0.0), diameter=settings.tip_diameter,
+        cohesive=material.cohesion != "none",
+    )  # fmt: skip
+    found = {
+        name: {"unit": unit, **asdict(interval), "sentence": _in_a_sentence(findings, name, interval, unit)}
+        for name, interval, unit in (("sinkage_dem", sunk, "m"), ("stiffness", stiffness, "N/m"))
+        if interval is not None
+    }
+    if rest is None:
+        return found
+    force = max(float(run.force.max()) for run in findings.of("driven"))
+    ends = None if stiffness is None else interval_of_rest(settings.weight, stiffness, rest["depth_range"][1])
+    beyond = settings.weight / force if force > 0 else None
+    low, high = ends or (None, None)
+    times = "" if beyond is None else say("far_beyond", times=_two_digits(beyond), force=f"{force:.2g}")
+    known = say("rest_unknown") if low is None or high is None else say("rest_within", ends=in_words(low, high, "m"))
+    said = f"{times}{known}"
+    rest["sentences"] = [rest["sentences"][0], said, *rest["sentences"][1:]]
+    depth = {"unit": "m", "value": rest["depth"], "low": low, "high": high, "times_beyond": beyond, "sentence": said}
+    return found | {"depth_to_rest": depth}
+
+
+def _in_a_sentence(findings: Findings, name: str, interval: Interval, unit: str) -> str:
+    """What is known of a number, and what would tell the rest."""
+    count = sum(value is not None for value in findings.sinkages(findings.beds))
+    count = len(findings.seeds) if name == "stiffness" else count
+    what = "the sinkage at rest" if name == "sinkage_dem" else "K"
+    if interval.low is not None and interval.high is not None:
+        whence = say("chance_kept") if interval.one_bed else say("chance_beds", count=count)
+        return say("sure_within", what=what, ends=in_words(interval.low, interval.high, unit), whence=whence)
+    if interval.chance is None:
+        return say("sure_unknown", what=what)
+    return say("sure_chance", what=what, ends=in_words(*interval.chance, unit), count=count)
+
+
+def _two_digits(number: float) -> str:
+    return f"{float(f'{number:.2g}'):g}"
 
 
 def _length(depth: float) -> str:

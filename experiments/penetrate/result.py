@@ -20,9 +20,10 @@ from .amended import kept_law, run_beside
 from .departures import departures
 from .findings import BedFacts, Findings, bed_entry, bed_quantities, drop_note
 from .reference import compare_with, read_reference
-from .rest import answer
+from .rest import answer, how_sure, sinkage_interval
 from .settings import PenetrateSettings, say
 from .similarity import fast_for_gravity, pace_of, similarity_of
+from .sure import in_words
 from .units import Unit, make_spike
 
 __all__ = [
@@ -49,6 +50,7 @@ def conclude(
     overlap = max((note["max_overlap"] for note in notes.values() if note.get("max_overlap") is not None), default=None)
     stiffened: list[Json] = [note for seed in settings.seeds for note in folder.noted(f"stiffer-{seed}", [])]
     rest = answer(findings, material)
+    sure = how_sure(findings, material, rest)
     quantities = findings.quantities() | bed_quantities(facts, overlap, _made(stiffened)) | _depth_needed(rest)
     codes = ({note.get("code") for note in notes.values()} | {folder.code}) - {None, ""}
     doubts = {
@@ -91,6 +93,7 @@ def conclude(
         "spike": asdict(make_spike(settings)) | {"load": settings.weight},
         "warnings": warnings,
         "similarity": similarity_of(settings),
+        "sure": sure,
         **({} if rest is None else {"rest": rest}),
     }  # fmt: skip
     if law is not None:
@@ -244,15 +247,23 @@ def _which_stiffness(findings: Findings) -> str | None:
     standing, fitted = findings.standing_stiffness().get("stiffness_standing"), findings.fit.stiffness
     if standing is None or fitted <= 0:
         return None
-    ratio = standing["value"] / fitted
+    interval = sinkage_interval(findings, beds.find_material(findings.settings))
+    ratio, load = standing["value"] / fitted, findings.settings.weight
     if ratio >= 1.005:
         wrong = f"overstates the sinkage at rest {ratio:.2g} times"
     elif ratio <= 0.995:
         wrong = f"understates the sinkage at rest {1 / ratio:.2g} times"
     else:
         wrong = "gives the sinkage at rest as well"
+    shallowest = None if interval is None or interval.chance is None else interval.chance[0]
+    if shallowest is not None and shallowest <= 0:
+        there = say("standing_none")
+    elif interval is not None and interval.low is not None and interval.high is not None:
+        there = say("standing_ends", ends=in_words(load / interval.high, load / interval.low, "N/m"))
+    else:
+        there = say("standing", standing=_words(standing))
     deepest, s = 1e3 * findings.deepest(), findings.settings
-    return say("which_stiffness", deepest=deepest, s=s, wrong=wrong, standing=_words(standing))
+    return say("which_stiffness", deepest=deepest, s=s, wrong=wrong, standing=there)
 
 
 def _at_surface(findings: Findings) -> str | None:

@@ -17,9 +17,9 @@ from vis.penetrate import summary_parts as words
 from vis.penetrate.summary_parts import say
 from vis.pictures.frames import frame_names
 
-__all__ = ["summarise"]
+__all__ = ["REAL_GRAINS", "summarise"]
 
-_REAL_GRAINS = {"sand": 2e-4, "sand-weak": 2e-4}
+REAL_GRAINS = {"sand": 2e-4, "sand-weak": 2e-4}
 """Diameter of real grains [m]: 0.2 mm is where fine sand ends and medium sand begins (ISO 14688-1)."""
 
 
@@ -42,7 +42,7 @@ def summarise(run: RunFolder) -> dict[str, Any]:
         "banner": _banner(run),
         "lead": _lead(run, experiment),
         "seeds": len({r.seed for r in run.runs if r.seed is not None}),
-        "tiles": _tiles(run, quantities),
+        "tiles": _with_errors(_tiles(run, quantities), words.mapping_of(result.get("sure"))),
         "caveat": _caveat(result, quantities),
         "answers": _answers(run, quantities),
         "rest": words.rest_part(result),
@@ -111,16 +111,64 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
     return [{"label": label, "value": value, "note": note} for label, value, note in tiles]
 
 
+def _with_errors(tiles: list[dict[str, str]], sure: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The tiles with their errors of chance and grain size, as result.json states them, and a row of real grains."""
+    rows: list[dict[str, Any]] = []
+    for tile in tiles:
+        name = "stiffness" if tile["label"].startswith("Fitted stiffness") else "sinkage_dem"
+        entry = words.mapping_of(sure.get(name))
+        if entry and (name == "stiffness" or tile["label"].startswith("Sinks to rest at")):
+            value = quote(entry["value"], None, entry["unit"], significant=2)
+            if name == "sinkage_dem" and entry["value"] < 0:
+                value = tile["value"].split(f"{words.NBSP}±")[0] + f"{words.NBSP}mm above the surface"
+                value = value if "±" in tile["value"] else tile["value"]
+            rows.append({**tile, "value": value, "errors": _errors(entry)})
+            if name == "sinkage_dem":
+                known = entry["low"] is not None
+                ends = words.between(entry["low"], entry["high"], "m") if known else "not known"
+                note = say("of_real_grains") if known else words.sentence(str(entry["sentence"]))
+                rows.append({"label": "Sinkage among real grains (95 %)", "value": ends, "note": note})
+        else:
+            rows.append(tile)
+    return rows
+
+
+def _errors(entry: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Chance as a half-width or as two ends, grain size as what it may change, and what is not known."""
+    value, unit, parts = entry["value"], entry["unit"], []
+    for name in ("chance", "grain_size"):
+        low, high = entry[name] if entry[name] is not None else (None, None)
+        if low is None or high is None:
+            parts.append("not known")
+        elif abs((high - value) - (value - low)) < 1e-6 * abs(high - low):
+            parts.append(quote(high - value, None, unit, significant=2))
+        else:
+            sides = [(f"{words.MINUS}", value - low), ("+", high - value)]
+            parts.append(" ".join(f"{sign}{quote(by, None, unit, significant=2)}" for sign, by in sides if by > 0))
+    return parts[0], parts[1] or "0", "not known"
+
+
 def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
     parts = [f"and damping C = {words.fitted(quantities, 'damping')}, for motion"]
     drops = [r for r in run.of_kind("drop") if words.value_of(r.quantities, "stop_time") is not None]
     depths = [float(r.bed.depth.max()) for r in (*run.of_kind("driven"), *drops) if r.bed is not None]
     parts[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
     if words.value_of(quantities, "stiffness_standing") is not None:
-        parts.append(f"use K = {quantity(quantities['stiffness_standing'])} for a foot that stands")
+        parts.append(_standing(run, quantities))
     if words.std_of(quantities, "stiffness") is None and words.value_of(quantities, "stiffness_error") is not None:
         parts.append("± is the standard error of the fit")
     return "; ".join(parts)
+
+
+def _standing(run: RunFolder, quantities: Mapping[str, Any]) -> str:
+    """Which K a foot that stands has: load over the ends of its sinkage, or none where it may not sink at all."""
+    sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("sinkage_dem"))
+    chance, load = words.list_of(sure.get("chance")), words.value_of(quantities, "load")
+    if chance and chance[0] <= 0:
+        return say("standing_unknown")
+    if sure.get("low") and load is not None:
+        return say("standing", k=words.between(load / sure["high"], load / sure["low"], "N/m"))
+    return say("standing", k=quantity(quantities["stiffness_standing"]))
 
 
 def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
@@ -128,7 +176,7 @@ def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
     bed = words.mapping_of(result.get("bed"))
     overlap, grain = words.value_of(quantities, "max_overlap"), words.plain_value(bed.get("grain"))
     factor = words.plain_value(words.mapping_of(bed.get("softening")).get("factor"))
-    real = _REAL_GRAINS.get(str(bed.get("material")))
+    real = REAL_GRAINS.get(str(bed.get("material")))
     parts = []
     if factor is not None and factor > 1.05:
         parts.append(f"softened {quote(1.001 * factor, None, '1', significant=2)} times")
@@ -204,6 +252,8 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
         load = f" of {quantity(quantities['load'])}" if words.value_of(quantities, "load") is not None else ""
         text = f"Set down under its load{load}, the spike comes to rest {_rests_at(quantities)}"
         text += " deep." if sunk >= 0 else ": it stands on grains that extend above the mean surface."
+        sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("sinkage_dem")).get("sentence")
+        text += f" {words.sentence(str(sure))}" if sure else ""
         if law is not None:
             text += model + (f", {_deeper(law / sunk)}." if sunk > 0 else ".")
         return text + more

@@ -136,6 +136,13 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
     assert main(["bed", "foot", str(tmp_path / "none.json"), "cone", "--depth", "0.01"]) == BAD_INPUT
 
 
+def test_forces_that_cancel_by_symmetry_are_printed_as_zero(capsys):
+    """A cylinder pushed straight down: round-off, some 1e-17 N, is no force."""
+    assert main(["bed", "foot", str(KEPT / "rft.json"), "cylinder", "--size", "16mm", "--depth", "1.4mm"]) == DONE
+    printed = [line.split(" = ")[1] for line in capsys.readouterr().out.splitlines()[:3]]
+    assert printed[:2] == ["0 N", "0 N"] and float(printed[2].split()[0]) > 0.1
+
+
 def test_at_a_tenth_of_the_speed_kept_plates_bear_more_by_what_the_page_says():
     """The first bed of the kept table again: 1.15 and 1.32 times, within two std of a difference of two pushes."""
     kept = json.loads((KEPT / "result.json").read_text(encoding="utf-8"))["runs"]

@@ -204,6 +204,22 @@ def test_bearing_capacity_is_terzaghis():
         assert bearing_capacity(100.0, angle) == pytest.approx(1.3 * 100 * factor, rel=2e-3)
 
 
+def test_cohesive_regolith_is_held_against_the_cohesion_that_its_own_angles_need(fake, tmp_path):
+    """q = 1.3 c N_c: at 36.8 degrees N_c = 54.57, at 50 degrees 266.88 (Prandtl), not the 20.7 of the run's grains."""
+    result = penetrate.run(PenetrateSettings(**FOOT, gravity="1e-3g", seeds=(1,), frame_count=0), tmp_path / "run")
+    beside, area = result["rest"]["beside"], math.pi * 0.008**2
+    needs = [0.5 / area / (1.3 * factor) for factor in (54.57, 266.88)]
+    assert beside["cohesions_enough"] == pytest.approx(needs, rel=1e-3)
+    assert result["rest"]["cohesion_enough"] > needs[0]  # weaker grains need more
+    low, high = beside["depth_range"]
+    assert low == 0 < high < result["rest"]["depth"]  # 24 ± 20 Pa: open
+    # A load of a tenth is supported even by the 4 Pa of the lower end; one of ten times by neither end.
+    for load, verdict in (("0.05N", "should support"), ("50N", "should not")):
+        own = PenetrateSettings(**FOOT | {"load": load}, gravity="1e-3g", seeds=(1,), frame_count=0)
+        said = penetrate.run(own, tmp_path / load)["rest"]["sentences"]
+        assert any(verdict in text for text in said)
+
+
 def test_stronger_grains_are_expected_to_bear_as_was_measured():
     """1.7 times from a rolling friction of 0.1 to 0.356, 25 to 30.8 degrees (docs/materials.md)."""
     from dataclasses import replace

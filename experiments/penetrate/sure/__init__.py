@@ -1,0 +1,10 @@
+"""How sure the numbers of a spike or foot are: an interval for real grains from its beds and from kept runs.
+
+Imports `vis`.
+"""
+
+from .interval import Interval, Trend, in_words, interval_of_rest, interval_of_sinkage, interval_of_stiffness, trends
+
+__all__ = [
+    "Interval", "Trend", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness", "trends",
+]  # fmt: skip
