@@ -157,13 +157,12 @@ class AmendedLaw:
 
     def warnings(self) -> list[str]:
         """What a reader must know: a spike that is not the model's, and speeds that it was not fitted to."""
-        own, spike = self.settings, self.model.spike
+        own, spike, sizes = self.settings, self.model.spike, list(self.by_diameter)
         said = []
-        if spike.diameter is not None and not math.isclose(spike.diameter, own.tip_diameter, rel_tol=0.01):
-            sizes, of_k = list(self.by_diameter), "K and C are those of that tip"
-            if any(math.isclose(size, own.tip_diameter, rel_tol=1e-6) for size in sizes):
-                of_k = "K and C are those fitted to this diameter"
-            elif len(sizes) > 1:
+        fitted = any(math.isclose(size, own.tip_diameter, rel_tol=0.01) for size in (spike.diameter, *sizes) if size)
+        if spike.diameter is not None and not fitted:
+            of_k = "K and C are those of that tip"
+            if len(sizes) > 1:
                 between = sizes[0] < own.tip_diameter < sizes[-1]
                 of_k = say("k_between" if between else "k_beyond", stiffness=self.pair[0],
                            listed=" and ".join(f"{1e3 * size:g}" for size in sizes))  # fmt: skip

@@ -92,7 +92,15 @@ def test_a_legend_says_measured_only_of_trials_that_hedgebed_did_not_make(tmp_pa
     assert f"trials, {source};" in write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("phases", "over"), [(["in"] * 4, "depth [mm]"), (["in", "in", "out", "out"], "time [s]")])
+@pytest.mark.parametrize(
+    ("phases", "over"),
+    [
+        (["in"] * 4, "depth [mm]"),
+        (["in", "in", "out", "out"], "time [s]"),
+        (["in", "rest", "in", "in"], "depth [mm]"),
+        (["in", "rest", "rest", "rest"], "time [s]"),
+    ],
+)
 def test_the_force_of_a_push_is_drawn_over_its_depth_and_what_is_left_too_where_it_only_goes_in(phases, over):
     one, depth = np.ones(4), np.array([0.001, 0.002, 0.0015, 0.0005])
     channel = Channel("a", "force", np.arange(4.0), one, one, one, one, one, np.array(phases), None, depth)

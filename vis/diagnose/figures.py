@@ -50,8 +50,8 @@ _FACTORS = {"mm": 1e3, "degrees": 180 / math.pi}
 _NARROW = 3.0
 """Range of chi-square up to which its axis is linear."""
 _BINS = 20
-_GOES_IN = 0.95
-"""Share of the rows of a push above the surface or on the way in, from which on it only goes in."""
+_OUT, _HELD = 0.05, 0.5
+"""Shares of the rows of a push on the way out and at rest up to which it only goes in."""
 _APART = 0.005
 """Share of the range within which bins lie at one place."""
 
@@ -81,8 +81,10 @@ class Channel:
 
     @property
     def goes_in(self) -> bool:
-        """Whether it is a push that only goes in: then its depth orders its rows as the time does."""
-        return self.depth is not None and bool(np.mean(np.isin(self.phase, ("free", "in"))) >= _GOES_IN)
+        """Whether it is a push that only goes in and is not held for long: its depth orders its rows as time does."""
+        if self.depth is None:
+            return False
+        return bool(np.mean(self.phase == "out") <= _OUT and np.mean(self.phase == "rest") <= _HELD)
 
     def residual(self, stage: str) -> Array:
         """(measured - model) / std."""

@@ -195,12 +195,15 @@ class Diagnosis(Known):
     @property
     def facts(self) -> tuple[str, ...]:
         """What the trials that took part show of the base model's numbers, a sentence each."""
-        return tuple(self.problem.facts(self.best.values, self.forms, (*self.fitted, *self.held_out)))
+        trials = (*self.fitted, *self.held_out)
+        return tuple(self.problem.facts(self.best.values, self.forms, trials, is_open=bool(self.undetermined)))
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
-        """Base parameters that these trials leave open although the fit has a standard error for them."""
-        return tuple(self.problem.undetermined(self.best.values, self.forms, (*self.fitted, *self.held_out)))
+        """Base parameters that these trials leave open, although the fit may have a standard error for them."""
+        errors = {name: told["std"] for name, told in self.base_parameters(self.best).items()}
+        trials = (*self.fitted, *self.held_out)
+        return tuple(self.problem.undetermined(self.best.values, self.forms, trials, errors))
 
     @cached_property
     def next_experiment(self) -> str:

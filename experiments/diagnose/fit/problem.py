@@ -285,12 +285,14 @@ class Problem(Protocol):
         """What is hard to believe of the forms' numbers, a sentence each."""
         return ()
 
-    def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> Sequence[str]:
-        """What `trials` show of the base model's numbers, a sentence each."""
+    def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str], *, is_open: bool) -> Sequence[str]:
+        """What `trials` show of the base model's numbers, a sentence each; `is_open`: whether one is undetermined."""
         return ()
 
-    def undetermined(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> Sequence[str]:
-        """Base parameters that `trials` leave open although a fit has a standard error for them, by name."""
+    def undetermined(
+        self, values: Values, forms: Sequence[Form], trials: Sequence[str], errors: Mapping[str, float | None]
+    ) -> Sequence[str]:
+        """Base parameters that `trials` leave open, by name. `errors`: name -> standard error in the fit, or None."""
         return ()
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:

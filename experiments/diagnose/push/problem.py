@@ -42,7 +42,7 @@ from .doubt import off_rest, off_surface, path_error, reversing, touching, turni
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, scatter_parameters, speeds_of
-from .remarks import Push, damping_is_open, facts
+from .remarks import SURE, Push, contradict, facts
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
@@ -435,16 +435,23 @@ class PenetrationProblem(Problem):
         model = PenetrationModel(**tables, spike=spike, surface=surface, notes=notes, trial=trials, effect=effects)
         write_model(Path(path), model)
 
-    def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> list[str]:
+    def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str], *, is_open: bool) -> list[str]:
         """Sentences on K, its spread, and whether C can be determined, where it was not known; none with drops."""
-        return facts(self._pushes(values, forms, trials), tuple(dict.fromkeys(form.effect for form in forms)))
+        added = tuple(dict.fromkeys(form.effect for form in forms))
+        return facts(self._pushes(values, forms, trials), added, is_open=is_open)
 
-    def undetermined(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> tuple[str, ...]:
-        """C of each diameter where these pushes leave it open; see `Problem`."""
-        pushes = self._pushes(values, forms, trials)
-        if not damping_is_open(pushes, tuple(form.effect for form in forms)):
-            return ()
-        return tuple(named("damping", diameter, self._diameters) for diameter in self._diameters)
+    def undetermined(
+        self, values: Values, forms: Sequence[Form], trials: Sequence[str], errors: Mapping[str, float | None]
+    ) -> tuple[str, ...]:
+        """C of each diameter that is less than `SURE` errors above 0, or of all where pushes contradict one another."""
+        pushes, names = (
+            self._pushes(values, forms, trials),
+            [named("damping", d, self._diameters) for d in self._diameters],
+        )
+        if pushes and contradict(pushes, [form.effect for form in forms]):
+            return tuple(names)
+        found = [(name, values.get(name, 0.0), errors.get(name)) for name in names if pushes]
+        return tuple(name for name, damping, error in found if error is None or damping < SURE * error)
 
     def _pushes(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> list[Push]:
         """The pushes among `trials`; none where C was known beforehand, or drops show it."""

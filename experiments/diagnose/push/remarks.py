@@ -8,7 +8,9 @@ import numpy as np
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array
 
-__all__ = ["Push", "damping_is_open", "facts"]
+__all__ = ["Push", "SURE", "contradict", "facts"]
+
+SURE = 2.0  # standard errors from which on a C is sure
 
 
 @dataclass(frozen=True)
@@ -22,14 +24,14 @@ class Push:
     spring: Array  # force of the best model with C = 0 [N]
 
 
-def facts(pushes: Sequence[Push], added: Sequence[str]) -> list[str]:
-    """Sentences. `added`: names of what the best model has beyond the base."""
+def facts(pushes: Sequence[Push], added: Sequence[str], *, is_open: bool) -> list[str]:
+    """Sentences. `added`: names of what the best model has beyond the base. `is_open`: whether C is not determined."""
     if not pushes:
         return []
     sentences = _stiffness(pushes)
-    straight, bent = _each(pushes, added)
-    if not _open(straight, bent):
+    if not is_open:
         return sentences
+    straight, bent = _each(pushes, added)
     sentences.append(
         "C cannot be determined from these pushes: fitted to each alone with a straight spring it is "
         + _range([c for _, c, _ in straight])
@@ -39,9 +41,11 @@ def facts(pushes: Sequence[Push], added: Sequence[str]) -> list[str]:
     return sentences
 
 
-def damping_is_open(pushes: Sequence[Push], added: Sequence[str]) -> bool:
-    """Whether these pushes leave C open: fitted to each alone, it has either sign or is no more than 2 errors off 0."""
-    return bool(pushes) and _open(*_each(pushes, added))
+def contradict(pushes: Sequence[Push], added: Sequence[str]) -> bool:
+    """Whether C, fitted to each push alone beside the best model's spring, is surely positive in one and surely
+    negative in another. A straight spring in the place of a bent one would give C what the bend does."""
+    straight, bent = _each(pushes, added)
+    return len({c > 0 for _, c, s in bent or straight if abs(c) >= SURE * s}) > 1
 
 
 _Fitted = list[tuple[float, float, float]]
@@ -51,11 +55,6 @@ def _each(pushes: Sequence[Push], added: Sequence[str]) -> tuple[_Fitted, _Fitte
     """`_two` of each push with a straight spring, and with the best model's where that has more."""
     straight = [_two(push, lambda p: np.maximum(p.depth, 0.0)) for push in pushes]
     return straight, [_two(push, lambda p: p.spring) for push in pushes] if added else []
-
-
-def _open(straight: _Fitted, bent: _Fitted) -> bool:
-    found = straight + bent
-    return len({c > 0 for _, c, _ in found}) > 1 or any(abs(c) < 2 * s for _, c, s in found)
 
 
 def _stiffness(pushes: Sequence[Push]) -> list[str]:

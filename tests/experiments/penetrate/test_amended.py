@@ -103,7 +103,8 @@ def test_on_another_tip_a_section_goes_with_the_square_of_the_diameter_and_a_sha
     (said,) = wide.warnings()
     assert "12 mm" in said and "18 mm" in said
     fitted = MODEL + fitted_at(0.018, 300.0, 2.0)
-    assert law(model=fitted, tip_diameter=0.018).pair == (300.0, 2.0)
+    known = law(model=fitted, tip_diameter=0.018)
+    assert known.pair == (300.0, 2.0) and known.warnings() == []
     assert law(effects).warnings() == []
 
 

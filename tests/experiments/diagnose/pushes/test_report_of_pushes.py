@@ -13,6 +13,7 @@ from experiments.campaign import Recording, read_campaign
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose.experiment import diagnose_campaign, run
+from experiments.diagnose.push.remarks import Push, contradict
 from experiments.diagnose.report.document import document
 from experiments.diagnose.report.sentences import behind_words
 from experiments.diagnose.report.summary import summary_sentences
@@ -113,6 +114,37 @@ def test_a_c_that_these_pushes_leave_open_has_no_error_and_an_experiment(result)
         assert found["quantities"][f"damping@0.08_{stage}"]["std"] is None
     assert "To determine C" in said["next_experiment"]
     assert "spike" not in said["next_experiment"]
+
+
+def test_pushes_contradict_one_another_on_c_by_the_best_models_spring():
+    """F = K z^1.5 + C v: a straight spring takes the bend for a negative C in all, the right spring finds C."""
+    random, depth, speed = np.random.default_rng(3), np.linspace(0.0, 0.02, 200), np.full(200, 0.05)
+    spring = 6000.0 * depth**1.5
+
+    def contradicting(*dampings):
+        rest = [0.05 * random.standard_normal(200) for _ in dampings]
+        pairs = zip(dampings, rest, strict=True)
+        pushes = [Push(0.016, depth, speed, spring + c * speed + left, spring) for c, left in pairs]
+        assert not contradict(pushes, [])
+        return contradict(pushes, ["depth-hardening"])
+
+    assert not contradicting(3.0, 2.0, 0.0)
+    assert contradicting(3.0, 2.0, -2.0)
+
+
+def test_a_c_that_several_speeds_determine_keeps_its_error_though_no_push_shows_it_alone(tmp_path):
+    """At 0.01 to 0.05 m/s C v is 0.4 to 2 times the noise of a reading; all speeds together show C."""
+    trials = []
+    for k, speed in enumerate((0.01, 0.02, 0.05) * 2):
+        random, time = np.random.default_rng(k), np.linspace(0.0, 0.02 / speed, 100)
+        force = 900.0 * speed * time + 2.0 * speed + FORCE_STD * random.standard_normal(100)
+        trials.append((f"{k}", "driven", speed, Recording({"t_s": time, "depth_m": speed * time, "force_N": force})))
+    campaign = saved(tmp_path / "c", campaign_of(trials, doubt=(1.0, 1.0), depth_std=1e-5))
+    found = diagnose_campaign(campaign)
+    said = document(found)
+    damping = said["base"]["after"]["damping"]
+    assert found.undetermined == () and "To determine C" not in said["next_experiment"]
+    assert damping["value"] == pytest.approx(2.0, abs=4 * damping["std"]) and damping["std"] < 0.5
 
 
 def test_stated_values_that_are_far_off_are_said_first_with_what_to_do():
