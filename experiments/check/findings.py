@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from experiments.campaign.tables import PenetrationTrial, TumbleTrial
 from .pushes import depth_zeros, force_units, penetration_oddities
 from .shifted import shifted_depths
 from .tumbles import tumble_oddities
+from .units import noise_unit, push_units
 from .words import Finding, row_noise, say, times, unit_words
 
 __all__ = ["find_implausible", "loud_sensors", "missing_sensors", "said_once", "without_companions"]
@@ -21,10 +23,21 @@ _NOISY, _QUIET = 2.0, 0.1  # times the stated noise; coloured noise has less fro
 _NAMED = ("looks like", "would say so")  # words of a finding that names a unit
 _FOLLOWS = ("by a jump that no motion makes", "jumps so often", "what [sensors.", "its zero is to be taken off")
 """Words of findings that follow from such a unit."""
+_UNITS = ("is force_N in", "is depth_m in", "is t_s in", "looks like")  # words that ask for a unit
+_ZERO_OFF, _SETS_IN = "subtract its zero", "the force sets in at"  # words of a zero that is off
 _OFF_SCALE = "in other units (N/mm, g)"  # words of a force that is out of all proportion
 _TOGETHER = (frozenset(("x", "y", "theta")), frozenset(("gyro", "ax", "ay")), frozenset(("wheel",)),
              frozenset(("depth",)), frozenset(("force",)), frozenset(("accel",)))  # fmt: skip
 """Channels of one sensor."""
+_TURNING = (frozenset(("theta", "gyro")), frozenset(("x", "y")), *_TOGETHER[2:])
+"""Channels of which a unit is named once."""
+
+
+class _Scatter(NamedTuple):
+    """Scatter of a column from row to row."""
+
+    ratio: float  # over the noise that is stated, which is > 0
+    stated: float  # in the column's unit
 
 
 def find_implausible(campaign: Campaign) -> list[Finding]:
@@ -82,7 +95,42 @@ def _each_implausible(campaign: Campaign) -> list[Finding]:
         units = [Finding(trial="", channel="force", what=what, doubt=True) for what in force_units(campaign)]
         if units:  # more than that the force is off scale
             found = [f for f in found if f.channel != "force" or _OFF_SCALE not in f.what] + units
-    return found
+    if not any(finding.channel == "force" and _ZERO_OFF not in finding.what for finding in found):
+        found += [
+            Finding(trial=trial, channel=channel, what=f"trial {trial}: {what}" if trial else what, doubt=True)
+            for trial, channel, what in push_units(campaign)
+        ]
+    return _without_zeros([*found, *_units_by_noise(campaign, found)])
+
+
+def _units_by_noise(campaign: Campaign, found: Sequence[Finding]) -> list[Finding]:
+    """Columns whose scatter over the stated noise is the factor of another unit; none for which something that is
+    named already may be the cause."""
+    named = {f.channel for f in found if any(words in f.what for words in (*_NAMED, *_UNITS))}
+    return [
+        Finding(trial="", channel=_channel(column), what=_unit_sentence(name, column, scatter), doubt=True)
+        for (name, column), scatter in _scatters(campaign).items()
+        if noise_unit(column, scatter.ratio) is not None
+        and not any(_channel(column) in sensor and named & sensor for sensor in _TURNING)
+    ]
+
+
+def _unit_sentence(name: str, column: str, scatter: _Scatter) -> str:
+    return say(
+        "sensor_in_a_unit", column=column, scatter=scatter.ratio * scatter.stated, ratio=times(scatter.ratio),
+        name=name, question=noise_unit(column, scatter.ratio),
+    )  # fmt: skip
+
+
+def _without_zeros(found: Sequence[Finding]) -> list[Finding]:
+    """Without zeros that are off, of channels that may be in another unit."""
+    units = [f for f in found if any(words in f.what for words in (*_NAMED, *_UNITS))]
+
+    def follows(finding: Finding) -> bool:
+        channel = "force" if _SETS_IN in finding.what else finding.channel if _ZERO_OFF in finding.what else None
+        return any(unit.channel == channel and unit.trial in ("", finding.trial) for unit in units)
+
+    return [finding for finding in found if not follows(finding)]
 
 
 def said_once(found: Sequence[Finding]) -> list[Finding]:
@@ -107,6 +155,27 @@ def loud_sensors(campaign: Campaign) -> list[Finding]:
     """Sensors whose readings scatter from row to row by far more, or far less, than the noise that is stated: by fourth
     differences, of which a smooth motion leaves little; the median of a trial, so that touches do not count; the median
     over the trials. Grains that jam and yield make the force do the same."""
+    found = []
+    for (name, column), scatter in _scatters(campaign).items():
+        ratio, stated = scatter.ratio, scatter.stated
+        if noise_unit(column, ratio) is not None:
+            continue  # reported as a unit
+        if ratio > _NOISY:
+            words = f"{column} scatters from row to row by {ratio * stated:.2g}, {times(ratio)} what "
+            cause = f"[sensors.{name}] states: a noisier sensor, or a motion as fast as the sampling"
+            found.append(Finding(trial="", channel=_channel(column), what=words + cause))
+        elif ratio < _QUIET and name != "depth":  # a driven depth is smooth, and only its smoothing needs its noise
+            unit = unit_words(1 / ratio) if ratio > 0 else None
+            words = say(
+                "quiet_sensor", name=name, std=stated, column=column, ratio=times(1 / ratio),
+                unit=unit or "stated too large, or smoothed when it was recorded",
+            )  # fmt: skip
+            found.append(Finding(trial="", channel=_channel(column), what=words))
+    return found
+
+
+def _scatters(campaign: Campaign) -> dict[tuple[str, str], _Scatter]:
+    """(key of [sensors], column) -> how its readings scatter; by the method of `loud_sensors`."""
     tables = campaign.tables
     ratios: dict[tuple[str, str], list[float]] = {}
     stated: dict[tuple[str, str], float] = {}
@@ -121,21 +190,7 @@ def loud_sensors(campaign: Campaign) -> list[Finding]:
                 if std > 0 and len(known) >= 40 and np.mean(np.diff(known) == 0) <= 0.2:
                     ratios.setdefault((name, column), []).append(row_noise(known) / std)
                     stated[name, column] = std
-    found = []
-    for (name, column), own in ratios.items():
-        ratio = float(np.median(own))
-        if ratio > _NOISY:
-            words = f"{column} scatters from row to row by {ratio * stated[name, column]:.2g}, {times(ratio)} what "
-            cause = f"[sensors.{name}] states: a noisier sensor, or a motion as fast as the sampling"
-            found.append(Finding(trial="", channel=_channel(column), what=words + cause))
-        elif ratio < _QUIET and name != "depth":  # a driven depth is smooth, and only its smoothing needs its noise
-            unit = unit_words(1 / ratio) if ratio > 0 else None
-            words = say(
-                "quiet_sensor", name=name, std=stated[name, column], column=column, ratio=times(1 / ratio),
-                unit=unit or "stated too large, or smoothed when it was recorded",
-            )  # fmt: skip
-            found.append(Finding(trial="", channel=_channel(column), what=words))
-    return found
+    return {key: _Scatter(float(np.median(own)), stated[key]) for key, own in ratios.items()}
 
 
 def _channel(column: str) -> str:

@@ -13,7 +13,7 @@ from rigid.platform.rig import STANDARD_GRAVITY
 
 from .words import OFF, ZERO, Array, Odd, oddity, say, std_of, times
 
-__all__ = ["depth_zeros", "down", "force_units", "penetration_oddities"]
+__all__ = ["depth_zeros", "down", "force_units", "penetration_oddities", "trials_of"]
 
 _DEEP, _DEEP_METRES = 30.0, 0.3  # diameters, and metres, beyond both of which a depth is doubted
 _WIDE_METRES, _SHALLOW = 1.0, 0.02  # a diameter above this is doubted where the spike goes less than this share deep
@@ -39,6 +39,8 @@ _FORCES = {
     "kilograms of force, kgf (times 9.80665 it is newtons)": (1 / STANDARD_GRAVITY, True),
     "grams of force, gf (times 0.00980665 it is newtons)": (1e3 / STANDARD_GRAVITY, True),
     "pounds of force, lbf (times 4.44822 it is newtons)": (1 / _POUND, False),
+    "millinewtons (force_mN would say so)": (1e3, True),
+    "kilonewtons (times 1,000 it is newtons)": (1e-3, True),
     "newtons that were multiplied by 9.81 once more": (STANDARD_GRAVITY, False),
     "newtons that were multiplied by 4.448 once more": (_POUND, False),
 }
@@ -102,11 +104,11 @@ def _off_scale(tables: PenetrationCampaign, trial: PenetrationTrial, depth: Arra
     else:
         mass = tables.spike.mass or 0.0
         push, what, key = mass * (trial.gravity - data["accel_m_s2"]), "mass (g - accel)", "[spike] mass or stiffness"
-    also = ", or the force in mN" if trial.mode == "driven" else ""
     met = float(np.nanmedian(np.where(near, push, np.nan))) if np.isfinite(push[near]).any() else 0.0
     if met > 0 and not 1 / _OFF_SCALE < met / spring < _OFF_SCALE:
+        first = "" if trial.mode == "drop" else "is force_N in mN, or " if met > spring else "is force_N in kN, or "
         yield oddity("force" if trial.mode == "driven" else "accel", "off_scale", what=what, met=met, tables=tables,
-                     depth_mm=1e3 * depth[last], spring=spring, key=key, also=also)  # fmt: skip
+                     depth_mm=1e3 * depth[last], spring=spring, key=key, first=first)  # fmt: skip
 
 
 def _driven(
@@ -129,7 +131,14 @@ def _driven(
         if moving.sum() >= 8 and np.ptp(time[moving]) > 0:
             speed = float(np.polyfit(time[moving], depth[moving], 1)[0])
             if not 0.5 < speed / trial.speed < 2.0:
-                yield Odd("depth", f"speed = {trial.speed:g} m/s, but the depth goes in at {speed:.3g} m/s")
+                unit = _time_unit(speed / trial.speed)
+                yield Odd("depth", f"speed = {trial.speed:g} m/s, but the depth goes in at {speed:.3g} m/s{unit}")
+
+
+def _time_unit(ratio: float) -> str:
+    """A question about the unit of time, where a speed is that many times what it should be; else nothing."""
+    known = {1e-3: "; is t_s in ms? Then name the column t_ms", 60.0: "; is t_s in minutes?"}
+    return next((words for unit, words in known.items() if abs(ratio / unit - 1) < 0.2), "")
 
 
 def _rises(force: Array) -> bool:
@@ -158,7 +167,9 @@ def _drop(
         if abs(start) > max(OFF * errors[2], ZERO * std):
             yield oddity("depth", "touches_later", start_mm=1e3 * start)
         elif abs(speed - trial.speed) > max(OFF * errors[1], 0.2 * trial.speed):
-            yield Odd("depth", f"speed = {trial.speed:g} m/s at the surface, but the depth goes in at {speed:.3g} m/s")
+            unit = _time_unit(speed / trial.speed)
+            what = f"speed = {trial.speed:g} m/s at the surface, but the depth goes in at {speed:.3g} m/s{unit}"
+            yield Odd("depth", what)
 
 
 def _second_derivative(trial: PenetrationTrial, time: Array, depth: Array, accel: Array, std: float) -> Iterator[Odd]:
@@ -185,6 +196,8 @@ def _second_derivative(trial: PenetrationTrial, time: Array, depth: Array, accel
         "it is what an accelerometer reads, upwards positive: gravity less the reading is d2(depth)/dt2":
             of_gravity - of_accel,
         "it looks like units of g: accel_g would say so": STANDARD_GRAVITY * of_accel,
+        "it looks like mm/s2 (divided by 1,000 it is m/s2)": 1e-3 * of_accel,
+        "the times look like ms: t_ms would say so": 1e-6 * of_accel,
     }  # fmt: skip
     words, best = min(((words, left(model)) for words, model in others.items()), key=lambda pair: pair[1])
     if as_asked > ZERO * std and best < 0.2 * as_asked:
@@ -318,8 +331,9 @@ def force_units(campaign: Campaign) -> Iterator[str]:
     words = say("force_units", size=size, whose=whose, all="all " if several else "", count=len(pushes),
                 es="es" if several else "")  # fmt: skip
     yield (
-        f"{words}{', or like '.join(near[:2])}{'; or the stiffness is another than stated' if stated else ''}"
-        ". Nothing was converted: a model that is fitted to it takes the factor for a stiffness"
+        f"{words}{', or like '.join(near[:2])}"
+        f"{'; or is [surface] stiffness in other units (N/mm), or another than stated?' if stated else '.'}"
+        " Nothing was converted: a model that is fitted to it takes the factor for a stiffness"
     )
 
 

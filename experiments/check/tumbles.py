@@ -24,6 +24,7 @@ from .words import OFF, ZERO, Array, Odd, oddity, say, times, unit_words
 __all__ = ["Lag", "find_lag", "pieces", "tumble_oddities"]
 
 _OF_THE_TORQUE = tuple(id for id, effect in EFFECTS.items() if effect.on_torque_alone)
+_MILLI = (200.0, 5000.0)  # times as long as another's of the same trial a recording lasts whose times are in ms
 _LATE = 0.03  # seconds of a lag between clocks or of a late beginning that are reported; `diagnose` finds smaller lags
 _SIGMAS = 4.0
 _LEAST = 0.2  # share of the weight within which counterweight and gravity may differ: both are rounded
@@ -33,6 +34,7 @@ _TURNS = {
     180 / math.pi: "gyro_rad_s looks like degrees a second: gyro_deg_s would say so",
     math.pi / 180: "theta_rad looks like degrees: theta_deg would say so",
     30 / math.pi: "gyro_rad_s looks like revolutions a minute: gyro_rpm would say so",
+    1e3: "the times look like ms: t_ms would say so (or gyro_rad_s is in mrad/s)",
 }
 _NO_TURN = "one of the two has another scale, or is not about the axis of rotation"
 _APART = 0.02  # seconds by which the lag of a trial's second half must be another
@@ -54,6 +56,12 @@ def tumble_oddities(campaign: Campaign, tables: TumbleCampaign, trial: TumbleTri
     for name, own in there.items():
         if not own.time[0] < 1.0 <= 1.0 + own.time[-1]:
             yield oddity(name, "other_zero_of_time", name=name, first=own.time[0], last=own.time[-1])
+            return
+    spans = {name: float(own.time[-1] - own.time[0]) for name, own in there.items()}
+    for name, span in spans.items():
+        others = [other for sensor, other in spans.items() if sensor != name]
+        if others and _MILLI[0] * min(others) < span < _MILLI[1] * min(others):
+            yield oddity(name, "times_in_ms", name=name, span=span, other=min(others))
             return
     yield from _begins_late(tables, trial, there)
     yield from _gravity(tables, trial)

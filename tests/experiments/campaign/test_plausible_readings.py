@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, FORCE_STD, STIFFNESS, campaign_of, driven_trial, drop_trial
 
-from experiments.campaign import Campaign, Recording, read_campaign
+from experiments.campaign import Campaign, Recording, read_campaign, write_campaign
 from experiments.campaign.files import TEMPLATES
 from experiments.check import find_implausible
 from experiments.check.pushes import force_units
@@ -54,6 +54,8 @@ def some_pushes(*, doubt: tuple[float, float] = (0.3, 0.3), stiffness: float = 1
         (1e3 / GRAVITY, "grams of force, gf"),
         (1 / 4.44822, "pounds of force, lbf"),
         (GRAVITY, "newtons that were multiplied by 9.81 once more"),
+        (1e3, "millinewtons (force_mN would say so)"),
+        (1e-3, "kilonewtons"),
     ],
 )
 def test_a_force_in_another_unit_is_named_where_the_stiffness_is_uncertain(factor, words):
@@ -80,6 +82,84 @@ def test_drops_tell_the_unit_of_a_force_where_nobody_knows_the_stiffness():
     assert list(force_units(campaign)) == []
     (said,) = force_units(scaled(campaign, 1 / GRAVITY))
     assert "kgf" in said and "the drops" in said
+
+
+def columns_times(campaign: Campaign, column: str, factor: float, *, trial: str = "", sensor: str = "") -> Campaign:
+    """The same with a column times `factor`, of one trial or sensor where one is given."""
+    recordings = {}
+    for (id, name), recording in campaign.recordings.items():
+        chosen = trial in ("", id) and sensor in ("", name)
+        own = {key: values * (factor if chosen and key == column else 1.0) for key, values in recording.columns.items()}
+        recordings[id, name] = Recording(own)
+    return replace(campaign, recordings=recordings)
+
+
+def nobody_knows(campaign: Campaign) -> Campaign:
+    """The same without a stated stiffness."""
+    free = campaign.tables.uncertainty.model_copy(update={"stiffness": 2.0, "damping": 2.0})
+    return replace(campaign, tables=campaign.tables.model_copy(update={"uncertainty": free}))
+
+
+def stated_noise(campaign: Campaign, factor: float) -> Campaign:
+    """The same with the noise of the force stated `factor` times as large."""
+    force = campaign.tables.sensors.force.model_copy(update={"std": (factor * FORCE_STD,)})
+    sensors = campaign.tables.sensors.model_copy(update={"force": force})
+    return replace(campaign, tables=campaign.tables.model_copy(update={"sensors": sensors}))
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda: columns_times(nobody_knows(some_pushes()), "force_N", 1e3), "is force_N in mN"),
+        (lambda: stated_noise(columns_times(nobody_knows(some_pushes()), "force_N", 1e3), 1e3), "is force_N in mN"),
+        (lambda: columns_times(nobody_knows(some_pushes()), "force_N", 1e3, trial="1"), "other pushes at"),
+        (lambda: columns_times(nobody_knows(some_pushes()), "force_N", 1e-4), "is force_N in kN"),
+        (lambda: columns_times(some_pushes(), "t_s", 1e3), "is t_s in ms"),
+        (lambda: columns_times(some_pushes(), "t_s", 1 / 60), "is t_s in minutes"),
+        (lambda: columns_times(template("tumble"), "t_s", 1e3), "t_ms would say"),
+        (lambda: columns_times(template("tumble"), "t_s", 1e3, sensor="wheel"), "is t_s in ms"),
+        (lambda: columns_times(template("tumble"), "x_m", 1e3), "is x_m in mm"),
+        (lambda: turned(template("tumble"), 180 / np.pi), "theta_deg would say"),
+        (lambda: columns_times(template("penetration"), "t_s", 1e3, trial="003"), "t_ms would say"),
+    ],
+)
+def test_a_unit_that_no_stated_number_tells_is_asked_for_before_anything_is_fitted(made, said):
+    """By the sensor's noise, by the other trials, by what no bed bears, by the stated speed."""
+    found = find_implausible(made())
+    assert any(said in finding.what and finding.doubt for finding in found), [finding.what for finding in found]
+    assert not any("subtract its zero" in finding.what for finding in found)
+
+
+def template(kind: str) -> Campaign:
+    """The template of a kind."""
+    return read_campaign(TEMPLATES / f"template-{kind}")
+
+
+def turned(campaign: Campaign, factor: float) -> Campaign:
+    """The same with both angle and rate times `factor`, so that camera and gyro agree."""
+    return columns_times(columns_times(campaign, "theta_rad", factor), "gyro_rad_s", factor)
+
+
+@pytest.mark.parametrize("name", ["cmu-plate-sinkage", "cmu-plates-against-bed"])
+def test_measured_pushes_into_sand_are_asked_for_no_unit_and_in_millinewtons_they_are(name):
+    measured = read_campaign(TEMPLATES / name)
+    assert find_implausible(measured) == []
+    (asked,) = find_implausible(columns_times(measured, "force_N", 1e3))
+    assert "force_N in mN" in asked.what
+    first = measured.tables.trial[0].id
+    for column, unit in (("force_N", "force_mN"), ("t_s", "t_ms")):
+        (asked,) = find_implausible(columns_times(measured, column, 1e3, trial=first))
+        assert asked.trial == first and unit in asked.what
+
+
+def test_made_up_pushes_are_asked_for_no_unit(tmp_path):
+    """Of a seen suite, effects and causes outside the library among them; its files have other units, all named."""
+    from benchmarks.hidden.suite import make_case, suite
+
+    for case in suite("rig", 4, seed=760, trials=6):
+        made = read_campaign(write_campaign(tmp_path / str(case["seed"]), make_case("rig", case)[0]))
+        told = " ".join(finding.what for finding in find_implausible(made))
+        assert not any(words in told for words in ("is force_N in", "is t_s in", "is depth_m in", "newtons")), case
 
 
 def test_a_force_that_shows_nothing_below_zero_is_left_out_there_and_said():
