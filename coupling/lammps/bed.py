@@ -58,6 +58,7 @@ class LammpsBed:
         self.recipe, self.surface, self.packing_fraction = bed.recipe, bed.surface, bed.packing_fraction
         self.mean_diameter, self.overlap_limit = bed.mean_diameter, bed.overlap_limit
         self.ranks, self.begin, self.tensile = ranks, float(begin), bed.settings.tensile
+        self.runtime = bed.runtime  # What Taichi runs on: with the same it is not started anew, which ends `bed`
         self.steps = self.grain_steps = 0
         self._seen = 0.0  # Largest overlap that was seen, over the mean diameter of the pair [1]
         grains = bed.grains(contacts=False)

@@ -1,5 +1,6 @@
 """Grains in LAMMPS under the feet of a robot that moves in the plane: `LammpsFeet`."""
 
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -36,7 +37,7 @@ class LammpsFeet(BedFeet, LammpsGround):
         # A bed of one grain, which is never stepped: for the distances to the feet's shapes.
         self._ruler = Bed.from_grains(
             bed.material, positions=np.full((1, 3), grain), radii=np.array([grain]), size=bed.size, height=bed.height,
-            threads=1,
+            **asdict(bed.runtime),
         )  # fmt: skip
         self._shapes = [
             (body, self._ruler.add_body(shape, position=(0.0, 0.0, bed.height)))

@@ -232,6 +232,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         """The run on the prepared bed, with its bound on overlaps and, with `sleep`, its rules of sleep."""
         s = self.settings
         ground = self.ground(bed)
+        bed = ground.bed  # in LAMMPS another one than was prepared
         bed.max_overlap, bed.overlap_limit = 0.0, run_limit(s.max_overlap)
         bed.mark_origin()
         if s.sleep:

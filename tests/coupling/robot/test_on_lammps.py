@@ -9,7 +9,7 @@ from spatial_runs import EXAMPLES, ball, grain_bed
 
 from coupling.lammps import LammpsBed, LammpsMissingError, find_lammps
 from coupling.robot import BedFeet, LammpsFeet, LostRobotError, MujocoRobot, RobotRun
-from dem import Bed
+from dem import SAND, Bed
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 pytestmark = pytest.mark.long
@@ -123,3 +123,21 @@ def test_a_foot_that_starts_in_the_sand_is_refused_with_the_height_that_would_do
     robot = MujocoRobot(ball("box", "0.015 0.015 0.015", mass=0.1, height=0.014), "foot")
     with pytest.raises(ValueError, match=r"feet: 'foot' starts in the sand, .* mm higher would do"):
         RobotRun(robot, grounds(robot, ranks=1), duration=0.01)
+
+
+def test_feet_in_lammps_do_not_end_the_bed_that_they_were_made_of():
+    """With another number of threads Taichi starts anew, which ends earlier beds; a kernel of theirs then aborts."""
+    grains = grain_bed().grains()
+    bed = Bed.from_grains(
+        SAND, positions=grains.position, radii=grains.radius, max_overlap=0.1, size=(0.096, 0.096, 0.05), height=0.3,
+        threads=2,
+    )  # fmt: skip
+    robot = MujocoRobot(EXAMPLES / "mujoco-hopper" / "hopper.xml", ["foot"], height=1e-3)
+    moved = LammpsBed(bed, ranks=1)
+    try:
+        LammpsFeet(moved, robot.feet, origin=(0.048, 0.048), **FRICTION)
+        bed.check_valid()
+        bed.mark_origin()
+    finally:
+        moved.close()
+    assert bed.grains().displacement == pytest.approx(0.0)

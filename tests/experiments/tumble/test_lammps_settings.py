@@ -2,6 +2,7 @@
 
 import os
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,6 +10,7 @@ from coupling.lammps import LammpsEndedError, check_ranks
 from experiments.cli.main import main
 from experiments.cli.runs import FAILED, carry_out
 from experiments.grains import lammps
+from experiments.grains.on_bed import PlatformOnBed
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import RunFolder
 from experiments.tumble.settings import TumbleSettings
@@ -42,6 +44,18 @@ def test_grains_in_lammps_are_grains():
     assert TumbleSettings(**TUMBLE).duration == TumbleSettings(ground="bed", surface="sand").duration
     assert PenetrateSettings(**PENETRATE, ranks=2).on_grains
     assert not PenetrateSettings(ground="spring-damper", model="model.toml").on_grains
+
+
+def test_displacements_and_overlaps_of_a_run_are_those_of_the_bed_in_lammps_not_of_the_prepared_one():
+    marked = []
+    prepared, moved = (SimpleNamespace(mark_origin=lambda name=name: marked.append(name)) for name in ("ours", "moved"))
+    ground = SimpleNamespace(bed=moved)
+    platform = SimpleNamespace(
+        settings=TumbleSettings(**TUMBLE), ground=lambda bed: ground, run_on=lambda ground: ground.bed
+    )
+    assert PlatformOnBed.stepper(platform, prepared) is moved
+    assert marked == ["moved"] and moved.max_overlap == 0.0
+    assert not hasattr(prepared, "max_overlap")
 
 
 def test_without_lammps_a_run_is_refused_with_what_to_install(monkeypatch, tmp_path, capsys):
