@@ -6,6 +6,7 @@ from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
 from experiments.runs.whole_runs import computed_run
+from rigid.ground.flat_foot import DEPTHS, OVER_BALL
 from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
 from rigid.platform.files import find_platform
 
@@ -21,7 +22,9 @@ DEPTH = 1.0  # to which the map holds [tip diameters]
 
 def _answer(settings: GroundSettings) -> tuple[GroundMap, Answer]:
     if settings.tip != "sphere":
-        raise ValueError(say("of_other_tip", tip=settings.tip))
+        (shallow, deep), (first, last) = DEPTHS, OVER_BALL
+        flat = say("flat_in_grains", shallow=shallow, deep=deep, first=first, last=last)
+        raise ValueError(say("of_other_tip", tip=settings.tip, flat=flat if settings.tip == "flat" else ""))
     found = read_map(settings.material)
     return found, found.answer(
         gravity=settings.gravity, diameter=settings.tip_diameter, grain=settings.grain, packing=settings.packing,

@@ -7,7 +7,14 @@ from pathlib import Path
 
 from experiments.platform.ground_file import SPIKES_PER_ROW, fitted_ground
 from experiments.platform.numbers import platform_numbers
-from experiments.platform.settled import Number, Settled, check_spike_length, defaults_said, of_other_spikes
+from experiments.platform.settled import (
+    Number,
+    Settled,
+    check_spike_length,
+    defaults_said,
+    of_earth,
+    of_other_spikes,
+)
 from experiments.runs.types import Json
 from rigid.ground_file import GroundFile
 from rigid.hop import Tumbler
@@ -98,6 +105,9 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
     own_numbers: Json = {name: numbers.value(name) for name in body if name in numbers}
     Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own_numbers)  # refuses what no body can have
     warnings += numbers.check_actuation(settings.actuator, of_platform) + numbers.check_body(of_platform)
+    if fitted is None:
+        mass = numbers.value("mass")
+        warnings += of_earth(numbers, surface, weight=mass * settings.gravity, mass=mass, counterweight=0.0)
     tumbler = Tumbler(
         mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
         lean=of_platform.lean, gravity=settings.gravity, mu_s=numbers.value("mu_s"), mu_d=numbers.value("mu_d"),

@@ -2,8 +2,8 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed mujoco`; calling one imports what computes.
 
-Imports `coupling`, `coupling.robot`, `dem`, `experiments.grains`, `experiments.platform`, `experiments.runs`, `rigid`,
-`vis`.
+Imports `coupling`, `coupling.robot`, `dem`, `experiments.grains`, `experiments.groundmap`, `experiments.platform`,
+`experiments.runs`, `rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

@@ -6,15 +6,16 @@ from typing import Any, TypedDict
 
 from coupling.robot import Foot, law_under_feet
 from coupling.robot.soles import FeetLaw
-from dem.grains.materials import material
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import Surface
+from rigid.ground.flat_foot import DEPTHS, OVER_LAW
 from rigid.ground.laws import SurfaceLaw, find_law
+from rigid.ground.rft_foot import FLAT
 from rigid.ground.soles import Sole, diameter_powers, ill_sized, shape_ratio
 from rigid.ground_file import GroundFile
-from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
+from .gravity import GravityRule
 from .settings import RobotSettings
 
 __all__ = [
@@ -94,32 +95,20 @@ def law_of(
 
 
 def settle_spring(
-    settings: RobotSettings, surface: Surface, gravity: float, largest: float, numbers: dict[str, Number]
+    settings: RobotSettings, surface: Surface, rule: GravityRule, largest: float, numbers: dict[str, Number]
 ) -> list[str]:
-    """Settle K and C of one spike, and warn where they are those of another gravity [m/s2].
+    """Settle K and C of one spike, and warn where they are those of another gravity than the run's.
 
-    ``largest``: area of the largest foot over that of the spike [1]. Without cohesion the forces among grains in slow
-    motion go with their weight. So K goes with gravity g, and C, a force over a speed, with sqrt(g), as speeds do in
-    motions that are similar (docs/coupling.md). Raises ValueError where K of the surface does not go with gravity.
+    ``largest``: area of the largest foot over that of the spike [1].
     """
-    share = gravity / STANDARD_GRAVITY
-    loose = surface.grains is not None and material(surface.grains).cohesion == "none"
-    if settings.scale_with_gravity and not loose:
-        what = "made of grains with cohesion" if surface.granular else "hard ground"
-        raise ValueError(say("scaled_surface", surface=surface.name, what=what))
     powers = diameter_powers("spring-damper", {})
-    for key, unit, power in (("stiffness", "N/m", 1.0), ("damping", "N s/m", 0.5)):
-        given, own = getattr(settings, key), getattr(surface, key) / SPIKES_PER_ROW
-        scaled = f" times (g / {STANDARD_GRAVITY:g} m/s2)^{power:g}" if settings.scale_with_gravity else ""
-        own *= share**power if settings.scale_with_gravity else 1.0
-        origin = f"surface {surface.name}{scaled}, of one spike{_times(largest, powers[key])}"
+    for key, unit in (("stiffness", "N/m"), ("damping", "N s/m")):
+        given, own = getattr(settings, key), rule.scale(key) * getattr(surface, key) / SPIKES_PER_ROW
+        origin = f"surface {surface.name}{rule.origin(key)}, of one spike{_times(largest, powers[key])}"
         numbers[key] = Number(own, unit, origin) if given is None else Number(given, unit, "given")
-    fits = settings.scale_with_gravity or settings.stiffness is not None or not surface.granular
-    if fits or share >= 0.5:
+    if settings.stiffness is not None or not surface.granular:
         return []
-    stiffness = largest * numbers["stiffness"].value
-    key = "of_earth" if loose else "of_earth_cohesive"
-    return [say(key, stiffness=stiffness, scaled=share * stiffness, gravity=gravity, surface=surface.name)]
+    return rule.warning(surface, largest * numbers["stiffness"].value)
 
 
 def settle_other_law(
@@ -159,11 +148,20 @@ def settle_other_law(
     else:
         size = say("size_none")
     more = "" if "gravity" in own else ", nor gravity"
-    return [say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)]
+    told = say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)
+    return [told, *_flat_in_grains("" if given or unsized else law.name, surface, largest)]
 
 
-def spring_words(settings: RobotSettings, surface: Surface, largest: Largest) -> list[str]:
-    """For which foot K and C of `surface` are, and how far the largest is from it, in a sentence; none if given."""
+def _flat_in_grains(law: str, surface: Surface, largest: Largest) -> list[str]:
+    """How much harder grains push a flat foot than this law of sand, in a sentence; none where it was not measured."""
+    if surface.name != "sand" or largest.sole.roundness != FLAT or law not in OVER_LAW:
+        return []
+    (shallow, deep), (first, last) = DEPTHS, OVER_LAW[law]
+    return [say("flat_in_grains", name=largest.name, law=law, shallow=shallow, deep=deep, first=first, last=last)]
+
+
+def spring_words(settings: RobotSettings, surface: Surface, largest: Largest, rule: GravityRule) -> list[str]:
+    """For which foot K and C of `surface` are, how far the largest is from it, and their errors; none if given."""
     left = [key for key in ("stiffness", "damping") if getattr(settings, key) is None]
     if not left:
         return []
@@ -171,7 +169,8 @@ def spring_words(settings: RobotSettings, surface: Surface, largest: Largest) ->
         size = say("size_hard", most=largest)
     else:
         size = _similar(largest, Sole.of_spike(surface.spike), say("tip_sphere"), surface.spike, surface.name)
-    return [say("spring_defaults", names=" and ".join(left), surface=surface, size=size)]
+    told = [say("spring_defaults", names=" and ".join(left), surface=surface, size=size), *rule.errors(surface, left)]
+    return [*told, *_flat_in_grains("spring-damper" if len(left) == 2 else "", surface, largest)]
 
 
 def fitted_words(fitted: GroundFile, largest: Largest) -> list[str]:

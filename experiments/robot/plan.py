@@ -24,6 +24,7 @@ from rigid.platform.rig import STANDARD_GRAVITY
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
+from .gravity import GravityRule, gravity_rule
 from .laws import SPIKE, Largest, fitted_words, law_of, settle_other_law, settle_spring, spring_words
 from .settings import RobotSettings
 
@@ -48,6 +49,7 @@ class RobotPlan:
     numbers: Mapping[str, Number]
     scales: Mapping[str, float]  # Area of each part of a foot over that of the tip that the law is of [1]
     fitted: GroundFile | None  # The file that the law comes from
+    rule: GravityRule  # How K and C of the surface follow gravity
     warnings: tuple[str, ...]
 
     def robot(self) -> MujocoRobot:
@@ -71,10 +73,10 @@ class RobotPlan:
 
     def standing_on(self, parts: Iterable[str]) -> "RobotPlan":
         """The same on grains, with K of the largest of these parts where words name K of a foot."""
-        gravity, numbers = self.numbers["gravity"].value, dict(self.numbers)
+        numbers = dict(self.numbers)
         some = max(self.scales[name] for name in parts)
         of_all, of_some = (
-            settle_spring(self.settings, self.surface, gravity, most, numbers)
+            settle_spring(self.settings, self.surface, self.rule, most, numbers)
             for most in (max(self.scales.values()), some)
         )
         told = dict(zip(of_all, of_some, strict=True))
@@ -150,12 +152,13 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
             soles[part.name] = sole_of(part, to_matrix(turn), of=tip or SPIKE)
     most = max(scales, key=lambda name: (scales[name], soles[name].area))
     largest = Largest(name=most, times=scales[most], sole=soles[most])
+    rule = gravity_rule(settings, surface, robot.gravity, {name: sole.diameter for name, sole in soles.items()})
     if fitted is not None:
         warnings += fitted_words(fitted, largest)
         warnings += _beyond_gravity(settings, fitted, robot.gravity)
     elif of_surface:
-        warnings += settle_spring(settings, surface, robot.gravity, largest.times, numbers)
-        warnings += [] if settings.on_grains else spring_words(settings, surface, largest)
+        warnings += settle_spring(settings, surface, rule, largest.times, numbers)
+        warnings += [] if settings.on_grains else spring_words(settings, surface, largest, rule)
     else:
         warnings += settle_other_law(settings, surface, robot.gravity, largest, numbers)
     _settle_friction(settings, surface, numbers)
@@ -164,7 +167,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     numbers["weight"] = Number(max(robot.mass * robot.gravity, 1e-9), "N", "mass times gravity")
     return RobotPlan(
         settings=settings, model=model, controller=_controller(settings, folder), surface=surface, numbers=numbers,
-        scales=scales, fitted=fitted, warnings=tuple(warnings),
+        scales=scales, fitted=fitted, rule=rule, warnings=tuple(warnings),
     )  # fmt: skip
 
 

@@ -62,9 +62,10 @@ class RobotSettings(GrainsSettings):
     spike's."""
     damping: NotNegative | None = None
     """C of one foot, while going in [N s/m]; likewise, on sand times that ratio of areas to the power 1.25."""
-    scale_with_gravity: bool = False
-    """Whether K and C of the surface, which are those of 1 g, follow gravity: K in proportion, C with its square root.
-    So do those of grains without cohesion."""
+    scale_with_gravity: bool | None = None
+    """Whether K and C of the surface, which are those of 1 g, follow gravity: K in proportion, C with its square root,
+    as in grains without cohesion. If not given: on sand, where the map of hedgebed ground covers gravity (1e-6 g to
+    1 g) and feet (1 to 100 mm)."""
     mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (sand: 0.6).")
     mu_d: NotNegative | None = None
     """Sliding friction [1]; the surface's if not given (sand: 0.3), half of mu_s where that is."""

@@ -66,7 +66,7 @@ class StrictSettings(BaseModel):
         hint = field.annotation
         kinds = plain_kinds(hint)
         if bool in kinds:
-            if not isinstance(value, bool):
+            if not isinstance(value, bool) and not (value is None and type(None) in kinds):
                 raise ValueError("it must be true or false")
         elif kinds & {int, float} and value is not None:
             may_be_unset = get_args(hint) if get_origin(hint) is UnionType else ()

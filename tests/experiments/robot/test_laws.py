@@ -1,9 +1,15 @@
 """The law under a robot's feet: for which foot its numbers are, and what a ground file does not go with."""
 
+import json
+from pathlib import Path
+
 import pytest
 
+from experiments.groundmap import Settings as GroundSettings
+from experiments.groundmap import check as check_ground
 from experiments.robot.plan import plan_robot
 from experiments.robot.settings import RobotSettings
+from rigid.ground import flat_foot
 from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
 
@@ -73,3 +79,39 @@ def test_each_law_states_for_which_foot_its_numbers_are_and_how_far_this_one_is_
     round_.write_text(BALL)
     said = told(model=str(round_))
     assert "tip of 12" in said and "too" not in said
+
+
+PUSHES = Path(__file__).parents[3] / "docs/results/mujoco-laws/flat-foot.json"
+
+
+def test_factors_of_a_flat_foot_in_grains_are_those_of_the_kept_pushes():
+    kept = json.loads(PUSHES.read_text(encoding="utf-8"))
+    columns = [kept["depth_over_diameter"].index(depth) for depth in flat_foot.DEPTHS]
+    flat, ball = (
+        next(push["force"] for push in kept["pushes"] if push["tip"] == tip and push["grain"] == 0.0015)
+        for tip in ("flat", "sphere")
+    )
+    found = {"ball": (flat_foot.OVER_BALL, ball)}
+    for law, factors in flat_foot.OVER_LAW.items():
+        (own,) = (one for one in kept["laws"] if (one["tip"], one["law"], one["speed"]) == ("flat", law, 0.1))
+        found[law] = (factors, own["force"])
+    for factors, below in found.values():
+        assert [flat[k] / below[k] for k in columns] == pytest.approx(factors, rel=0.02)
+
+
+def test_grains_push_a_flat_foot_harder_than_spring_and_rft_and_a_sentence_says_how_much(tmp_path):
+    def told(**given):
+        return [said for said in plan_robot(RobotSettings(**HOPPER | given)).warnings if "Grains of sand" in said]
+
+    (said,) = told()
+    assert "9.9 times" in said and "4.8 times" in said
+    (said,) = told(ground="rft")
+    assert " 4 times" in said and "1.3 times" in said
+    (tmp_path / "ball.xml").write_text(BALL)
+    for other in (
+        {"ground": "bekker"}, {"surface": "brick"}, {"surface": "jsc1a"}, {"stiffness": 900.0, "damping": 3.0},
+        {"model": str(tmp_path / "ball.xml")},
+    ):  # fmt: skip
+        assert not told(**other)
+    with pytest.raises(ValueError, match=r"11 times .* a ball .*3\.4 times"):
+        check_ground(GroundSettings(tip="flat"))

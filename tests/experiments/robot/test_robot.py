@@ -10,6 +10,7 @@ from tumble_runs import stop_at
 
 from coupling.lammps import LammpsMissingError, find_lammps
 from experiments.cli.main import main
+from experiments.groundmap.maps import read_map
 from experiments.robot import experiment as robot
 from experiments.robot.energy import MOST_RESIDUAL, growth_warning
 from experiments.robot.laws import given_parameters
@@ -124,23 +125,52 @@ def test_the_depth_of_a_bed_that_a_refusal_names_is_accepted():
     extent(float(re.findall(r"([0-9.]+) m is accepted", str(refused.value))[0])).check_extent()
 
 
-def test_k_of_sand_goes_with_gravity_and_c_with_its_root_where_that_is_asked_for_and_a_warning_names_it():
+def test_k_of_sand_goes_with_gravity_and_c_with_its_root_unless_that_is_refused_and_a_warning_names_it():
     """Forces among grains without cohesion go with their weight, speeds of similar motions with the root of gravity."""
     low = HOPPER | {"gravity": 9.80665e-3}
-    kept, scaled = (plan_robot(RobotSettings(**low, scale_with_gravity=asked)) for asked in (False, True))
+    kept, scaled, asked = (plan_robot(RobotSettings(**low, scale_with_gravity=asked)) for asked in (False, None, True))
     assert scaled.numbers["stiffness"].value == pytest.approx(1e-3 * kept.numbers["stiffness"].value)
     assert scaled.numbers["damping"].value == pytest.approx(1e-3**0.5 * kept.numbers["damping"].value)
+    assert scaled.numbers == asked.numbers
     (of_one_g,) = [said for said in kept.warnings if "--scale-with-gravity" in said]
     foot = scaled.numbers["stiffness"].value * scaled.scales["foot"]
     assert f"{foot:.3g} N/m" in of_one_g and f"{1e3 * foot:.3g} N/m" in of_one_g
-    assert not [said for said in scaled.warnings if "gravity" in said]
+    assert not [said for said in scaled.warnings if "--scale-with-gravity" in said]
     given = plan_robot(RobotSettings(**low, stiffness=2.0))
-    assert given.numbers["stiffness"].value == 2.0 and not [said for said in given.warnings if "gravity" in said]
+    assert given.numbers["stiffness"].value == 2.0 and given.numbers["damping"] == scaled.numbers["damping"]
+    assert not [said for said in given.warnings if "K = " in said]
     sticky = plan_robot(RobotSettings(**low, surface="jsc1a"))
     assert [said for said in sticky.warnings if "cohesion of jsc1a" in said]
     for surface in ("jsc1a", "brick"):
         with pytest.raises(ValueError, match=f"scale_with_gravity.*{surface}"):
             plan_robot(RobotSettings(**low, surface=surface, scale_with_gravity=True))
+
+
+@pytest.mark.parametrize("gravity", [9.80665, 1.62, 9.80665e-3, 9.80665e-6])
+def test_k_and_c_of_sand_and_their_errors_are_those_that_hedgebed_ground_states_at_this_gravity(gravity):
+    map_ = read_map("sand").answer(gravity=gravity, diameter=0.012, grain=2e-4, packing=None, load=None)
+    plan = plan_robot(RobotSettings(**HOPPER, gravity=gravity))
+    for name in ("stiffness", "damping"):
+        assert plan.numbers[name].value == pytest.approx(
+            getattr(map_, name).value, rel=2e-3
+        )  # the surface's are rounded
+    (said,) = [said for said in plan.warnings if "standard deviations" in said]
+    assert f"± {map_.stiffness.std:.2g} N/m" in said and f"± {map_.damping.std:.2g} N s/m" in said
+
+
+def test_k_of_sand_stays_that_of_one_g_where_the_map_of_gravity_does_not_reach(tmp_path):
+    """Below 1e-6 g, above 1 g, of a foot of more than 100 mm, and of sand that has no map: a warning says why."""
+    (tmp_path / "lander.xml").write_text(LANDER, encoding="utf-8")
+    lander = {"model": str(tmp_path / "lander.xml"), "feet": ("hull",), "gravity": 1.0}
+    beyond = [HOPPER | {"gravity": gravity} for gravity in (5e-6, 25.0)]
+    weak = HOPPER | {"gravity": 1.0, "surface": "sand-weak"}
+    sets = [(given, "beyond the map") for given in beyond]
+    for given, why in [*sets, (weak, "no map"), (lander, "'hull' has")]:
+        plan = plan_robot(RobotSettings(**given))
+        earth = plan_robot(RobotSettings(**given | {"gravity": 9.81}))
+        assert plan.numbers["stiffness"] == earth.numbers["stiffness"]
+        (said,) = [said for said in plan.warnings if "--scale-with-gravity" in said]
+        assert why in said and not [said for said in plan.warnings if "standard deviations" in said]
 
 
 def test_a_hull_that_stays_above_the_grains_does_not_set_the_k_that_a_warning_names(tmp_path):

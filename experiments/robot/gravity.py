@@ -1,0 +1,114 @@
+"""How K and C of a surface follow gravity: by the map of `hedgebed ground` where it covers the robot's feet.
+
+Forces in slow motion among rigid grains without cohesion are in proportion to their weight. So K goes with gravity g,
+and C, a force over a speed, with sqrt(g), as speeds do in similar motions (`experiments.groundmap.maps`). The map adds
+the ranges within which this is used, and the standard deviations.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from dem.grains.materials import material
+from experiments.groundmap.maps import POWERS, Answer, read_map
+from experiments.groundmap.settings import GroundSettings
+from experiments.platform.surfaces import Surface
+from rigid.platform.rig import STANDARD_GRAVITY
+
+from . import say
+from .settings import RobotSettings
+
+__all__ = ["GravityRule", "gravity_rule"]
+
+SAME = 0.01
+"""Relative difference of gravity from 1 g up to which K and C stay as they are [1]: MuJoCo's own 9.81 m/s2 is 1 g."""
+NEAR = (0.5, 2.0)
+"""Gravity over 1 g outside which K and C of 1 g get a warning [1]."""
+SYMBOLS = {"stiffness": ("K", "N/m"), "damping": ("C", "N s/m")}
+
+
+@dataclass(frozen=True, kw_only=True)
+class GravityRule:
+    """How K and C of one spike at 1 g become those of a run."""
+
+    gravity: float  # Of the run [m/s2]
+    follows: bool  # Whether K and C are scaled to it
+    loose: bool  # Whether the surface is made of grains without cohesion
+    answer: Answer | None = None  # Of the map for the surface's spike, where the map is used
+    why_not: str = ""  # Why the map is not used, in words
+
+    @property
+    def share(self) -> float:
+        """Gravity over 1 g [1]; 1 within `SAME` of it, unless scaling was asked for."""
+        return self.gravity / STANDARD_GRAVITY
+
+    def scale(self, name: str) -> float:
+        """Factor on K (``stiffness``) or C (``damping``) of 1 g [1]."""
+        return float(self.share ** POWERS[name][0]) if self.follows else 1.0
+
+    def origin(self, name: str) -> str:
+        """The factor in words; empty without one."""
+        return f" times (g / {STANDARD_GRAVITY:g} m/s2)^{POWERS[name][0]:g}" if self.follows else ""
+
+    def warning(self, surface: Surface, stiffness: float) -> list[str]:
+        """That K and C are those of 1 g, where gravity is far from it; ``stiffness``: of one foot at 1 g [N/m]."""
+        if self.follows or NEAR[0] <= self.share <= NEAR[1]:
+            return []
+        key = "of_earth" if self.loose else "of_earth_cohesive"
+        scaled = self.share * stiffness
+        return [
+            say(key, stiffness=stiffness, scaled=scaled, gravity=self.gravity, surface=surface.name, why=self.why_not)
+        ]
+
+    def errors(self, surface: Surface, names: list[str]) -> list[str]:
+        """The map's K and C of the surface's spike with their standard deviations; none where the map is not used."""
+        if self.answer is None or surface.spike is None:
+            return []
+        told = []
+        for name in names:
+            (symbol, unit), number = SYMBOLS[name], getattr(self.answer, name)
+            told.append(f"{symbol} = {number.value:.3g} ± {number.std:.2g} {unit}")
+        real = say("real_grains") if self.share < NEAR[0] else ""
+        numbers = " and ".join(told)
+        return [say("of_map", gravity=self.gravity, spike=1e3 * surface.spike, numbers=numbers, real=real)]
+
+
+def gravity_rule(
+    settings: RobotSettings, surface: Surface, gravity: float, diameters: Mapping[str, float]
+) -> GravityRule:
+    """The rule of a run on `surface` under `gravity` [m/s2].
+
+    ``diameters``: name of each part of the feet -> diameter of the circle of its area from above [m]. Raises ValueError
+    where scaling is asked for and K of the surface is not in proportion to gravity.
+    """
+    loose = surface.grains is not None and material(surface.grains).cohesion == "none"
+    asked = settings.scale_with_gravity
+    if asked and not loose:
+        what = "made of grains with cohesion" if surface.granular else "hard ground"
+        raise ValueError(say("scaled_surface", surface=surface.name, what=what))
+    near = abs(gravity / STANDARD_GRAVITY - 1) <= SAME
+    answer, why_not = _of_map(surface, STANDARD_GRAVITY if near else gravity, diameters)
+    follows = bool(asked) or (asked is None and answer is not None and not near)
+    used = answer if follows or near else None
+    return GravityRule(
+        gravity=gravity, follows=follows, loose=loose, answer=used, why_not=why_not if asked is None else ""
+    )
+
+
+def _of_map(surface: Surface, gravity: float, diameters: Mapping[str, float]) -> tuple[Answer | None, str]:
+    """The map's answer for the surface's spike; None where the map does not cover gravity or feet, and why."""
+    if surface.grains is None or surface.spike is None:
+        return None, ""
+    try:
+        found = read_map(surface.grains)
+    except ValueError:
+        return None, say("no_map", grains=surface.grains)
+    low, high = found.ranges["tip_diameter"]
+    for name, diameter in diameters.items():
+        if not low <= diameter <= high:
+            return None, say("beyond_map", name=name, diameter=1e3 * diameter, low=1e3 * low, high=1e3 * high)
+    grain = float(GroundSettings.model_fields["grain"].default)  # That K and C of the surface are extrapolated to
+    try:
+        answer = found.answer(gravity=gravity, diameter=surface.spike, grain=grain, packing=None, load=None)
+    except ValueError as error:
+        return None, say("beyond_gravity", error=error)
+    return answer, ""
