@@ -7,10 +7,11 @@ Imports `dem`, `rigid`, and of `coupling` the ground of a bed.
 
 from .bed import LammpsBed
 from .ground import LammpsGround
+from .pieces import OutOfPlaneError
 from .process import INSTALL, LammpsEndedError, LammpsMissingError, check_ranks, find_lammps
-from .regions import OutOfPlaneError, check_plane
+from .regions import check_count, check_plane
 
 __all__ = [
-    "INSTALL", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError", "OutOfPlaneError", "check_plane",
-    "check_ranks", "find_lammps",
+    "INSTALL", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError", "OutOfPlaneError", "check_count",
+    "check_plane", "check_ranks", "find_lammps",
 ]  # fmt: skip

@@ -20,14 +20,13 @@ from rigid.ground.reaction import State
 
 from .law import WALL_TRIAL, MeanContact, kinetic_energy, law_words, spring_energy
 from .process import Lammps
-from .regions import MovingBody, check_thickness, pieces_of
+from .regions import MovingBody, check_count, check_thickness, pieces_of
 from .words import box_of, data_file, digits, spheres
 
 __all__ = ["LammpsBed"]
 
 Vector = np.ndarray
 FLOOR = 0
-MOST_PIECES = 30  # Of all bodies: each takes one of LAMMPS' 32 groups
 STILL = 1e-5  # Mean kinetic energy of a bed at rest [m g d]
 _SPELL, _MOST_SPELLS = 1.5, 60  # How long grains are left to come to rest at a time [sqrt(d / g)], how often at most
 _SKIN = 0.05  # Of the neighbour lists [d]
@@ -140,9 +139,7 @@ class LammpsBed:
         """
         pieces = pieces_of(shape)
         check_thickness(pieces, float(self.radius.max()))
-        count = len(pieces) + sum(len(body.pieces) for body in self._bodies)
-        if count > MOST_PIECES:
-            raise ValueError(f"the bodies have {count} pieces: a bed in LAMMPS takes at most {MOST_PIECES}")
+        check_count([*pieces, *(piece for body in self._bodies for piece in body.pieces)])
         faced = Facing(**facing)
         faced.refuse_for(self.material)
         row = pair_row(self.material, faced, tensile=self.tensile)

@@ -6,145 +6,36 @@ corner of two bodies. Where two pieces of one body are smooth together (a ball a
 has the grains beside it, so that a grain touches only the nearest. A grain that passes from one of these to the next
 begins a new contact there, without friction's history.
 
-A region turns about one axis, which LAMMPS takes as a constant, and has the velocity of that turning. Here the axis is
-y, across the plane of motion. A turning about two axes would need regions that move inside of regions.
+The pieces of a convex polyhedron are described in `polyhedra`.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.shapes.basic import Ball, Cone, Cylinder, Shape
+from dem.shapes.mesh import Mesh, Polyhedron
 from dem.shapes.solids import Box, Capsule, Placed
 from rigid.spatial.quaternions import multiply, to_matrix
 
+from .pieces import IN_PLANE, JUMP, OutOfPlaneError, Piece, Primitive, Seat
+from .polyhedra import convex_corners, polyhedron_pieces
 from .words import digits
 
-__all__ = ["MovingBody", "OutOfPlaneError", "Piece", "check_plane", "check_thickness", "pieces_of"]
+__all__ = ["MOST_PIECES", "MovingBody", "check_count", "check_plane", "check_thickness", "pieces_of"]
 
 Vector = np.ndarray
-_IN_PLANE = 1e-6  # How far from the plane of motion, or from its normal, an axis may be [rad]
-_JUMP, _ARM = 1e-9, 0.1  # A larger change of place [m], or over this arm [m] of angle, is no motion
-_SIDES = 16  # Of the polygon around a circle
+MOST_PIECES = 30  # Of all bodies: each takes one of LAMMPS' 32 groups
+_ARM = 0.1  # Over which a larger change of angle than JUMP is no motion [m]
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 _NO_POINT = (
     "LAMMPS gives no right force on a cone where it is thinner than a grain; a Ball as tip, a wider end, or the ground "
     "`bed` would do"
 )
-
-
-class OutOfPlaneError(ValueError):
-    """A body turns out of the plane of motion, x and z."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            "this body turns out of the plane of motion, x and z: LAMMPS' regions turn about one constant axis, which "
-            "is y here; the ground `bed` takes such a body"
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A primitive, where it is in the body, and from where to where along its own z axis grains belong to it [m]."""
-
-    shape: Ball | Cylinder | Cone | Box
-    begin: float = -math.inf
-    end: float = math.inf
-    at: Vector = field(default_factory=lambda: np.zeros(3))  # Of its origin in the body's axes [m]
-    axes: Vector = field(default_factory=lambda: np.eye(3))  # From its axes to the body's
-
-    def seat(self, turn: Vector) -> "Seat":
-        """How its region stands, the body turned by this matrix. Raises OutOfPlaneError where no region can."""
-        axes, shape = turn @ self.axes, self.shape
-        middle = turn @ self.at + axes @ np.array(shape.center if isinstance(shape, Ball | Box) else np.zeros(3))
-        if isinstance(shape, Ball):
-            return Seat(0.0, np.zeros((3, 3)), middle)
-        across = np.flatnonzero(np.abs(axes[1]) > 1 - _IN_PLANE**2)  # its axes that lie along y
-        if isinstance(shape, Box):
-            if not len(across):
-                raise OutOfPlaneError
-            side = axes[:, (across[0] + 1) % 3]
-        elif len(across) and across[0] == 2:
-            side = np.array([0.0, 0.0, 1.0])
-        elif abs(axes[1, 2]) < _IN_PLANE:
-            side = axes[:, 2]
-        else:
-            raise OutOfPlaneError
-        angle = math.atan2(side[0], side[2])
-        back = _about_y(-angle)
-        kept = np.array([1.0, 1.0, 1.0] if isinstance(shape, Box) else [0.0, 0.0, 1.0])  # a turn about its axis
-        return Seat(angle, back @ axes * kept, back @ middle)
-
-    def words(self, seat: "Seat") -> str:
-        """Style and numbers of the region, before it is turned by `seat.angle` about y."""
-        shape, (x, y, z) = self.shape, seat.at
-        if isinstance(shape, Ball):
-            return f"sphere {digits((x, y, z, shape.radius))}"
-        if isinstance(shape, Box):
-            half = np.abs(np.round(seat.axes)) @ (0.5 * np.array(shape.size))
-            return f"block {digits(np.column_stack([seat.at - half, seat.at + half]).ravel())}"
-        sense = round(float(seat.axes[1, 2]))
-        radii = (shape.bottom_radius, shape.top_radius) if isinstance(shape, Cone) else (shape.radius,)
-        kind = "cone" if isinstance(shape, Cone) else "cylinder"
-        if sense:
-            low, high = sorted((sense * shape.bottom, sense * shape.top))
-            return f"{kind} y {digits((x, z, *radii[::sense], y + low, y + high))}"
-        return f"{kind} z {digits((x, y, *radii, z + shape.bottom, z + shape.top))}"
-
-    def corners(self) -> Vector:
-        """Corners of a box around it in the body's axes [m], shape [8, 3]."""
-        low, high = _ends(self.shape)
-        found = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-        return np.asarray(self.at + np.array(found) @ self.axes.T)
-
-    def outline(self) -> Vector:
-        """Corners of a polyhedron around it, at most 2 % wider, in the body's axes [m], shape [n, 3]; not of a ball."""
-        shape = self.shape
-        if isinstance(shape, Box | Ball):
-            return self.corners()
-        angle = 2 * math.pi * np.arange(_SIDES) / _SIDES
-        ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_SIDES)]) / math.cos(math.pi / _SIDES)
-        if isinstance(shape, Cone):
-            below, above = shape.bottom_radius, shape.top_radius
-        else:
-            below = above = shape.radius
-        found = np.concatenate([below * ring + (0.0, 0.0, shape.bottom), above * ring + (0.0, 0.0, shape.top)])
-        return np.asarray(self.at + found @ self.axes.T)
-
-
-@dataclass(frozen=True, eq=False)
-class Seat:
-    """A region's turn about y [rad], and before that turn the piece's axes, 0 where it is round, and its middle or
-    origin [m]."""
-
-    angle: float
-    axes: Vector
-    at: Vector
-
-    def like(self, other: "Seat") -> bool:
-        """Whether one region, turned, is both."""
-        return bool(np.abs(self.axes - other.axes).max() < _IN_PLANE and np.abs(self.at - other.at).max() < _JUMP)
-
-
-def _about_y(angle: float) -> Vector:
-    """The matrix of a turn by this angle [rad]."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-
-
-def _ends(shape: Ball | Cylinder | Cone | Box) -> tuple[Vector, Vector]:
-    """Lower and upper corner of a box around a shape [m]."""
-    if isinstance(shape, Ball):
-        return np.array(shape.center) - shape.radius, np.array(shape.center) + shape.radius
-    if isinstance(shape, Box):
-        half = 0.5 * np.array(shape.size)
-        return np.array(shape.center) - half, np.array(shape.center) + half
-    radius = max(shape.bottom_radius, shape.top_radius) if isinstance(shape, Cone) else shape.radius
-    return np.array([-radius, -radius, shape.bottom]), np.array([radius, radius, shape.top])
 
 
 def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
@@ -159,7 +50,7 @@ def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
     ordered = sorted((_known(part) for part in parts), key=_bottom)
     seams = [_seam(below, above) for below, above in pairwise(ordered)]
     ends = [-math.inf, *seams, math.inf]
-    return [Piece(part, ends[k], ends[k + 1]) for k, part in enumerate(ordered)]
+    return [Primitive(part, ends[k], ends[k + 1]) for k, part in enumerate(ordered)]
 
 
 def check_thickness(pieces: Sequence[Piece], grain_radius: float) -> None:
@@ -170,34 +61,56 @@ def check_thickness(pieces: Sequence[Piece], grain_radius: float) -> None:
     r = R on R* is at most twice R, and our bed's is R.
     """
     for piece in pieces:
-        shape = piece.shape
+        shape = piece.shape if isinstance(piece, Primitive) else None
         if isinstance(shape, Cone) and (thin := min(shape.bottom_radius, shape.top_radius)) < grain_radius:
             raise ValueError(
                 f"{shape} is {thin:g} m in radius at one end, the largest grain {grain_radius:g} m: {_NO_POINT}"
             )
 
 
-def check_plane(shapes: Sequence[Shape], turn: Vector) -> None:
-    """Raise ValueError for a body of these shapes that LAMMPS cannot have, OutOfPlaneError for one that it cannot have
-    in this turn, a unit quaternion."""
-    for piece in pieces_of(shapes):
+def check_count(pieces: Sequence[Piece]) -> None:
+    """Raise ValueError for more pieces, of all bodies together, than a bed in LAMMPS takes."""
+    if len(pieces) <= MOST_PIECES:
+        return
+    flat = sum(not isinstance(piece, Primitive) for piece in pieces)
+    of_faces = f", {flat} of them faces and edges of polyhedra: fewer corners, or parallelograms as faces, would do"
+    raise ValueError(
+        f"the bodies have {len(pieces)} pieces{of_faces if flat else ''}; a bed in LAMMPS takes at most {MOST_PIECES}"
+    )
+
+
+def check_plane(shapes: Sequence[Shape], turn: Vector) -> list[Piece]:
+    """The pieces of a body of these shapes. Raises ValueError for one that LAMMPS cannot have, OutOfPlaneError for one
+    that it cannot have in this turn, a unit quaternion."""
+    pieces = pieces_of(shapes)
+    check_count(pieces)
+    for piece in pieces:
         piece.seat(to_matrix(turn))
+    return pieces
 
 
 def _alone(part: Shape) -> list[Piece]:
     """The pieces of a shape that stands by itself."""
+    at, axes = np.zeros(3), np.eye(3)
     if isinstance(part, Placed):
         at, axes = np.array(part.position), to_matrix(np.array(part.turn) / math.hypot(*part.turn))
-        return [replace(piece, at=at + axes @ piece.at, axes=axes @ piece.axes) for piece in _alone(part.bare)]
+        part = part.bare
+    if isinstance(part, Polyhedron | Mesh):
+        return polyhedron_pieces(at + convex_corners(part) @ axes.T)
+    return [replace(piece, at=at + axes @ piece.at, axes=axes @ piece.axes) for piece in _primitives(part)]
+
+
+def _primitives(part: Shape) -> list[Primitive]:
+    """Those of a shape in its own axes."""
     if isinstance(part, Capsule):
         start, along = np.array(part.start), np.array(part.end) - np.array(part.start)
         length, placed = float(np.linalg.norm(along)), {"at": start, "axes": _upright(along)}
         return [
-            Piece(Ball(radius=part.radius), -math.inf, 0.0, **placed),
-            Piece(Cylinder(0.0, length, part.radius), 0.0, length, **placed),
-            Piece(Ball((0.0, 0.0, length), part.radius), length, math.inf, **placed),
+            Primitive(Ball(radius=part.radius), -math.inf, 0.0, **placed),
+            Primitive(Cylinder(0.0, length, part.radius), 0.0, length, **placed),
+            Primitive(Ball((0.0, 0.0, length), part.radius), length, math.inf, **placed),
         ]
-    return [Piece(_known(part))]
+    return [Primitive(_known(part))]
 
 
 def _upright(axis: Vector) -> Vector:
@@ -213,7 +126,7 @@ def _known(part: Shape) -> Ball | Cylinder | Cone | Box:
         return part
     raise ValueError(
         f"{type(part).__name__} has no counterpart among LAMMPS' regions: a body in LAMMPS is made of Ball, Capsule, "
-        f"Cylinder, Cone or Box"
+        f"Cylinder, Cone, Box or convex Polyhedron"
     )
 
 
@@ -262,16 +175,16 @@ class MovingBody:
 
     def place(self, position: Vector, velocity: Vector, turn: Vector, spin: Vector) -> None:
         """Set pose and motion. Raises OutOfPlaneError for a body that leaves the plane of motion, x and z."""
-        if math.hypot(spin[0], spin[2]) > _IN_PLANE * max(1.0, abs(float(spin[1]))):
+        if math.hypot(spin[0], spin[2]) > IN_PLANE * max(1.0, abs(float(spin[1]))):
             raise OutOfPlaneError
         turned = to_matrix(turn)
         since = turned @ self.base.T
-        if not self.seats or math.hypot(since[0, 1], since[2, 1]) > _IN_PLANE or since[1, 1] < 0:
+        if not self.seats or math.hypot(since[0, 1], since[2, 1]) > IN_PLANE or since[1, 1] < 0:
             self._sit(turned)
             since = np.eye(3)
         angle = math.atan2(since[0, 2], since[2, 2])
         angle += 2 * math.pi * round((self.angle - angle) / (2 * math.pi))
-        jump = float(np.abs(position - self.position).max()) > _JUMP or abs(angle - self.angle) > _JUMP / _ARM
+        jump = float(np.abs(position - self.position).max()) > JUMP or abs(angle - self.angle) > JUMP / _ARM
         self.jumped, self.angle = self.jumped or jump, angle
         self.position, self.velocity = np.array(position, dtype=float), np.array(velocity, dtype=float)
         self.turn, self.spin = np.array(turn, dtype=float), np.array(spin, dtype=float)
@@ -320,10 +233,7 @@ class MovingBody:
     @property
     def spans(self) -> bool:
         """Whether its section is the same all along y, so that it may be as wide as the bed."""
-        return all(
-            isinstance(piece.shape, Box) or (isinstance(piece.shape, Cylinder) and round(float(seat.axes[1, 2])))
-            for piece, seat in zip(self.pieces, self.seats, strict=True)
-        )
+        return all(piece.spans(seat) for piece, seat in zip(self.pieces, self.seats, strict=True))
 
     def extent(self, level: float) -> tuple[Vector, Vector]:
         """Where it begins and ends along x and y [m], shape [2] both, of what is below a height [m].
@@ -332,8 +242,7 @@ class MovingBody:
         """
         axes, found = to_matrix(self.turn), [np.zeros((0, 2))]
         for piece in self.pieces:
-            shape = piece.shape
-            if isinstance(shape, Ball):
+            if isinstance(piece, Primitive) and isinstance(shape := piece.shape, Ball):
                 centre = self.position + axes @ (piece.at + piece.axes @ np.array(shape.center))
                 above = max(0.0, float(centre[2]) - level)
                 if above < shape.radius:
@@ -380,14 +289,13 @@ class MovingBody:
             corners = self.position + piece.corners() @ turned.T
             sides = np.column_stack([corners.min(axis=0) - travel, corners.max(axis=0) + travel])
             lines += [f"group {own} clear", f"region near block {digits(sides.ravel())} units box"]
-            parts, up = ["near"], turned @ piece.axes[:, 2]
-            for height, sense, kind in ((piece.begin, 1.0, "above"), (piece.end, -1.0, "below")):
-                if math.isfinite(height):
-                    at, normal = self.position + turned @ piece.at + height * up, sense * up
-                    lines.append(f"region {kind} plane {digits((*at, *normal))} units box")
-                    parts.append(kind)
-            if len(parts) > 1:
-                lines.append(f"region chosen intersect {len(parts)} {' '.join(parts)}")
-            lines.append(f"group {own} region {'chosen' if len(parts) > 1 else 'near'}")
-            lines += [f"region {kind} delete" for kind in (["chosen"] if len(parts) > 1 else []) + parts]
+            for cell in piece.cells():
+                parts = [f"side{k}" for k in range(len(cell))]
+                halves = zip(parts, cell, strict=True)
+                lines += [f"region {kind} {half.words(self.position, turned)} units box" for kind, half in halves]
+                if parts:
+                    lines.append(f"region chosen intersect {len(parts) + 1} near {' '.join(parts)}")
+                lines.append(f"group {own} region {'chosen' if parts else 'near'}")
+                lines += [f"region {kind} delete" for kind in (["chosen", *parts] if parts else [])]
+            lines.append("region near delete")
         return lines

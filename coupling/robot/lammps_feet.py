@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from coupling.lammps import LammpsGround, OutOfPlaneError, check_plane
+from coupling.lammps import LammpsGround, OutOfPlaneError, check_count, check_plane
 from dem import Bed
 from rigid.ground.reaction import Reaction, Turned
 
@@ -24,9 +24,9 @@ STILL = 1e-9  # Turning about another axis than y over that of a joint [1]
 class LammpsFeet(BedFeet, LammpsGround):
     """A `coupling.lammps.LammpsBed` under the feet of a robot; parameters as of `BedFeet`.
 
-    Feet are made of spheres, capsules, cylinders and boxes, and turn about y alone: LAMMPS' regions have one constant
-    axis. A grain in the corner of two geoms of a foot touches both; on a `dem.Bed` it touches the nearest. Of energies
-    see `LammpsGround`.
+    Feet are made of spheres, capsules, cylinders, boxes and convex meshes, and turn about y alone: LAMMPS' regions have
+    one constant axis. A grain in the corner of two geoms of a foot touches both; on a `dem.Bed` it touches the nearest.
+    Of energies see `LammpsGround`.
     """
 
     repeatable = False
@@ -72,6 +72,7 @@ class LammpsFeet(BedFeet, LammpsGround):
 
 def refuse_in_lammps(robot: MujocoRobot) -> None:
     """Raise ValueError, naming it, for a geom that LAMMPS has no region for, and a foot that can leave the plane."""
+    pieces = []
     for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
         out_of_plane = np.abs(robot.jacobian(foot.body)[1][[0, 2]]).max(axis=0) > STILL
         if out_of_plane.any():
@@ -82,14 +83,17 @@ def refuse_in_lammps(robot: MujocoRobot) -> None:
             )
         for part in foot.parts:
             try:
-                check_plane(part.shapes, turn)
+                pieces += check_plane(part.shapes, turn)
             except OutOfPlaneError:
                 raise ValueError(
                     f"feet: {part.name!r} stands askew: in LAMMPS an axis of it lies in the plane of x and z, or along "
                     f"y; ground = 'bed' takes it"
                 ) from None
-            except ValueError:
+            except ValueError as error:
                 raise ValueError(
-                    f"feet: {part.name!r} is of the kind {part.kind}, for which LAMMPS has no region: sphere, capsule, "
-                    f"cylinder or box would do, or ground = 'bed'"
+                    f"feet: {part.name!r} is of the kind {part.kind}, which ground = 'bed' alone takes here: {error}"
                 ) from None
+    try:
+        check_count(pieces)
+    except ValueError as error:
+        raise ValueError(f"feet: {error}") from None

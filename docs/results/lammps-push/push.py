@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from coupling.lammps import LammpsBed, LammpsMissingError
-from dem import Ball, Bed, Cylinder
+from dem import Ball, Bed, Cylinder, Polyhedron
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--size", type=float, nargs=3, default=(0.03, 0.03, 0.03), help="of the prepared bed [m]")
@@ -27,6 +27,7 @@ parser.add_argument("--grain", type=float, default=0.003, help="mean diameter [m
 parser.add_argument("--copies", type=int, default=1, help="how often the prepared bed is laid end to end [1]")
 parser.add_argument("--ranks", type=int, nargs="+", default=(1,), help="each is a run of its own in LAMMPS")
 parser.add_argument("--radius", type=float, default=0.006, help="of the spike [m]")
+parser.add_argument("--sides", type=int, default=0, help="of a plate as thick as its radius, in place of the spike")
 parser.add_argument("--seeds", type=int, nargs="+", default=(1,), help="of the prepared beds")
 parser.add_argument("--speed", type=float, default=0.2, help="of the spike [m/s]")
 parser.add_argument("--parts", type=int, default=20, help="means of the force, each over --steps")
@@ -53,6 +54,10 @@ def push(bed, start, asked, pids, finer):
     """Mean force and moment on the spike in each part, shape [parts, 6]; processor and wall time a grain-step [s]."""
     steps = asked.steps * finer
     shapes = [Ball(radius=asked.radius), Cylinder(bottom=0.0, top=0.06, radius=asked.radius)]
+    if asked.sides:
+        angle = 2 * np.pi * (np.arange(asked.sides) + 0.5) / asked.sides
+        ring = asked.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        shapes = [Polyhedron([(*point, z) for point in ring for z in (0.0, asked.radius)])]
     body = bed.add_body(shapes, position=start)
     bed.move_body(body, velocity=(0.0, 0.0, -asked.speed))
     bed.advance(steps)  # compiles here, sets up there
@@ -82,6 +87,8 @@ def push_all(asked, seed):
     away = np.hypot(grains.position[:, 0] % size[0] - x, grains.position[:, 1] % size[1] - y)
     near = away < asked.radius + grains.radius
     reach = np.sqrt((asked.radius + grains.radius[near]) ** 2 - away[near] ** 2)
+    if asked.sides:
+        reach = grains.radius[near]  # its lower face touches no grain yet
     start = (x, y, float((grains.position[near, 2] + reach).max()))
     print(f"seed {seed}: {len(grains.id)} grains, steps of {piece.time_step:.4g} s")
     columns, costs = {}, {}

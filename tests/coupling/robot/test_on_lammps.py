@@ -5,7 +5,7 @@ The tests need LAMMPS and mpiexec (`apt install lammps openmpi-bin`), and are sk
 
 import numpy as np
 import pytest
-from spatial_runs import EXAMPLES, ball, grain_bed
+from spatial_runs import EXAMPLES, ball, grain_bed, model_of, moving
 
 from coupling.lammps import LammpsBed, LammpsMissingError, find_lammps
 from coupling.robot import BedFeet, LammpsFeet, LostRobotError, MujocoRobot, RobotRun
@@ -91,6 +91,28 @@ def test_a_wheel_with_grousers_digs_in_lammps_as_on_our_bed(grounds):
         assert theirs.columns[name].mean() == pytest.approx(ours.columns[name].mean(), rel=error)
     torque = [run.feet[:, 0, 11].mean() for run in (ours, theirs)]
     assert torque[0] < -0.1 and torque[1] == pytest.approx(torque[0], rel=0.15)
+
+
+def test_a_foot_with_the_mesh_of_an_octagonal_plate_lands_askew_as_on_our_bed(grounds):
+    angle = np.pi / 4 * np.arange(8)
+    corners = " ".join(f"{0.03 * np.cos(a):.9g} {0.03 * np.sin(a):.9g} {z}" for a in angle for z in (-0.01, 0.01))
+    text = f"""<mujoco><option timestep="1e-3" integrator="implicitfast"/><asset><mesh name="plate" vertex="{corners}"/>
+        </asset><worldbody><body pos="0 0 0.2"><joint type="slide" axis="0 0 1"/><geom size=".02" mass="0.2"/>
+        <body pos="0 0 -.1" euler="0 4 0"><joint axis="0 1 0" stiffness="2"/><geom name="foot" type="mesh" mesh="plate"
+        mass="0.2"/></body></body></worldbody></mujoco>"""
+    runs = []
+    for ranks in (None, 1):
+        robot = moving(MujocoRobot(model_of(text), "foot", height=1e-3), -0.3, 0.0)
+        runs.append(RobotRun(robot, grounds(robot, ranks=ranks), duration=0.03, substeps=4))
+        runs[-1].run()
+    ours, theirs = runs
+    assert len(theirs.ground.bed._bodies[0].pieces) == 10
+    assert ours.columns["fz"].mean() > 2.0
+    assert theirs.columns["fz"].mean() == pytest.approx(ours.columns["fz"].mean(), rel=0.01)
+    fall = ours.columns["z"][0] - ours.columns["z"].min()
+    assert theirs.columns["z"] == pytest.approx(ours.columns["z"], abs=5e-3 * fall)
+    tilt = [run.joints["qpos"][:, 1] for run in runs]
+    assert tilt[1] == pytest.approx(tilt[0], abs=0.02 * np.ptp(tilt[0]))
 
 
 def test_a_stopped_run_goes_on_from_its_state_within_a_percent(grounds):

@@ -100,7 +100,7 @@ UP = '<joint name="up" type="slide" axis="0 0 1"/>'
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"kind": "ellipsoid"}, "'foot' is of the kind ellipsoid, .* or ground = 'bed'"),
+        ({"kind": "ellipsoid"}, "'foot' is of the kind ellipsoid, which ground = 'bed' alone .* pieces"),
         ({"joint": UP + '<joint name="yaw" axis="0 0 1"/>'}, "the joint 'yaw' can turn 'foot' out of the plane"),
         ({"joint": '<freejoint name="root"/>'}, "the joint 'root' can turn 'foot' out of the plane"),
         ({"quat": "0.9 0.2 0.1 0"}, "'foot' stands askew"),
