@@ -64,7 +64,7 @@ class PenetrationProblem(Problem):
     """One campaign of penetration."""
 
     kind = "penetration"
-    whole = "the bed or the spike"
+    whole = "the bed or the tip"
     clocks = (("force",), ("depth", "accel"))
     by_path = True
     hidden_scatter = ("bed damping",)  # comes near to what a speed does

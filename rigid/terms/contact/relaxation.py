@@ -94,7 +94,7 @@ CANDIDATE = fit.Candidate(
                      "e at most relax_fast / (1 + relax_fast) * z"),
         ),
         apart={
-            "shaft-friction": "Hold the spike for a minute: a force that relaxes goes on falling by equal steps for "
+            "shaft-friction": "Hold the tip for a minute: a force that relaxes goes on falling by equal steps for "
                               "equal factors of time, friction that is let go falls once.",
             "plastic-sinkage": "Push in, hold for a minute and push on: what has relaxed is missing at the start of "
                                "the second push, a crater leaves nothing behind there.",
