@@ -17,7 +17,7 @@ from rigid.platform.rig import STANDARD_GRAVITY
 from . import say
 from .settings import RobotSettings
 
-__all__ = ["GravityRule", "gravity_rule"]
+__all__ = ["NEAR", "GravityRule", "gravity_rule"]
 
 SAME = 0.01
 """Relative difference of gravity from 1 g up to which K and C stay as they are [1]: MuJoCo's own 9.81 m/s2 is 1 g."""

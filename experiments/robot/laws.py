@@ -13,9 +13,10 @@ from rigid.ground.laws import SurfaceLaw, find_law
 from rigid.ground.rft_foot import FLAT
 from rigid.ground.soles import Sole, diameter_powers, ill_sized, shape_ratio
 from rigid.ground_file import GroundFile
+from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
-from .gravity import GravityRule
+from .gravity import NEAR, GravityRule
 from .settings import RobotSettings
 
 __all__ = [
@@ -149,7 +150,9 @@ def settle_other_law(
         size = say("size_none")
     more = "" if "gravity" in own else ", nor gravity"
     told = say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)
-    return [told, *_flat_in_grains("" if given or unsized else law.name, surface, largest)]
+    fixed = surface.granular and "gravity" not in values and not NEAR[0] <= gravity / STANDARD_GRAVITY <= NEAR[1]
+    of_law = [say("gravity_of_law", law=law.name, gravity=gravity)] if fixed else []
+    return [told, *of_law, *_flat_in_grains("" if given or unsized else law.name, surface, largest)]
 
 
 def _flat_in_grains(law: str, surface: Surface, largest: Largest) -> list[str]:
@@ -170,6 +173,8 @@ def spring_words(settings: RobotSettings, surface: Surface, largest: Largest, ru
     else:
         size = _similar(largest, Sole.of_spike(surface.spike), say("tip_sphere"), surface.spike, surface.name)
     told = [say("spring_defaults", names=" and ".join(left), surface=surface, size=size), *rule.errors(surface, left)]
+    if surface.granular:
+        told.append(say("springs_back", share=find_law("rft").rebound({})))
     return [*told, *_flat_in_grains("spring-damper" if len(left) == 2 else "", surface, largest)]
 
 

@@ -146,6 +146,7 @@ def conclude(
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
+        say("airborne") if _airborne(run) else None,
     ]  # fmt: skip
     if plan.fitted is not None:
         warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]
@@ -241,6 +242,12 @@ def _flights(run: RobotRun) -> tuple[list[tuple[int, int]], int | None]:
     touched, lasting = int(np.argmin(free)), max(1, round(APART / run.macro_step))
     found = [(touched + low, touched + high) for low, high in spells(free[touched:]) if high - low >= lasting]
     return found, touched
+
+
+def _airborne(run: RobotRun) -> bool:
+    """Whether the run ends in a flight."""
+    flights, _ = _flights(run)
+    return bool(flights) and flights[-1][1] == len(run.columns["touching"])
 
 
 def _sentences(run: RobotRun) -> list[str]:

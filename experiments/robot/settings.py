@@ -45,9 +45,9 @@ class RobotSettings(GrainsSettings):
     """Material: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; if not given, that of the grains of a
     ground.toml, else sand."""
     ground: str = "spring-damper"
-    """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, katsuragi-durian, bekker,
-    rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or lammps (a bed whose grains
-    are in LAMMPS; the feet move in the plane of x and z)."""
+    """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, power-irreversible,
+    katsuragi-durian, bekker, rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or
+    lammps (a bed whose grains are in LAMMPS; the feet move in the plane of x and z)."""
     ground_parameters: tuple[str, ...] = ()
     """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot. Defaults are those of a
     spike of 12 mm, scaled to the size of each foot."""

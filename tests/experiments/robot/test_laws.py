@@ -115,3 +115,14 @@ def test_grains_push_a_flat_foot_harder_than_spring_and_rft_and_a_sentence_says_
         assert not told(**other)
     with pytest.raises(ValueError, match=r"11 times .* a ball .*3\.4 times"):
         check_ground(GroundSettings(tip="flat"))
+
+
+def test_a_law_that_springs_back_or_does_not_take_gravity_says_so():
+    def told(part, **given):
+        return [said for said in plan_robot(RobotSettings(**HOPPER | given)).warnings if part in said]
+
+    assert told("gives back") and told("gives back", gravity=1.0)
+    assert not told("gives back", surface="brick") and not told("gives back", ground="rft")
+    for law in ("power-irreversible", "katsuragi-durian", "bekker"):
+        assert told("not take gravity", ground=law, gravity=1.0) and not told("not take gravity", ground=law)
+    assert not told("not take gravity", ground="rft", gravity=1.0) and not told("not take gravity", gravity=1.0)

@@ -410,6 +410,21 @@ def test_threads_on_a_law_are_taken_with_a_message_as_in_a_tumble(tmp_path, caps
     assert "threads = 1" in told and "] tumble" not in told and "] robot" in told
 
 
+@pytest.mark.parametrize(("duration", "airborne"), [(0.08, False), (0.15, True)])
+def test_a_run_that_ends_in_a_flight_says_that_the_flight_is_cut_off(duration, airborne, tmp_path):
+    """A fall of 20 mm takes 64 ms, half a swing of 1.5 kg on 15 kN/m 31 ms, the flight after it 128 ms."""
+    (tmp_path / "lander.xml").write_text(LANDER, encoding="utf-8")
+    settings = RobotSettings(
+        model=str(tmp_path / "lander.xml"), feet=("tip",), surface="brick", stiffness=15e3, damping=0.0, height=0.02,
+        duration=duration,
+    )  # fmt: skip
+    plan = plan_robot(settings)
+    run = RobotFollowed(settings, plan).run_on_law()
+    run.run()
+    told = conclude(settings, plan, run, tmp_path).warnings
+    assert any("cut off" in said for said in told) == airborne
+
+
 @pytest.mark.long
 def test_a_run_on_a_law_leaves_its_series_and_numbers(tmp_path):
     settings = RobotSettings(**HOPPER, controller=HOP, duration=0.45, frame_count=0)
