@@ -6,9 +6,11 @@ Gatelli and Mara, Reliability Engineering and System Safety 91, 2006, 717-727). 
 its mean over the lists that it is combined with.
 """
 
+import itertools
 import json
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +26,7 @@ from .design import Design, problem_of
 from .factors import unit_of
 from .settings import SweepSettings
 
-__all__ = ["FEWEST_SAMPLES", "conclude"]
+__all__ = ["FEWEST_SAMPLES", "conclude", "shared_title"]
 
 FEWEST_SAMPLES = 64
 """Of a Latin hypercube, below which RBD-FAST has no confidence interval [1]."""
@@ -83,12 +85,22 @@ def conclude(
         quantities={"runs": quantity(len(tasks), "1"), "failed": quantity(failed, "1")},
         tables=[_each_run(design, columns) if len(tasks) <= FEW else _spreads(columns),
                 *([_sensitivity_table(sensitive)] if sensitive else [])],
-        of=settings.experiment, factors=[
+        of=settings.experiment, each=shared_title(one.result for one in outcomes.values()), factors=[
             {"key": key, "unit": unit_of(key, design.experiment.settings_class())} for key in design.keys
         ],
         columns=[{"name": column.name, "unit": column.unit, "head": column.head} for column in drawn],
         sensitivities=sensitive, warnings=warnings,
     )  # fmt: skip
+
+
+def shared_title(results: Iterable[str]) -> str:
+    """What all runs of a sweep are, such as "A tumble on brick": the parts up to a colon or comma that titles share.
+
+    ``results``: Text of each run's result.json; an empty one is of a run that failed.
+    """
+    titles = [re.split(r"(?<=[:,]) ", str(json.loads(text).get("title", ""))) for text in results if text]
+    shared = itertools.takewhile(lambda parts: len(set(parts)) == 1, zip(*titles, strict=False))
+    return " ".join(parts[0] for parts in shared).rstrip(":,")
 
 
 def _columns(tasks: Sequence[Task], outcomes: Mapping[str, Outcome]) -> list[_Column]:

@@ -11,7 +11,7 @@ from PIL import Image, ImageColor
 
 from vis.compare.report import _draw_path
 from vis.diagnose.figures import _PHASES
-from vis.page.plots import STATES, as_it_lies, name_below, new_figure
+from vis.page.plots import STATES, as_it_lies, handle, new_figure, title_above
 from vis.pictures.render import write_gif
 
 
@@ -39,26 +39,36 @@ def test_the_caption_of_two_paths_says_of_their_shape_what_the_picture_does(heig
 
 
 @pytest.mark.parametrize("layout", ["constrained", "none"])
-def test_a_figure_has_the_name_of_its_surface_below_its_panels_which_stay_as_high(layout: str) -> None:
+def test_a_figure_is_titled_with_its_surface_above_its_legend_and_panels_stay_as_high(layout: str) -> None:
     figure = new_figure(3.0, layout=layout)
     axis = figure.subplots()
     if layout == "none":
         figure.subplots_adjust(bottom=0.17)
-    axis.set_xlabel("time [s]")
+    axis.set_title("0.1 m/s")
+    legend = figure.legend(handles=[handle("bed", "black")], loc="outside upper center")
     figure.canvas.draw()
     before = axis.get_window_extent().height
-    name_below(figure, "Plates in sand")
+    title_above(figure, "Plates in sand")
     figure.canvas.draw()
     words = next(text for text in figure.findobj(Text) if text.get_text() == "Plates in sand")
-    box, label = words.get_window_extent(), axis.xaxis.label.get_window_extent()
-    assert 0.0 <= box.y0 < box.y1 <= label.y0 and box.x1 <= figure.bbox.x1
-    assert axis.get_window_extent().height == pytest.approx(before, rel=1e-9 if layout == "none" else 0.1)
+    box, key = words.get_window_extent(), legend.get_window_extent()
+    assert key.y1 <= box.y0 < box.y1 <= figure.bbox.y1 and box.x0 >= 0.0
+    assert axis.get_window_extent().height == pytest.approx(before, rel=1e-9)
 
 
-def test_a_figure_whose_title_names_the_surface_is_left_as_it_is() -> None:
+def test_a_title_longer_than_its_figure_goes_on_in_a_second_line() -> None:
+    figure = new_figure(3.0)
+    title_above(figure, "A tumble on a bed of sand, " + "and so on " * 12)
+    figure.canvas.draw()
+    (title,) = figure.texts
+    box = title.get_window_extent()
+    assert "\n" in title.get_text() and 0.0 <= box.x0 < box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
+
+
+def test_a_figure_whose_panel_names_the_surface_is_left_as_it_is() -> None:
     figure = new_figure(3.0, layout="none")
     figure.subplots().set_title("Plates in sand", loc="left")
-    name_below(figure, "Plates in sand")
+    title_above(figure, "Plates in sand")
     assert len(figure.texts) == 0 and figure.get_size_inches()[1] == 3.0
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from rigid.series import read_series
 from vis.page.numbers import typeset
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
-from vis.page.plots import GREY, new_figure
+from vis.page.plots import GREY, new_figure, title_above
 from vis.page.report import Report, Result, number_text, report_of
 
 __all__ = ["write_validation_report"]
@@ -59,7 +59,7 @@ def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
             lw=1.6,
             label=typeset(label),
         )
-    axis.set(xlabel=typeset(plot["x"]), ylabel=typeset(plot["y"]))
+    axis.set(xlabel=typeset(plot["x"]), ylabel=typeset(plot["y"]), title=typeset(plot["title"]))
     if "x" in plot["log"]:
         axis.set_xscale("log")
     if "y" in plot["log"]:
@@ -68,6 +68,7 @@ def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
         drawing.legend(fontsize=7, loc="outside lower center", ncols=across)
     else:
         axis.legend(fontsize=7)
+    title_above(drawing, typeset(case["title"]))
     drawing.savefig(path, dpi=_DPI)
     caption = "Lines: the reference; dots: the bed." if plot["lines"] else "Dots: the bed."
     return figure(path, title=plot["title"], caption=caption, half=True)

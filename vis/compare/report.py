@@ -13,7 +13,7 @@ from rigid.series import read_series
 from vis.film.film import ARROWS, draw_runs, shown
 from vis.film.reel import NAME, AnyReel, Reel, SpaceReel
 from vis.page.folder import read_folder
-from vis.page.numbers import short
+from vis.page.numbers import short, typeset
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, as_it_lies, handle, legend_above, sheet
 from vis.page.report import Report, Result, again, report_of, unit_text
@@ -22,7 +22,7 @@ from vis.pictures.frames import frame_names
 
 from .robots import draw_robots
 
-__all__ = ["write_compare_report"]
+__all__ = ["titles_of", "write_compare_report"]
 
 Columns = Mapping[str, Array]
 Labels = tuple[str, str]
@@ -38,6 +38,7 @@ def write_compare_report(report: Report) -> Path:
     """
     result = report.result
     labels = (result["runs"][0]["label"], result["runs"][1]["label"])
+    report.about = titles_of(result)
     shown = {"penetrate": lambda: [Section("", _drives(report, labels))], "mujoco": lambda: _robots(report, labels)}
     rows = [(row["key"], row["first"], row["second"], row["unit"]) for row in result["differs"]]
     given = table_of(("key", *labels, "unit"), rows, words=True)
@@ -49,6 +50,11 @@ def write_compare_report(report: Report) -> Path:
     ]
     lead = ["compare", *(f"{run['label']}: {run['title']}" for run in result["runs"])]
     return report.write(sections, lead=lead, tiles=_tiles(result), title=f"Compared: {result['title']}")
+
+
+def titles_of(result: Result) -> str:
+    """What both runs are, a line each as their figures have it: label and title, which names the surface."""
+    return "\n".join(f"{run['label']}: {typeset(str(run['title']))}" for run in result["runs"])
 
 
 def _tumbles(report: Report, labels: Labels) -> list[Section]:

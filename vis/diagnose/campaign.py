@@ -36,7 +36,7 @@ _TUMBLE = (
 )
 
 
-@report_of(dpi=130)
+@report_of(dpi=130, named=True)
 def write_campaign_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a made-up campaign, and return the report."""
     result, quantities = report.result, report.result["quantities"]
@@ -85,7 +85,7 @@ def _draw(campaign: Path, trials: Sequence[Result]) -> Figure:
 # What was found in a campaign -----------------------------------------------------------------------------------------
 
 
-@report_of(dpi=130)
+@report_of(dpi=130, named=True)
 def write_inspection_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a checked campaign, and return the report."""
     result, quantities = report.result, report.result["quantities"]

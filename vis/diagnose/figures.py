@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from rigid.series import read_series
 from vis.diagnose.held_out import worsens_held_out
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
-from vis.page.report import Result
+from vis.page.report import Result, capital
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
 
 __all__ = [
-    "Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "source_of", "worst",
+    "Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "source_of",
+    "trials_of", "worst",
 ]  # fmt: skip
 
 labels = Sentences(__package__, "labels.toml")
@@ -119,6 +120,25 @@ def source_of(folder: Path) -> str:
     if not made_by.startswith("hedgebed "):
         return "measured"
     return "simulated on grains" if " penetrate, grains" in made_by or " on a bed of " in made_by else "simulated"
+
+
+def trials_of(folder: Path) -> str:
+    """What the trials of a diagnosis are, as titles have it: the campaign's name, surface, gravities, their source.
+
+    Empty without model.toml.
+    """
+    path = folder / "model.toml"
+    if not path.exists():
+        return ""
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    name, surface = str(tables.get("name", "trials")), str(tables.get("surface", {}).get("kind", ""))
+    words = name if not surface or surface in name else f"{name}, on {surface}"
+    local = tables.get("rig", {}).get("gravity")
+    found = {trial.get("gravity_sim", trial.get("gravity", local)) for trial in tables.get("trial", ())} - {None}
+    if found:
+        ends = dict.fromkeys(f"{gravity:.3g}" for gravity in (min(found), max(found)))
+        words += f", {' to '.join(ends)} m/s\N{SUPERSCRIPT TWO}"
+    return f"{capital(words)}: {source_of(folder)}"
 
 
 def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:

@@ -13,6 +13,7 @@ from vis.diagnose.figures import (
     draw_trajectories,
     read_channel,
     source_of,
+    trials_of,
     worst,
 )
 from vis.diagnose.usable import has_numbers_to_use
@@ -68,7 +69,8 @@ def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
     """Each of the figures that has something to show."""
     channels = [read_channel(path) for path in sorted((report.folder / "series").glob("*.csv"))]
     held, labels = set(diagnosis["gap"]["held_out_trials"]), _labels(diagnosis)
-    source, aside = source_of(report.folder), {row["trial"] for row in diagnosis.get("set_aside", [])}
+    source, report.about = source_of(report.folder), trials_of(report.folder)
+    aside = {row["trial"] for row in diagnosis.get("set_aside", [])}
     shown = worst([channel for channel in channels if len(channel.time) and channel.trial not in aside], held)
     drawings = {
         "trajectories": draw_trajectories(shown, held, labels, source),

@@ -79,6 +79,8 @@ class _Plane(Camera):
         _frame_and_ruler(axis, stage)
         level = stage.place(np.array([[focus[0], reel.cut, reel.surface]]), focus)[0, 1]
         axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
+        if 0.0 < level < 0.8:
+            axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", color=INK, bbox=HALO)
         self.mark(axis, stage, frame, focus, level)
 
     def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
@@ -111,7 +113,7 @@ class _Near(_Plane):
         return np.column_stack([reel.feet(), high])
 
     def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
-        axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", bbox=HALO)
+        """Nothing: which row is which shows on the whole of it."""
 
 
 class _Space(Camera):

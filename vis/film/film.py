@@ -33,6 +33,8 @@ __all__ = ["ARROWS", "MOST_FRAMES", "Sheet", "draw_runs", "film_times", "moments
 say = Sentences(__package__)
 ARROWS = say("arrows")
 MOST_FRAMES = 48
+_TALLEST = 2.0
+"""Weights that the longest arrow of a run in space stands for at most: a robot that hops pushes with several."""
 _WORDS = {"start": "when the torque begins", "half": "half way round", "end": "at the end"}
 
 
@@ -75,6 +77,8 @@ class Sheet:
         self.labels = [reel.called for reel in self.reels] if labels is None else list(labels)
         self.page = canvas.Page(size, by, max(reel.colour_top(by) for reel in self.reels) or 1.0)
         self.weight = max(reel.number("weight") for reel in self.reels)
+        peak = max((reel.peak for reel in self.reels if isinstance(reel, SpaceReel)), default=0.0)
+        self.shorter = min(1.0, _TALLEST * self.weight / peak) if peak > 0.0 else 1.0
         reach = max(reel.reach for reel in self.reels)
         self.panels = layout(self.reels)
         self.stages, self.ways = [], []
@@ -93,11 +97,12 @@ class Sheet:
             for number, reel in enumerate(self.reels):
                 left = next(panel.place[0] for panel in self.panels if panel.run == number)
                 title = str(reel.result["title"]) if len(self.reels) == 1 else _with_surface(self.labels[number], reel)
-                sheet.text(left, 0.975, typeset(title), fontsize=15, fontweight="bold", va="top")
+                sheet.text(left, 0.975, typeset(capital(title)), fontsize=15, fontweight="bold", va="top")
                 sheet.text(left, 0.93, reel.line(reel.nearest(time)), fontsize=13, va="top", color="#444444")
             for panel in self.panels:
                 if panel.camera.arrow:
-                    long = panel.camera.arrow * panel.place[3] * float(sheet.get_size_inches()[1])
+                    share = self.shorter * panel.camera.arrow
+                    long = share * panel.place[3] * float(sheet.get_size_inches()[1])
                     right = panel.place[0] + panel.place[2]
                     canvas.draw_measure(sheet, right=right, height=0.915, length=long, weight=self.weight)
             if all(len(reel.states) for reel in self.reels):
@@ -124,7 +129,7 @@ class Sheet:
         stage.draw(axis, frame, self.page.colours(frame.grains), focus)
         camera.dress(axis, reel, stage, frame, focus)
         if camera.arrow:
-            long = camera.arrow * stage.height / self.weight  # [m/N]
+            long = self.shorter * camera.arrow * stage.height / self.weight  # [m/N]
             points, fields = frame.clouds.get("row_forces", (np.zeros((0, 3)), {}))
             for point, force in zip(points, fields.get("force", np.zeros((0, 3))), strict=True):
                 ends = stage.place(np.array([point, point + long * np.asarray(force, dtype=float)]), focus)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rigid.result import read_result
 from vis.page.folder import read_columns
-from vis.page.plots import Array
+from vis.page.plots import Array, mean_over
 from vis.page.report import Result
 from vis.pictures.canvas import colour_top, moved_since
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
@@ -31,6 +31,8 @@ _SPIKE, _CLEAR, _WIDE = 0.012, 0.04, 0.06
 drawn, all of spikes that end 0.2 m from the centre [m]."""
 _BLOCK, _THIN = 0.08, 0.06
 """Depth of the ground that is drawn where there are no grains [m], in the plane and in space."""
+_SHEET = 1e-4
+"""Its extent behind the plane of the spikes [m]: its upper edge is the surface, no upper side is seen behind that."""
 
 
 class _Filmed:
@@ -124,6 +126,16 @@ class SpaceReel(_Filmed):
         return float(np.linalg.norm(points - self.centres[0], axis=1).max())
 
     @cached_property
+    def peak(self) -> float:
+        """Largest force of the ground on all of it [N], a mean over 5 ms; 0 where the folder does not have it."""
+        path = self.folder / "series" / "motion.csv"
+        motion = read_columns(path)[0] if path.exists() else {}
+        if "fz_N" not in motion:
+            return 0.0
+        means = mean_over(5e-3, motion["t_s"], (motion[f"f{axis}_N"] for axis in "xyz"))
+        return float(np.linalg.norm(means, axis=0).max())
+
+    @cached_property
     def box(self) -> tuple[Array, Array]:
         """Corners of the bed, or of a block of ground under the way [m]."""
         if self.on_grains:
@@ -207,7 +219,7 @@ class Reel(_Filmed):
         """Corners of the bed, or of the block of ground that stands for a law [m]."""
         if self._first is None:
             x = self.series["x_m"]
-            return np.array([x.min() - 1.0, 0.0, -_BLOCK]), np.array([x.max() + 1.0, 0.5 * _WIDE, 0.0])
+            return np.array([x.min() - 1.0, 0.0, -_BLOCK]), np.array([x.max() + 1.0, _SHEET, 0.0])
         return grains_box(self._first)
 
     @property

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from textwrap import wrap
 from typing import Any
 
 import matplotlib as mpl
@@ -21,8 +22,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "AXES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES", "WIDTH", "Array", "as_it_lies",
-    "handle", "legend_above", "line_handles", "line_styles", "mean_over", "name_below", "new_figure", "new_panels",
-    "nice_below", "shades", "sheet", "smooth_ratio", "styled",
+    "handle", "legend_above", "line_handles", "line_styles", "mean_over", "new_figure", "new_panels", "nice_below",
+    "shades", "sheet", "smooth_ratio", "styled", "title_above",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -41,6 +42,8 @@ STATES = {"stand": "#a4a4a4", "pivot": BED, "slip": MODEL, "hop": "#882255"}
 """The states in the order of losing hold, with their colours: apart for the colour-blind too (tests/vis/test_style.py),
 to whom Okabe and Ito's green is the grey of standing or the blue of pivoting; Tol's wine is neither."""
 DPI = 160
+_TITLE, _TITLE_LINE, _TITLE_LETTERS = 10.5, 0.185, 11.2
+"""Title of a figure: its size [points], the height of a line [inch], letters in an inch of a line."""
 _TOO_LONG = 8.0  # times as long as high: drawn in its true shape such a way is a line
 
 _STYLE: dict[Any, Any] = {
@@ -129,23 +132,29 @@ def legend_above(figure: Figure, handles: Sequence[Any], columns: int | None = N
         figure.legend(handles=handles, loc="outside upper left", ncols=columns, **options)
 
 
-def name_below(figure: Figure, words: str) -> None:
-    """Name in the lower right corner what a figure is of, such as its surface; a figure laid out by hand grows for it.
+def title_above(figure: Figure, words: str) -> None:
+    """Title a figure with what it is of, such as its surface: above its legend, and the figure grows by as much.
 
     Where the title of a panel says so already, nothing is added.
     """
     if not words or words in {axis.get_title("left") for axis in figure.axes}:
         return
-    style: dict[str, Any] = {"fontsize": 7.5, "color": "#666666", "ha": "right"}
-    if figure.get_layout_engine() is not None:
-        figure.supxlabel(words, x=0.995, **style)
-        return
-    below, (width, height) = 0.2, figure.get_size_inches()
-    edges = figure.subplotpars
-    figure.set_size_inches(width, height + below)
-    share = height / (height + below)
-    figure.subplots_adjust(bottom=1 - share * (1 - edges.bottom), top=1 - share * (1 - edges.top))
-    figure.text(0.995, 0.012, words, va="bottom", **style)
+    width, height = figure.get_size_inches()
+    lines = [part for line in words.split("\n") for part in wrap(line, int(_TITLE_LETTERS * width))]
+    grown = height + _TITLE_LINE * len(lines) + 0.06
+    share = height / grown
+    figure.draw_without_rendering()  # the panels keep the places that the layout gives them
+    figure.set_layout_engine("none")
+    figure.set_size_inches(width, grown)
+    for axis in figure.axes:
+        box = axis.get_position(original=True)
+        axis.set_position((box.x0, share * box.y0, box.width, share * box.height))
+    for legend in figure.legends:
+        box = legend.get_bbox_to_anchor().transformed(figure.transFigure.inverted())
+        anchor = (box.x0, share * box.y0, box.width, share * box.height)
+        legend.set_bbox_to_anchor(anchor, transform=figure.transFigure)
+    top = 1.0 - 0.07 / grown
+    figure.text(0.09 / width, top, "\n".join(lines), fontsize=_TITLE, fontweight="bold", ha="left", va="top")
 
 
 def handle(label: str, color: Any, **style: Any) -> Line2D:

@@ -15,12 +15,12 @@ from vis.page.folder import read_columns
 from vis.page.limits import limits_words
 from vis.page.numbers import typeset
 from vis.page.page import Block, Page, Section, Tile, code, figure, table, text
-from vis.page.plots import Array, name_below, styled
+from vis.page.plots import Array, styled, title_above
 from vis.page.sentences import Sentences
 
 __all__ = [
     "Progress", "Report", "Result", "again", "capital", "given", "number_text", "report_of", "tables", "terms_text",
-    "unit_text",
+    "title_of", "unit_text",
 ]  # fmt: skip
 
 Progress = Callable[[float], None]
@@ -34,8 +34,8 @@ class Report:
 
     ``folder``: The run folder. ``progress``: Called with the share that is done, 0 to 1. ``package``: Whose
     figures.toml has the titles and captions. ``dpi``: Of its figures; the style's own if not given. ``named``: Whether
-    each figure has the result's title, which names the surface, in a corner. Raises FileNotFoundError where the folder
-    has no result.json, and where a series is missing that is drawn.
+    the title of each figure is that of the result, which names the surface. ``about``: That title; a report may set
+    another. Raises FileNotFoundError where the folder has no result.json, and where a series is missing that is drawn.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Report:
         self.folder, self.dpi, self.captions = Path(folder), dpi, Sentences(package, "figures.toml")
         self.done, self.progress = 0.0, progress
         self.result: Result = read_result(self.folder / "result.json")
-        self.about = typeset(str(self.result["title"])) if named else ""
+        self.about = title_of(self.result) if named else ""
         self.figures = self.folder / "figures"
         self.figures.mkdir(exist_ok=True)
 
@@ -53,12 +53,13 @@ class Report:
         """The columns of a CSV file of the folder that are numbers."""
         return read_columns(self.folder / name)[0]
 
-    def draw(self, key: str, drawing: Figure, *, name: str = "", **values: Any) -> Block:
+    def draw(self, key: str, drawing: Figure, *, name: str = "", about: str = "", **values: Any) -> Block:
         """Write a figure to figures/`name`.png, or figures/`key`.png, and return what shows it in the report.
 
-        Title and caption are those of `key` in figures.toml, their placeholders filled with `values`.
+        Title and caption are those of `key` in figures.toml, their placeholders filled with `values`. `about` is the
+        title on the picture itself where it is another than the report's.
         """
-        name_below(drawing, self.about)
+        title_above(drawing, about or self.about)
         path = self.figures / f"{name or key}.png"
         drawing.savefig(path, dpi=self.dpi)
         self.tell(self.done + 0.2 * (1.0 - self.done))
@@ -123,7 +124,7 @@ def report_of(dpi: int | None = None, *, named: bool = False) -> Callable[[Calla
     """Make of a function of a `Report` one of its folder: `write(folder, *, progress=None, **options)`.
 
     It draws in the house's style, `dpi` dots an inch, and takes titles and captions from figures.toml of its package.
-    `named`: each figure has the result's title in a corner.
+    `named`: the title of each figure is that of the result.
     Raises FileNotFoundError where the folder has no result.json, or a file that is drawn.
     """
 
@@ -137,6 +138,15 @@ def report_of(dpi: int | None = None, *, named: bool = False) -> Callable[[Calla
         return of_folder
 
     return decorate
+
+
+def title_of(result: Result) -> str:
+    """The title of a result as a figure has it, with the gravity of the bed where the title does not name one."""
+    words, homes = str(result.get("title", "")), [result.get("bed"), result.get("foundation"), *result.get("runs", ())]
+    found = {home["gravity"] for home in homes if isinstance(home, Mapping) and "gravity" in home}
+    if len(found) == 1 and "m/s2" not in words and "gravities" not in words:
+        words += f", at {found.pop():.3g} m/s2"
+    return typeset(words)
 
 
 def again(command: str, before: str = "In this folder:", after: str = "") -> Section:

@@ -46,6 +46,13 @@ class PaperRun:
         self.surfaces = in_order(c["surface"] for c in self.cases)
         self.hard = [name for name in _HARD if name in self.surfaces]
 
+    def on(self, what: str, surfaces: Sequence[str], rigs: Sequence[float] = ()) -> str:
+        """The title of a figure: what it shows, on which surfaces' spring-dampers, in which simulated gravities."""
+        gravities = " and ".join(f"{rig:g} g" for rig in rigs or self.rigs)
+        named = [_SOILS.get(name, name) for name in surfaces]
+        listed = " and ".join(filter(None, (", ".join(named[:-1]), named[-1])))
+        return f"{what} on the spring-damper of {listed}, {gravities}"
+
     def colour(self, torque: float) -> str:
         """The colour of a torque."""
         return COLOURS[self.torques.index(torque) % len(COLOURS)]
@@ -129,7 +136,8 @@ def figure_5(paper: PaperRun) -> Block | None:
     band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
     dotted = handle("the paper's 1 ms step", INK, lw=1.1, ls=_DOTTED)
     legend_above(drawing, [*paper.handles(), band, dotted], columns=5)
-    return paper.draw("figure5", drawing, rig=rig, shown=1e3 * _SHOWN, gap=gap)
+    about = paper.on("Path of the start", ["steel"], [rig])
+    return paper.draw("figure5", drawing, about=about, rig=rig, shown=1e3 * _SHOWN, gap=gap)
 
 
 _ROWS = (("low", "μ low"), ("nominal", "μ"), ("high", "μ high"), ("paper", "1 ms step"))
@@ -157,7 +165,8 @@ def figure_6(paper: PaperRun) -> Block | None:
     handles = [handle(name, colour, lw=6) for name, colour in STATES.items()]
     handles.append(handle("first hop", INK, marker="v", ls="", ms=5))
     legend_above(drawing, handles, columns=5)
-    return paper.draw("figure6", drawing, rig=rig, widest=widest)
+    about = paper.on("States", paper.hard, [rig])
+    return paper.draw("figure6", drawing, about=about, rig=rig, widest=widest)
 
 
 def _state_bar(axis: Axes, paper: PaperRun, case: Result, row: int) -> None:
@@ -213,7 +222,7 @@ def figure_7(paper: PaperRun) -> Block | None:
     band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
     legend_above(drawing, [*paper.handles(), *gravities, band], columns=6)
     missing = f" No hop that rises: {'; '.join(flat)}." if flat else ""
-    return paper.draw("figure7", drawing, missing=missing)
+    return paper.draw("figure7", drawing, about=paper.on("First hops", paper.hard), missing=missing)
 
 
 def _motors(paper: PaperRun) -> list[float]:
@@ -264,7 +273,7 @@ def figure_8(paper: PaperRun) -> Block:
     hollow = handle("the paper's 1 ms step", INK, marker="o", mfc="none", ls="", ms=7)
     dots = [handle(paper.label(t), paper.colour(t), marker="o", ls="", ms=5) for t in paper.torques]
     legend_above(drawing, [*dots, hollow, dashed], columns=3)
-    return paper.draw("figure8", drawing)
+    return paper.draw("figure8", drawing, about=paper.on("Angles and speeds", paper.surfaces))
 
 
 def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: str, scale: float, place: int) -> None:
@@ -314,7 +323,8 @@ def figure_signs(paper: PaperRun) -> Block | None:
         handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three beds, 95 %", MODEL, marker="s", ls="", ms=6),
         Patch(color=GREY, alpha=0.22, lw=0, label="the paper: motors about +22.5°, brakes below 0"),
     ], 2)  # fmt: skip
-    return paper.draw("signs", drawing)
+    named = " and ".join(_SOILS[name] for name in surfaces)
+    return paper.draw("signs", drawing, about=f"Launch angles on {named}: spring-damper, grains and the paper's text")
 
 
 def _grains_of(entries: Sequence[Result], surfaces: Sequence[str]) -> str:
@@ -390,7 +400,8 @@ def figure_sweep(paper: PaperRun) -> Block | None:
     legend = [handle(label, INK, marker=mark, ls="", ms=6) for mark, label in (("<", "halved"), (">", "doubled"))]
     legend += [handle(f"mu_d = {ratio:g} mu_s", INK, marker="D", ls="", ms=_diamond(ratio, ratios)) for ratio in ratios]
     legend_above(drawing, [*paper.handles(), *legend], columns=5)
-    return paper.draw("sweep", drawing, rig=rig)
+    about = paper.on("One number halved or doubled", paper.hard, [rig])
+    return paper.draw("sweep", drawing, about=about, rig=rig)
 
 
 def _diamond(ratio: float, ratios: Sequence[float]) -> float:
@@ -409,6 +420,8 @@ def figure_evidence(paper: PaperRun) -> Block | None:
     drawing, ((left, right),) = sheet(1, 2, 3.4, width_ratios=(1.0, 1.25))
     left.axhspan(17.5, 27.5, color=GREY, alpha=0.2, lw=0)
     left.axhline(22.5, color=GREY, lw=0.9, ls=_DASHED)
+    place = left.get_yaxis_transform()  # x in shares of the panel
+    left.text(0.98, 28.2, "the text: 22.5°, here ± 5°", transform=place, ha="right", va="bottom", fontsize=8)
     times = [0.0 if entry["value"] is None else entry["value"] for entry in (step["best"], *rise["values"])]
     told = [step["best"], *rise["values"]]
     motors = in_order(c["torque"] for c in paper.cases if c["actuator"] == "motor")
@@ -417,7 +430,8 @@ def figure_evidence(paper: PaperRun) -> Block | None:
         style = {"ls": _SURFACE_LINES[surface], "marker": _RIG_MARKS[paper.rigs.index(rig) % 4], "ms": 3.5, "lw": 1.1}
         left.plot(times, [math.nan if a is None else a for a in angles], color=paper.colour(torque), **style)
     left.set(xlabel="time constant of the torque [s]", ylabel="trajectory angle [degrees]", ylim=(0, 70))
-    left.set_title("low torque, steel and brick")
+    left.set_title("Motors: angle as the torque rises")
+    right.set_title("What would explain the text")
     shown = sorted(rows[1:], key=lambda row: row["nats"])
     for place, row in enumerate(shown):
         colour = BED if row["id"] == "torque-rise" else GREY
@@ -430,7 +444,7 @@ def figure_evidence(paper: PaperRun) -> Block | None:
     lines += [handle(surface, INK, lw=1.1, ls=_SURFACE_LINES[surface]) for surface in _HARD]
     lines += [handle(f"{rig:g} g", INK, ls="", marker=_RIG_MARKS[k % 4], ms=3.5) for k, rig in enumerate(paper.rigs)]
     legend_above(drawing, lines, 6)
-    return paper.draw("evidence", drawing)
+    return paper.draw("evidence", drawing, about=paper.on("Low torques", _HARD))
 
 
 FIGURES = {

@@ -10,7 +10,7 @@ from matplotlib.colors import TwoSlopeNorm
 
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, listing, table
-from vis.page.plots import BED, GREY, INK, handle, legend_above, line_styles, new_panels, sheet
+from vis.page.plots import BED, GREY, INK, Array, handle, legend_above, line_styles, new_panels, sheet
 from vis.page.report import Report, Result, report_of, tables
 
 __all__ = ["write_lawfit_report"]
@@ -65,10 +65,12 @@ def _laws(report: Report, laws: list[Result], cell: str) -> Block | None:
     places = np.unique(np.linspace(0, len(speeds) - 1, min(_MOST, len(speeds))).round().astype(int))
     drawing, axes = new_panels(len(places), height=3.4, sharey=True)
     styles = line_styles([law["name"] for law in laws])
-    columns = report.columns(f"series/bins-{cell}.csv" if cell else "series/bins.csv")
+    file = f"series/bins-{cell}.csv" if cell else "series/bins.csv"
+    columns = report.columns(file) if (report.folder / file).exists() else None  # a kept result has the means alone
     for axis, place in zip(axes, places, strict=True):
-        rows = np.isclose(columns["rate_m_s"], speeds[place], rtol=1e-3)
-        axis.plot(1e3 * columns["depth_m"][rows], columns["force_N"][rows], ".", color=BED, ms=3, alpha=0.4)
+        if columns is not None:
+            rows = np.isclose(columns["rate_m_s"], speeds[place], rtol=1e-3)
+            axis.plot(1e3 * columns["depth_m"][rows], columns["force_N"][rows], ".", color=BED, ms=3, alpha=0.4)
         depth, force = 1e3 * np.array(first["depth"]), np.array(first["force"][place])
         axis.plot(depth, force, "o", color=INK, ms=4)
         for law in laws:
@@ -77,17 +79,15 @@ def _laws(report: Report, laws: list[Result], cell: str) -> Block | None:
         axis.set(title=f"{speeds[place]:.3g} m/s", xlabel="depth of the tip [mm]")
         axis.axhline(0.0, color=GREY, lw=0.8)
     axes[0].set_ylabel("force on the spike [N]")
-    marks = [
-        handle("a run", BED, marker=".", ls="", alpha=0.5),
-        handle("mean of the beds", INK, marker="o", ms=4, ls=""),
-    ]
+    marks = [handle("a run on grains", BED, marker=".", ls="", alpha=0.5)] if columns is not None else []
+    marks.append(handle("grains, mean of the beds", INK, marker="o", ms=4, ls=""))
     lines = [handle(law["name"], lw=1.5, **styles[law["name"]]) for law in laws]
     legend_above(drawing, [*marks, *lines], 3)
     return report.draw("laws", drawing, name=f"laws-{cell}" if cell else "")
 
 
 def _crossed(report: Report) -> list[Block]:
-    """Force over rho g D^3 of all cells, and the best law at the slowest and the fastest Froude number of each tip."""
+    """Force over rho g D^3 of all cells with the best law: a row for each tip, a panel for each Froude number."""
     if "crossed" not in report.result:
         return []
     columns, best = report.columns("series/crossed.csv"), report.result["crossed"][0]["name"]
@@ -96,27 +96,39 @@ def _crossed(report: Report) -> list[Block]:
     gravities = sorted({cell["gravity"] for cell in cells}, reverse=True)
     styles = line_styles(gravities).values()
     looks = [{"marker": mark, "color": style["color"]} for mark, style in zip("ox+sd^v", styles, strict=False)]
-    drawing, axes = new_panels(len(tips), height=3.4)
-    lines = {}
-    for axis, tip in zip(axes, tips, strict=True):
+    drives = _froudes(columns["froude"])
+    drawing, grid = sheet(len(tips), len(drives), 0.5 + 2.5 * len(tips), sharex=True, sharey="row")
+    for row, tip in zip(grid, tips, strict=True):
         own = [k for k, cell in enumerate(cells) if (cell["tip"], cell["diameter"], cell["cone_angle"]) == tip]
-        for k in own:
-            rows, look = columns["cell"] == k, looks[gravities.index(cells[k]["gravity"]) % len(looks)]
-            axis.plot(columns["depth"][rows], columns["force"][rows], ls="", ms=4, alpha=0.6, **look)
-        rows = np.isin(columns["cell"], own)
-        for end, style in (("slowest", "-"), ("fastest", "--")):
-            froude = columns["froude"][rows].min() if end == "slowest" else columns["froude"][rows].max()
-            on = rows & np.isclose(columns["froude"], froude, rtol=0.02)
+        for axis, (low, high) in zip(row, drives, strict=True):
+            driven = (columns["froude"] >= low) & (columns["froude"] <= high)
+            for k in own:
+                there, look = driven & (columns["cell"] == k), looks[gravities.index(cells[k]["gravity"]) % len(looks)]
+                axis.plot(columns["depth"][there], columns["force"][there], ls="", ms=4, alpha=0.6, **look)
+            on = driven & np.isin(columns["cell"], own)
             depth, place = np.unique(columns["depth"][on], return_index=True)
-            axis.plot(depth, columns[best][on][place], style, color=INK, lw=1.5)
-            lines[style] = handle(f"{best}, {end} drive", INK, ls=style)
-        axis.set(title=f"{tip[0]}, {1e3 * tip[1]:g} mm", xlabel="depth over diameter [1]")
-    axes[0].set_ylabel("force / (ρ g D³) [1]")
+            axis.plot(depth, columns[best][on][place], color=INK, lw=1.5)
+            axis.set_title(f"{tip[0]} {1e3 * tip[1]:g} mm, v/√(g D) = {high:.2g}", fontsize=9)
+        row[0].set_ylabel("force / (ρ g D³) [1]")
+    for axis in grid[-1]:
+        axis.set_xlabel("depth over diameter [1]")
     marks = [
-        handle(f"{gravity:.4g} m/s²", ls="", ms=4, **look) for gravity, look in zip(gravities, looks, strict=False)
+        handle(f"grains at {gravity:.4g} m/s²", ls="", ms=4, **look)
+        for gravity, look in zip(gravities, looks, strict=False)
     ]
-    legend_above(drawing, [*marks, *lines.values()], 4)
+    legend_above(drawing, [*marks, handle(f"{best}, one law for all", INK, lw=1.5)], 4)
     return [report.draw("crossed", drawing)]
+
+
+def _froudes(froude: Array) -> list[tuple[float, float]]:
+    """Least and largest v / sqrt(g D) of each group of drives; of more than `_MOST` groups, some between the ends.
+
+    Drives of one nominal speed slow down a little at their ends: a gap of a fifth separates two groups.
+    """
+    values = np.unique(froude)
+    groups = np.split(values, 1 + np.flatnonzero(values[1:] > 1.2 * values[:-1]))
+    chosen = np.unique(np.linspace(0, len(groups) - 1, min(_MOST, len(groups))).round().astype(int))
+    return [(float(groups[k][0]), float(groups[k][-1])) for k in chosen]
 
 
 def _trust(report: Report, laws: list[Result], cell: str) -> Block | None:

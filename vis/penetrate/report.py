@@ -17,10 +17,10 @@ from matplotlib.figure import Figure
 from vis.page.answer import answer
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
 from vis.page.limits import limits_words
-from vis.page.numbers import quote, typeset
+from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, figure, table, text, write_template
-from vis.page.plots import BED, DASHED, GREY, MODEL, handle, legend_above, name_below, sheet, styled
-from vis.page.report import Progress, Report, Result, again, report_of
+from vis.page.plots import BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
+from vis.page.report import Progress, Report, Result, again, report_of, title_of
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
@@ -109,7 +109,7 @@ def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[t
             if plot is None:
                 missing.append(f"{what}: no data.")
             else:
-                name_below(plot.figure, typeset(str(run.result.get("title", ""))))
+                title_above(plot.figure, title_of(run.result))
                 drawn.append((plot, plot.save(target)))
     return drawn, missing
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid.series import read_series
+from vis.page.numbers import typeset
 from vis.page.page import Block, Section, Tile, text
 from vis.page.plots import BED, GREY, MODEL, handle, legend_above, new_panels, shades
 from vis.page.report import Report, Result, again, report_of, tables, unit_text
@@ -25,6 +26,7 @@ def write_sweep_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a sweep, and return the report."""
     result = report.result
     table = read_series(report.folder / "table.csv")
+    report.about = ": ".join(filter(None, (typeset(result.get("each", "")), str(result["title"]))))
     drawn = result["columns"][:MOST_DRAWN]
     figures = [_over(report, table, column) for column in drawn]
     if len(result["columns"]) > len(drawn):

@@ -290,7 +290,8 @@ def _sweep_section(report: Report) -> Section:
     sweep = report.result["sweep"]
     drawing = _draw_sweep(sweep["keys"], report.columns(sweep["file"]))
     names = " and ".join(key["key"] for key in sweep["keys"])
-    drawn = report.draw("sweep", drawing, trials=sweep["trials"], names=names)
+    about = f"{report.about.partition(':')[0]}: {sweep['trials']} trials over {names}"
+    drawn = report.draw("sweep", drawing, about=about, trials=sweep["trials"], names=names)
     made = tables(report.result) if "tables" in report.result else []
     return Section("The sweep", [drawn, *made, listing(sweep["sentences"])])
 

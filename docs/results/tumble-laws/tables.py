@@ -16,7 +16,7 @@ import numpy as np
 from experiments import groundmap, tumble
 from experiments.converge.statistics import interval_of
 from rigid.ground_file import GroundFile, read_ground
-from vis.page.plots import BED, MODEL, handle, legend_above, sheet, styled
+from vis.page.plots import BED, MODEL, handle, legend_above, sheet, styled, title_above
 
 HERE = Path(__file__).parent
 RESULTS = HERE.parent
@@ -137,6 +137,7 @@ def draw() -> None:
         marks = [handle("grains of sand, each bed", BED, ls="", marker="o", ms=4)]
         marks.append(handle("surface law, ± standard deviation", MODEL, ls="", marker="s", ms=5))
         legend_above(drawing, marks, 2)
+        title_above(drawing, "The motor of 0.22 N m on sand at 0.0085 g: grains and surface laws")
         drawing.savefig(RESULTS.parent / "images" / "tumble-laws.png", dpi=126)
 
 
