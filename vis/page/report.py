@@ -142,8 +142,11 @@ def report_of(dpi: int | None = None, *, named: bool = False) -> Callable[[Calla
 
 def title_of(result: Result) -> str:
     """The title of a result as a figure has it, with the gravity of the bed where the title does not name one."""
-    words, homes = str(result.get("title", "")), [result.get("bed"), result.get("foundation"), *result.get("runs", ())]
-    found = {home["gravity"] for home in homes if isinstance(home, Mapping) and "gravity" in home}
+    words = str(result.get("title", ""))
+    homes = [result.get("bed"), result.get("foundation"), *(result.get("runs") or ())]
+    given = [home.get("gravity") for home in homes if isinstance(home, Mapping)]
+    numbers = [one.get("value") if isinstance(one, Mapping) else one for one in given]
+    found = {number for number in numbers if isinstance(number, int | float)}
     if len(found) == 1 and "m/s2" not in words and "gravities" not in words:
         words += f", at {found.pop():.3g} m/s2"
     return typeset(words)
