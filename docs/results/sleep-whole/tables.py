@@ -10,7 +10,17 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-QUANTITIES = ("depth_start_mm", "deepest_mm", "angle_deg", "up_mm", "ahead_mm", "rotation_deg", "lost_mJ")
+QUANTITIES = (
+    "depth_start_mm",
+    "deepest_mm",
+    "angle_deg",
+    "up_mm",
+    "ahead_mm",
+    "rotation_deg",
+    "lost_mJ",
+    "lift_N",
+    "work_mJ",
+)
 
 
 def main() -> None:
@@ -22,10 +32,14 @@ def main() -> None:
         share = np.mean([float(runs[s, rules]["grain_steps"]) / float(runs[s, "awake"]["grain_steps"]) for s in seeds])
         print(f"{rules}: {len(seeds)} beds, {share:.3f} of the grain-steps of all awake")
         for name in QUANTITIES:
-            awake, asleep = (np.array([float(runs[s, r][name]) for s in seeds]) for r in ("awake", rules))
+            known = [seed for seed in seeds if runs[seed, "awake"][name] and runs[seed, rules][name]]
+            if len(known) < 2:  # lift and work were not kept for every bed
+                continue
+            awake, asleep = (np.array([float(runs[s, r][name]) for s in known]) for r in ("awake", rules))
             difference = asleep - awake
-            half = stats.t.ppf(0.975, len(seeds) - 1) * difference.std(ddof=1) / len(seeds) ** 0.5
-            print(f"  {name:15s} awake {awake.mean():8.3f}, difference {difference.mean():7.3f} ± {half:.3f}")
+            half = stats.t.ppf(0.975, len(known) - 1) * difference.std(ddof=1) / len(known) ** 0.5
+            mean = f"{difference.mean():7.3f} ± {half:.3f}"
+            print(f"  {name:15s} awake {awake.mean():8.3f}, difference {mean}, {len(known)} beds")
 
 
 if __name__ == "__main__":
