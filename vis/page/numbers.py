@@ -14,7 +14,18 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["column", "digits_for", "foldable", "in_two_digits", "plain", "quantity", "quote", "short", "typeset"]
+__all__ = [
+    "between",
+    "column",
+    "digits_for",
+    "foldable",
+    "in_two_digits",
+    "plain",
+    "quantity",
+    "quote",
+    "short",
+    "typeset",
+]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SCALED = {"J", "s", "Pa", "W", "kg"}
@@ -90,6 +101,14 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
         decimals = digits_for(std / scale)
         text = f"{_fixed(value / scale, decimals)}{_SPACE}±{_SPACE}{_fixed(std / scale, decimals)}"
     return f"{text}{_SPACE}{shown}" if shown else text
+
+
+def between(low: float, high: float, unit: str) -> str:
+    """Two ends of an interval in SI units, with two digits each and the unit of the upper: "0 to 7.3 mm"."""
+    top = quote(high, None, unit, significant=2)
+    scale = _scale(float(f"{high:.1e}"), unit)[0]
+    bottom = f"{float(f'{low / scale:.2g}'):g}".replace("-", _MINUS) if low else "0"
+    return f"{bottom} to {top}"
 
 
 def foldable(text: str) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vis.page.folder import RunFolder
-from vis.page.numbers import plain, quantity, quote, short
+from vis.page.numbers import between, plain, quantity, quote, short
 from vis.penetrate import summary_parts as words
 from vis.penetrate.summary_parts import say
 from vis.pictures.frames import frame_names
@@ -90,7 +90,7 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
             (
                 "Sinks to rest",
                 "not in this bed",
-                f"{under}it would need about {quote(needed, None, 'm', significant=2)}",
+                f"{under}it would need about {quote(needed, None, 'm', significant=2)}{_needs(run)}",
             )
         )
     elif _restless(run, quantities):
@@ -125,7 +125,7 @@ def _with_errors(tiles: list[dict[str, str]], sure: Mapping[str, Any]) -> list[d
             rows.append({**tile, "value": value, "errors": _errors(entry)})
             if name == "sinkage_dem":
                 known = entry["low"] is not None
-                ends = words.between(entry["low"], entry["high"], "m") if known else "not known"
+                ends = between(entry["low"], entry["high"], "m") if known else "not known"
                 note = say("of_real_grains") if known else words.sentence(str(entry["sentence"]))
                 rows.append({"label": "Sinkage among real grains (95 %)", "value": ends, "note": note})
         else:
@@ -160,6 +160,14 @@ def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
     return "; ".join(parts)
 
 
+def _needs(run: RunFolder) -> str:
+    """The ends of the depth to rest and how far it is extrapolated, as far as result.json has them."""
+    sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("depth_to_rest"))
+    ends = f" ({between(sure['low'], sure['high'], 'm')} with its errors)" if sure.get("low") else ""
+    times = sure.get("times_beyond")
+    return ends + (say("beyond_pushes", times=plain(times, 2)) if times is not None else "")
+
+
 def _standing(run: RunFolder, quantities: Mapping[str, Any]) -> str:
     """Which K a foot that stands has: load over the ends of its sinkage, or none where it may not sink at all."""
     sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("sinkage_dem"))
@@ -167,7 +175,7 @@ def _standing(run: RunFolder, quantities: Mapping[str, Any]) -> str:
     if chance and chance[0] <= 0:
         return say("standing_unknown")
     if sure.get("low") and load is not None:
-        return say("standing", k=words.between(load / sure["high"], load / sure["low"], "N/m"))
+        return say("standing", k=between(load / sure["high"], load / sure["low"], "N/m"))
     return say("standing", k=quantity(quantities["stiffness_standing"]))
 
 

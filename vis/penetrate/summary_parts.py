@@ -16,7 +16,7 @@ from vis.page.numbers import column, plain, quantity, quote, short
 from vis.page.sentences import Sentences
 
 __all__ = [
-    "Departure", "MINUS", "NBSP", "SHARES", "Table", "bed_part", "between", "cell_text", "departure_rows",
+    "Departure", "MINUS", "NBSP", "SHARES", "Table", "bed_part", "cell_text", "departure_rows",
     "departures_part",
     "facts_table", "fit_error", "fit_part", "fitted", "joined", "label_of", "list_of", "mapping_of", "more_or_less",
     "numbers_table", "percent", "plain_value", "reference_part", "reproduce_part", "rest_part",
@@ -174,11 +174,6 @@ def signed_percent(share: float) -> str:
 def more_or_less(share: float, above: str, below: str) -> str:
     """A share in per cent without its sign, and the word that its sign stands for."""
     return f"{percent(abs(share))} {above if share > 0 else below}"
-
-
-def between(low: float, high: float, unit: str) -> str:
-    """Two ends of an interval with two digits each: "0 mm to 7.3 mm"."""
-    return " to ".join(quote(end, None, unit, significant=2) for end in (low, high))
 
 
 def joined(words: list[str]) -> str:

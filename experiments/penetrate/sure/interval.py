@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from vis.page.numbers import foldable, quote
+from vis.page.numbers import between, foldable
 
 __all__ = [
     "Interval", "Trend", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness", "trends",
@@ -123,8 +123,5 @@ def _half(values: Sequence[float], kept: tuple[float, int] | None) -> float | No
 
 
 def in_words(low: float, high: float, unit: str) -> str:
-    """Two ends with two digits and one unit: "0 to 7.3 mm"."""
-    top = foldable(quote(high, None, unit, significant=2))
-    scale = 1e-3 if top.endswith("mm") else 1.0
-    bottom = f"{float(f'{low / scale:.2g}'):g}" if low else "0"
-    return f"{bottom} to {top}".replace("-", "\N{MINUS SIGN}")
+    """Two ends with two digits and one unit, for text that folds: "0 to 7.3 mm"."""
+    return foldable(between(low, high, unit))
