@@ -182,7 +182,7 @@ def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
     """One bed each is of `sand-weak`, three beds are of `sand`; JSC-1A, which was not asked for, is not named."""
     drawn = []
     paper = PaperRun(
-        SimpleNamespace(draw=lambda _, drawing: drawn.append(drawing), folder=small, result=result_of(small))
+        SimpleNamespace(draw=lambda _, drawing, **about: drawn.append(drawing), folder=small, result=result_of(small))
     )
     figure_signs(paper)
     (figure,) = drawn
@@ -376,6 +376,7 @@ def test_the_picture_of_figure_5_names_surface_and_gravity():
     paper = SimpleNamespace(
         surfaces=["steel"], rigs=[0.0085, 0.015], torques=[0.22], colour=lambda torque: "k", case=lambda *of: {},
         rows=lambda case: (path, np.array(["slip"] * 9)), handles=list, draw=lambda key, drawing, **values: drawing,
+        on=lambda *of: "",
     )  # fmt: skip
     assert figure_5(paper).axes[0].get_title() == "steel, 0.0085 g"
 

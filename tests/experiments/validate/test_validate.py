@@ -97,7 +97,7 @@ def test_many_curves_are_told_beneath_their_plot(tmp_path):
         rows = [f"{name},{x},{x * k}" for k, name in enumerate("abcdefghi"[:count]) for x in (0.0, 1.0)]
         (tmp_path / "curves.csv").write_text("\n".join(["curve,x,y", *rows]))
         plot = {"series": "curves.csv", "title": "t", "x": "x", "y": "y", "log": "", "lines": ["a"]}
-        _draw(tmp_path, {"id": f"of-{count}"}, plot, 1)
+        _draw(tmp_path, {"id": f"of-{count}", "title": "t"}, plot, 1)
         heights.append(matplotlib.image.imread(tmp_path / "figures" / f"of-{count}-1.png").shape[0])
     assert heights[1] > heights[0] + 30
     assert len(set(_COLOURS)) == len(_COLOURS) >= 9
