@@ -26,6 +26,9 @@ _INNER = 0.94
 """Share of a picture's height that its margins leave."""
 _BELOW = 0.3
 """How far a tip lies at most below the middle of the picture from near, over its height: its arrow stays inside."""
+_SHEET = 1e-4
+"""Extent behind the plane of the spikes of the ground of a law in that plane's pictures [m]: its upper edge is the
+surface, and no upper side is seen behind that."""
 _LINE = 0.0315
 """From one line of a key to the next, over the height of the sheet."""
 _STEADY = 0.03
@@ -67,6 +70,8 @@ class _Plane(Camera):
     def set_up(self, reel: Reel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         width = max(self.width, self.tall * pixels[0] / pixels[1])
         (low, high), kind = reel.box, Stage if opengl else FlatStage
+        if reel.frames is None:
+            high = np.array([high[0], reel.cut + _SHEET, high[2]])
         stage = kind(pixels, width=width * reach, cut=reel.cut, low=low, high=high, radius=reel.radius)
         return stage, _steady(self.way(reel, stage, reach))
 

@@ -31,8 +31,6 @@ _SPIKE, _CLEAR, _WIDE = 0.012, 0.04, 0.06
 drawn, all of spikes that end 0.2 m from the centre [m]."""
 _BLOCK, _THIN = 0.08, 0.06
 """Depth of the ground that is drawn where there are no grains [m], in the plane and in space."""
-_SHEET = 1e-4
-"""Its extent behind the plane of the spikes [m]: its upper edge is the surface, no upper side is seen behind that."""
 
 
 class _Filmed:
@@ -219,7 +217,7 @@ class Reel(_Filmed):
         """Corners of the bed, or of the block of ground that stands for a law [m]."""
         if self._first is None:
             x = self.series["x_m"]
-            return np.array([x.min() - 1.0, 0.0, -_BLOCK]), np.array([x.max() + 1.0, _SHEET, 0.0])
+            return np.array([x.min() - 1.0, 0.0, -_BLOCK]), np.array([x.max() + 1.0, 0.5 * _WIDE, 0.0])
         return grains_box(self._first)
 
     @property

@@ -150,12 +150,12 @@ def test_beds_of_calibrate_are_computed_together_only_where_the_budget_reaches_t
 
 
 def command(*tokens, log):
-    """A process of hedgebed with a process group of its own."""
+    """hedgebed in its own process group. It takes Ctrl-C even where a script runs these tests in the background."""
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     with log.open("w") as file:
         return subprocess.Popen(
             [sys.executable, "-m", "hedgebed", *map(str, tokens)], env=environment, stdout=file, stderr=file,
-            start_new_session=True,
+            start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )  # fmt: skip
 
 
