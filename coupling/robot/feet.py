@@ -88,6 +88,14 @@ class Foot:
             heights.append(float(self.lowest(matrix)[:, 2].min()))
         return min(heights)
 
+    def bottoms(self, ups: Vector) -> Vector:
+        """`bottom` of many postures [m], shape (n,); ``ups``: third row of each matrix, shape (n, 3)."""
+        heights = [(part.vertices @ ups.T).min(axis=0) for part in self.parts]
+        if len(self.centres):
+            sizes = np.linalg.norm(np.einsum("pij,nj->npi", self.spreads, ups), axis=2)
+            heights.append((ups @ self.centres.T - sizes).min(axis=1))
+        return np.asarray(np.min(heights, axis=0))
+
     @cached_property
     def reach(self) -> float:
         """Largest distance of its surface from its origin [m]."""

@@ -97,6 +97,7 @@ def option_of(name: str, field: FieldInfo) -> inspect.Parameter:
     annotation = Annotated[
         hint,  # type: ignore[valid-type]
         Parameter(help=field.description, show_default=shown, consume_multiple=True, negative=None if is_flag else "",
+                  show=not more.get("hidden", False),
                   alias=str(more["option_alias"]) if "option_alias" in more else None),
     ]  # fmt: skip
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

@@ -136,6 +136,14 @@ def numbers_over_time(
     final |= {"ground_work": (time, series["taken_J"])}
     touching = series["touching"] > 0
     first = float(time[int(np.argmax(touching))]) if touching.any() else None
+    begun = np.cumsum(touching) > 0
+    for name in moved.names:
+        one = "" if len(moved.names) == 1 else f"_{name}"
+        if (height := moved.feet.get(f"{name}_height_m")) is not None:  # an older run does not have it
+            largest[f"clearance_largest{one}"] = time, np.where(begun, np.maximum(height, 0.0), 0.0)
+            final[f"clearance_end{one}"] = time, height
+        depth = moved.feet[f"{name}_depth_m"]
+        largest[f"sinkage_largest{one}"], final[f"sinkage_end{one}"] = (time, depth), (time, depth)
     flights: list[float] = []
     if first is not None:
         within = (time >= first) & (time <= end)

@@ -4,7 +4,7 @@
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
 from dem.engine.values import Sleep
 from experiments.platform.settings import NotNegative, Positive
@@ -13,9 +13,11 @@ from experiments.runs.strict import StrictSettings
 from . import say
 from .lammps import RANKS
 
-__all__ = ["OF_THE_MASTER", "GrainsSettings", "TumbleBedSettings"]
+__all__ = ["HIDDEN", "OF_THE_MASTER", "GrainsSettings", "TumbleBedSettings"]
 
 
+HIDDEN: dict[str, JsonValue] = {"hidden": True}
+"""Of a setting that the help leaves out, since nothing but an older run.toml has it."""
 OF_THE_MASTER = (
     "substeps", "body_steps", "extrapolation", "iterations", "tumbles", "tumble_turn", "drop_speed", "drop_along",
     "drop_spin", "drop_theta",
@@ -61,9 +63,9 @@ class GrainsSettings(StrictSettings):
     sleep_pace: int = Field(Sleep.pace, ge=1, le=64)
     """Sleep: a slow grain is computed every so many steps [1]. Above 4 its mass is scaled by (sleep_pace / 4)^2, and
     sand supports too much load (docs/bed.md, Sleep). 1: no slow grains [1]."""
-    sleep_force: Positive = 1.0
+    sleep_force: Positive = Field(1.0, json_schema_extra=HIDDEN)
     """No longer used; accepted at its default so that older run.toml files can be read [1]."""
-    sleep_share: Positive = Field(0.5, description="No longer used, as sleep_force [1].")
+    sleep_share: Positive = Field(0.5, description="No longer used, as sleep_force [1].", json_schema_extra=HIDDEN)
     frame_count: int = Field(30, ge=0, le=1000, description="Bed: number of frames for ParaView; 0: none.")
     checkpoint_interval: Positive = Field(60.0, description="Bed: time between two checkpoints, in real time [s].")
     arch: Literal["cpu", "cuda"] = Field("cpu", description="Bed: processor that computes it.")

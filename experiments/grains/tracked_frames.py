@@ -20,22 +20,22 @@ from dem import Grains
 from experiments.runs.types import Json
 from rigid.platform.solids import Mesh
 from rigid.spatial.quaternions import to_matrix
-from vis.pictures.frames import GRAIN_FIELDS, FrameWriter, HeightMap, read_frames
+from vis.pictures.frames import GRAIN_FIELDS, FrameWriter, HeightMap, frames_of, read_frames
 from vis.pictures.meshes import revolve, spike_mesh
 from vis.pictures.tracks import height_map, lying
 
 from .settings import GrainsSettings
 
-__all__ = ["NAME", "PlatformFrames", "member_mesh"]
-
-NAME = "tumble"
+__all__ = ["PlatformFrames", "member_mesh"]
 
 Array = NDArray[np.float64]
 Run = TypeVar("Run", bound=CoupledTumble | SpatialRun | RobotRun)
 
 
 class PlatformFrames(ABC, Generic[Run]):
-    """Writes frames/tumble.pvd, and continues it after a stop."""
+    """Writes frames/tumble.pvd, or of another `name`, and continues it after a stop."""
+
+    name = "tumble"
 
     def __init__(self, run: Run, folder: Path, settings: GrainsSettings, *, resumed: bool) -> None:
         self.interval = max(run.duration / max(1, settings.frame_count), run.master.macro_step)
@@ -43,9 +43,10 @@ class PlatformFrames(ABC, Generic[Run]):
         self._untouched: HeightMap | None = None
         self._spacing = 0.5 * settings.grain
         keep_until = max(run.time, 0.0) - 0.5 * run.master.macro_step if resumed else None
-        self.writer = FrameWriter(folder, name=NAME, resume=resumed, keep_until=keep_until)
+        name = (frames_of(folder) if resumed else None) or self.name  # a run may have begun under an earlier name
+        self.writer = FrameWriter(folder, name=name, resume=resumed, keep_until=keep_until)
         if resumed and self.writer.times:
-            self._untouched = read_frames(folder, NAME)[0].maps.get("surface")
+            self._untouched = read_frames(folder, name)[0].maps.get("surface")
 
     @abstractmethod
     def body_meshes(self, run: Run) -> dict[str, Mesh]:

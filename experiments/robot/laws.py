@@ -20,8 +20,8 @@ from .gravity import NEAR, GravityRule
 from .settings import RobotSettings
 
 __all__ = [
-    "SPIKE", "Largest", "UnderFeet", "fitted_words", "given_parameters", "law_of", "settle_other_law", "settle_spring",
-    "spring_words",
+    "SPIKE", "Largest", "UnderFeet", "fitted_words", "given_parameters", "law_notes", "law_of", "of_sand",
+    "settle_other_law", "settle_spring", "spring_words",
 ]  # fmt: skip
 
 SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
@@ -31,6 +31,9 @@ SHAPE_DEPTH = 0.2
 """Depth over the diameter of the foot at which its shape is compared with that of the tip [1]: that of a light foot."""
 LIKE_TIP = 1.1
 """Ratio of forces above which, and below whose inverse, a foot has another shape than the tip [1]."""
+SAME_AREA = 0.02
+"""Relative difference of two areas from above that is not stated [1]: a polygon of 32 sides has 0.6 % less than its
+circle."""
 OWN_SCALE = {"bekker": ("radius", "tip_height"), "rft": ("radius",)}
 """Laws that take the foot's own size -> the parameters that it replaces."""
 
@@ -42,6 +45,11 @@ class Largest:
     name: str
     times: float  # Its area over that of the tip that the law is of [1]
     sole: Sole
+
+    @property
+    def alike(self) -> bool:
+        """Whether it has the area of the tip, up to the polygon that stands for a round foot."""
+        return abs(self.times - 1.0) < SAME_AREA
 
 
 class OneLaw(TypedDict):
@@ -131,7 +139,8 @@ def settle_other_law(
     replaced = () if unsized or "radius" in given else OWN_SCALE.get(law.name, ())
     for parameter in law.parameters:
         name = parameter.name
-        origin = f"default of {law.name}, of one spike{_times(largest.times, powers.get(name, 0.0))}"
+        whose = "dry sand" if law.name in OWN_SCALE and not unsized else "one spike"
+        origin = f"default of {law.name}, of {whose}{_times(largest.times, powers.get(name, 0.0))}"
         origin = "given" if name in given else origin
         if name not in ("gravity", *replaced) or (name in given and name != "gravity"):
             numbers[name] = Number(values[name], parameter.unit, origin)
@@ -141,18 +150,30 @@ def settle_other_law(
     if not left:
         return []
     if unsized:
-        size = say("size_unsized", most=largest, spike=1e3 * SPIKE)
+        size = say("size_unsized", area=_area(largest), spike=1e3 * SPIKE)
     elif law.name in OWN_SCALE:
-        size = say(f"size_{law.name}", most=largest, spike=1e3 * SPIKE)
+        size = say(f"size_{law.name}")
     elif any(name in powers for name in left):
         size = _similar(largest, Sole.of_spike(SPIKE), say("tip_sphere"), SPIKE, "dry sand")
     else:
         size = say("size_none")
     more = "" if "gravity" in own else ", nor gravity"
-    told = say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)
+    told = [say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)]
+    if of_sand(settings, surface):
+        told = []  # `law_notes` has it
     fixed = surface.granular and "gravity" not in values and not NEAR[0] <= gravity / STANDARD_GRAVITY <= NEAR[1]
     of_law = [say("gravity_of_law", law=law.name, gravity=gravity)] if fixed else []
-    return [told, *of_law, *_flat_in_grains("" if given or unsized else law.name, surface, largest)]
+    return [*told, *of_law, *_flat_in_grains("" if given or unsized else law.name, surface, largest)]
+
+
+def of_sand(settings: RobotSettings, surface: Surface) -> bool:
+    """Whether the law is 3D-RFT with its own numbers, those of dry sand, on sand."""
+    return settings.ground == "rft" and surface.name == "sand" and not settings.ground_parameters
+
+
+def law_notes(settings: RobotSettings, surface: Surface) -> list[str]:
+    """Which law a robot on sand stands on, in a sentence; none of another law."""
+    return [say("chosen_law", share=find_law("rft").rebound({}))] if of_sand(settings, surface) else []
 
 
 def _flat_in_grains(law: str, surface: Surface, largest: Largest) -> list[str]:
@@ -179,24 +200,37 @@ def spring_words(settings: RobotSettings, surface: Surface, largest: Largest, ru
 
 
 def fitted_words(fitted: GroundFile, largest: Largest) -> list[str]:
-    """The same of the law of a file."""
-    if largest.times == 1.0:
-        return []
+    """The same of the law of a file; none where the feet have size and shape of its tip."""
     tip, diameter = fitted.foot.tip, fitted.foot.diameter
     if fitted.law in OWN_SCALE:
-        size = say("size_file", kind=say(f"tip_{tip}"), spike=1e3 * diameter, grains=fitted.material, most=largest)
+        size = say(
+            "size_file", kind=say(f"tip_{tip}"), spike=1e3 * diameter, grains=fitted.material, area=_area(largest)
+        )
         return [say("fitted", file=fitted, size=size)]
     soles = {"sphere": Sole.of_spike, "flat": Sole.of_flat_tip}  # 3D-RFT has no series of a cone here
     sole = soles[tip](diameter) if tip in soles else None
+    if largest.alike and not _unlike(largest, sole):
+        return []
     return [say("fitted", file=fitted, size=_similar(largest, sole, say(f"tip_{tip}"), diameter, fitted.material))]
 
 
 def _similar(largest: Largest, tip: Sole | None, kind: str, diameter: float, grains: str) -> str:
     """The size and shape of the largest foot over those of a tip, in words; ``tip``: None where it has no sole."""
+    shape = _unlike(largest, tip)
+    return say("size_similar", kind=kind, spike=1e3 * diameter, grains=grains, area=_area(largest), shape=shape)
+
+
+def _unlike(largest: Largest, tip: Sole | None) -> str:
+    """How the shape of the largest foot differs from that of a tip, in words; empty where it does not."""
     ratio = 1.0 if tip is None else shape_ratio(largest.sole, tip, depth=SHAPE_DEPTH)
-    how = "" if 1 / LIKE_TIP <= ratio <= LIKE_TIP else "stiffer" if ratio > 1 else "softer"
-    shape = how and say(f"shape_{how}", ratio=ratio, depth=SHAPE_DEPTH)
-    return say("size_similar", kind=kind, spike=1e3 * diameter, grains=grains, most=largest, shape=shape)
+    if 1 / LIKE_TIP <= ratio <= LIKE_TIP:
+        return ""
+    return say(f"shape_{'stiffer' if ratio > 1 else 'softer'}", name=largest.name, ratio=ratio, depth=SHAPE_DEPTH)
+
+
+def _area(largest: Largest) -> str:
+    """The area of the largest foot over that of the tip, in words; empty where they are the same."""
+    return "" if largest.alike else say("largest_area", most=largest)
 
 
 def _refuse_unsized(settings: RobotSettings, surface: Surface, law: SurfaceLaw, ill: list[str]) -> None:
@@ -214,7 +248,7 @@ def _refuse_unsized(settings: RobotSettings, surface: Surface, law: SurfaceLaw, 
 
 def _times(largest: float, power: float) -> str:
     """How many times a number of one spike is under the largest foot, in words; ``power``: of the diameter."""
-    return f"; {largest ** (0.5 * power):.3g} times under a foot" if power and largest > 1 else ""
+    return f"; {largest ** (0.5 * power):.3g} times under a foot" if power and largest > 1 + SAME_AREA else ""
 
 
 def given_parameters(settings: RobotSettings) -> dict[str, float]:

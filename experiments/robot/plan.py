@@ -25,7 +25,7 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .gravity import GravityRule, gravity_rule
-from .laws import SPIKE, Largest, fitted_words, law_of, settle_other_law, settle_spring, spring_words
+from .laws import SPIKE, Largest, fitted_words, law_notes, law_of, settle_other_law, settle_spring, spring_words
 from .settings import RobotSettings
 
 __all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "try_controller", "width_of"]
@@ -51,6 +51,7 @@ class RobotPlan:
     fitted: GroundFile | None  # The file that the law comes from
     rule: GravityRule  # How K and C of the surface follow gravity
     warnings: tuple[str, ...]
+    notes: tuple[str, ...] = ()  # What a person is to know and no warning is
 
     def robot(self) -> MujocoRobot:
         """The robot where it starts."""
@@ -89,7 +90,7 @@ class RobotPlan:
             for name, number in self.numbers.items()
             if number.origin != "given"
         ]
-        return [*told, *(f"warning: {warning}" for warning in self.warnings)]
+        return [*told, *self.notes, *(f"warning: {warning}" for warning in self.warnings)]
 
 
 def find_model(name: str) -> Path:
@@ -168,6 +169,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotP
     return RobotPlan(
         settings=settings, model=model, controller=_controller(settings, folder), surface=surface, numbers=numbers,
         scales=scales, fitted=fitted, rule=rule, warnings=tuple(warnings),
+        notes=tuple(law_notes(settings, surface)),
     )  # fmt: skip
 
 

@@ -22,6 +22,8 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .energy import MOST_RESIDUAL, balance_warning
+from .feet import feet_quantities, feet_reached, heights_of
+from .laws import of_sand
 from .plan import RobotPlan
 from .settings import RobotSettings
 
@@ -37,13 +39,15 @@ UNITS = {
 FOOT = (
     "x_m", "y_m", "z_m", "q0", "q1", "q2", "q3", "fx_N", "fy_N", "fz_N", "mx_N_m", "my_N_m", "mz_N_m", "depth_m",
 )  # fmt: skip
-"""Of each foot in series/feet.csv, as `RobotRun.feet` has them."""
+"""Of each foot in series/feet.csv, as `RobotRun.feet` has them; `height_m` of its lowest point stands beside them."""
 
 Array = np.ndarray
 
 
 class RobotFrames(PlatformFrames[RobotRun]):
     """The feet (``spikes``) and the rest of the robot (``hull``), as frames of platforms call them."""
+
+    name = "robot"
 
     def body_meshes(self, run: RobotRun) -> dict[str, Mesh]:
         return {}
@@ -97,10 +101,11 @@ def write_series_of(run: RobotRun, folder: Path) -> None:
     named: dict[str, Array] = {UNITS[name]: values for name, values in rows.items()}
     named |= {"stored_J": stored, "dissipated_J": run.dissipated_by_row}
     write_series(folder / "series" / "motion.csv", named)
-    feet = run.feet
+    feet, heights = run.feet, heights_of(run)
     columns = {"t_s": rows["time"]}
     for k, foot in enumerate(run.robot.feet):
         columns |= {f"{foot.name}_{what}": feet[:, k, n] for n, what in enumerate(FOOT)}
+        columns[f"{foot.name}_height_m"] = heights[:, k]
     write_series(folder / "series" / "feet.csv", columns)
     write_series(folder / "series" / "joints.csv", {"t_s": rows["time"]} | joint_columns(run))
     if isinstance(run.ground, BedFeet):
@@ -138,7 +143,8 @@ def conclude(
     """The result, its series written. On grains `beside` is the robot on the spring-damper."""
     write_series_of(run, folder)
     robot = run.robot
-    title, sentences = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity), _sentences(run)
+    title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
+    sentences = [*_sentences(run), *plan.notes]
     if run.energy_residual > MOST_RESIDUAL:
         title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
     warnings: list[str | None] = [
@@ -156,8 +162,8 @@ def conclude(
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
         "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
         "duration": settings.duration,
-        "feet": [foot.name for foot in robot.feet], "warnings": warnings, "macro_step": run.macro_step,
-        "robot_step": robot.step, "steps": run.master.count,
+        "feet": [foot.name for foot in robot.feet], "feet_reached": feet_reached(run, heights_of(run)),
+        "warnings": warnings, "macro_step": run.macro_step, "robot_step": robot.step, "steps": run.master.count,
     }  # fmt: skip
     if softening is not None and beside is not None and isinstance(run.ground, BedFeet):
         rows = beside.columns
@@ -168,6 +174,7 @@ def conclude(
         bed = run.ground.bed
         result["code"] = fingerprint()
         result["grains"] = grains.bed_numbers(settings, run, bed, softening, in_rig=False) | {
+            "mode": say("one_gravity", gravity=plan.numbers["gravity"].value),
             "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
         }  # fmt: skip
         warnings += [
@@ -186,7 +193,8 @@ def _ground_named(plan: RobotPlan) -> str:
         return f"a bed of {plan.surface.name}{' in LAMMPS' if plan.settings.ground == 'lammps' else ''}"
     if plan.fitted is not None:
         return f"{plan.fitted.material} ({plan.law})"
-    return f"{plan.surface.name} ({plan.law})" if plan.law == "spring-damper" else say("other_law", law=plan.law)
+    own = plan.law == "spring-damper" or of_sand(plan.settings, plan.surface)
+    return f"{plan.surface.name} ({plan.law})" if own else say("other_law", law=plan.law)
 
 
 def _beyond(plan: RobotPlan, run: RobotRun) -> list[str]:
@@ -218,6 +226,7 @@ def quantities_of(run: RobotRun) -> dict[str, Json]:
         "longest_flight": (longest * run.macro_step, "s", say("longest_flight")),
         "sinkage_largest": (float(rows["sinkage"].max()), "m", "of the lowest point of any foot"),
         "sinkage_end": (float(rows["sinkage"][-1]), "m", "the same, at the end"),
+        **feet_quantities(feet_reached(run, heights_of(run))),
         "largest_force": (float(force.max()), "N", say("whole_force")),
         "actuator_work": (float(rows["actuator_work"][-1]), "J", say("actuator_work")),
         "ground_work": (float(rows["taken"][-1]), "J", say("ground_work")),
@@ -258,6 +267,7 @@ def _sentences(run: RobotRun) -> list[str]:
         return [say("touches_nothing")]
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
     told = [say("went", way=1e3 * way, rise=1e3 * float(rows["z"].max() - rows["z"][0]))]
-    told.append(say("flew", count=len(flights)) if flights else say("stayed"))
+    longest = 1e3 * run.macro_step * max((end - begin for begin, end in flights), default=0)
+    told.append(say("flew", count=len(flights), apart=1e3 * APART, longest=longest) if flights else say("stayed"))
     told.append(say("sank", depth=1e3 * float(rows["sinkage"].max()), end=1e3 * float(rows["sinkage"][-1])))
     return told

@@ -1,11 +1,11 @@
 """Settings of `hedgebed mujoco`: a robot of one's own, its feet, and what they stand on."""
 
-from typing import Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
 from experiments.grains.lammps import ON_GRAINS, RANKS, lammps_fault
-from experiments.grains.settings import GrainsSettings
+from experiments.grains.settings import HIDDEN, GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
 from rigid.checks import nearest
 from rigid.ground.laws import GROUNDS
@@ -18,6 +18,10 @@ say = Sentences(__package__)
 
 ON_ANY_GROUND = ("substeps", "extrapolation", "iterations", "frame_count", "checkpoint_interval")
 """Of `GrainsSettings`, those that a surface law takes too."""
+DEFAULT, OF_DEFAULT = "rft", (None, "sand")
+"""The ground of a robot that is given none, and the surfaces of which it is the default; None: the default surface."""
+OF_THE_SPRING = ("stiffness", "damping", "scale_with_gravity")
+"""Settings that belong to the spring-damper, which is the ground where one of them is given and no other is."""
 SPRING = (*ON_GRAINS, "spring-damper")
 """Grounds that take K and C: on grains the forecast does."""
 NOT_OURS = ("lowering_speed", "body_steps")
@@ -44,10 +48,11 @@ class RobotSettings(GrainsSettings):
     surface: str | None = None
     """Material: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; if not given, that of the grains of a
     ground.toml, else sand."""
-    ground: str = "spring-damper"
+    ground: str = DEFAULT
     """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, power-irreversible,
     katsuragi-durian, bekker, rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or
-    lammps (a bed whose grains are in LAMMPS; the feet move in the plane of x and z)."""
+    lammps (a bed whose grains are in LAMMPS; the feet move in the plane of x and z). If not given: rft on sand;
+    spring-damper on other surfaces, and with stiffness, damping or scale_with_gravity."""
     ground_parameters: tuple[str, ...] = ()
     """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot. Defaults are those of a
     spike of 12 mm, scaled to the size of each foot."""
@@ -70,6 +75,23 @@ class RobotSettings(GrainsSettings):
     mu_d: NotNegative | None = None
     """Sliding friction [1]; the surface's if not given (sand: 0.3), half of mu_s where that is."""
 
+    spike_friction: NotNegative = Field(0.5, description="On a bed: friction coefficient of feet and grains [1].")
+    spike_restitution: float = Field(
+        0.5, ge=0.01, le=1, description="On a bed: coefficient of restitution of feet and grains [1]."
+    )
+    lowering_speed: Positive | None = Field(
+        None, description="None: a robot is not set down.", json_schema_extra=HIDDEN
+    )
+    body_steps: int = Field(1, ge=1, description="1: the model sets the steps [1].", json_schema_extra=HIDDEN)
+    substeps: int = Field(10, ge=1, le=200)
+    """Time steps of the ground between two exchanges of forces with the robot [1]."""
+    extrapolation: int = Field(0, ge=0, le=2, description="Order of the extrapolation of the exchanged forces [1].")
+    iterations: int = Field(1, ge=1, le=50)
+    """Most iterations of an exchange [1]; 1: explicit exchange. Not with ground lammps."""
+    frame_count: int = Field(
+        30, ge=0, le=1000, description="Number of frames for pictures, film and ParaView; 0: none."
+    )
+    checkpoint_interval: Positive = Field(60.0, description="Time between two checkpoints, in real time [s].")
     bed_size: tuple[Positive, Positive, Positive] = (0.3, 0.3, 0.08)
     """On a bed: its size along x and y (both periodic) and its depth [m]; the feet start over its middle."""
     grain: Positive = Field(0.006, description="On a bed: mean grain diameter [m].")
@@ -79,6 +101,20 @@ class RobotSettings(GrainsSettings):
     def on_grains(self) -> bool:
         """Whether the ground is made of grains."""
         return self.ground in ON_GRAINS
+
+    @model_validator(mode="before")
+    @classmethod
+    def _choose_ground(cls, given: Any) -> Any:
+        """The spring-damper where no ground is given, and the surface or another setting is not one of `rft` on sand.
+
+        Under flat feet 3D-RFT is nearer to grains of sand than the spring-damper, and it does not spring back
+        (docs/notes/mujoco.md). Its numbers are those of dry sand, so that other surfaces have the spring-damper.
+        """
+        if not isinstance(given, dict) or given.get("ground") is not None:
+            return given
+        of_spring = any(given.get(name) is not None for name in OF_THE_SPRING)
+        other = given.get("surface") not in OF_DEFAULT
+        return given | {"ground": "spring-damper"} if of_spring or other else given
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -103,7 +139,8 @@ class RobotSettings(GrainsSettings):
         of_spring = self.stiffness is not None or self.damping is not None
         if of_spring and self.ground not in SPRING:
             return say("of_the_spring", s=self)
-        return say("nothing_unsized", s=self) if self.ignore_foot_size and self.ground in SPRING else None
+        sized = self.ground in SPRING or (self.ground == DEFAULT and self.surface in OF_DEFAULT)
+        return say("nothing_unsized", s=self) if self.ignore_foot_size and sized else None
 
     def _scaled(self) -> str | None:
         if not self.scale_with_gravity:
@@ -120,7 +157,7 @@ class RobotSettings(GrainsSettings):
         fields = type(self).model_fields
         for name in NOT_OURS:
             if getattr(self, name) != fields[name].default:
-                return say("not_ours", name=name, value=getattr(self, name))
+                return say(f"no_{name}", value=getattr(self, name))
         if self.on_grains or self.ranks is not None:
             return self.sleep_fault() or lammps_fault(self)
         for name in GrainsSettings.model_fields:

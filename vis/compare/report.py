@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 
 from rigid.series import read_series
 from vis.film.film import ARROWS, draw_runs, shown
-from vis.film.reel import NAME, AnyReel, Reel, SpaceReel
+from vis.film.reel import AnyReel, Reel, SpaceReel
 from vis.page.folder import read_folder
 from vis.page.numbers import short, typeset
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, as_it_lies, handle, legend_above, sheet
 from vis.page.report import Report, Result, again, report_of, unit_text
 from vis.page.states import LINES, draw_bands, draw_forces, legend_of_runs
-from vis.pictures.frames import frame_names
+from vis.pictures.frames import frames_of
 
 from .robots import draw_robots
 
@@ -95,7 +95,7 @@ def _seen(report: Report, labels: Labels) -> list[Block]:
     folders = _folders(report)
     if report.result["kind"] == "tumble":
         reels: Sequence[AnyReel] = _alike([Reel(folder) for folder in folders])
-    elif without := [label for label, home in zip(labels, folders, strict=True) if NAME not in frame_names(home)]:
+    elif without := [label for label, home in zip(labels, folders, strict=True) if frames_of(home) is None]:
         return [text(f"There are no pictures: {' and '.join(without)} kept no frames (frame_count = 0).", small=True)]
     else:
         reels = [SpaceReel(folder) for folder in folders]

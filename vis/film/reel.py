@@ -19,13 +19,11 @@ from vis.page.folder import read_columns
 from vis.page.plots import Array, mean_over
 from vis.page.report import Result
 from vis.pictures.canvas import colour_top, moved_since
-from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
+from vis.pictures.frames import Frame, Frames, frames_of, grains_box, read_frames
 from vis.pictures.meshes import in_place, spike_mesh
 
-__all__ = ["NAME", "AnyReel", "Reel", "SpaceReel"]
+__all__ = ["AnyReel", "Reel", "SpaceReel"]
 
-NAME = "tumble"
-"""Of the frames in a run folder."""
 _SPIKE, _CLEAR, _WIDE = 0.012, 0.04, 0.06
 """Of the platform on a law, which sees points only: diameter and length of a spike, width of the hull as they are
 drawn, all of spikes that end 0.2 m from the centre [m]."""
@@ -38,7 +36,7 @@ class _Filmed:
 
     ``folder``: The run folder. ``result``: Its result.json. ``series``: The columns of trajectory.csv. ``states``: Its
     states, a word a row; none in a folder of an older hedgebed. ``times``: When there is a picture [s], increasing.
-    ``frames``: Its frames; None: the ground is a law that has none.
+    ``frames``: Its frames; None: the ground is a law that has none. ``name``: Of its frames.
     """
 
     still: ClassVar[tuple[int, int]]
@@ -56,7 +54,9 @@ class _Filmed:
         self.folder = Path(folder)
         self.result: Result = read_result(self.folder / "result.json")
         self.series, self.states = read_columns(self.folder / "trajectory.csv")
-        self.frames = read_frames(self.folder, NAME) if NAME in frame_names(self.folder) else None
+        name = frames_of(self.folder)
+        self.name = name or "tumble"
+        self.frames = read_frames(self.folder, name) if name is not None else None
         self.times: Array = np.zeros(0) if self.frames is None else np.asarray(self.frames.times)
 
     def __len__(self) -> int:

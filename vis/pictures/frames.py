@@ -27,7 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 from rigid.digests import digest_of, digest_of_data
 
 __all__ = [
-    "GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "HeightMap", "check_frames", "frame_names", "grains_box",
+    "BODIES", "GRAIN_FIELDS", "Frame", "FrameWriter", "Frames", "HeightMap", "check_frames", "frame_names",
+    "frames_of", "grains_box",
     "read_frames",
 ]  # fmt: skip
 
@@ -40,6 +41,8 @@ GRAIN_FIELDS: dict[str, tuple[int, str]] = {
     "displacement": (3, "displacement since the start of the run [m]"),
     "id": (1, "number of the grain"),
 }
+BODIES = ("robot", "tumble")
+"""Frames of a robot and of a platform. Older run folders have those of a robot as `tumble`."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*\Z")
 _DIGESTS = "Digests"
 Body = tuple[ArrayLike, ArrayLike]
@@ -254,6 +257,12 @@ def read_frames(folder: str | Path, name: str = "frames") -> Frames:
 def frame_names(folder: str | Path) -> list[str]:
     """Ids of the runs that have frames in a run folder, sorted."""
     return sorted(path.stem for path in (Path(folder) / "frames").glob("*.pvd"))
+
+
+def frames_of(folder: str | Path) -> str | None:
+    """Name of the frames of a platform or robot in a run folder, of `BODIES`; None where there are none."""
+    found = frame_names(folder)
+    return next((name for name in BODIES if name in found), None)
 
 
 def check_frames(folder: str | Path) -> None:

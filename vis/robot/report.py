@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vis.film.film import ARROWS, draw_runs, shown
-from vis.film.reel import NAME, SpaceReel
+from vis.film.reel import SpaceReel
 from vis.page.numbers import quantity
-from vis.page.page import Section, Tile, listing, text
+from vis.page.page import Section, Tile, listing, table_of, text
 from vis.page.plots import AXES, BED, DASHED, INK, MODEL, Array, legend_above, line_styles, mean_over
 from vis.page.report import Report, given, report_of
 from vis.pictures.canvas import COLOURS
-from vis.pictures.frames import frame_names
+from vis.pictures.frames import frames_of
 from vis.spatial.report import draw_energy, pair, say_grains
 from vis.view.curves import MOST_LINES, joint_columns
 from vis.view.page import report_scene
@@ -23,6 +23,15 @@ from vis.view.page import report_scene
 __all__ = ["write_robot_report"]
 
 Columns = Mapping[str, Array]
+REACHED = {
+    "clearance_largest": "highest [mm]", "clearance_end": "height at the end [mm]", "sinkage_largest": "deepest [mm]",
+    "sinkage_end": "depth at the end [mm]",
+}  # fmt: skip
+"""Number of a foot in result.json -> head of its column."""
+HEIGHTS = (
+    "Height and depth of the lowest point of each foot, from the undisturbed surface. The highest is that after the "
+    "first touch of any foot."
+)
 
 
 @report_of(dpi=130, named=True)
@@ -45,7 +54,7 @@ def write_robot_report(
         drawn.append(report.draw("beside", _draw_beside(motion, report.columns("series/spring-damper.csv"))))
     drawn += [report.draw("joints", _draw_joints(joints)), report.draw("energy", draw_energy(motion, "the robot"))]
     seen = []
-    if pictures and NAME in frame_names(home):
+    if pictures and frames_of(home):
         made = draw_runs([SpaceReel(home)], home, "robot", by=colour, film=film, progress=report.rest())
         notes = [text(ARROWS, small=True), *(text(note) for note in made.notes)]
         seen = [Section("Pictures", [*report_scene(home), *shown(made), *notes])]
@@ -54,6 +63,7 @@ def write_robot_report(
         Section("", [listing(result["departures"]["sentences"])]),
         *seen,
         Section("Over time", [*drawn, *say_grains(result)]),
+        *_feet(result.get("feet_reached") or {}),
         Section("The trial", [given(result["trial"])]),
         report.numbers(beside=(result.get("grains") or {}).get("beside") or {}),
         report.again("hedgebed mujoco run.toml"),
@@ -65,6 +75,13 @@ def write_robot_report(
         Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was"),
     ]
     return report.write(sections, lead=["mujoco", f"{result['duration']:g} s"], tiles=tiles)
+
+
+def _feet(reached: Mapping[str, Mapping[str, float]]) -> list[Section]:
+    """How high and how deep each foot went; nothing in a folder of an older hedgebed."""
+    rows = [(name, *(f"{1e3 * numbers[key]:.4g}" for key in REACHED)) for name, numbers in reached.items()]
+    blocks = table_of(("foot", *REACHED.values()), rows)
+    return [Section("The feet", [text(HEIGHTS), *blocks])] if blocks else []
 
 
 def _draw_path(motion: Columns) -> Figure:

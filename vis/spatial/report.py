@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vis.film.film import ARROWS, draw_runs, shown
-from vis.film.reel import NAME, SpaceReel
+from vis.film.reel import SpaceReel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity
 from vis.page.page import Block, Section, Tile, listing, text
@@ -18,7 +18,7 @@ from vis.page.plots import AXES, BED, DASHED, DOTTED, GREY, INK, MODEL, Array, l
 from vis.page.report import Report, Result, given, report_of
 from vis.page.states import States, draw_bands, draw_states, passages
 from vis.pictures.canvas import COLOURS
-from vis.pictures.frames import frame_names
+from vis.pictures.frames import frames_of
 from vis.view.page import report_scene
 
 __all__ = ["draw_energy", "pair", "say_grains", "write_spatial_report"]
@@ -49,7 +49,7 @@ def write_spatial_report(
     ):
         drawn.append(report.draw(key, drawing))
     seen = []
-    if pictures and NAME in frame_names(home):
+    if pictures and frames_of(home):
         made = draw_runs([SpaceReel(home)], home, "space", by=colour, film=film, progress=report.rest())
         seen = [
             Section(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vis.film.reel import NAME, Reel, SpaceReel
+from vis.film.reel import Reel, SpaceReel
 from vis.page.folder import Run, read_folder
 from vis.page.plots import Array
 from vis.page.report import Result
@@ -80,7 +80,7 @@ def _in_plane(home: Path) -> Source:
     grains_missing = reel.frames is None and reel.result.get("ground") == "bed"
     low, high = reel.box
     return Source(
-        id=NAME, title=f"Platform on {_stands_on(reel.result)}",
+        id=reel.name, title=f"Platform on {_stands_on(reel.result)}",
         times=reel.times, frame=reel.frame, cut=reel.cut, surface=reel.surface,
         low=low, high=high, block=not reel.on_grains, force=("weight", reel.number("weight")),
         panels=curves.of_tumble(home, reel.series, called), states=curves.bands(reel.series["t_s"], reel.states),
@@ -130,12 +130,12 @@ def _on_reel(
     """A run in space that has frames, or its curves alone."""
     if not len(series):
         return Source(
-            id=NAME, title=title, times=np.zeros(0), frame=_no_frame, panels=panels, states=states,
+            id=series.name, title=title, times=np.zeros(0), frame=_no_frame, panels=panels, states=states,
             note=say("no_frames"),
         )  # fmt: skip
     low, high = series.box
     return Source(
-        id=NAME, title=title, times=series.times, frame=series.frame, low=low, high=high,
+        id=series.name, title=title, times=series.times, frame=series.frame, low=low, high=high,
         cut=float(low[1]) - (0.01 * float(high[1] - low[1])), surface=float(high[2]) if not series.on_grains else None,
         block=not series.on_grains, force=force, panels=panels, states=states,
     )  # fmt: skip

@@ -26,7 +26,7 @@ def runs(tmp_path_factory):
     home = tmp_path_factory.mktemp("runs")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
-        robot.run(RobotSettings(**HOPPER, height=0.005, duration=0.15), home / "spring")
+        robot.run(RobotSettings(**HOPPER, height=0.005, duration=0.15, ground="spring-damper"), home / "spring")
         robot.run(RobotSettings(**HOPPER, height=0.005, duration=0.25, ground="rft"), home / "rft")
         wheel = {"model": "wheel", "feet": ("wheel",), "frame_count": 0, "duration": 0.01}
         robot.run(RobotSettings(**wheel), home / "wheel")

@@ -67,17 +67,20 @@ def test_each_law_states_for_which_foot_its_numbers_are_and_how_far_this_one_is_
         return said
 
     file = ground_file(tmp_path)
-    for given in ({}, {"ground": "katsuragi-durian"}, {"ground": "power-irreversible"}, {"ground": file}):
+    spring = {"ground": "spring-damper"}
+    for given in (spring, {"ground": "katsuragi-durian"}, {"ground": "power-irreversible"}, {"ground": file}):
         said = told(**given)
         assert "tip of 12" in said and "24.8 times" in said and "2.5 times" in said and "too deep" in said
-    for given in ({"ground": "rft"}, {"ground": "bekker"}, {"ground": ground_file(tmp_path, law="rft")}):
-        assert "24.8 times" in told(**given) and "too deep" not in told(**given)
+    for given in ({"ground": "rft", "surface": "jsc1a"}, {"ground": "bekker"}):
+        assert "dry sand" in told(**given) and "times" not in told(**given)
+    own = told(ground=ground_file(tmp_path, law="rft"))
+    assert "24.8 times" in own and "too deep" not in own
     assert "'foot'" in told(surface="brick") and "hard ground" in told(surface="brick")
     given = {"stiffness": 900.0, "damping": 3.0}
     assert not [said for said in plan_robot(RobotSettings(**HOPPER | given)).warnings if "law" in said]
     round_ = tmp_path / "ball.xml"
     round_.write_text(BALL)
-    said = told(model=str(round_))
+    said = told(model=str(round_), **spring)
     assert "tip of 12" in said and "too" not in said
 
 
@@ -103,9 +106,9 @@ def test_grains_push_a_flat_foot_harder_than_spring_and_rft_and_a_sentence_says_
     def told(**given):
         return [said for said in plan_robot(RobotSettings(**HOPPER | given)).warnings if "Grains of sand" in said]
 
-    (said,) = told()
+    (said,) = told(ground="spring-damper")
     assert "9.9 times" in said and "4.8 times" in said
-    (said,) = told(ground="rft")
+    (said,) = told()
     assert " 4 times" in said and "1.3 times" in said
     (tmp_path / "ball.xml").write_text(BALL)
     for other in (
@@ -121,8 +124,36 @@ def test_a_law_that_springs_back_or_does_not_take_gravity_says_so():
     def told(part, **given):
         return [said for said in plan_robot(RobotSettings(**HOPPER | given)).warnings if part in said]
 
-    assert told("gives back") and told("gives back", gravity=1.0)
-    assert not told("gives back", surface="brick") and not told("gives back", ground="rft")
+    spring = {"ground": "spring-damper"}
+    assert told("gives back", **spring) and told("gives back", **spring, gravity=1.0)
+    assert not told("gives back", surface="brick") and not told("gives back")
     for law in ("power-irreversible", "katsuragi-durian", "bekker"):
         assert told("not take gravity", ground=law, gravity=1.0) and not told("not take gravity", ground=law)
-    assert not told("not take gravity", ground="rft", gravity=1.0) and not told("not take gravity", gravity=1.0)
+    assert not told("not take gravity", gravity=1.0) and not told("not take gravity", **spring, gravity=1.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "law"),
+    [
+        ({}, "rft"), ({"surface": "sand"}, "rft"), ({"surface": "sand", "gravity": 0.01}, "rft"),
+        ({"surface": "brick"}, "spring-damper"), ({"surface": "jsc1a"}, "spring-damper"),
+        ({"stiffness": 900.0}, "spring-damper"), ({"scale_with_gravity": False}, "spring-damper"),
+        ({"surface": "sand", "ground": "bekker"}, "bekker"),
+    ],
+)  # fmt: skip
+def test_a_robot_that_is_given_no_ground_has_rft_on_sand_and_the_spring_damper_elsewhere(given, law):
+    settings = RobotSettings(**HOPPER | given)
+    assert settings.ground == law and RobotSettings(**settings.model_dump()) == settings
+    notes = plan_robot(settings).notes
+    assert [law for said in notes if "default on sand" in said] == ["rft"] * (law == "rft")
+
+
+def test_a_foot_of_the_size_and_shape_of_the_tip_is_told_nothing_of_its_area(tmp_path):
+    """A ball of 12 mm on laws of a ball of 12 mm: its picture has 0.5 % less area."""
+    (tmp_path / "ball.xml").write_text(BALL.replace("0.04", "0.006"))
+    small = {"model": str(tmp_path / "ball.xml"), "feet": ("foot",)}
+    for ground in ("spring-damper", "katsuragi-durian", ground_file(tmp_path)):
+        plan = plan_robot(RobotSettings(**small, ground=ground))
+        assert plan.scales["foot"] == pytest.approx(1.0, abs=0.02) and plan.scales["foot"] != 1.0
+        told = [*plan.warnings, *(number.origin for number in plan.numbers.values())]
+        assert not [said for said in told if "times the area" in said or "under a foot" in said]

@@ -28,6 +28,7 @@ pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedg
 
 HOP = f"{EXAMPLES / 'mujoco-hopper' / 'hop.py'}:control"
 HOPPER = {"model": "hopper", "feet": ("foot",)}
+SPRING = HOPPER | {"ground": "spring-damper"}
 LANDER = """<mujoco model="lander"><worldbody><body name="body" pos="0 0 0.2"><freejoint/>
   <geom name="hull" type="cylinder" size="0.1 0.01" mass="1"/>
   <geom name="tip" type="cylinder" size="0.03 0.01" pos="0 0 -0.12" mass="0.5"/></body></worldbody></mujoco>"""
@@ -39,17 +40,22 @@ ON_BED = HOPPER | {"ground": "bed", "height": 0.012, "grain": 0.012, "bed_size":
     [
         ({"ground": "bad"}, "ground = 'bad' is not known"),
         ({"ground": "bekker", "stiffness": 1.0}, "ground = 'bekker' takes ground_parameters"),
-        ({"ground_parameters": ("exponent=1",)}, "ground_parameters = exponent=1 belongs to another"),
+        (
+            {"surface": "brick", "ground_parameters": ("exponent=1",)},
+            "ground_parameters = exponent=1 belongs to another",
+        ),
         ({"mu_s": 0.1, "mu_d": 0.2}, "mu_d = 0.2 is above mu_s = 0.1"),
         ({"lowering_speed": 0.1}, "lowering_speed = 0.1 is for platforms"),
         ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
         ({"feet": ()}, "feet"),
         ({"ground": "power", "scale_with_gravity": True}, "scale_with_gravity.*'power'"),
-        ({"ignore_foot_size": True}, "ignore_foot_size: ground = 'spring-damper' is always"),
+        ({"ignore_foot_size": True}, "ignore_foot_size: ground = 'rft' is always"),
+        ({"body_steps": 2}, "body_steps = 2 is for platforms"),
+        ({"sleep_pace": 8}, "sleep_pace = 8 belongs to ground = 'bed'"),
         ({"stiffness": 1.0, "damping": 1.0, "scale_with_gravity": True}, "scale_with_gravity"),
         ({"ground": "lammps", "iterations": 3}, r"iterations = 3 .* iterations = 1"),
         ({"ground": "bed", "ranks": 2}, r"ranks = 2 .*ground = 'bed'"),
-        ({"ranks": 2}, r"ranks = 2 .*ground = 'spring-damper'"),
+        ({"ranks": 2}, r"ranks = 2 .*ground = 'rft'"),
     ],
 )
 def test_what_does_not_go_together_is_refused_by_name(given, said):
@@ -127,7 +133,7 @@ def test_the_depth_of_a_bed_that_a_refusal_names_is_accepted():
 
 def test_k_of_sand_goes_with_gravity_and_c_with_its_root_unless_that_is_refused_and_a_warning_names_it():
     """Forces among grains without cohesion go with their weight, speeds of similar motions with the root of gravity."""
-    low = HOPPER | {"gravity": 9.80665e-3}
+    low = SPRING | {"gravity": 9.80665e-3}
     kept, scaled, asked = (plan_robot(RobotSettings(**low, scale_with_gravity=asked)) for asked in (False, None, True))
     assert scaled.numbers["stiffness"].value == pytest.approx(1e-3 * kept.numbers["stiffness"].value)
     assert scaled.numbers["damping"].value == pytest.approx(1e-3**0.5 * kept.numbers["damping"].value)
@@ -149,7 +155,7 @@ def test_k_of_sand_goes_with_gravity_and_c_with_its_root_unless_that_is_refused_
 @pytest.mark.parametrize("gravity", [9.80665, 1.62, 9.80665e-3, 9.80665e-6])
 def test_k_and_c_of_sand_and_their_errors_are_those_that_hedgebed_ground_states_at_this_gravity(gravity):
     map_ = read_map("sand").answer(gravity=gravity, diameter=0.012, grain=2e-4, packing=None, load=None)
-    plan = plan_robot(RobotSettings(**HOPPER, gravity=gravity))
+    plan = plan_robot(RobotSettings(**SPRING, gravity=gravity))
     for name in ("stiffness", "damping"):
         assert plan.numbers[name].value == pytest.approx(
             getattr(map_, name).value, rel=2e-3
@@ -161,8 +167,8 @@ def test_k_and_c_of_sand_and_their_errors_are_those_that_hedgebed_ground_states_
 def test_k_of_sand_stays_that_of_one_g_where_the_map_of_gravity_does_not_reach(tmp_path):
     """Below 1e-6 g, above 1 g, of a foot of more than 100 mm, and of sand that has no map: a warning says why."""
     (tmp_path / "lander.xml").write_text(LANDER, encoding="utf-8")
-    lander = {"model": str(tmp_path / "lander.xml"), "feet": ("hull",), "gravity": 1.0}
-    beyond = [HOPPER | {"gravity": gravity} for gravity in (5e-6, 25.0)]
+    lander = {"model": str(tmp_path / "lander.xml"), "feet": ("hull",), "gravity": 1.0, "ground": "spring-damper"}
+    beyond = [SPRING | {"gravity": gravity} for gravity in (5e-6, 25.0)]
     weak = HOPPER | {"gravity": 1.0, "surface": "sand-weak"}
     sets = [(given, "beyond the map") for given in beyond]
     for given, why in [*sets, (weak, "no map"), (lander, "'hull' has")]:
@@ -192,8 +198,9 @@ def test_a_law_whose_parameters_do_not_follow_from_the_surface_says_so_and_its_t
     settings = RobotSettings(**HOPPER, ground=law, surface="jsc1a", duration=0.01, ignore_foot_size=True)
     plan = plan_robot(settings)
     (said,) = [said for said in plan.warnings if "ground_parameters" in said]
-    assert all(word in said for word in ("12 mm", "'jsc1a'", "ground.toml"))
-    assert float(re.findall(r"has ([0-9.]+) times", said)[0]) == pytest.approx(25, rel=0.02)
+    assert all(word in said for word in ("'jsc1a'", "ground.toml"))
+    if law not in ("rft", "bekker"):  # which are of no tip
+        assert float(re.findall(r"12 mm .*has ([0-9.]+) times", said)[0]) == pytest.approx(25, rel=0.02)
     assert ("nor gravity" in said) == (law != "rft") and not [said for said in plan.warnings if "a guess" in said]
     made = RobotFollowed(settings, plan).run_on_law()
     made.run()
@@ -247,7 +254,7 @@ def test_a_law_of_grains_is_refused_on_hard_ground_and_accepted_it_is_that_of_th
     parts = plan.law_feet(plan.robot()).grounds[0][:8]
     assert sum(float(one.force(2e-3, 0.1)) for one in parts) == pytest.approx(once, rel=1e-9)
     assert not [number.origin for number in plan.numbers.values() if "under a foot" in number.origin]
-    assert [said for said in plan.warnings if "also under" in said]
+    assert [said for said in plan.warnings if "any size" in said]
 
 
 def test_a_larger_foot_has_more_force_under_a_law_and_its_numbers_say_how_much():
@@ -259,7 +266,7 @@ def test_a_larger_foot_has_more_force_under_a_law_and_its_numbers_say_how_much()
     for name in ("stiffness", "drag"):
         assert one.parameters[name] == pytest.approx(value * spike[name])
         assert f"{value:.3g} times under" in plan.numbers[name].origin
-    spring = plan_robot(RobotSettings(**HOPPER))
+    spring = plan_robot(RobotSettings(**SPRING))
     (one, *_), own = spring.law_feet(spring.robot()).grounds[0], spring.numbers
     assert one.parameters["stiffness"] == pytest.approx(value * own["stiffness"].value)
     assert one.parameters["damping"] == pytest.approx(value**1.25 * own["damping"].value)

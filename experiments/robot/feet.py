@@ -1,0 +1,71 @@
+"""How high and how deep each foot of a robot goes: its lowest point over the undisturbed surface."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling.robot import RobotRun
+
+from . import say
+
+__all__ = ["FEW", "feet_quantities", "feet_reached", "heights_of"]
+
+FEW = 6  # Most feet whose numbers are quantities of their own
+NAMES = ("clearance_largest", "clearance_end", "sinkage_largest", "sinkage_end")
+"""Of each foot [m]."""
+
+Array = NDArray[np.float64]
+
+
+def heights_of(run: RobotRun) -> Array:
+    """Height of the lowest point of each foot over the undisturbed surface at every row [m], shape (row, foot).
+
+    It is negative below the surface.
+    """
+    feet = run.feet
+    lowest = [foot.bottoms(_ups(feet[:, k, 3:7])) for k, foot in enumerate(run.robot.feet)]
+    return feet[:, :, 2] + np.column_stack(lowest)
+
+
+def feet_reached(run: RobotRun, heights: Array) -> dict[str, dict[str, float]]:
+    """Name of a foot -> its numbers of `NAMES` [m]; of the time after the first touch, if any foot touches."""
+    touching = run.columns["touching"] > 0
+    first = int(np.argmax(touching)) if touching.any() else 0
+    depths = run.feet[:, :, -1]
+    return {
+        foot.name: {
+            "clearance_largest": max(0.0, float(heights[first:, k].max())), "clearance_end": float(heights[-1, k]),
+            "sinkage_largest": float(depths[:, k].max()), "sinkage_end": float(depths[-1, k]),
+        }
+        for k, foot in enumerate(run.robot.feet)
+    }  # fmt: skip
+
+
+def feet_quantities(reached: dict[str, dict[str, float]]) -> dict[str, tuple[float, str, str]]:
+    """Name of a quantity -> value, unit and note, for the table of a run.
+
+    A robot of one foot has its clearance, one of up to `FEW` feet clearance and sinkage of each, others the largest
+    clearance of any foot.
+    """
+    best = max(reached, key=lambda name: reached[name]["clearance_largest"])
+    if len(reached) == 1 or len(reached) > FEW:
+        found = {"clearance_largest": (reached[best]["clearance_largest"], "m", say("clearance", foot=best))}
+        if len(reached) == 1:
+            found["clearance_end"] = (reached[best]["clearance_end"], "m", say("at_end"))
+        return found
+    return {
+        f"{name}_{foot}": (numbers[name], "m", say(_NOTES[name], foot=foot))
+        for name in NAMES
+        for foot, numbers in reached.items()
+    }
+
+
+_NOTES = {
+    "clearance_largest": "clearance", "clearance_end": "at_end", "sinkage_largest": "foot_sinkage",
+    "sinkage_end": "at_end",
+}  # fmt: skip
+
+
+def _ups(turns: Array) -> Array:
+    """The world's upward direction in axes turned by unit quaternions, shape (n, 4): the third row of each matrix."""
+    w, x, y, z = turns.T
+    return np.column_stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])

@@ -1,0 +1,92 @@
+"""How high and how deep each foot of a robot goes, and the frames that show it."""
+
+import numpy as np
+import pytest
+
+from coupling.robot import LawFeet, MujocoRobot, RobotRun
+from experiments.grains.tracked_frames import PlatformFrames
+from experiments.robot import experiment as robot
+from experiments.robot.feet import FEW, feet_quantities, feet_reached, heights_of
+from experiments.robot.result import RobotFrames
+from experiments.robot.settings import RobotSettings
+from experiments.runs.folder import read_series
+from rigid.spatial.quaternions import to_matrix
+from vis.pictures.frames import frame_names, frames_of, read_frames
+from vis.robot.report import write_robot_report
+from vis.view.sources import sources_of
+
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+
+HOPPER = {"model": "hopper", "feet": ("foot",)}
+PAIR = """<mujoco><worldbody>
+  <body name="one" pos="0 0 0.13"><freejoint/><geom name="box" type="box" size=".04 .03 .01" euler="0 20 0" mass="1"/>
+  </body><body name="two" pos="0.3 0 0.24"><freejoint/>
+  <geom name="egg" type="ellipsoid" size=".03 .02 .04" euler="30 0 40" mass="1"/></body></worldbody></mujoco>"""
+
+
+def dropped(tmp_path, *, duration):
+    """A box and an ellipsoid, both askew, that fall on hard springs without damping and leave them again."""
+    file = tmp_path / "pair.xml"
+    file.write_text(PAIR)
+    made = MujocoRobot(str(file), feet=["box", "egg"])
+    ground = LawFeet(made.feet, parameters={"stiffness": 2e4, "damping": 0.0}, mu_s=0.0)
+    run = RobotRun(made, ground, duration=duration)
+    run.run()
+    return run
+
+
+def test_heights_of_feet_are_those_of_their_lowest_points_at_every_moment(tmp_path):
+    run = dropped(tmp_path, duration=0.3)
+    heights, feet = heights_of(run), run.feet
+    for row in range(0, len(feet), 97):
+        for k, foot in enumerate(run.robot.feet):
+            low = feet[row, k, 2] + foot.bottom(to_matrix(feet[row, k, 3:7]))
+            assert heights[row, k] == pytest.approx(low, abs=1e-9)
+    depths = feet[:, :, -1]
+    assert depths.max() > 1e-3
+    assert depths == pytest.approx(np.maximum(-heights, 0.0), abs=2e-5)  # an ellipsoid's picture is 0.3 % too small
+
+
+def test_clearance_counts_from_the_first_touch_and_each_foot_has_its_own(tmp_path):
+    run = dropped(tmp_path, duration=0.3)
+    heights, time = heights_of(run), run.columns["time"]
+    reached = feet_reached(run, heights)
+    first = int(np.argmax(run.columns["touching"] > 0))
+    assert heights[0, 0] > heights[first:, 0].max() == reached["box"]["clearance_largest"]
+    assert reached["egg"]["clearance_end"] == heights[-1, 1] and time[-1] == pytest.approx(0.3)
+    found = feet_quantities(reached)
+    assert len(found) == 8 and found["clearance_largest_box"][0] == reached["box"]["clearance_largest"]
+    assert found["sinkage_largest_egg"][0] == pytest.approx(run.feet[:, 1, -1].max())
+
+
+def test_a_robot_of_one_foot_or_of_many_has_one_clearance_in_its_table():
+    def foot(height):
+        return {"clearance_largest": height, "clearance_end": -0.01, "sinkage_largest": 0.02, "sinkage_end": 0.01}
+
+    assert list(feet_quantities({"foot": foot(0.1)})) == ["clearance_largest", "clearance_end"]
+    many = feet_quantities({f"tip{k}": foot(0.1 * k) for k in range(FEW + 1)})
+    (value, _, note) = many.pop("clearance_largest")
+    assert not many and value == pytest.approx(0.1 * FEW) and f"tip{FEW}" in note
+
+
+def test_frames_of_a_robot_are_named_so_and_older_ones_are_continued_and_shown(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    settings = RobotSettings(**HOPPER, duration=0.05, frame_count=4)
+    result = robot.run(settings, tmp_path / "new")
+    heights = read_series(tmp_path / "new" / "series" / "feet.csv")["foot_height_m"]
+    assert result.quantities["clearance_end"].value == pytest.approx(heights[-1])
+    assert frame_names(tmp_path / "new") == ["robot"] and frames_of(tmp_path / "new") == "robot"
+    with monkeypatch.context() as patch:
+        patch.setattr(RobotFrames, "name", PlatformFrames.name)  # as it was once
+        robot.run(settings, tmp_path / "old")
+    assert frame_names(tmp_path / "old") == ["tumble"]
+    times = []
+    for folder in (tmp_path / "new", tmp_path / "old"):
+        (seen,) = sources_of(folder)
+        times.append(seen.times.tolist())
+    page = write_robot_report(tmp_path / "new", pictures=False).read_text(encoding="utf-8")
+    assert "The feet" in page and "at the end" in page
+    assert times[0] == times[1] and len(times[0]) >= 4
+    run = dropped(tmp_path, duration=0.01)
+    RobotFrames(run, tmp_path / "old", settings, resumed=True)
+    assert frame_names(tmp_path / "old") == ["tumble"] and len(read_frames(tmp_path / "old", "tumble").times)
