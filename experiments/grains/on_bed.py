@@ -27,6 +27,7 @@ from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
+from .bearing import STICKING, resistance_of
 from .bed_progress import BedProgress
 from .following import Followed, Run
 from .recipes import recipe_of
@@ -188,6 +189,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
             depth=forecast.margin * forecast.deepest,
             speed=max(forecast.margin * forecast.fastest, self.lowering_speed or 0.0), pressure=self.pressure,
             fall=RAIN * s.bed_size[2], fastest="the fastest tip's speed",
+            resistance=STICKING * resistance_of(self.material, s.grain),
         )  # fmt: skip
 
     def bed(self, softening: Softening, progress: Progress) -> Bed:

@@ -10,17 +10,20 @@ from rigid.ground.flat_foot import DEPTHS, OVER_BALL
 from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
 from rigid.platform.files import find_platform
 
-from .maps import Answer, GroundMap, Number, read_map
+from .answers import Answer, Number
+from .cohesive import CohesiveMap
+from .maps import GroundMap, read_map
 from .settings import GroundSettings, say
 
 __all__ = ["GROUND_FILE", "check", "ground_file", "resume", "run"]
 
 GROUND_FILE = "ground.toml"
 TO_90 = 1.645  # standard deviations of a 90 % interval
-DEPTH = 1.0  # to which the map holds [tip diameters]
+
+Map = GroundMap | CohesiveMap
 
 
-def _answer(settings: GroundSettings) -> tuple[GroundMap, Answer]:
+def _answer(settings: GroundSettings) -> tuple[Map, Answer]:
     if settings.tip != "sphere":
         (shallow, deep), (first, last) = DEPTHS, OVER_BALL
         flat = say("flat_in_grains", shallow=shallow, deep=deep, first=first, last=last)
@@ -42,14 +45,14 @@ def _interval(number: Number) -> tuple[float, float]:
     return number.value - TO_90 * number.std, number.value + TO_90 * number.std
 
 
-def ground_file(settings: GroundSettings, table: GroundMap, answer: Answer) -> GroundFile:
+def ground_file(settings: GroundSettings, table: Map, answer: Answer) -> GroundFile:
     """The spring-damper of the answer."""
 
     def estimate(number: Number) -> Estimate:
         low, high = _interval(number)
         return Estimate(value=number.value, std=number.std, interval=(max(0.0, low), high))
 
-    depth = DEPTH * settings.tip_diameter
+    depth = table.deepest * settings.tip_diameter
     return GroundFile(
         format=GROUND_FORMAT, law="spring-damper", material=table.name,
         source=f"hedgebed ground: {table.source}", notes=(say("of_map", answer=answer),),
@@ -63,7 +66,7 @@ def ground_file(settings: GroundSettings, table: GroundMap, answer: Answer) -> G
     )  # fmt: skip
 
 
-def _of_no_platform(settings: GroundSettings, table: GroundMap, answer: Answer) -> list[str]:
+def _of_no_platform(settings: GroundSettings, table: Map, answer: Answer) -> list[str]:
     """Where the load was not given and is not that of a platform: what that would be, and the sinkage under it."""
     in_rig = math.isclose(settings.gravity, table.reference["gravity"], rel_tol=1e-3)
     weight = table.reference["load"] if in_rig else 0.25 * find_platform("hedgehog").mass * settings.gravity
@@ -73,7 +76,7 @@ def _of_no_platform(settings: GroundSettings, table: GroundMap, answer: Answer) 
         _, heavier = _answer(settings.model_copy(update={"load": weight}))
         then = say("at_weight", mm=1e3 * heavier.sinkage.value, std=1e3 * heavier.sinkage.std)
     except ValueError:
-        then = say("too_heavy", mm=1e3 * settings.tip_diameter)
+        then = say("too_heavy", mm=1e3 * table.deepest * settings.tip_diameter)
     where = say("in_rig" if in_rig else "on_its_own")
     told = say("no_platform", answer=answer, reference=table.reference["load"], where=where, weight=weight, then=then)
     return [told]
@@ -96,18 +99,17 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
         "packing_fraction": quantity(answer.packing, "1", "of the bed"),
         "grain_ratio": quantity(answer.ratio, "1", "mean grain over tip diameter"),
     }
-    warnings = [*_of_no_platform(settings, table, answer), say("of_real_grains")]
+    words = table.words(answer, gravity=settings.gravity, diameter=settings.tip_diameter)
+    warnings = [*_of_no_platform(settings, table, answer), *words]
     low, high = _interval(c)
     if low <= 0:
         warnings.append(say("unidentified", low=low, high=high))
-    if answer.ratio < table.lines["stiffness"].finest:
-        warnings.append(say("extrapolated", answer=answer, finest=table.lines["stiffness"].finest))
-    if settings.packing is not None and settings.packing != table.packings[0]:
-        warnings.append(say("of_packing", answer=answer, measured=table.packed[0]))
+    if answer.ratio < table.finest:
+        warnings.append(say("extrapolated", answer=answer, finest=table.finest))
     if not answer.deep:
         warnings.append(say("shallow", depth=1e3 * table.reference["shallowest"] * settings.tip_diameter))
-    if sinkage.value < settings.grain:
-        warnings.append(say("below_grain", sinkage=1e3 * sinkage.value, grain=1e3 * settings.grain))
+    if sinkage.value < answer.grain:
+        warnings.append(say("below_grain", sinkage=1e3 * sinkage.value, grain=1e3 * answer.grain))
     return Result.make(
         "ground",
         title=say("title", s=settings, mm=1e3 * settings.tip_diameter),

@@ -1,7 +1,7 @@
 """Makes maps.toml from kept results: `python -m experiments.groundmap.make` from the root of a checkout.
 
-Reads docs/results/converge-flagship (numbers over grain size) and docs/results/ground-map (packing, and two runs that
-check the scaling). docs/results/README.md has the commands of those runs.
+Of sand it reads docs/results/converge-flagship (numbers over grain size) and docs/results/ground-map (packing, and two
+runs that check the scaling); of JSC-1A docs/results/penetrate-jsc-1a-push. docs/results/README.md has their commands.
 """
 
 import json
@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
+from rigid.platform.rig import STANDARD_GRAVITY
 from rigid.result import write_text
 
 from .maps import DATA, NAMES, TO_STD
 
-__all__ = ["made_map", "main"]
+__all__ = ["made_cohesive", "made_map", "main"]
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 PACKED = ("sand-rained", "sand-0.575", "sand-0.60")
@@ -26,6 +27,8 @@ RANGES = {
     "gravity": (9.80665e-6, 9.80665), "tip_diameter": (0.001, 0.1), "grain": (0.0, 0.2),
 }  # fmt: skip
 """In m/s2, m, and of the tip's diameter: what scaling covers; the grains of the coarsest bed are a fifth of the tip."""
+COHESIVE = "jsc-1a-loose-cut"
+PUSHED = "penetrate-jsc-1a-push"
 QUARTERS = (0.375, 0.625, 0.875)  # middles of the last three quarters of the drive's depth, of which forces are kept
 
 
@@ -58,7 +61,7 @@ def made_map() -> Mapping[str, Any]:
         "source": "docs/results/converge-flagship over grain size, docs/results/ground-map over packing",
         "reference": {
             "diameter": settings["tip_diameter"], "gravity": settings["gravity"], "load": 0.219,
-            "speed": max(settings["speeds"]), "exponent": float(np.mean(exponents)),
+            "speed": max(settings["speeds"]), "grain": 0.0002, "exponent": float(np.mean(exponents)),
             "exponent_std": float(np.std(exponents, ddof=1)),
             "shallowest": (QUARTERS[0] - 0.125) * settings["depth"] / settings["tip_diameter"],
         },
@@ -68,6 +71,29 @@ def made_map() -> Mapping[str, Any]:
             "ratio": results[0]["bed"]["grain"] / results[0]["spike"]["diameter"],
         },
         **lines,
+    }  # fmt: skip
+
+
+def made_cohesive() -> Mapping[str, Any]:
+    """The table of `jsc-1a-loose-cut`: numbers.json of its kept pushes, at 5/12 of a tip's diameter."""
+    numbers = json.loads((RESULTS / PUSHED / "numbers.json").read_text(encoding="utf-8"))
+    law, spike = numbers["map, 0 to 5 mm"], numbers["of a spike, 0 to 5 mm"]
+    return {
+        "source": f"docs/results/{PUSHED}",
+        "packing": law["packing"],
+        "deepest": 5 / 12,
+        "reference": {
+            "diameter": 0.012, "gravity": STANDARD_GRAVITY, "load": 0.219, "speed": law["fastest"], "grain": 0.0001,
+            "shallowest": 1 / 12, "most": math.ceil(1e4 * law["heaviest"]) / 1e4,
+        },
+        "range": {
+            **RANGES, "grain": (0.0, math.ceil(1e3 * law["coarsest"]) / 1e3),
+            "packing": (law["packing"] - 0.005, law["packing"] + 0.005),
+        },
+        "cohesive": {
+            **{key: law[key] for key in ("a", "b", "share", "finest")}, "off": max(law["off_case"], law["off_bed"]),
+            **{key: spike[key] for key in ("stiffness", "within", "damping", "damping_std")}, "shape": numbers["shape"],
+        },
     }  # fmt: skip
 
 
@@ -98,16 +124,13 @@ def _written(value: Any) -> str:
 
 def main() -> None:
     """Write maps.toml."""
-    table = made_map()
-    lines = [
-        "# Made by `python -m experiments.groundmap.make` from kept results; half-widths are of 95 %.",
-        "",
-        "[sand]",
-    ]
-    lines += [f"source = {_written(table['source'])}"]
-    for name, part in table.items():
-        if isinstance(part, dict):
-            lines += ["", f"[sand.{name}]", *(f"{key} = {_written(value)}" for key, value in part.items())]
+    lines = ["# Made by `python -m experiments.groundmap.make` from kept results; half-widths are of 95 %."]
+    for material, table in (("sand", made_map()), (COHESIVE, made_cohesive())):
+        lines += ["", f"[{material}]"]
+        lines += [f"{key} = {_written(value)}" for key, value in table.items() if not isinstance(value, dict)]
+        for name, part in table.items():
+            if isinstance(part, dict):
+                lines += ["", f"[{material}.{name}]", *(f"{key} = {_written(value)}" for key, value in part.items())]
     write_text(DATA, "\n".join(lines) + "\n")
 
 

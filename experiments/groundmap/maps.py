@@ -20,26 +20,18 @@ from typing import Any
 import numpy as np
 
 from dem.grains.materials import MATERIALS
-from vis.page.numbers import foldable, quote
 
+from .answers import Answer, Number, check_depth, check_ranges, times
+from .cohesive import CohesiveMap
 from .settings import say
 
-__all__ = ["DATA", "TO_STD", "Answer", "GroundMap", "Line", "Number", "read_map"]
+__all__ = ["DATA", "TO_STD", "GroundMap", "Line", "read_map"]
 
 DATA = Path(__file__).with_name("maps.toml")
 NAMES = ("stiffness", "damping", "sinkage")
 POWERS = {"stiffness": (1.0, 2.0), "damping": (0.5, 2.5), "sinkage": (0.0, 1.0)}
 """Powers of gravity and of the tip's diameter of each number. A speed has 0.5 and 0.5 (Froude number)."""
 TO_STD = 1.96  # of a 95 % half-width
-SLACK = 1e-9
-
-
-@dataclass(frozen=True)
-class Number:
-    """A value with its standard deviation, SI units."""
-
-    value: float
-    std: float
 
 
 @dataclass(frozen=True)
@@ -66,20 +58,6 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """K [N/m], C [N s/m] and sinkage [m] under `load` [N] of one spike."""
-
-    stiffness: Number
-    damping: Number
-    sinkage: Number
-    load: float
-    ratio: float  # d / D [1]
-    packing: float
-    speed: float  # of the fastest drives behind it, scaled [m/s]
-    deep: bool  # whether the sinkage is within the depths of the drives
-
-
-@dataclass(frozen=True)
 class GroundMap:
     """A table of maps.toml."""
 
@@ -91,22 +69,30 @@ class GroundMap:
     packed: tuple[float, float]  # d / D [1] of these beds, and K [N/m] of those at the first packing
     reference: Mapping[str, float]
     """diameter [m], gravity [m/s2], load [N], speed of the fastest drives [m/s], exponent of force over depth and its
-    standard deviation between beds, shallowest of the depths from which it comes [diameters]."""
+    standard deviation between beds, shallowest of the depths from which it comes [diameters], real grain [m]."""
     ranges: Mapping[str, tuple[float, float]]
     lines: Mapping[str, Line]
+    deepest: float = 1.0  # depth to which the map holds [tip diameters]
+
+    @property
+    def packing(self) -> float:
+        """That of the rained bed [1]."""
+        return self.packings[0]
+
+    @property
+    def finest(self) -> float:
+        """d / D of the finest bed [1]."""
+        return self.lines["stiffness"].finest
 
     def answer(
-        self, *, gravity: float, diameter: float, grain: float, packing: float | None, load: float | None
+        self, *, gravity: float, diameter: float, grain: float | None, packing: float | None, load: float | None
     ) -> Answer:
         """The numbers of a spike; SI units. Raises ValueError for what is beyond the map, naming the key."""
-        packing = self.packings[0] if packing is None else packing
+        packing = self.packing if packing is None else packing
+        grain = self.reference["grain"] if grain is None else grain
         ratio = grain / diameter
         asked = {"gravity": gravity, "tip_diameter": diameter, "packing": packing, "grain": ratio}
-        for key, value in asked.items():
-            low, high = self.ranges[key]
-            if not low * (1 - SLACK) <= value <= high * (1 + SLACK):
-                raise ValueError(say(f"beyond_{key}", map=self, value=value, low=low, high=high, diameter=diameter,
-                                     least=low * diameter, most=high * diameter))  # fmt: skip
+        check_ranges(self.name, self.ranges, asked, diameter)
         g, size = gravity / self.reference["gravity"], diameter / self.reference["diameter"]
         scaled = {}
         for name in NAMES:
@@ -117,19 +103,24 @@ class GroundMap:
         exponent, scatter = self.reference["exponent"], self.reference["exponent_std"]
         own_load = self.reference["load"] * g * size**3
         load = own_load if load is None else load
-        stiffness = _times(scaled["stiffness"], factor)
+        stiffness = times(scaled["stiffness"], factor)
         share = load / own_load / factor.value
         more = share ** (1 / exponent)
         of_factor, of_exponent = factor.std / factor.value / exponent, math.log(share) * scatter / exponent**2
-        sinkage = _times(scaled["sinkage"], Number(more, more * math.hypot(of_factor, of_exponent)))
-        if sinkage.value > diameter:
-            about = foldable(quote(sinkage.value, None, "m", significant=2))
-            raise ValueError(say("beyond_load", load=load, sinkage=about, diameter=1e3 * diameter))
-        if load < own_load and sinkage.value < grain:
-            raise ValueError(say("below_load", load=load, sinkage=1e3 * sinkage.value, grain=1e3 * grain))
+        sinkage = times(scaled["sinkage"], Number(more, more * math.hypot(of_factor, of_exponent)))
+        check_depth(
+            sinkage.value, load=load, own_load=own_load, grain=grain, diameter=diameter, most=self.deepest
+        )  # fmt: skip
         speed = self.reference["speed"] * (g * size) ** 0.5
         deep = share == 1.0 or sinkage.value >= self.reference["shallowest"] * diameter
-        return Answer(stiffness, scaled["damping"], sinkage, load, ratio, packing, speed, deep)
+        return Answer(stiffness, scaled["damping"], sinkage, load, grain, ratio, packing, speed, deep)
+
+    def words(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:
+        """What a person must know of this map besides its numbers; gravity [m/s2] and diameter [m] change nothing."""
+        told = [say("of_real_grains")]
+        if answer.packing != self.packing:
+            told.append(say("of_packing", answer=answer, measured=self.packed[0]))
+        return told
 
     def _factor(self, packing: float, ratio: float) -> Number:
         """K at this packing over that at the first: straight in its logarithm between the measured ones.
@@ -141,12 +132,6 @@ class GroundMap:
         added = (value - 1) * self.packed[1] / self.lines["stiffness"].at(ratio).value
         chance = float(np.interp(packing, self.packings, self.factor_stds))
         return Number(value, chance + abs(1 + added - value) / TO_STD)
-
-
-def _times(number: Number, factor: Number) -> Number:
-    """The product of two numbers that are independent."""
-    value = number.value * factor.value
-    return Number(value, math.hypot(number.std * factor.value, number.value * factor.std))
 
 
 def _line(table: Mapping[str, Any]) -> Line:
@@ -165,17 +150,23 @@ def _to_calibrate(name: str) -> str:
     return cut if cut in MATERIALS else "jsc-1a-loose-cut"
 
 
-def read_map(material: str) -> GroundMap:
+def read_map(material: str) -> GroundMap | CohesiveMap:
     """The map of a material. Raises ValueError for one that has none."""
     tables = _tables()
     if material not in tables:
         why = say("no_map_of_jsc", proposed=_to_calibrate(material)) if material.startswith(("jsc", "JSC")) else ""
-        raise ValueError(say("no_map", material=material, known=", ".join(tables), why=why))
+        raise ValueError(say("no_map", material=material, known=" and ".join(tables), why=why))
     table = tables[material]
+    ranges = {key: (low, high) for key, (low, high) in table["range"].items()}
+    if "cohesive" in table:
+        return CohesiveMap(
+            name=material, source=table["source"], packing=table["packing"], deepest=table["deepest"],
+            reference=table["reference"], ranges=ranges, law=table["cohesive"],
+        )  # fmt: skip
     lines = {name: _line(table[name]) for name in NAMES}
     return GroundMap(
         name=material, source=table["source"], packings=tuple(table["packing"]["fractions"]),
         factors=tuple(table["packing"]["factors"]), factor_stds=tuple(table["packing"]["stds"]),
         packed=(table["packing"]["ratio"], table["packing"]["stiffness"]), reference=table["reference"],
-        ranges={key: (low, high) for key, (low, high) in table["range"].items()}, lines=lines,
+        ranges=ranges, lines=lines,
     )  # fmt: skip

@@ -19,6 +19,7 @@ import numpy as np
 
 from experiments.platform.ground_file import fitted_ground, range_warnings, with_kept_ground
 from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
+from experiments.platform.settled import open_stiffness
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder
 from experiments.runs.memory import cores_there
@@ -234,7 +235,9 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
     rows = [[claim["quote"], claim["compared"], claim["ours"], inside[claim["met"]]] for claim in stated]
     weighed = evidence(settings, found)
     guesses = sorted({job.surface for job in jobs if find_surface(job.surface).guess})
+    springs = sorted({job.surface for job in jobs if job.fitted is None})
     warnings = [f"the numbers of {name} are a guess until they are calibrated" for name in guesses]
+    warnings += [said for name in springs for said in open_stiffness(find_surface(name))]
     warnings += [f"{entry['id']}: {said}" for entry in found for said in entry.pop("beyond_range")]
     fitted = next((job.fitted for job in jobs if job.fitted is not None), None)
     platform = jobs[0].trial

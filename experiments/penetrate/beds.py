@@ -10,7 +10,7 @@ from dem.contact.timestep import time_step_for
 from dem.grains.materials import material
 from dem.prepare import prepare
 from dem.prepare.bedfile import find_bed
-from experiments.grains.bearing import UNSURE, Bearing, bearing_of, strength
+from experiments.grains.bearing import STICKING, UNSURE, Bearing, bearing_of, strength
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.recipes import recipe_of
 from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material, stable_overlap
@@ -32,9 +32,6 @@ __all__ = [
 
 _SPELL, _MOST_SPELLS = 1.5, 60
 """How long grains are left to come to rest at a time [sqrt(d / g)], and how often at most."""
-_STICKING = 1.8
-"""By which the largest forces of grains that stick exceed those that chains have in others [1]: in beds of
-jsc-1a-loose and -heights of 2,000 grains, four across a flat foot, moduli chosen without it had to rise 1.8 times."""
 _FLAT = 2.0
 """The same of flat tips over those that widen [1]: in `sand-weak` and `sand` moduli chosen without it had to be 1.8 and
 1.9 times as large (docs/results/penetrate-foot-sand-weak, -sand)."""
@@ -190,7 +187,7 @@ def _softness(settings: PenetrateSettings) -> Softening:
         material, young=settings.young, max_overlap=settings.max_overlap, grain=settings.grain, spread=settings.spread,
         gravity=settings.gravity, bed_height=heavier * settings.bed_size[2],
         depth=depth, speed=speed, fastest=fastest, fall=heavier * RAIN * settings.bed_size[2], pressure=pressure,
-        strength=peaks * strength(material), resistance=_STICKING * bears.resistance,
+        strength=peaks * strength(material), resistance=STICKING * bears.resistance,
     )  # fmt: skip
 
 

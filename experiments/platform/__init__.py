@@ -1,6 +1,6 @@
 """The platform of an experiment: its numbers with where they come from, and its surface.
 
-Imports `experiments.runs`, `rigid`, `vis.page`.
+Imports `dem.grains`, `experiments.runs`, `rigid`, `vis.page`.
 """
 
 from vis.page.sentences import Sentences

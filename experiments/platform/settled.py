@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
+from dem.grains.materials import material
 from rigid.ground_file import GroundFile
 from rigid.platform.rig import STANDARD_GRAVITY
 
@@ -25,6 +26,7 @@ __all__ = [
     "check_lengths",
     "check_spike_length",
     "of_earth",
+    "open_stiffness",
     "refuse_other_grains",
     "rig_fault",
 ]
@@ -158,6 +160,8 @@ class Settled(dict[str, Number]):
                 self[key] = Number(row_of * fitted.values[key], _UNITS[key], of_row)
             else:
                 self.settle(key, getattr(material, key) / spikes_per_row, shared)
+        if origin.startswith("surface ") and self["stiffness"].origin == shared:
+            warnings += open_stiffness(material)
         self.settle("mu_s", material.mu_s, origin)
         if self["mu_s"].origin == "given":
             self.settle("mu_d", 0.5 * self.value("mu_s"), "default: half of mu_s")
@@ -238,6 +242,14 @@ def _said(name: str, number: Number) -> str:
     return f"{number.value:.6g}" + ("" if number.unit == "1" else f" {number.unit}")
 
 
+def open_stiffness(surface: Surface) -> list[str]:
+    """A warning with the range of K of a row, where the runs behind it leave one; else none."""
+    if surface.stiffness_range is None:
+        return []
+    low, high = surface.stiffness_range
+    return [say("open_stiffness", surface=surface, low=low, high=high, factor=math.sqrt(high / low))]
+
+
 def of_other_spikes(numbers: Mapping[str, Number], surface: str, *, diameter: float, whose: str) -> list[str]:
     """A warning where K or C is the surface's and was found with other spikes than these [m]; 0: none."""
     taken = [name for name in ("stiffness", "damping") if numbers[name].origin.startswith("surface ")]
@@ -259,7 +271,8 @@ def of_earth(
         return []
     if not numbers["stiffness"].origin.startswith(("surface ", "half of")):
         return []
-    return [say("of_earth", surface=surface, gravity=gravity, less=STANDARD_GRAVITY / gravity)]
+    key = "of_earth" if material(own.grains).cohesion == "none" else "of_earth_cohesive"
+    return [say(key, surface=surface, gravity=gravity, less=STANDARD_GRAVITY / gravity)]
 
 
 def rig_fault(stated: float, local: float = STANDARD_GRAVITY) -> str | None:

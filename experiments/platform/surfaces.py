@@ -4,6 +4,7 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from hedgebed_renamed import material_of_today
 from rigid.checks import nearest
@@ -33,12 +34,19 @@ class Surface:
     spike: float | None = None
     """Diameter of the spikes with ball tips that K and C are of [m]; None: of no certain ones."""
     guess: bool = False  # whether nothing but judgement stands behind the numbers
+    stiffness_range: tuple[float, float] | None = None
+    """Within which K may lie [N/m], where runs leave it that open; None: `source` states what is known."""
 
 
 @cache
 def _surfaces() -> dict[str, Surface]:
     tables = tomllib.loads(FILE.read_text(encoding="utf-8"))
-    return {name: Surface(name=name, **table) for name, table in tables.items()}
+    return {name: Surface(name=name, **_tuples(table)) for name, table in tables.items()}
+
+
+def _tuples(table: dict[str, Any]) -> dict[str, Any]:
+    """The same with tuples for lists."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
 
 def surface_names() -> list[str]:

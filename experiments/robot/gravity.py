@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dem.grains.materials import material
-from experiments.groundmap.maps import POWERS, Answer, read_map
-from experiments.groundmap.settings import GroundSettings
+from experiments.groundmap.answers import Answer
+from experiments.groundmap.maps import POWERS, read_map
 from experiments.platform.surfaces import Surface
 from rigid.platform.rig import STANDARD_GRAVITY
 
@@ -86,7 +86,7 @@ def gravity_rule(
         what = "made of grains with cohesion" if surface.granular else "hard ground"
         raise ValueError(say("scaled_surface", surface=surface.name, what=what))
     near = abs(gravity / STANDARD_GRAVITY - 1) <= SAME
-    answer, why_not = _of_map(surface, STANDARD_GRAVITY if near else gravity, diameters)
+    answer, why_not = _of_map(surface, STANDARD_GRAVITY if near else gravity, diameters) if loose else (None, "")
     follows = bool(asked) or (asked is None and answer is not None and not near)
     used = answer if follows or near else None
     return GravityRule(
@@ -106,9 +106,8 @@ def _of_map(surface: Surface, gravity: float, diameters: Mapping[str, float]) ->
     for name, diameter in diameters.items():
         if not low <= diameter <= high:
             return None, say("beyond_map", name=name, diameter=1e3 * diameter, low=1e3 * low, high=1e3 * high)
-    grain = float(GroundSettings.model_fields["grain"].default)  # That K and C of the surface are extrapolated to
-    try:
-        answer = found.answer(gravity=gravity, diameter=surface.spike, grain=grain, packing=None, load=None)
+    try:  # K and C of the surface are those of the map's real grains
+        answer = found.answer(gravity=gravity, diameter=surface.spike, grain=None, packing=None, load=None)
     except ValueError as error:
         return None, say("beyond_gravity", error=error)
     return answer, ""

@@ -6,7 +6,7 @@ from typing import Any, TypedDict
 
 from coupling.robot import Foot, law_under_feet
 from coupling.robot.soles import FeetLaw
-from experiments.platform.settled import Number
+from experiments.platform.settled import Number, open_stiffness
 from experiments.platform.surfaces import Surface
 from rigid.ground.flat_foot import DEPTHS, OVER_LAW
 from rigid.ground.laws import SurfaceLaw, find_law
@@ -194,6 +194,8 @@ def spring_words(settings: RobotSettings, surface: Surface, largest: Largest, ru
     else:
         size = _similar(largest, Sole.of_spike(surface.spike), say("tip_sphere"), surface.spike, surface.name)
     told = [say("spring_defaults", names=" and ".join(left), surface=surface, size=size), *rule.errors(surface, left)]
+    if "stiffness" in left:
+        told += open_stiffness(surface)
     if surface.granular:
         told.append(say("springs_back", share=find_law("rft").rebound({})))
     return [*told, *_flat_in_grains("spring-damper" if len(left) == 2 else "", surface, largest)]

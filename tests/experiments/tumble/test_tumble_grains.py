@@ -14,8 +14,11 @@ from tumble_runs import SMALL, prepare_small, small_bed, stop_at
 
 from coupling import CoupledTumble, LawGround, LeftTheBedError
 from dem import SAND_WEAK, BedFailure
+from dem.grains.materials import material as find_material
 from experiments.cli.main import main
 from experiments.grains import following
+from experiments.grains.bearing import STICKING
+from experiments.grains.recipes import recipe_of
 from experiments.grains.softening import Softening, run_limit
 from experiments.platform.numbers import platform_numbers
 from experiments.runs.folder import RunFolder
@@ -338,6 +341,17 @@ def test_the_box_is_as_high_as_a_platform_carries_grains_that_stick():
         if surface == "jsc1a":
             assert found[surface] == pytest.approx(0.06 + 2 * sticky.trial.spike_length + rise + 2 * motor.grain)
     assert found["sand"] is bed
+
+
+def test_grains_that_stick_are_stiff_enough_for_what_a_spike_meets_however_little_the_law_sinks():
+    """The pressure holds the resistance of the material, of the largest forces; sand has none."""
+    met = STICKING * recipe_of(find_material("jsc-1a-loose-cut")).resistance
+
+    def chosen(surface):
+        return PlanarOnBed(on_bed(surface=surface, torque=0.22, bed_stages=None, stiffness=1500.0)).softening()
+
+    assert chosen("jsc1a").pressure > met > chosen("sand").pressure
+    assert chosen("jsc1a").young > 2 * chosen("sand").young
 
 
 def test_the_length_that_a_refusal_names_holds_the_way_that_tumbles_on_grains_have_gone():

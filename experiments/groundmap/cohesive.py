@@ -1,0 +1,93 @@
+"""The map of grains that stick: K, C and sinkage of a ball tip where weight and cohesion both carry it.
+
+Rigid grains that stick have two stresses, rho g D of their weight and that of cohesion, c. Slow forces are then
+
+    F = rho g D^3 f(z / D, d / D, c / (rho g D)),
+
+and c does not depend on the size of the grains (`dem.grains.materials.Material.for_grain`). The map takes f to be the
+sum of a part of weight and one of cohesion, with one dependence on d / D:
+
+    K = exp(a + b d / D) [(1 - s) (g / g0) (D / D0)^2 + s D / D0].
+
+So K stays where gravity vanishes. docs/results/penetrate-jsc-1a-push fits a, b and s to pushes and states by which
+factor the map misses beds that it was not fitted to. Below the finest of these grains ln K goes straight to that of
+real grains, which no push determines: its error grows to the whole range there.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .answers import SLACK, Answer, Number, check_depth, check_ranges, times
+from .settings import say
+
+__all__ = ["CohesiveMap"]
+
+
+@dataclass(frozen=True)
+class CohesiveMap:
+    """A table of maps.toml with `cohesive`."""
+
+    name: str
+    source: str
+    packing: float
+    deepest: float  # depth to which the map holds [tip diameters]
+    reference: Mapping[str, float]
+    """diameter [m], gravity [m/s2], load [N], grain of the real soil [m], speed of the fastest drives [m/s], least of
+    the depths from which K comes [diameters], most of gravity times diameter [m2/s2]."""
+    ranges: Mapping[str, tuple[float, float]]
+    law: Mapping[str, float]
+    """a, b and share s; off, the factor by which K misses left-out beds; finest d / D; K of real grains [N/m] and the
+    factor within which; C of them [N s/m] and its std; shape, the std of ln(F / K z) over depth."""
+
+    @property
+    def finest(self) -> float:
+        """d / D of the finest bed [1]."""
+        return self.law["finest"]
+
+    def answer(
+        self, *, gravity: float, diameter: float, grain: float | None, packing: float | None, load: float | None
+    ) -> Answer:
+        """The numbers of a spike; SI units. Raises ValueError for what is beyond the map, naming the key."""
+        packing = self.packing if packing is None else packing
+        grain = self.reference["grain"] if grain is None else grain
+        ratio = grain / diameter
+        asked = {"gravity": gravity, "tip_diameter": diameter, "packing": packing, "grain": ratio}
+        check_ranges(self.name, self.ranges, asked, diameter)
+        most = self.reference["most"]
+        if gravity * diameter > most * (1 + SLACK):
+            raise ValueError(say("beyond_weight", name=self.name, diameter=diameter, gravity=gravity,
+                                 lightest=most / diameter, smallest=most / gravity))  # fmt: skip
+        g, size, share = gravity / self.reference["gravity"], diameter / self.reference["diameter"], self.law["share"]
+        logarithm, error = self._of_grains(ratio)
+        value = math.exp(logarithm) * ((1 - share) * g * size**2 + share * size)
+        stiffness = Number(value, value * error)
+        damping = Number(self.law["damping"] * size**2, self.law["damping_std"] * size**2)
+        own_load = self.reference["load"] * g * size**3
+        load = own_load if load is None else load
+        sinkage = load / value
+        check_depth(sinkage, load=load, own_load=own_load, grain=grain, diameter=diameter, most=self.deepest)
+        deep = sinkage >= self.reference["shallowest"] * diameter
+        uncertain = times(Number(sinkage, sinkage * error), Number(1.0, self.law["shape"]))
+        return Answer(
+            stiffness, damping, uncertain, load, grain, ratio, packing, self.reference["speed"], deep
+        )  # fmt: skip
+
+    def _of_grains(self, ratio: float) -> tuple[float, float]:
+        """ln of K at the reference for d / D, and its standard deviation."""
+        finest, real = self.law["finest"], self.reference["grain"] / self.reference["diameter"]
+        off = math.log(self.law["off"])
+        if ratio >= finest:
+            return self.law["a"] + self.law["b"] * ratio, off
+        way = min(1.0, (finest - ratio) / (finest - real))
+        first, last = self.law["a"] + self.law["b"] * finest, math.log(self.law["stiffness"])
+        return first + way * (last - first), math.hypot(off, way * math.log(self.law["within"]))
+
+    def words(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:
+        """What a person must know of this map besides its numbers."""
+        size = diameter / self.reference["diameter"]
+        even = self.law["share"] / (1 - self.law["share"]) * self.reference["gravity"] / size  # [m/s2]
+        told = [say("of_cohesion", even=even, gravity=gravity), say("of_coarse_beds", map=self, answer=answer)]
+        if not math.isclose(size, 1.0, rel_tol=1e-6):
+            told.append(say("of_similarity", map=self))
+        return told
