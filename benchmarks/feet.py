@@ -69,8 +69,8 @@ def run(out: Path, *, progress: Any) -> Json:
     progress.plan({"feet": 1.0})
     progress.stage("feet", total=float(len(SHAPES) * len(LAWS) * len(COUNTS)))
     for shape, law, count in product(SHAPES, LAWS, COUNTS):
-        model, data = _robot(shape, count)
-        forces = FootForces(model, data, find_feet(model, data, ["foot_*"]), law=law)
+        (model, data), spike = _robot(shape, count), GROUNDS[law].values({})
+        forces = FootForces(model, data, find_feet(model, data, ["foot_*"]), law=law, parameters=spike)
         made, speeds = max(1, calls // count), []
         for _ in range(rounds):
             begin = time.process_time()

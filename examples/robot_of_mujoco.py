@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from coupling.robot import LawFeet, MujocoRobot, RobotRun
+from experiments.robot.own_loop import law_of_run
 
 small = "--small" in sys.argv
 model = Path(__file__).parents[1] / "experiments/examples/mujoco-hopper/hopper.xml"
@@ -15,7 +16,8 @@ def control(model, data):
 
 
 robot = MujocoRobot(model, feet=["foot"], controller=control)
-ground = LawFeet(robot.feet, parameters={"stiffness": 966.0, "damping": 8.68}, mu_s=0.6)  # as --surface sand
+sand = law_of_run(robot.model, ["foot"], surface="sand")  # as the command
+ground = LawFeet(robot.feet, **sand.law, mu_s=sand.mu_s)
 run = RobotRun(robot, ground, duration=0.35 if small else 1.0, substeps=4)
 rows = run.run()
 print(f"sinks {1e3 * rows['sinkage'].max():.1f} mm, rises {1e3 * (rows['z'].max() - rows['z'][0]):.1f} mm")

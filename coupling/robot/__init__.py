@@ -15,10 +15,10 @@ from .lammps_feet import LammpsFeet, refuse_in_lammps
 from .law_feet import LawFeet
 from .models import LostRobotError, load_model
 from .run import RobotRun
-from .soles import law_under_feet, sole_of
+from .soles import foot_matrices, law_under_feet, sole_of
 from .stability import check_exchange
 
 __all__ = [
     "BedFeet", "Foot", "FootForces", "LammpsFeet", "LawFeet", "LostRobotError", "MujocoRobot", "Part", "RobotRun",
-    "check_exchange", "find_feet", "law_under_feet", "load_model", "refuse_in_lammps", "sole_of",
+    "check_exchange", "find_feet", "foot_matrices", "law_under_feet", "load_model", "refuse_in_lammps", "sole_of",
 ]  # fmt: skip

@@ -18,11 +18,13 @@ import numpy as np
 
 from rigid.checks import check_above_zero
 from rigid.ground.laws import find_law
+from rigid.ground.soles import of_one_foot
 from rigid.ground.specialised import Specialised, specialised
 
 from .body import MujocoRobot
 from .feet import Foot, Part, refuse_missing
 from .law_feet import LawFeet
+from .soles import default_law, foot_matrices, refuse_defaults
 from .stability import check_exchange
 
 __all__ = ["FootForces"]
@@ -53,15 +55,18 @@ class FootForces(AbstractContextManager["FootForces"]):
     ----------
     model, data : of MuJoCo. Calls with any other model do nothing; the stability is checked where `data` is.
     feet : as `find_feet` gives them.
-    law, parameters, scales, under : as `LawFeet` has them; all parts must spring back the same share.
+    law, parameters, scales, under : as `LawFeet` has them; all parts must spring back the same share. With neither
+        `scales` nor `under`, a law of grains takes what `parameters` does not have from its defaults for sand, in the
+        gravity of `model` and with shape and size of each foot in the posture of `data`, as `hedgebed mujoco` does.
     mu_d : friction of sliding [1].
     slip_speed : below which friction falls with the slip [m/s]; a step of dt needs mu_d g dt at least.
 
     Several may be entered at once, one for each model; they take the place of any other ``mjcb_passive``. `points`
     counts the points evaluated. Each MjData of the model has its own deepest depths. They are forgotten where its time
     goes back or jumps by more than a step (``mj_resetData``, another state); a second call at the same time does not
-    count. Raises ValueError for a law there is not, and for numbers that cannot be; on entry also
-    for a step at which the exchange of a run would be unstable.
+    count. Raises ValueError for a law there is not, for numbers that cannot be, and for those of one foot
+    or gravity that are neither given nor known, such as K of spring-damper; on entry also for a step at which the
+    exchange of a run would be unstable.
     """
 
     def __init__(
@@ -79,7 +84,14 @@ class FootForces(AbstractContextManager["FootForces"]):
     ) -> None:
         mujoco = self._mujoco = refuse_missing()
         check_above_zero("in m/s", slip_speed=slip_speed)
-        found, given, scales, under = find_law(law), parameters or {}, scales or {}, under or {}
+        given = parameters or {}
+        if not scales and not under and any(name not in given for name in of_one_foot(law)):
+            gravity = float(np.linalg.norm(model.opt.gravity))
+            full = default_law(feet, foot_matrices(data, feet), law, given, gravity=gravity)
+            law, scales, under = full["law"], full["scales"], full["under"]
+        scales, under = scales or {}, under or {}
+        refuse_defaults(feet, law, given, under)
+        found = find_law(law)
         self.model, self._data, self.feet, self.points, self._law = model, data, list(feet), 0, found
         self._make_ground = partial(LawFeet, self.feet, law=law, parameters=given, scales=scales, under=under)
         self._mu_d, self._slip = float(mu_d), float(slip_speed)

@@ -13,6 +13,7 @@ from rigid.ground.laws import find_law
 from rigid.ground.reaction import Contact, Facts, Reaction, Turned
 
 from .feet import Foot
+from .soles import refuse_defaults
 
 __all__ = ["LawFeet"]
 
@@ -29,7 +30,8 @@ class LawFeet(LawPoints):
     scales : name of a part -> how many times the law it has, such as its area over that the law is of [1].
     under : name of a part -> its own parameters, in place of `parameters`; `law_under_feet` makes all three.
 
-    Raises ValueError for a law or parameter there is not.
+    Parameters that are of one foot or of one gravity, such as K, a radius or a gravity, have no defaults here. Raises
+    ValueError for one of them that is not given, and for a law or parameter there is not.
     """
 
     lag = 0.0
@@ -50,6 +52,7 @@ class LawFeet(LawPoints):
         under: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
         self.feet, scales, under = list(feet), scales or {}, under or {}
+        refuse_defaults(self.feet, law, parameters or {}, under)
         self.grounds: list[list[SurfaceGround]] = []
         for foot in feet:
             own = []

@@ -5,15 +5,22 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from coupling.poses import Vector
+from rigid.ground.laws import find_law
 from rigid.ground.rft_foot import FLAT, LYING, ROUND
-from rigid.ground.soles import Sole, sized_law
+from rigid.ground.soles import Sole, ill_sized, of_one_foot, sized_law
 
 from .feet import Foot, Part
 
-__all__ = ["FeetLaw", "law_under_feet", "outline", "plan_area", "sole_of"]
+__all__ = [
+    "TIP", "FeetLaw", "default_law", "foot_matrices", "law_under_feet", "outline", "plan_area", "refuse_defaults",
+    "sole_of",
+]  # fmt: skip
 
+TIP = 0.012
+"""Diameter of the tip that the defaults of the laws of grains are of [m] (`rigid.ground.laws`)."""
 LEAST = 1e-3
 """Area of a part over that of the tip below which it counts as that much: of a plate that stands on its edge."""
 
@@ -73,7 +80,7 @@ def sole_of(part: Part, matrix: Vector, *, of: float) -> Sole:
 
 def law_under_feet(
     feet: Sequence[Foot],
-    matrices: Sequence[Vector],
+    matrices: ArrayLike,
     law: str,
     parameters: Mapping[str, float],
     *,
@@ -82,14 +89,77 @@ def law_under_feet(
 ) -> FeetLaw:
     """A law of a tip of diameter `of` [m] as each part of `feet` has it: arguments of `LawFeet` and `FootForces`.
 
-    ``matrices``: rotation of each foot in the posture in which its size counts. ``parameters``, ``given``: as
-    `rigid.ground.soles.sized_law` has them. Raises ValueError as it.
+    ``matrices``: rotation of each foot from its own axes to the world's in the posture in which its size counts, shape
+    (foot, 3, 3), as `foot_matrices` returns them. ``parameters``, ``given``: as `rigid.ground.soles.sized_law` has
+    them. Raises ValueError as it, and where the law takes a gravity that is not in ``parameters``.
+
+    A law of a fitted tip under a round plate of 60 mm, which has 25 times the area of the tip:
+
+    >>> import mujoco
+    >>> from coupling.robot import FootForces, LawFeet, find_feet, foot_matrices, law_under_feet, load_model
+    >>> from rigid.ground_file import read_ground
+    >>> model = load_model("experiments/examples/mujoco-hopper/hopper.xml")
+    >>> data = mujoco.MjData(model)
+    >>> mujoco.mj_forward(model, data)
+    >>> feet = find_feet(model, data, ["foot"])
+    >>> sand = read_ground("docs/results/calibrate-sand-1mm/ground.toml")
+    >>> matrices = foot_matrices(data, feet)  # from the axes of each foot to the world's
+    >>> matrices.shape
+    (1, 3, 3)
+    >>> own = law_under_feet(feet, matrices, sand.law, sand.values, of=sand.foot.diameter)
+    >>> sorted(own)
+    ['law', 'scales', 'under']
+    >>> round(own["under"]["foot"]["stiffness"] / sand.values["stiffness"])
+    25
+    >>> FootForces(model, data, feet, **own, mu_d=0.3).points  # evaluated so far
+    0
+    >>> LawFeet(feet, **own, mu_s=0.6).name
+    'spring-damper'
     """
+    if "gravity" in of_one_foot(law) and "gravity" not in parameters:
+        raise ValueError(f"law = {law!r} takes the gravity of the grains [m/s2]: give gravity in parameters")
     under: dict[str, Mapping[str, float]] = {}
     scales: dict[str, float] = {}
     name = law
-    for foot, matrix in zip(feet, matrices, strict=True):
+    for foot, matrix in zip(feet, np.asarray(matrices, dtype=float), strict=True):
         for part in foot.parts:
             own = sized_law(law, parameters, sole_of(part, matrix, of=of), of=of, given=given)
             name, under[part.name], scales[part.name] = own.law, own.parameters, own.count
     return {"law": name, "under": under, "scales": scales}
+
+
+def foot_matrices(data: Any, feet: Sequence[Foot]) -> Vector:
+    """Rotation of each foot in an MjData from its own axes to the world's, shape (foot, 3, 3); after ``mj_forward``."""
+    return np.array([data.xmat[foot.body] for foot in feet]).reshape(-1, 3, 3)
+
+
+def default_law(
+    feet: Sequence[Foot], matrices: ArrayLike, law: str, given: Mapping[str, float], *, gravity: float
+) -> FeetLaw:
+    """`law` under `feet` with what is not `given` from its defaults: in this gravity [m/s2], of the size of each foot.
+
+    The defaults are those of a tip of `TIP`; what is given is of one foot. Raises ValueError, naming them, for
+    parameters of which there is no default for a foot: those of brick, or of another exponent or gravity.
+    """
+    found, hard = find_law(law), law == "spring-damper"
+    ill = [name for name in of_one_foot(law) if name not in given] if hard else ill_sized(law, given)
+    if ill:
+        raise ValueError(
+            f"law = {law!r}: {' and '.join(ill)} must be given in parameters, of one foot: there is no default for "
+            f"feet in sand"
+        )
+    values = found.values(found.in_gravity(gravity, given))
+    return law_under_feet(feet, matrices, law, values, of=TIP, given=tuple(given))
+
+
+def refuse_defaults(
+    feet: Sequence[Foot], law: str, parameters: Mapping[str, float], under: Mapping[str, Mapping[str, float]]
+) -> None:
+    """Raise ValueError, naming part and parameter, where a part takes a default that is of another foot or gravity."""
+    for part in (part for foot in feet for part in foot.parts):
+        own = under.get(part.name, parameters)
+        if missing := [name for name in of_one_foot(law) if name not in own]:
+            raise ValueError(
+                f"law = {law!r}: {' and '.join(missing)} of foot {part.name!r} is not given, and its default is of "
+                f"another foot or gravity: give it in parameters, or take law_under_feet(...)"
+            )

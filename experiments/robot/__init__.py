@@ -1,6 +1,7 @@
 """A robot of MuJoCo on a surface law or on a bed of grains.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed mujoco`; calling one imports what computes.
+`experiments.robot.own_loop.law_of_run` is its surface law for a loop of one's own.
 
 Imports `coupling`, `coupling.robot`, `dem`, `experiments.grains`, `experiments.groundmap`, `experiments.platform`,
 `experiments.runs`, `rigid`, `vis`.

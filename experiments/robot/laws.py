@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, TypedDict
 
 from coupling.robot import Foot, law_under_feet
-from coupling.robot.soles import FeetLaw
+from coupling.robot.soles import TIP, FeetLaw
 from experiments.platform.settled import Number, open_stiffness
 from experiments.platform.surfaces import Surface
 from rigid.ground.flat_foot import DEPTHS, OVER_LAW
@@ -26,7 +26,7 @@ __all__ = [
 
 SPIKES_PER_ROW = 2.0  # Surfaces have their K and C for a row of two spikes
 HARD = ("hunt-crossley", "power")  # Laws that hard ground has too: their defaults are those of brick
-SPIKE = 0.012  # Diameter of the spike that the defaults of the other laws are of [m] (rigid.ground.laws)
+SPIKE = TIP  # Diameter of the spike that the defaults of the other laws are of [m]
 SHAPE_DEPTH = 0.2
 """Depth over the diameter of the foot at which its shape is compared with that of the tip [1]: that of a light foot."""
 LIKE_TIP = 1.1
@@ -98,7 +98,8 @@ def law_of(
             law="spring-damper", parameters=own, of=surface.spike if surface.granular else None, given=given
         )
     given_here = given_parameters(settings)
-    parameters = find_law(settings.ground).in_gravity(numbers["gravity"].value, given_here)
+    found = find_law(settings.ground)
+    parameters = found.values(found.in_gravity(numbers["gravity"].value, given_here))
     unsized = not surface.granular or bool(ill_sized(settings.ground, given_here))  # the second: accepted
     return UnderFeet(law=settings.ground, parameters=parameters, of=None if unsized else SPIKE, given=tuple(given_here))
 
@@ -127,26 +128,27 @@ def settle_other_law(
 
     The spike that the defaults are of is the tip of ``largest``. Raises ValueError for a
     parameter there is not, or out of bounds. Unless they are accepted, it raises it also for one that no foot on grains
-    has, and for a law of grains on hard ground.
+    has, for a law of grains on hard ground, and for defaults of 1 g that follow no other gravity.
     """
     law, given = find_law(settings.ground), given_parameters(settings)
-    own = law.in_gravity(gravity, given)
-    values = law.values(own)
     ill = ill_sized(law.name, given)
+    law.values(given)  # refuses a name or value that cannot be, before what it would do
     _refuse_unsized(settings, surface, law, ill)
+    values = law.values(law.in_gravity(gravity, given))
     unsized = bool(ill) or not surface.granular
     powers = {} if unsized else diameter_powers(law.name, values)
     replaced = () if unsized or "radius" in given else OWN_SCALE.get(law.name, ())
     for parameter in law.parameters:
         name = parameter.name
         whose = "dry sand" if law.name in OWN_SCALE and not unsized else "one spike"
-        origin = f"default of {law.name}, of {whose}{_times(largest.times, powers.get(name, 0.0))}"
+        sized = _times(largest.times, powers.get(name, 0.0))
+        origin = f"default of {law.name}, of {whose}{_in_gravity(law, name)}{sized}"
         origin = "given" if name in given else origin
         if name not in ("gravity", *replaced) or (name in given and name != "gravity"):
             numbers[name] = Number(values[name], parameter.unit, origin)
         elif name == "gravity" and name in given:
             numbers["ground_gravity"] = Number(values[name], parameter.unit, origin)
-    left = [name for name in values if name not in own and name not in replaced]
+    left = [name for name in values if name not in given and name not in ("gravity", *replaced)]
     if not left:
         return []
     if unsized:
@@ -157,11 +159,12 @@ def settle_other_law(
         size = _similar(largest, Sole.of_spike(SPIKE), say("tip_sphere"), SPIKE, "dry sand")
     else:
         size = say("size_none")
-    more = "" if "gravity" in own else ", nor gravity"
+    follows = "gravity" in values or bool(law.gravity_powers)
+    more = "" if follows else ", nor gravity"
     told = [say("law_defaults", names=", ".join(left), law=law, surface=surface, more=more, size=size)]
     if of_sand(settings, surface):
         told = []  # `law_notes` has it
-    fixed = surface.granular and "gravity" not in values and not NEAR[0] <= gravity / STANDARD_GRAVITY <= NEAR[1]
+    fixed = surface.granular and not follows and not NEAR[0] <= gravity / STANDARD_GRAVITY <= NEAR[1]
     of_law = [say("gravity_of_law", law=law.name, gravity=gravity)] if fixed else []
     return [*told, *of_law, *_flat_in_grains("" if given or unsized else law.name, surface, largest)]
 
@@ -246,6 +249,12 @@ def _refuse_unsized(settings: RobotSettings, surface: Surface, law: SurfaceLaw, 
     key = "unsized_law" if law.name in HARD else "unsized_exponent"
     needed = " ".join(f"{name}=VALUE" for name in ill)
     raise ValueError(say(key, law=law, names=" and ".join(ill), surface=surface, needed=needed, spike=1e3 * SPIKE))
+
+
+def _in_gravity(law: SurfaceLaw, name: str) -> str:
+    """How a default follows gravity, in words; empty where it does not."""
+    power = law.gravity_powers.get(name)
+    return f" times (g / {STANDARD_GRAVITY:g} m/s2)^{power:g}" if power else ""
 
 
 def _times(largest: float, power: float) -> str:

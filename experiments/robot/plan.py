@@ -25,7 +25,17 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .gravity import GravityRule, gravity_rule
-from .laws import SPIKE, Largest, fitted_words, law_notes, law_of, settle_other_law, settle_spring, spring_words
+from .laws import (
+    SPIKE,
+    Largest,
+    UnderFeet,
+    fitted_words,
+    law_notes,
+    law_of,
+    settle_other_law,
+    settle_spring,
+    spring_words,
+)  # fmt: skip
 from .settings import RobotSettings
 
 __all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "try_controller", "width_of"]
@@ -60,10 +70,15 @@ class RobotPlan:
 
     def law_feet(self, robot: MujocoRobot, *, as_spring: bool = False) -> LawFeet:
         """The surface law under the robot's feet; `as_spring`: the spring-damper, whatever the settings say."""
-        own = law_of(self.settings, self.surface, self.fitted, self.numbers, as_spring=as_spring)
-        options = own.options(robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)])
+        options = self.feet_law(as_spring=as_spring).options(
+            robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)]
+        )
         mu_s, mu_d = (self.numbers[name].value for name in ("mu_s", "mu_d"))
         return LawFeet(robot.feet, mu_s=mu_s, mu_d=mu_d, time_step=LAW_STEP, **options)
+
+    def feet_law(self, *, as_spring: bool = False) -> UnderFeet:
+        """The law of `law_feet`, before it is scaled to each foot."""
+        return law_of(self.settings, self.surface, self.fitted, self.numbers, as_spring=as_spring)
 
     @property
     def law(self) -> str:
@@ -119,13 +134,16 @@ def keep_files(settings: RobotSettings, folder: Path) -> None:
         keep_given(folder, CONTROLLER, Path(settings.controller.rpartition(":")[0]).read_bytes())
 
 
-def plan_robot(settings: RobotSettings, *, folder: Path | None = None) -> RobotPlan:
+def plan_robot(settings: RobotSettings, *, folder: Path | None = None, model: Any = None) -> RobotPlan:
     """What `settings` describe; the files are those kept in `folder`, where it is given.
 
-    Raises ValueError, naming the setting, for what there is not and what cannot be.
+    ``model``: a mujoco.MjModel in place of the file that the settings name; a copy is used. Raises ValueError, naming
+    the setting, for what there is not and what cannot be.
     """
     mujoco = refuse_missing()
-    if folder is not None:
+    if model is not None:
+        model = copy.copy(model)
+    elif folder is not None:
         model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
     else:
         model = load_model(find_model(settings.model))

@@ -20,7 +20,7 @@ at every moment force * rate >= d(stored)/dt, as `tests/rigid/ground/test_laws.p
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -36,6 +36,9 @@ __all__ = [
     "springback_energy",
 ]  # fmt: skip
 
+EARTH_GRAVITY = 9.80665  # Standard gravity, that of the defaults [m/s2]
+NEAR_1_G = 0.1
+"""Relative difference from 1 g up to which defaults without a rule are used [1]: tables of moduli scatter by more."""
 Numbers = Any  # A law's numbers: anything that p[0], p[1] ... can be read from.
 
 MEMORY = (
@@ -61,6 +64,9 @@ class SurfaceLaw:
     rate_work: Callable[..., Any]
     has_memory: bool  # Whether it takes the deepest depth and the parameter `rebound`
     bends: tuple[int, ...] = ()  # Slots that hold depths at which the functions bend [m], for those who integrate them
+    gravity_powers: Mapping[str, float] = field(default_factory=dict, hash=False)
+    """Name of a parameter -> power of gravity that its default is in proportion to. The defaults are of 1 g."""
+    of_one_g: tuple[str, ...] = ()  # Parameters whose defaults are of 1 g and follow no known rule
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
         """All parameters, as given or by default. Raises ValueError as `check_parameters`."""
@@ -70,9 +76,27 @@ class SurfaceLaw:
         return check_parameters(self.parameters, given, self.name)
 
     def in_gravity(self, gravity: float, given: Mapping[str, float]) -> dict[str, float]:
-        """`given`, with this gravity of the grains [m/s2] where the law has one and it is not given."""
-        takes = any(parameter.name == "gravity" for parameter in self.parameters)
-        return ({"gravity": gravity} if takes else {}) | dict(given)
+        """`given`, and what of the defaults follows this gravity of the grains [m/s2] (`gravity_powers`).
+
+        Raises ValueError, naming them, where parameters of `of_one_g` are left at their defaults in a gravity that
+        differs from 1 g by more than `NEAR_1_G`.
+        """
+        left = [name for name in self.of_one_g if name not in given]
+        powers = {name: power for name, power in self.gravity_powers.items() if name not in given}
+        share = gravity / EARTH_GRAVITY
+        if powers and not gravity > 0:
+            raise ValueError(
+                f"gravity = {gravity:g} m/s2: {' and '.join(powers)} of {self.name} follow the weight of the grains, "
+                f"so gravity must be above 0, or give them"
+            )
+        if left and abs(share - 1) > NEAR_1_G:
+            raise ValueError(
+                f"gravity = {gravity:.4g} m/s2: the defaults of {' and '.join(left)} of {self.name} are of 1 g, and "
+                f"the source of the law has no rule for another gravity: give these parameters, or use rft"
+            )
+        own = {p.name: gravity for p in self.parameters if p.name == "gravity"}
+        own |= {p.name: p.default * share ** powers[p.name] for p in self.parameters if p.name in powers}
+        return own | dict(given)
 
     def numbers(self, given: Mapping[str, float], *, count: float = 1.0) -> tuple[float, ...]:
         """p of the functions for these parameters, of `count` spikes side by side. Raises ValueError as `values`."""
@@ -163,7 +187,9 @@ _REBOUND = _number("rebound", "1", 0.05, "share of the deepest depth that spring
                    source=MEMORY)  # fmt: skip
 _RADIUS = _number("radius", "m", 0.006, "radius of the spike's ball and shaft", highest=1.0, above_lowest=True,
                   source="ours : 12 mm across")  # fmt: skip
-_SAND = katsuragi_durian(diameter=0.012, projectile_density=7850.0, bulk_density=1500.0, friction=0.6, gravity=9.80665)
+_SAND = katsuragi_durian(
+    diameter=0.012, projectile_density=7850.0, bulk_density=1500.0, friction=0.6, gravity=EARTH_GRAVITY
+)
 
 _RFT = (
     _number("bulk_density", "kg/m3", 1500.0, "rho_c of the bed", highest=2e4, above_lowest=True,
@@ -172,7 +198,7 @@ _RFT = (
             source="dry sand; the fit of xi_n is for 0.3 to 0.9"),
     _number("surface_friction", "1", 0.4, "friction coefficient of grains and spike", highest=2.0,
             source="ours"),
-    _number("gravity", "m/s2", 9.80665, "gravity of the grains: 1 g even in the rig", highest=100.0,
+    _number("gravity", "m/s2", EARTH_GRAVITY, "gravity of the grains: 1 g even in the rig", highest=100.0,
             above_lowest=True, source="docs/planar.md"),
     _number("inertia", "1", 1.1, "lambda of the term lambda rho v_n^2", highest=10.0,
             source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rft.py"),
@@ -227,6 +253,7 @@ _LAWS = (
             _REBOUND,
         ),
         slots=("stiffness", "damping", "exponent"), extensive=(0, 1),
+        gravity_powers={"stiffness": 1.0, "damping": 0.5},
     ),
     _law(
         "katsuragi-durian", "spring_damper", "inertial",
@@ -238,7 +265,7 @@ _LAWS = (
             _number("drag", "kg/m", _SAND["drag"], "b = m / d_1: inertia of the grains", source="as stiffness"),
             _REBOUND,
         ),
-        slots=("stiffness", "drag"), extensive=(0, 1),
+        slots=("stiffness", "drag"), extensive=(0, 1), gravity_powers={"stiffness": 1.0},
     ),
     _law(
         "bekker", "bekker", "no",
@@ -257,6 +284,7 @@ _LAWS = (
             _REBOUND,
         ),
         slots=("pressure times section", "exponent", "tip_height"), extensive=(0,), bends=(2,), make=_make_bekker,
+        of_one_g=("cohesive_modulus", "frictional_modulus"),
     ),
     _law(
         "rft", "rft", "rft",

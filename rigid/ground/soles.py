@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from .laws import find_law
 from .rft_foot import FLAT, ROUND
 
-__all__ = ["SizedLaw", "Sole", "diameter_powers", "ill_sized", "shape_ratio", "sized_law"]
+__all__ = ["SizedLaw", "Sole", "diameter_powers", "ill_sized", "of_one_foot", "shape_ratio", "sized_law"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +80,17 @@ def diameter_powers(law: str, values: Mapping[str, float]) -> dict[str, float]:
         "rft": {},
     }
     return known[find_law(law).name]
+
+
+def of_one_foot(law: str) -> tuple[str, ...]:
+    """Names of the parameters of a law that are of one foot or of one gravity: their defaults suit no other.
+
+    Raises ValueError for a law there is not.
+    """
+    found = find_law(law)
+    own = {"bekker": ("radius", "tip_height", *found.of_one_g), "rft": ("radius", "gravity"),
+           "rft-foot": ("area", "height", "roundness", "perimeter", "gravity")}  # fmt: skip
+    return own[found.name] if found.name in own else tuple(diameter_powers(found.name, {}))
 
 
 def sized_law(

@@ -9,7 +9,7 @@ from import_graph import ROOT
 FINDER = doctest.DocTestFinder(exclude_empty=True, recurse=True)
 EXAMPLES = [
     pytest.param(test, id=f"{package}.{test.name}")
-    for package in ("rigid", "coupling")
+    for package in ("rigid", "coupling", "coupling.robot")
     for name in import_module(package).__all__
     if isinstance((public := getattr(import_module(package), name)), type) or callable(public)
     for test in FINDER.find(public, name, module=import_module(public.__module__))
@@ -18,11 +18,15 @@ EXAMPLES = [
 WITH_AN_EXAMPLE = {
     "rigid.Spike", "rigid.simulate", "rigid.flight", "rigid.escape_speed", "rigid.launch_speed_for",
     "rigid.find_platform", "coupling.drive", "coupling.drop", "coupling.set_down",
+    "coupling.robot.law_under_feet",
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_the_example_of_a_docstring_prints_what_it_says(example):
+def test_the_example_of_a_docstring_prints_what_it_says(example, monkeypatch):
+    if example.name.startswith("coupling.robot"):
+        pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+    monkeypatch.chdir(ROOT)
     assert doctest.DocTestRunner().run(example).failed == 0
 
 

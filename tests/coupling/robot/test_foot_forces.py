@@ -82,7 +82,7 @@ def test_its_wrench_on_a_foot_askew_is_the_sum_over_all_points_of_the_foot(law, 
     mujoco.mj_forward(model, data)
     (foot,) = find_feet(model, data, ["foot"])
     data.qfrc_passive[:] = 0.0
-    forces = FootForces(model, data, [foot], law=law, mu_d=mu_d, slip_speed=slow)
+    forces = FootForces(model, data, [foot], law=law, parameters=find_law(law).values({}), mu_d=mu_d, slip_speed=slow)
     forces(model, data)
     turn, found = data.xmat[foot.body].reshape(3, 3), find_law(law)
     speed, spin, push = data.qvel[:3], turn @ data.qvel[3:], np.zeros(6)

@@ -11,6 +11,7 @@ from coupling import LawGround, SpatialRun
 from coupling.poses import Wrench
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, RobotRun, load_model
 from coupling.robot.stability import Load
+from rigid.ground.laws import find_law
 from rigid.platform.actuation import TorqueHistory
 from rigid.platform.files import find_platform
 from rigid.spatial.quaternions import from_turn, to_matrix
@@ -148,7 +149,7 @@ def pushing(model, data):
 @pytest.mark.parametrize("law", ["hunt-crossley", "power", "katsuragi-durian", "bekker", "rft"])
 def test_every_law_stops_the_robot_and_its_impulse_is_what_the_robot_gained(law):
     robot = MujocoRobot(ball("sphere", "0.01", mass=0.05, height=0.0103), "foot")
-    ground = LawFeet(robot.feet, law=law, time_step=1e-5)
+    ground = LawFeet(robot.feet, law=law, parameters=find_law(law).values({}), time_step=1e-5)
     run = RobotRun(robot, ground, duration=0.1)
     rows = run.run()
     impulse = run.macro_step * float(rows["fz"].sum())

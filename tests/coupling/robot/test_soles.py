@@ -102,4 +102,4 @@ def test_parts_that_spring_back_differently_are_refused_in_the_callback():
     first = robot.feet[0].parts[0].name
     under = {first: find_law("rft").values({"rebound": 0.1})}
     with pytest.raises(ValueError, match=r"rebound, \[0\.05, 0\.1\]"):
-        FootForces(robot.model, robot.data, robot.feet, law="rft", under=under)
+        FootForces(robot.model, robot.data, robot.feet, law="rft", parameters=find_law("rft").values({}), under=under)

@@ -127,8 +127,11 @@ def test_a_law_that_springs_back_or_does_not_take_gravity_says_so():
     spring = {"ground": "spring-damper"}
     assert told("gives back", **spring) and told("gives back", **spring, gravity=1.0)
     assert not told("gives back", surface="brick") and not told("gives back")
-    for law in ("power-irreversible", "katsuragi-durian", "bekker"):
-        assert told("not take gravity", ground=law, gravity=1.0) and not told("not take gravity", ground=law)
+    for law in ("power", "hunt-crossley"):
+        unsized = {"ground": law, "ignore_foot_size": True}
+        assert told("not take gravity", **unsized, gravity=1.0) and not told("not take gravity", **unsized)
+    for law in ("power-irreversible", "katsuragi-durian"):
+        assert not told("not take gravity", ground=law, gravity=1.0)
     assert not told("not take gravity", gravity=1.0) and not told("not take gravity", **spring, gravity=1.0)
 
 
