@@ -37,6 +37,7 @@ DEPTHS = (3e-3, 5e-3)  # Down to which K and C are fitted, for a tip of 12 mm [m
 EARTH = 9.80665
 PACKING = 0.563  # Of the beds at 1 g [1]
 SLOW = 0.1  # Pushes below this speed are slow [m/s]
+SLOWEST = 0.02  # Pushes below this speed only show whether slow ones are slow enough [m/s]
 
 
 @dataclass(frozen=True, order=True)
@@ -82,6 +83,21 @@ def spring(rows: np.ndarray, depth: float) -> float:
     """K of one push: least squares of F = K z down to `depth` [N/m]."""
     z, force = rows[rows[:, 0] <= depth].T
     return float(z @ force / (z @ z))
+
+
+def without_slowest(pushes: Pushes) -> Pushes:
+    """The pushes that are fitted."""
+    return {place: {speed: rows for speed, rows in own.items() if speed > SLOWEST} for place, own in pushes.items()}
+
+
+def print_slowest(pushes: Pushes, depth: float) -> None:
+    """K of the slowest pushes over that of the next slow one at their place."""
+    for place, own in pushes.items():
+        first, *others = sorted(own)
+        if first < SLOWEST and others:
+            to = depth * place.tip / TIP
+            ratio = spring(own[first], to) / spring(own[others[0]], to)
+            print(f"K at {1e3 * first:g} over {1e3 * others[0]:g} mm/s, {place}: {ratio:.3g}")
 
 
 def fit_places(pushes: Pushes, depth: float) -> dict[Place, Fit]:
@@ -286,7 +302,8 @@ def print_dampings(fits: dict[Place, Fit]) -> tuple[Interval, float]:
 
 def main() -> None:
     """Fit, extrapolate, write and print."""
-    pushes = read_pushes()
+    everything = read_pushes()
+    pushes = without_slowest(everything)
     lines, numbers = [], {}
     for depth in DEPTHS:
         fits, words = fit_places(pushes, depth), f"0 to {1e3 * depth:g} mm"
@@ -309,6 +326,7 @@ def main() -> None:
         for key, ratio in print_gravities(pushes, depth).items():
             if ratio is not None:
                 numbers[f"{key}, {words}"] = {"value": ratio.mean, "chance": ratio.half, "count": ratio.count}
+        print_slowest(everything, depth)
         fastest = max(max(own) for own in pushes.values())
         numbers[f"map, {words}"] = map_of(fits) | {"fastest": fastest, "packing": PACKING}
         print("map:", {key: round(value, 3) for key, value in numbers[f"map, {words}"].items()})
