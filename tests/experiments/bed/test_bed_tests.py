@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from golden import golden
 
-from dem import SAND, Bed, BedFailure
+from dem import SAND, SAND_WEAK, Bed, BedFailure
 from dem.measure import cutting
 from dem.measure.cutting import cohesion_of, cut_and_load
 from dem.measure.penetrometer import ConePush, cone_gradient, cone_length, standard_speed
@@ -151,7 +151,7 @@ def test_a_face_of_sand_does_not_stand(cache):
 def test_a_face_of_grains_that_stick_stands_to_a_height_of_their_strength(tmp_path, monkeypatch):
     """Rumpf's tensile strength, packing Z F / pi d^2, times tan phi of about 0.5 bounds the cohesion from above."""
     monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
-    stuff = replace(SAND, name="sticky", cohesion="dmt", surface_energy=0.1)
+    stuff = replace(SAND_WEAK, name="sticky", cohesion="dmt", surface_energy=0.1)
     bed = Bed.prepare(stuff, size=(18 * GRAIN, 6 * GRAIN, 6 * GRAIN), grain=GRAIN, seed=1, threads=1)
     pull_off = 4 * math.pi * stuff.surface_energy * GRAIN / 4  # 4 pi gamma R*, R* = d / 4
     strength = bed.packing_fraction * bed.coordination_number * pull_off / (math.pi * GRAIN**2)
