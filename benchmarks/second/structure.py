@@ -17,9 +17,9 @@ from matplotlib.patches import Patch
 
 from benchmarks.diagnosis.table import read_cases
 from experiments.runs.types import Json
-from vis.page.plots import legend_above, sheet, styled
+from vis.page.plots import legend_above, sheet, styled, title_above
 
-__all__ = ["counted", "draw", "outcome_of"]
+__all__ = ["counted", "draw", "outcome_of", "titled"]
 
 GROUPS = ("nothing hidden", "one effect", "outside the library")
 OUTCOMES = {
@@ -64,6 +64,13 @@ def counted(cases: Sequence[Json]) -> dict[str, dict[float, Counter[str]]]:
     return found
 
 
+def titled(cases: Sequence[Json]) -> str:
+    """What the campaigns are of, as the figure has it; the second simulator's pushes are in sand at 1 g."""
+    kinds = sorted({str(case["kind"]).removeprefix("second-") for case in cases})
+    where = ", sand, 9.81 m/s²" if kinds == ["push"] else ""
+    return f"Verdicts on simulated campaigns ({' and '.join(kinds)}{where})"
+
+
 def draw(path: Path, cases: Sequence[Json]) -> None:
     """Write the figure of these records to `path`. Raises ValueError where none has a stated size."""
     found = counted(cases)
@@ -85,6 +92,7 @@ def draw(path: Path, cases: Sequence[Json]) -> None:
             axis.grid(False, axis="x")
         axes[0].set_ylabel("share of campaigns [1]")
         legend_above(drawing, [Patch(color=OUTCOMES[name], label=name) for name in OUTCOMES if name in seen], 6)
+        title_above(drawing, titled(cases))
         drawing.savefig(path, dpi=126)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from rigid.series import read_series
 from vis.page.numbers import typeset
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
 from vis.page.plots import GREY, new_figure, title_above
-from vis.page.report import Report, Result, number_text, report_of
+from vis.page.report import Report, Result, capital, number_text, report_of
 
 __all__ = ["write_validation_report"]
 
@@ -36,7 +36,7 @@ def write_validation_report(report: Report) -> Path:
 
 
 def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
-    """One plot: references as lines, what the bed did as dots."""
+    """One plot: references as lines, what the bed did as dots; a line and the dots that it is for have one colour."""
     columns = read_series(folder / plot["series"], text=("curve",))
     curves = dict.fromkeys(columns["curve"].tolist())
     path = folder / "figures" / f"{case['id']}-{number}.png"
@@ -45,19 +45,18 @@ def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
     below = _LEGEND_ROW * -(-len(curves) // across) if beneath else 0.0
     drawing = new_figure(_HEIGHT + below, width=_WIDTH)
     axis = drawing.subplots()
-    colours = cycle(_COLOURS)
     lines = plot["lines"]
+    colours = _colours(curves, lines)
     for label in curves:
         own = columns["curve"] == label
-        colour = GREY if label in lines and len(lines) == 1 else next(colours)
         axis.plot(
             columns["x"][own],
             columns["y"][own],
             "-" if label in lines else "o",
-            color=colour,
+            color=colours[label],
             ms=3.5,
             lw=1.6,
-            label=typeset(label),
+            label=typeset(label.replace("; ", ", ")),
         )
     axis.set(xlabel=typeset(plot["x"]), ylabel=typeset(plot["y"]), title=typeset(plot["title"]))
     if "x" in plot["log"]:
@@ -68,10 +67,34 @@ def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
         drawing.legend(fontsize=7, loc="outside lower center", ncols=across)
     else:
         axis.legend(fontsize=7)
-    title_above(drawing, typeset(case["title"]))
+    title_above(drawing, _titled(case))
     drawing.savefig(path, dpi=_DPI)
     caption = "Lines: the reference; dots: the bed." if plot["lines"] else "Dots: the bed."
     return figure(path, title=plot["title"], caption=caption, half=True)
+
+
+def _colours(curves: Iterable[str], lines: Collection[str]) -> dict[str, str]:
+    """The colour of each curve: grey where it is the only line; one colour for a line and the dots that it is for, as
+    "line; 3 mm" and "bed; 3 mm"; else each its own."""
+    found: dict[str, str] = {}
+    unpaired: dict[tuple[str, bool], str] = {}
+    colours = cycle(_COLOURS)
+    for label in curves:
+        is_line, of = label in lines, label.partition("; ")[2] or label
+        if is_line and len(lines) == 1:
+            found[label] = GREY
+        elif (of, not is_line) in unpaired:
+            found[label] = unpaired.pop((of, not is_line))
+        else:
+            found[label] = unpaired[of, is_line] = next(colours)
+    return found
+
+
+def _titled(case: Result) -> str:
+    """What the figures of a case are of: without "Measured", as their dots are simulated; grains and gravity."""
+    words = capital(str(case["title"]).removeprefix("Measured: "))
+    stuff = case.get("stuff", "")
+    return typeset(f"{words}; {stuff}" if stuff else words)
 
 
 def _cells(row: Result) -> tuple[str, ...]:

@@ -96,10 +96,15 @@ class RunFolder:
     reason: str = ""
 
     @property
-    def on_surface(self) -> str:
-        """What the title of a picture ends with: ", " and the material of the bed; empty where result.json has none."""
+    def surface(self) -> str:
+        """The bed, as the title of a picture has it: material and gravity, as far as result.json has them."""
         bed = self.result.get("bed")
-        return f", {bed['material']}" if isinstance(bed, dict) and isinstance(bed.get("material"), str) else ""
+        if not isinstance(bed, dict):
+            return ""
+        gravity = bed.get("gravity")
+        gravity = gravity.get("value") if isinstance(gravity, dict) else gravity
+        known = [str(bed["material"])] if isinstance(bed.get("material"), str) else []
+        return ", ".join([*known, f"{gravity:.3g} m/s²"] if isinstance(gravity, int | float) else known)
 
     def of_kind(self, kind: str) -> list[Run]:
         """The runs of a kind, by speed and seed."""

@@ -24,12 +24,15 @@ from vis.page.sentences import Sentences
 from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
 __all__ = [
-    "Plot", "above_surface", "by_speed", "drag_plot", "gap_plot", "has_model", "pair_of_handles", "spread_words",
-    "work_plot",
+    "RECORDED", "Plot", "above_surface", "by_speed", "drag_plot", "gap_plot", "has_model", "pair_of_handles",
+    "spread_words", "work_plot",
 ]  # fmt: skip
 
 say = Sentences(__package__)
 captions = Sentences(__package__, "figures.toml")
+RECORDED: dict[str, Any] = {"color": GREY, "lw": 0.7, "alpha": 0.7}
+"""Line of a force of the bed as recorded: grey, so that only means are in the bed's blue."""
+_UNLOADING: Any = (0, (5, 1.3, 1, 1.3))
 
 
 @dataclass(frozen=True)
@@ -110,17 +113,17 @@ def drag_plot(run: RunFolder) -> Plot | None:
     for axis, speed in zip(axes, speeds, strict=True):
         here = [r for r in driven if r.speed == speed]
         seeds = len(here)
-        axis.set_title(f"{speed:.3g} m/s{run.on_surface}   ({seeds} bed{'s' if seeds > 1 else ''})")
-        for way, shade in (("in", 1.0), ("out", 0.45)):
-            _band(axis, _parts([r.bed for r in here], way), BED, alpha=shade, solid=way == "in")
+        axis.set_title(f"{speed:.3g} m/s   ({seeds} bed{'s' if seeds > 1 else ''})")
+        for way, dashes in (("in", "-"), ("out", _UNLOADING)):
+            _band(axis, _parts([r.bed for r in here], way), dashes)
             if models := _parts([r.model for r in here], way):
                 grid, mean, _ = _mean_by_depth(models)
                 style = DASHED if way == "in" else (0, (1, 1.5))
                 axis.plot(1e3 * grid, mean, color=MODEL, ls=style, lw=1.8)
         for part in filter(None, (above_surface(r.bed) for r in here)):
-            axis.plot(1e3 * part.depth, part.force, color=BED, lw=0.6, alpha=0.25)
+            axis.plot(1e3 * part.depth, part.force, **RECORDED)
             grid, mean, _ = _mean_by_depth([part], bins=8)
-            axis.plot(1e3 * grid, mean, color=BED, lw=1.6, alpha=0.4)
+            axis.plot(1e3 * grid, mean, color=BED, lw=1.2)
         axis.axhline(0.0, color=GREY, lw=0.8)
         if above:
             axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
@@ -129,8 +132,8 @@ def drag_plot(run: RunFolder) -> Plot | None:
     _label(axes, "depth of the tip [mm]", "force on the spike [N]")
     handles = [handle("bed, loading", BED, lw=2.2)]
     out = any(((r.bed.phase == "out") & (r.bed.depth >= 0.0)).any() for r in driven if r.bed is not None)
-    handles += [handle("bed, unloading", BED, lw=2.2, alpha=0.45)] if out else []
-    handles += [handle("bed, as recorded", BED, lw=0.7, alpha=0.55)]
+    handles += [handle("bed, unloading", BED, lw=1.8, ls=_UNLOADING)] if out else []
+    handles += [handle("bed, as recorded", **RECORDED)]
     law = has_model(driven)
     handles += [handle("spring-damper, in", MODEL, ls=DASHED)] if law else []
     handles += [handle("spring-damper, out", MODEL, ls=(0, (1, 1.5)))] if law and out else []
@@ -237,17 +240,16 @@ def _label(axes: list[Axes], x: str, y: str) -> None:
             axis.set_ylabel(y)
 
 
-def _band(axis: Axes, there: Sequence[Series], colour: str, *, alpha: float, solid: bool) -> None:
+def _band(axis: Axes, there: Sequence[Series], dashes: Any) -> None:
+    """Force of the bed over depth: each part as recorded, their mean with these dashes, and their spread."""
     if not there:
         return
     grid, mean, spread = _mean_by_depth(there)
+    for part in there:
+        axis.plot(1e3 * part.depth, part.force, **RECORDED)
     if len(there) > 1:
-        for part in there:
-            axis.plot(1e3 * part.depth, part.force, color=colour, lw=0.6, alpha=0.45 * alpha)
-        axis.fill_between(1e3 * grid, mean - spread, mean + spread, color=colour, alpha=0.2 * alpha, lw=0)
-    else:
-        axis.plot(1e3 * there[0].depth, there[0].force, color=colour, lw=0.7, alpha=0.55 * alpha)
-    axis.plot(1e3 * grid, mean, color=colour, alpha=alpha, lw=2.2 if solid else 1.8)
+        axis.fill_between(1e3 * grid, mean - spread, mean + spread, color=BED, alpha=0.2, lw=0)
+    axis.plot(1e3 * grid, mean, color=BED, ls=dashes, lw=2.2 if dashes == "-" else 1.8)
 
 
 def _parts(runs: Iterable[Series | None], way: str) -> list[Series]:

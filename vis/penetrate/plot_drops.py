@@ -10,7 +10,7 @@ from vis.page.numbers import quote
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, nice_below, sheet
 from vis.page.report import capital
 from vis.page.sentences import Sentences
-from vis.penetrate.plot_drag import Plot, above_surface, by_speed, has_model, pair_of_handles, spread_words
+from vis.penetrate.plot_drag import RECORDED, Plot, above_surface, by_speed, has_model, pair_of_handles, spread_words
 from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
 
 __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
@@ -44,7 +44,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
                 above.plot(time, 1e3 * series.depth[shown], color=colour, ls=style, lw=1.1 if thin else 1.8)
                 force = series.force
                 if colour == BED:
-                    below.plot(time, force[shown], color=colour, lw=0.6, alpha=0.4)
+                    below.plot(time, force[shown], **RECORDED)
                     force = _running_mean(series.time, force, window)
                 inside, width = time >= 0.0, 1.2 if thin else 1.8
                 below.plot(time[inside], force[shown][inside], color=colour, ls=style, lw=width)
@@ -54,7 +54,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
                     1e3 * (series.time[peak] - start), series.force[peak], "o" if colour == BED else "D",
                     color=colour, ms=5, mec="white", mew=0.8, zorder=5,
                 )  # fmt: skip
-        above.set_title(f"dropped at {speed:.3g} m/s{run.on_surface}")
+        above.set_title(f"dropped at {speed:.3g} m/s")
         above.axhline(0.0, color=GREY, lw=0.8)
         if early:
             for axis in (above, below):
@@ -64,7 +64,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
     axes[0, 0].set_ylabel("depth of the tip [mm]")
     axes[1, 0].set_ylabel("force on the spike [N]")
     axes[0, 0].invert_yaxis()
-    recorded = handle("bed, as recorded", BED, lw=0.7, alpha=0.55)
+    recorded = handle("bed, as recorded", **RECORDED)
     peaks = handle("peak force, as recorded", GREY, marker="o", ls="", ms=5)
     bed, *model = pair_of_handles()[: 2 if has_model(drops) else 1]
     legend_above(figure, [bed, recorded, *model, peaks])

@@ -21,7 +21,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from vis.page.numbers import quote
-from vis.page.plots import INK, styled
+from vis.page.plots import DASHED, INK, styled
 
 __all__ = [
     "COLOURS", "FORCE", "HALO", "Page", "blank_page", "colour_top", "colour_values", "colourmap", "draw_force",
@@ -149,7 +149,8 @@ class Page:
             draw(axis)
             self._rulers(axis, place, section)
             figure.text(0.03, 0.965, title, fontsize=16, fontweight="bold", va="top", bbox=HALO)
-            figure.text(0.03, 0.905, lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35, bbox=HALO)
+            below = 0.965 - 0.06 - 0.045 * title.count("\n")
+            figure.text(0.03, below, lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35, bbox=HALO)
             if note:
                 figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
             self.colour_bar(figure, (0.885, 0.2, 0.018, 0.5), 11.5).ax.tick_params(labelsize=11)
@@ -178,6 +179,9 @@ class Page:
         x = left - offset
         count = int(np.floor((surface - floor) / step + 1e-9))
         line([(x, y, surface), (x, y, floor)], color=INK, lw=1.0)
+        # Across the cut, over the spike too: how deep its tip is shows against this line, not against the far surface.
+        line([(left, y, surface), (right, y, surface)], color="white", lw=2.4, alpha=0.6)
+        line([(left, y, surface), (right, y, surface)], color=INK, lw=1.1, ls=DASHED)
         for i in range(count + 1):
             z = surface - i * step
             ends = line([(x, y, z), (x - 0.5 * offset, y, z)], color=INK, lw=1.0)

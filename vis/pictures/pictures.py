@@ -65,6 +65,8 @@ assert image.GetScalarComponentAsDouble(32, 32, 0, 2) < 200
 _STILLS = 6
 _STILL_COSTS = 4.0  # in frames of the animation, as measured in software
 _ANIMATED = 48
+_TILTS = (0.06, 0.40)
+"""Least and greatest slope of the view down on a bed [1]."""
 
 
 @dataclass(frozen=True)
@@ -365,6 +367,16 @@ def _high(frame: Frame, by: str) -> float:
     return float(np.percentile(values, 99.5)) if len(values) else 0.0
 
 
+def _tilt(story: _Story, behind: float) -> float:
+    """How far the camera looks down, as a slope [1], on a bed that reaches so far behind the cut [m].
+
+    On the picture the surface behind the cut rises by tilt x `behind`. Above a spike that sinks less than this rise the
+    surface would look like the rim of a hole: the less it sinks, the lower the camera.
+    """
+    deepest = float(np.nanmax(story.depth)) if np.isfinite(story.depth).any() else behind
+    return float(np.clip(deepest / behind, *_TILTS)) if behind > 0.0 else _TILTS[1]
+
+
 def _view(
     run: RunFolder, story: _Story, frames: list[int], by: str, top: float, file: Path, size: tuple[int, int]
 ) -> View:
@@ -385,9 +397,11 @@ def _view(
         surface = float(stated)
     high[2] = max(min(high[2], surface + 0.25 * (surface - low[2])), surface)  # a grain that flies does not count
     count = f"{len(position):,}".replace(",", "\N{NO-BREAK SPACE}")
+    title = "\n".join(filter(None, (story.title, run.surface)))
     return {
-        "name": story.name, "frames": frames, "by": by, "top": top, "title": story.title + run.on_surface,
+        "name": story.name, "frames": frames, "by": by, "top": top, "title": title,
         "lines": [story.line(index) for index in frames], "note": f"{count} grains; {CUT}", "low": low.tolist(),
         "high": high.tolist(), "cut": cut, "radius": float(first.grains["radius"].mean()), "surface": surface,
+        "tilt": _tilt(story, float(high[1]) - cut),
         "file": str(file), "size": list(size),
     }  # fmt: skip

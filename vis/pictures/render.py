@@ -45,6 +45,7 @@ class View(TypedDict):
     cut: float
     radius: float
     surface: float
+    tilt: float
 
 
 class PictureJob(TypedDict):
@@ -54,8 +55,8 @@ class PictureJob(TypedDict):
     views: list[View]
 
 
-CUT = "cut open along the spike's mid-plane: what is in front is left out, of the spike too"
-_SLAB = "shown are those up to four diameters behind the spike's mid-plane, the farther the darker"
+CUT = "cut open along the spike's mid-plane: with the spike; dashed: the undisturbed surface"
+_SLAB = "up to four diameters behind the spike's mid-plane, the farther the darker; dashed: the undisturbed surface"
 """In the small print of a picture with OpenGL, and of one without."""
 _GIF_LIMIT = 5_500_000  # bytes
 _KEPT = tuple(ImageColor.getrgb(colour)[:3] for colour in ("#ffffff", *STATES.values(), str(FORCE["color"])))
@@ -96,7 +97,7 @@ def _images(folder: Path, view: View, opengl: bool) -> Iterator[NDArray[np.uint8
     page, frames = Page(size, view["by"], view["top"]), read_frames(folder, view["name"])
     section = (low[0], high[0], view["cut"], low[2], view["surface"])
     note = view["note"] if opengl else view["note"].replace(CUT, _SLAB)
-    drawer = (Scene if opengl else Section)(size, low, high, cut=view["cut"], radius=view["radius"])
+    drawer = (Scene if opengl else Section)(size, low, high, cut=view["cut"], radius=view["radius"], tilt=view["tilt"])
     with closing(drawer):
         for index, line in zip(view["frames"], view["lines"], strict=True):
             draw = partial(drawer.draw, frame=frames[index], colours=page.colours(frames[index].grains))

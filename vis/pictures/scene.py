@@ -134,10 +134,12 @@ class Scene(Rendered):
 
     ``size``: Width and height of the image [pixels]. ``low``, ``high``: Corners of the undisturbed bed [m]. ``cut``:
     Grains with y below this [m], and the part of a body in front of it, are left out. ``radius``: Typical radius of a
-    grain [m], for the shading of the gaps between them.
+    grain [m], for the shading of the gaps between them. ``tilt``: Slope at which the view goes down [1].
     """
 
-    def __init__(self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float) -> None:
+    def __init__(
+        self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float, tilt: float = 0.40
+    ) -> None:
         width, height = high[0] - low[0], high[2] - low[2]
         reach = float(max(width, 1.25 * height))
         centre = np.array([0.5 * (low[0] + high[0]), cut, 0.5 * (low[2] + high[2])])
@@ -148,7 +150,7 @@ class Scene(Rendered):
         self._plotter.enable_ssao(radius=3.0 * radius, bias=0.12 * radius, kernel_size=48, blur=True)
         self._plotter.enable_parallel_projection()
         camera = self._plotter.camera
-        view = np.array([0.0, -1.0, 0.40])  # from straight ahead: a depth on the ruler is the same all across the cut
+        view = np.array([0.0, -1.0, tilt])  # from straight ahead: a depth on the ruler is the same all across the cut
         camera.focal_point = tuple(centre)
         camera.position = tuple(centre + view / np.linalg.norm(view) * 1.3 * reach)
         camera.up = (0.0, 0.0, 1.0)

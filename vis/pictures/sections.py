@@ -28,10 +28,13 @@ class Section:
     """A view along +y on the plane of the cut, in proportion.
 
     ``size``: Width and height of the page [pixels]. ``low``, ``high``: Corners of the undisturbed bed [m]. ``cut``: The
-    plane's y [m]. ``radius``: Typical radius of a grain [m]; the slab is eight of them thick.
+    plane's y [m]. ``radius``: Typical radius of a grain [m]; the slab is eight of them thick. ``tilt``: Of the camera
+    of `Scene`; this view is level.
     """
 
-    def __init__(self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float) -> None:
+    def __init__(
+        self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float, tilt: float = 0.0
+    ) -> None:
         left, right, foot, head = 0.125, 0.865, 0.13, 0.90
         self._low, self._high = low, high
         self._cut, self._depth = cut, SLAB * radius

@@ -152,6 +152,7 @@ class Case:
     informational: bool = False  # it is shown and not counted: what it is held against is known to be something else
     seconds: float = 2.0  # expected time, for the progress [s]
     reason: str = ""  # why it fails, where it is known to; shown only while it does
+    stuff: str = ""  # of a bed: its grains and their gravity, for the titles of the figures
     waits_for: str = ""  # what is missing in the bed, where ``compute`` is None
 
     def __post_init__(self) -> None:
@@ -160,7 +161,8 @@ class Case:
 
     def about(self) -> Json:
         """What result.json says of it whatever comes out."""
-        return {key: getattr(self, key) for key in ("id", "family", "title", "reference", "source", "slow", "measured")}
+        keys = ("id", "family", "title", "reference", "source", "slow", "measured")
+        return {key: getattr(self, key) for key in keys} | ({"stuff": self.stuff} if self.stuff else {})
 
     def counted(self, status: str) -> str:
         """How a status counts: a failure of one that is informational does not."""

@@ -294,7 +294,7 @@ def _plots(rows: Sequence[Held], names: Sequence[str]) -> Iterator[Plot]:
         some = slice(None, None, max(1, len(x) // DOTS))
         curves.append(Curve(f"measured, {name}", x, one.measured.mean(axis=0) / unit, False))
         curves.append(Curve(f"bed, {name}", x[some], one.beds.mean(axis=0)[some] / unit))
-    yield Plot("One curve for all plates, were it so", "z / D [1]", "F / (rho g D^3) [1]", curves)
+    yield Plot("Forces of all plates, scaled by their size", "z / D [1]", "F / (rho g D^3) [1]", curves)
 
 
 def powers(rows: Sequence[Held], kind: str) -> tuple[float, float]:
