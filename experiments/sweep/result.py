@@ -94,13 +94,17 @@ def conclude(
 
 
 def shared_title(results: Iterable[str]) -> str:
-    """What all runs of a sweep are, such as "A tumble on brick": the parts up to a colon or comma that titles share.
+    """What all runs of a sweep are, such as "A tumble on brick: free at 1 m/s2": the parts up to a colon or comma that
+    titles share. Only those before the first that differs where it is the very first, or numbers of parts differ.
 
     ``results``: Text of each run's result.json; an empty one is of a run that failed.
     """
     titles = [re.split(r"(?<=[:,]) ", str(json.loads(text).get("title", ""))) for text in results if text]
-    shared = itertools.takewhile(lambda parts: len(set(parts)) == 1, zip(*titles, strict=False))
-    return " ".join(parts[0] for parts in shared).rstrip(":,")
+    same = [(part[0], len(set(part)) == 1) for part in zip(*titles, strict=False)]
+    if len({len(title) for title in titles}) > 1 or not (same and same[0][1]):
+        same = list(itertools.takewhile(lambda part: part[1], same))
+    shared = [words for words, alike in same if alike]
+    return " ".join(shared).rstrip(":,")
 
 
 def _columns(tasks: Sequence[Task], outcomes: Mapping[str, Outcome]) -> list[_Column]:

@@ -1,10 +1,12 @@
 """Pictures show something, and what they show depends on the data; without OpenGL sections stand in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
 
-from vis.pictures import pictures
+from vis.pictures import canvas, pictures
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.pictures import make_pictures, opengl_available
 from vis.pictures.render import write_gif
@@ -102,6 +104,24 @@ def test_the_set_down_has_a_scale_of_its_own(tmp_path, make_run):
     assert rest["top"] <= min(view["top"] for view in job["views"] if view["by"] == "displacement")
     tops = {view["top"] for view in job["views"] if view["by"] == "displacement" and view is not rest}
     assert len(tops) == 1
+
+
+def test_the_camera_is_low_where_a_spike_hardly_sinks(tmp_path, make_run):
+    """The surface behind the cut rises by tilt x its extent: no more than the spike sinks, within the bounds."""
+    run = pictures.read_folder(make_run(tmp_path, frames=2))
+    story = pictures._tell(run, "driven-0.1-seed1")
+    for depth, tilt in ((0.0001, 0.06), (0.006, 0.2), (0.030, 0.4)):
+        assert pictures._tilt(replace(story, depth=np.array([0.0, depth])), 0.030) == pytest.approx(tilt)
+
+
+def test_the_undisturbed_surface_is_dashed_across_the_cut(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(canvas, "pixels", lambda figure: drawn.append(figure))
+    page = canvas.Page((400, 300), "displacement", 1.0)
+    places = {"place": lambda points: points[:, [0, 2]], "section": (0.2, 0.8, 0.0, 0.1, 0.6)}
+    page.compose("A title", "", lambda axis: None, **places)
+    (line,) = (line for line in drawn[0].axes[0].lines if line.is_dashed())
+    assert line.get_xydata().tolist() == [[0.2, 0.6], [0.8, 0.6]]
 
 
 def test_a_renderer_that_dies_costs_no_pictures(tmp_path, monkeypatch, make_run):

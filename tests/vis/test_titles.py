@@ -12,6 +12,7 @@ from PIL import Image
 from experiments.sweep.result import shared_title
 from vis.compare.report import titles_of
 from vis.diagnose.figures import trials_of
+from vis.page.plots import title_above
 from vis.page.report import Report, title_of
 
 ROOT = Path(__file__).parents[2]
@@ -52,6 +53,16 @@ def test_a_figure_of_a_report_has_the_title_on_the_picture(tmp_path: Path) -> No
         assert image.height > 0.5 * image.width  # the picture has grown by the title
 
 
+def test_a_title_above_leaves_two_axes_of_one_panel_on_each_other() -> None:
+    drawing = Figure(figsize=(8.0, 4.0))
+    panel, beside = drawing.subplots(1, 2)
+    other = panel.twinx()
+    title_above(drawing, "A title")
+    places = [axis.get_position(original=True).bounds for axis in (panel, other, beside)]
+    assert places[0] == pytest.approx(places[1])
+    assert places[0][1::2] == pytest.approx(places[2][1::2])
+
+
 @pytest.mark.parametrize("folder", sorted(path.parent for path in RESULTS.glob("diagnose-*/model.toml")))
 def test_figures_of_a_diagnosis_name_surface_gravity_and_what_the_trials_are(folder: Path) -> None:
     title = trials_of(folder)
@@ -74,7 +85,8 @@ def test_figures_of_two_runs_have_a_line_for_each_with_its_surface() -> None:
 @pytest.mark.parametrize(
     ("titles", "shared"),
     [
-        (["A tumble on brick: 0.15 N m, rig", "A tumble on brick: 0.2 N m, rig"], "A tumble on brick"),
+        (["A tumble on brick: 0.15 N m, rig", "A tumble on brick: 0.2 N m, rig"], "A tumble on brick: rig"),
+        (["A tumble on brick: 0.15 N m, rig", "A tumble on brick: rig"], "A tumble on brick"),
         (["A 12 mm spike in sand", "A 12 mm spike in sand"], "A 12 mm spike in sand"),
         (["A tumble on brick: 0.2 N m", "A tumble on steel: 0.2 N m"], ""),
         ([], ""),

@@ -29,6 +29,8 @@ _BELOW = 0.3
 _SHEET = 1e-4
 """Extent behind the plane of the spikes of the ground of a law in that plane's pictures [m]: its upper edge is the
 surface, and no upper side is seen behind that."""
+_RULER = 0.2
+"""Longest ruler of a picture, over its width; lines on the ground of a law in space are one ruler apart."""
 _LINE = 0.0315
 """From one line of a key to the next, over the height of the sheet."""
 _STEADY = 0.03
@@ -150,7 +152,8 @@ class _Space(Camera):
             "high": high,
             "radius": reel.radius,
         }
-        stage = Stage(pixels, **seen, opacity=OPACITY) if opengl else FlatStage(pixels, **seen)
+        ruled = nice_below(_RULER * width)
+        stage = Stage(pixels, **seen, opacity=OPACITY, ruled=ruled) if opengl else FlatStage(pixels, **seen)
         stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
         focus = level - 0.12 * stage.height
         if narrow:
@@ -165,7 +168,7 @@ def _frame_and_ruler(axis: Any, stage: Stage | FlatStage) -> None:
     """A thin frame around the picture, and a length in its lower right corner: the same everywhere on the picture."""
     for spine in axis.spines.values():
         spine.set(visible=True, color="#bbbbbb")
-    step, right = nice_below(0.2 * stage.width), 0.97
+    step, right = nice_below(_RULER * stage.width), 0.97
     for colour, thick in (("white", 5.0), (INK, 2.5)):
         ends = [right - step / stage.width, right]
         axis.plot(ends, [0.035, 0.035], color=colour, lw=thick, solid_capstyle="butt")

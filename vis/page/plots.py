@@ -146,8 +146,8 @@ def title_above(figure: Figure, words: str) -> None:
     figure.draw_without_rendering()  # the panels keep the places that the layout gives them
     figure.set_layout_engine("none")
     figure.set_size_inches(width, grown)
-    for axis in figure.axes:
-        box = axis.get_position(original=True)
+    boxes = [axis.get_position(original=True) for axis in figure.axes]  # all before one moves: twins move together
+    for axis, box in zip(figure.axes, boxes, strict=True):
         axis.set_position((box.x0, share * box.y0, box.width, share * box.height))
     for legend in figure.legends:
         box = legend.get_bbox_to_anchor().transformed(figure.transFigure.inverted())

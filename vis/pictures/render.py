@@ -55,7 +55,7 @@ class PictureJob(TypedDict):
     views: list[View]
 
 
-CUT = "cut open along the spike's mid-plane: with the spike; dashed: the undisturbed surface"
+CUT = "cut open along the spike's mid-plane, with the spike; dashed: the undisturbed surface"
 _SLAB = "up to four diameters behind the spike's mid-plane, the farther the darker; dashed: the undisturbed surface"
 """In the small print of a picture with OpenGL, and of one without."""
 _GIF_LIMIT = 5_500_000  # bytes

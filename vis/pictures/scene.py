@@ -28,6 +28,8 @@ _RIM = (0.30, 0.32, 0.35)
 FLOOR = (0.55, 0.55, 0.57)
 METAL = (0.74, 0.76, 0.79)
 GROUND = (0.86, 0.80, 0.70)
+_RULED = (0.66, 0.59, 0.48)
+"""Lines on a block of ground."""
 OPACITY = 0.55
 """Of a block of ground with tips in it: they show through."""
 PARTS = {"hull": (0.80, 0.82, 0.85), "spikes": (0.52, 0.55, 0.60)}
@@ -69,6 +71,21 @@ class Rendered:
         self._plotter.add_mesh(
             box, color=colour, ambient=ambient, diffuse=diffuse, opacity=opacity, culling=culling, smooth_shading=False
         )
+
+    def add_grid(self, low: Array, high: Array, step: float) -> None:
+        """Lines along x and y, a `step` apart, on top of a box with these corners [m], that stay: they show how what
+        is above moves over a ground without grains."""
+        ends = []
+        for axis in (0, 1):
+            at = step * np.arange(np.ceil(low[axis] / step), np.floor(high[axis] / step) + 1.0)
+            for edge in (low[1 - axis], high[1 - axis]):
+                points = np.full((len(at), 3), high[2] + 1e-3 * step)
+                points[:, axis], points[:, 1 - axis] = at, edge
+                ends.append(points)
+        pairs = np.concatenate([np.stack(ends[:2], axis=1), np.stack(ends[2:], axis=1)])
+        if len(pairs):
+            lines = self._pyvista.line_segments_from_points(pairs.reshape(-1, 3))
+            self._plotter.add_mesh(lines, color=_RULED, line_width=2.0, lighting=False)
 
     def draw(self, axis: Any, *frame: Any, **more: Any) -> None:
         """Show the picture of a frame on an axes whose limits are 0 to 1; arguments as those of `render`."""
@@ -226,8 +243,8 @@ class Stage(Eye, Rendered):
     """Renders frames with VTK. Needs OpenGL: use it only in a process that may die.
 
     ``low``, ``high``: Corners of the bed [m]; without grains, of a block of ground. ``radius``: Typical radius of a
-    grain [m], for the shading of gaps; None: a block of ground in place of grains. ``opacity``: Of that block. (the
-    others as `Eye`)
+    grain [m], for the shading of gaps; None: a block of ground in place of grains. ``opacity``: Of that block.
+    ``ruled``: Distance of the lines on it [m]; 0: it has none. (the others as `Eye`)
     """
 
     def __init__(
@@ -238,6 +255,7 @@ class Stage(Eye, Rendered):
         high: Array,
         radius: float | None,
         opacity: float = 1.0,
+        ruled: float = 0.0,
         **view: float,
     ) -> None:
         Eye.__init__(self, size, **({"pitch": 0.24} | view))
@@ -245,6 +263,8 @@ class Stage(Eye, Rendered):
         thick = 0.03 * float(high[2] - low[2])
         if radius is None:
             self.add_block((low[0], high[0], self.cut, high[1], low[2], high[2]), GROUND, 0.4, 0.7, opacity)
+            if ruled > 0.0:
+                self.add_grid(low, high, ruled)
         else:
             self.add_block((low[0], high[0], self.cut, high[1], low[2] - thick, low[2] - 1e-6), FLOOR, 0.25, 0.8)
             if radius / self.width * size[0] > 4.0:  # on smaller grains the shading of gaps does not show

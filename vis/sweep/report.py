@@ -26,7 +26,7 @@ def write_sweep_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a sweep, and return the report."""
     result = report.result
     table = read_series(report.folder / "table.csv")
-    report.about = ": ".join(filter(None, (typeset(result.get("each", "")), str(result["title"]))))
+    report.about = "; ".join(filter(None, (typeset(result.get("each", "")), str(result["title"]))))
     drawn = result["columns"][:MOST_DRAWN]
     figures = [_over(report, table, column) for column in drawn]
     if len(result["columns"]) > len(drawn):
@@ -64,7 +64,9 @@ def _over(report: Report, table: Mapping[str, NDArray], column: Result) -> Block
             axis.tick_params(axis="x", labelrotation=30)
     axes[0].set_ylabel(f"{column['name'].replace('_', ' ')}{f' [{unit}]' if unit else ''}")
     if by:
-        marks = [handle(f"{group}", colour, marker="o", ls="") for group, colour in zip(groups, colours, strict=True)]
+        marks = [
+            handle(f"{by} = {group}", colour, marker="o", ls="") for group, colour in zip(groups, colours, strict=True)
+        ]
         legend_above(drawing, marks)
     name = column["name"].replace("_", " ").capitalize()
     key = "over" if by else "over_plain"

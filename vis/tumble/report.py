@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 from vis.film.film import draw_runs, shown
 from vis.film.reel import Reel
 from vis.page.folder import read_columns
-from vis.page.numbers import quantity, quote, short, typeset
+from vis.page.numbers import quantity, quote, short
 from vis.page.page import Block, Section, Tile, figure, listing, table, text
 from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result, given, report_of, tables, terms_text
@@ -121,8 +121,7 @@ def _trajectory(report: Report, numbers: Columns, states: States) -> Block:
     far = max(float(np.ptp(numbers["x_m"])), float(np.ptp(numbers["y_m"])))
     height = 3.8
     drawing, (path, rates) = panels(2, height, widths=(1.25, 1.0), right=0.925)
-    drawing.subplots_adjust(top=1 - 0.65 / height)  # the title stands between the legend and the powers of ten
-    path.set_title(typeset(report.result["title"]), fontsize=8.5, pad=14)
+    drawing.subplots_adjust(top=1 - 0.5 / height)  # below the legend there is room for powers of ten
     label = _draw_path(path, numbers, states, far, _value(report.result, "trajectory_angle"))
     more = (handle(label, INK, lw=1.0, ls=(0, (4, 3))),) if label else ()
     speed = np.hypot(numbers["vx_m_s"], numbers["vy_m_s"])
@@ -290,7 +289,10 @@ def _sweep_section(report: Report) -> Section:
     sweep = report.result["sweep"]
     drawing = _draw_sweep(sweep["keys"], report.columns(sweep["file"]))
     names = " and ".join(key["key"] for key in sweep["keys"])
-    about = f"{report.about.partition(':')[0]}: {sweep['trials']} trials over {names}"
+    what, _, given = report.about.partition(": ")
+    swept = {key["key"] for key in sweep["keys"]} & {"gravity", "rig"}
+    gravity = [part for part in given.split(", ") if " at " in part and not swept]
+    about = f"{', '.join([what, *gravity])}: {sweep['trials']} trials over {names}"
     drawn = report.draw("sweep", drawing, about=about, trials=sweep["trials"], names=names)
     made = tables(report.result) if "tables" in report.result else []
     return Section("The sweep", [drawn, *made, listing(sweep["sentences"])])

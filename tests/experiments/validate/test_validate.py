@@ -18,7 +18,7 @@ from experiments.validate.beds.friction_angle import mohr_angle
 from experiments.validate.pages import KEPT, markdown, notebook
 from experiments.validate.settings import ValidateSettings
 from experiments.validate.suite import SUITE, chosen
-from vis.bed.validation import _COLOURS, _draw
+from vis.bed.validation import _COLOURS, _colours, _draw, _titled
 
 
 def good(tell):
@@ -101,6 +101,20 @@ def test_many_curves_are_told_beneath_their_plot(tmp_path):
         heights.append(matplotlib.image.imread(tmp_path / "figures" / f"of-{count}-1.png").shape[0])
     assert heights[1] > heights[0] + 30
     assert len(set(_COLOURS)) == len(_COLOURS) >= 9
+
+
+def test_a_line_and_the_dots_that_it_is_for_have_one_colour():
+    lines, dots = ["line; 3 mm", "line; 7 mm"], ["bed; 3 mm", "bed; 7 mm", "bed 1; own", "bed 2; own"]
+    found = _colours([*lines, *dots], lines)
+    assert [found[label] for label in dots[:2]] == [found[label] for label in lines]
+    assert len(set(found.values())) == 4
+    assert _colours(["law", *dots], ["law"])["law"] not in {found[label] for label in dots}
+
+
+def test_figures_of_real_cases_name_grains_and_gravity_and_call_nothing_measured():
+    titles = {case.id: _titled(case.about()) for case in SUITE if case.measured}
+    assert titles["katsuragi-durian"].endswith("glass beads, 9.81 m/s\N{SUPERSCRIPT TWO}")
+    assert not [title for title in titles.values() if "easured" in title or "m/s\N{SUPERSCRIPT TWO}" not in title]
 
 
 def test_finished_cases_are_kept_until_their_code_changes(suite, tmp_path, monkeypatch):
