@@ -113,7 +113,7 @@ def test_a_line_and_the_dots_that_it_is_for_have_one_colour():
 
 def test_figures_of_real_cases_name_grains_and_gravity_and_call_nothing_measured():
     titles = {case.id: _titled(case.about()) for case in SUITE if case.measured}
-    assert titles["katsuragi-durian"].endswith("glass beads, 9.81 m/s\N{SUPERSCRIPT TWO}")
+    assert "glass beads" in titles["katsuragi-durian"]
     assert not [title for title in titles.values() if "easured" in title or "m/s\N{SUPERSCRIPT TWO}" not in title]
 
 
