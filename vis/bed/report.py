@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vis.page.folder import surface_words
 from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, figure, listing
 from vis.page.plots import DASHED, handle, legend_above, new_panels, shades
@@ -93,12 +94,13 @@ def _picture(report: Report) -> tuple[list[Block], str]:
     file = folder / "figures" / "bed.png"
     count = f"{len(grains['position']):,}".replace(",", "\N{NO-BREAK SPACE}")
     view: View = {
-        "name": "bed", "frames": [0], "by": "coordination", "title": "The bed",
+        "name": "bed", "frames": [0], "by": "coordination",
+        "title": "\n".join(filter(None, ("The bed", surface_words(result)))),
         "top": nice_above(float(colour_values(grains, "coordination").max())),
         "lines": [f"packing {result['quantities']['packing_fraction']['value']:.4f}"],
-        "note": f"{count} grains; cut open in the middle", "low": low.tolist(), "high": high.tolist(),
-        "cut": 0.5 * float(low[1] + high[1]), "radius": float(grains["radius"].mean()),
-        "surface": float(result["bed"]["surface"]["value"]), "file": str(file), "size": [1600, 1200],
+        "note": f"{count} grains; cut open in the middle; dashed: the surface", "low": low.tolist(),
+        "high": high.tolist(), "cut": 0.5 * float(low[1] + high[1]), "radius": float(grains["radius"].mean()),
+        "surface": float(result["bed"]["surface"]["value"]), "file": str(file), "size": [1600, 1200], "tilt": 0.4,
     }  # fmt: skip
     job: PictureJob = {"folder": str(folder), "views": [view]}
     stands_in = "a cross-section stands in for the picture"

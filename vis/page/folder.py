@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from rigid import series
 
 __all__ = [
     "PHASES", "PYTHON_RUNS", "Run", "RunFolder", "Series", "Setting", "from_python", "read_columns", "read_folder",
-    "read_series",
+    "read_series", "surface_words",
 ]  # fmt: skip
 
 PHASES = ("free", "in", "rest", "out")
@@ -98,13 +99,7 @@ class RunFolder:
     @property
     def surface(self) -> str:
         """The bed, as the title of a picture has it: material and gravity, as far as result.json has them."""
-        bed = self.result.get("bed")
-        if not isinstance(bed, dict):
-            return ""
-        gravity = bed.get("gravity")
-        gravity = gravity.get("value") if isinstance(gravity, dict) else gravity
-        known = [str(bed["material"])] if isinstance(bed.get("material"), str) else []
-        return ", ".join([*known, f"{gravity:.3g} m/s²"] if isinstance(gravity, int | float) else known)
+        return surface_words(self.result)
 
     def of_kind(self, kind: str) -> list[Run]:
         """The runs of a kind, by speed and seed."""
@@ -114,6 +109,18 @@ class RunFolder:
     def speeds(self, kind: str) -> list[float]:
         """The speeds [m/s] at which a kind was run, increasing."""
         return sorted({run.speed for run in self.runs if run.kind == kind and run.speed is not None})
+
+
+def surface_words(result: Mapping[str, Any]) -> str:
+    """Material and gravity of the bed of a result, as far as it has them; empty where it has no bed."""
+    bed = result.get("bed")
+    if not isinstance(bed, dict):
+        return ""
+    gravity, material = bed.get("gravity"), bed.get("material")
+    gravity = gravity.get("value") if isinstance(gravity, dict) else gravity
+    material = material.get("name") if isinstance(material, dict) else material
+    known = [material] if isinstance(material, str) else []
+    return ", ".join([*known, f"{gravity:.3g} m/s²"] if isinstance(gravity, int | float) else known)
 
 
 def read_folder(folder: str | Path) -> RunFolder:
