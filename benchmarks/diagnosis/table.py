@@ -22,6 +22,8 @@ Case = Json
 _LABELS = {
     "held_out_at_most_1_2": "right names: held-out gap at most 1.2, sensor noise alone",
     "held_out_with_scatter_at_most_1_2": "right names: held-out gap at most 1.2, with the scatter of fitted replicates",
+    "pairs_both_named_both_plain": "pairs both named, the weaker one's signature at least 10",
+    "pairs_both_named_weaker_visible": "pairs both named, the weaker one's signature 1 to 10",
     "replicates_that_differ": "right names: campaigns whose fitted replicates differ beyond the sensors",
     "intervals_hold_truth": "95 % intervals that hold the truth",
     "intervals_90_hold_truth": "90 % intervals that hold the truth",
@@ -60,7 +62,7 @@ def summarise(cases: Sequence[Case]) -> Json:
     plain = [c for c in single if c["signature"] >= _PLAIN]
     named = [c for c in single if c["verdict"] in ("named", "ambiguous")]
     right = [c for c in named if _right(c)]
-    explained = [*right, *(c for c in pairs if c["verdict"] != "unknown" and set(c["truth"]) == set(c["effects"]))]
+    explained = [*right, *(c for c in pairs if c["verdict"] != "unknown" and _both(c))]
     tried = [c for c in cases if "baselines" in c]
     names = sorted({name for c in tried for name in c["baselines"]} - {"code"})
     of_truth = [(_after(c), left) for c in right if (left := _by_truth(c)) is not None]
@@ -83,7 +85,9 @@ def summarise(cases: Sequence[Case]) -> Json:
         "sets_hold_truth": _share(named, holds),
         "ambiguous_sets_hold_truth": _share([c for c in named if c["verdict"] == "ambiguous"], holds),
         "set_size": float(np.mean([1 + len(c["alternatives"]) for c in named])) if named else None,
-        "pairs_both_named": _share(pairs, lambda c: set(c["truth"]) == set(c["effects"])),
+        "pairs_both_named": _share(pairs, _both),
+        "pairs_both_named_both_plain": _share([c for c in pairs if c["signature"] >= _PLAIN], _both),
+        "pairs_both_named_weaker_visible": _share([c for c in pairs if 1 <= c["signature"] < _PLAIN], _both),
         "pairs_one_named": _share(pairs, lambda c: bool(set(c["truth"]) & set(c["effects"]))),
         "pairs_something_false": _share(pairs, lambda c: bool(set(c["effects"]) - set(c["truth"]))),
         "unknown_recall": _share(outside, unknown),
@@ -106,6 +110,11 @@ def summarise(cases: Sequence[Case]) -> Json:
 def _right(case: Case) -> bool:
     """Whether the first name is the truth, and nothing else is called certain."""
     return case["verdict"] in ("named", "ambiguous") and case["effects"] == case["truth"]
+
+
+def _both(case: Case) -> bool:
+    """Whether the names are the two that are hidden, and no others. A pair's signature is that of the weaker one."""
+    return set(case["truth"]) == set(case["effects"])
 
 
 def _by_truth(case: Case) -> float | None:

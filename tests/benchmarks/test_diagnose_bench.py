@@ -67,6 +67,18 @@ def test_held_out_gaps_are_counted_with_the_sensors_noise_and_with_the_scatter_o
     assert summary["replicates_that_differ"] == {"share": pytest.approx(1 / 3), "of": 3}
 
 
+def test_pairs_are_counted_by_the_signature_of_the_weaker_effect():
+    """Plain ones, and those whose weaker effect is visible; a pair with an invisible effect counts in neither."""
+    both, one = ["layering", "adhesion"], ["adhesion"]
+    summary = summarise([
+        case(["adhesion", "layering"], "named", named, signature=signature)
+        for named, signature in ((both, 10.0), (one, 30.0), (both, 1.0), (both, 9.9), (one, 3.0), (one, 0.9))
+    ])  # fmt: skip
+    assert summary["pairs_both_named"] == {"share": 0.5, "of": 6}
+    assert summary["pairs_both_named_both_plain"] == {"share": 0.5, "of": 2}
+    assert summary["pairs_both_named_weaker_visible"] == {"share": pytest.approx(2 / 3), "of": 3}
+
+
 def test_ninety_percent_intervals_of_base_parameters_are_counted_by_number():
     def told(value, **more):
         numbers = {"stiffness": {"value": value, "std": 1.0}, "mass": {"value": 5.0, "std": 0.1}}
