@@ -18,9 +18,10 @@ from dem.grains.materials import Facing, Material
 from dem.grains.packing import bulk_packing, surface_height
 from rigid.ground.reaction import State
 
-from .law import WALL_TRIAL, MeanContact, kinetic_energy, law_words, spring_energy
+from .law import WALL_TRIAL, MeanContact, kinetic_energy, law_words, spring_energy, spring_force
 from .process import Lammps
 from .regions import MovingBody, check_count, check_thickness, pieces_of
+from .rolling import RollingClasses
 from .words import box_of, data_file, digits, spheres
 
 __all__ = ["LammpsBed"]
@@ -66,6 +67,8 @@ class LammpsBed:
         self._rows = [bed.state()["body_pair"][FLOOR].astype(float)]  # Pair parameters of floor and bodies
         self._grain_row = pair_row(self.material, tensile=self.tensile)
         self._mean = MeanContact.of(self.radius, self.mass)
+        self._classes = RollingClasses(self._grain_row, self.material, self.radius, self.mass)
+        self._followed = 0  # Step from which on LAMMPS follows the loads of the grains
         self._bodies: list[MovingBody] = []
         self._sums, self._reactions = np.zeros(0), np.zeros((1, 6))
         self._set_up = False  # Whether LAMMPS is ready to go on without a setup
@@ -88,9 +91,10 @@ class LammpsBed:
         places[:, 0] = self.begin + (places[:, 0] - self.begin) % self.size[0]
         places[:, 1] %= self.size[1]
         box = box_of(*self.size[:2], self.height + deepest, low=(self.begin, 0.0, -deepest))
-        atoms = spheres(self.radius, places, self.material.density)
+        atoms = spheres(self.radius, places, self.material.density, types=self._classes.of(self._loads(grains)))
         moving = [digits(row) for row in np.hstack([grains.velocity, grains.spin])]
-        (self._lammps.folder / "grains.data").write_text(data_file(box, atoms, moving), encoding="ascii")
+        text = data_file(box, atoms, moving, types=self._classes.count)
+        (self._lammps.folder / "grains.data").write_text(text, encoding="ascii")
         self._lammps.tell([*self._head(), "read_data grains.data", *self._interactions()])
 
     def _wears_out(self) -> bool:
@@ -111,19 +115,16 @@ class LammpsBed:
     def _interactions(self) -> list[str]:
         """What a restart file does not have, or not for certain: law, floor, gravity, integrator, lists."""
         g = math.hypot(*self.gravity)
-        grains, floor = self._words(self._grain_row), self._wall_words(self._rows[FLOOR], bodies=bool(self._bodies))
+        floor = self._wall_words(self._rows[FLOOR], bodies=bool(self._bodies))
         return [
             f"neighbor {_SKIN * self.mean_diameter:.17g} bin", "neigh_modify delay 0 every 1 check yes",
-            "pair_style granular", f"pair_coeff * * {grains}",
+            "pair_style granular", *self._classes.pairs(tensile=self.tensile),
             "fix motion all nve/sphere", f"fix pull all gravity {g:.17g} vector {digits(self.gravity)}",
             f"fix floor all wall/gran granular {floor} zplane 0.0 NULL contacts",
             "compute floor all reduce sum f_floor[2] f_floor[3] f_floor[4]",
             f"timestep {self.time_step:.17g}",
-            "thermo_style custom step", "thermo_modify lost error norm no",
+            "thermo_style custom step", "thermo_modify lost error norm no", *self._classes.watch(),
         ]  # fmt: skip
-
-    def _words(self, row: Sequence[float]) -> str:
-        return law_words(row, self.material, tensile=self.tensile, mean=self._mean)
 
     def _wall_words(self, row: Sequence[float], *, bodies: bool) -> str:
         """The same of floor or body. With ``bodies`` in the bed `_prepare` makes two setups."""
@@ -207,7 +208,7 @@ class LammpsBed:
         for body in self._bodies:
             self._check_inside(body, duration)
             commands += body.select(duration, self.mean_diameter)
-        self._lammps.tell([*commands, f"run {steps} pre no post no"])
+        self._lammps.tell([*commands, *self._classes.runs(self.steps, steps, self._followed)])
         self.steps += steps
         self.grain_steps += steps * self.grain_count
         for body in self._bodies:
@@ -358,6 +359,14 @@ class LammpsBed:
         touching = overlap > 0
         return pairs[touching, 0], pairs[touching, 1], overlap[touching]
 
+    def _loads(self, grains: Grains) -> Vector:
+        """Half the sum of r . F of each grain's contacts with grains, by their springs [N m], shape [grain_count]."""
+        first, second, overlap = self._touching(grains.position)
+        r_1, r_2 = self.radius[first], self.radius[second]
+        force = spring_force(self._grain_row, self.material.cohesion, overlap, r_1 * r_2 / (r_1 + r_2))
+        half = 0.5 * (r_1 + r_2 - overlap) * force
+        return sum((np.bincount(side, half, self.grain_count) for side in (first, second)), np.zeros(self.grain_count))
+
     def _look(self, position: Vector) -> tuple[Vector, Vector, Vector]:
         """`_touching`, with the largest overlap kept. Raises BedFailure past its bound, which only a look can see."""
         first, second, overlap = self._touching(position)
@@ -452,6 +461,7 @@ class LammpsBed:
         self._lammps.wait()
         path.unlink()
         self._sums, self._set_up, self._worn = np.zeros(0), False, False
+        self._followed = self.steps
 
     def close(self) -> None:
         """End LAMMPS."""

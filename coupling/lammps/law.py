@@ -11,7 +11,8 @@ go through it. E* and G* are the effective moduli, a the contact radius, m* the 
 | no pull by the dashpot | `limit_damping`, which LAMMPS has for Hertz alone: with DMT and JKR the dashpot may pull |
 | tangential spring 8 G* a, `rescaled` or `displacement` | `mindlin_rescale/force` or `mindlin` with k_t = 8 G* |
 | tangential dashpot | x_gammat = tangential over normal factor |
-| rolling friction | `rolling sds`: its spring is 8 G* a at `OVERLAP`, whatever the load; its bound is the same |
+| rolling friction | `rolling sds`: its spring is 8 G* a by classes of load (`.rolling`); its bound is the same |
+| rolling friction at floor and bodies | the spring is 8 G* a at `OVERLAP`, whatever the load |
 | sliding and rolling: the bound holds the spring, the dashpot acts while it sticks | it holds the two together |
 | twisting | `twisting marshall`: the same spring; its bound is 2/3 mu a F_n, ours 3 pi / 16 mu a F_n; another dashpot |
 
@@ -49,13 +50,7 @@ Row = Sequence[float] | np.ndarray
 TANGENTIAL = {"displacement": "mindlin", "rescaled": "mindlin_rescale/force"}
 """LAMMPS' names of our springs (`Material.tangential`)."""
 OVERLAP = 0.004
-"""Overlap of the contact whose rolling spring all contacts have, over a diameter [1]. LAMMPS has none that follows the
-load.
-
-Chosen by the push of docs/results/lammps-push: with 0.004 its mean force over 5.3 ms is 0.4 ± 1.6 % above ours, with
-0.01 2.7 ± 0.5 % above, and with 0.001 4 % below. A platform that is set down meets 0.4 and 0.8 % more than in our bed
-over 7.9 ms (docs/notes/scale.md). Grains that are pressed harder have too soft a rolling spring: the shipped wheel on
-12 mm grains pulls 13 % less than in our bed, and 7 % less with 0.01 (5 % without rolling friction)."""
+"""Overlap of the contact whose rolling spring all contacts with floor and bodies have, over a diameter [1]."""
 _TRIAL = "hertz/material 1 0.9 0 tangential linear_nohistory 0 0 damping tsuji"
 WALL_TRIAL = (
     "region trial block 0 2 0 2 0 2 units box", "create_box 1 trial", "create_atoms 1 single 1 1 0.45 units box",
@@ -71,7 +66,7 @@ _LEAST, _MOST = 0.05, 1.2  # Between which the polynomial falls
 
 @dataclass(frozen=True)
 class MeanContact:
-    """The contact for which constant springs of rolling are chosen: contact radius [m] and reduced mass [kg]."""
+    """The contact for which a constant spring of rolling is chosen: contact radius [m] and reduced mass [kg]."""
 
     radius: float
     mass: float

@@ -18,10 +18,12 @@ def box_of(*sides: float, low: Sequence[float] = (0.0, 0.0, 0.0), figures: int =
     return [f"{digits((begin, begin + side), figures)} {axis}lo {axis}hi" for begin, side, axis in ends]
 
 
-def spheres(radii: np.ndarray, places: np.ndarray, density: float, figures: int = 17) -> list[str]:
-    """Type, diameter [m], density [kg/m3] and position [m] of each sphere."""
-    rows = zip(radii, places, strict=True)
-    return [f"1 {digits((2 * radius, density, *place), figures)}" for radius, place in rows]
+def spheres(
+    radii: np.ndarray, places: np.ndarray, density: float, figures: int = 17, *, types: np.ndarray | None = None
+) -> list[str]:
+    """Type (1 if not given), diameter [m], density [kg/m3] and position [m] of each sphere."""
+    rows = zip(np.ones(len(radii), dtype=int) if types is None else types, radii, places, strict=True)
+    return [f"{kind} {digits((2 * radius, density, *place), figures)}" for kind, radius, place in rows]
 
 
 def data_file(box: Sequence[str], atoms: Sequence[str], velocities: Sequence[str] = (), *, types: int = 1) -> str:
