@@ -7,6 +7,7 @@ a foot at rest on a slope creeps. What it computes is therefore not the bits of 
 
 import copy
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -58,6 +59,7 @@ class FootForces(AbstractContextManager["FootForces"]):
     law, parameters, scales, under : as `LawFeet` has them; all parts must spring back the same share. With neither
         `scales` nor `under`, a law of grains takes what `parameters` does not have from its defaults for sand, in the
         gravity of `model` and with shape and size of each foot in the posture of `data`, as `hedgebed mujoco` does.
+    depths : name of a part -> depth to which its parameters hold [m]; the first part that goes deeper warns, once.
     mu_d : friction of sliding [1].
     slip_speed : below which friction falls with the slip [m/s]; a step of dt needs mu_d g dt at least.
 
@@ -81,6 +83,7 @@ class FootForces(AbstractContextManager["FootForces"]):
         slip_speed: float = 0.01,
         scales: Mapping[str, float] | None = None,
         under: Mapping[str, Mapping[str, float]] | None = None,
+        depths: Mapping[str, float] | None = None,
     ) -> None:
         mujoco = self._mujoco = refuse_missing()
         check_above_zero("in m/s", slip_speed=slip_speed)
@@ -109,10 +112,11 @@ class FootForces(AbstractContextManager["FootForces"]):
             for part in foot.parts:
                 own = under.get(part.name, given)
                 numbers = found.numbers(own, count=part.share * scales.get(part.name, 1.0))
-                groups += _groups(part, specialised(found, numbers), count)
+                limit = (depths or {}).get(part.name, math.inf)
+                groups += _groups(part, specialised(found, numbers), count, limit)
                 count += len(part.centres)
             self._plans.append((foot, groups))
-        self._zeros = [0.0] * count
+        self._zeros, self._warned = [0.0] * count, False
         self._forgotten = _Depths(self._zeros, self._zeros)  # of a law without memory
         self._apply, self._velocity = mujoco.mj_applyFT, mujoco.mj_objectVelocity
 
@@ -173,6 +177,15 @@ class FootForces(AbstractContextManager["FootForces"]):
             if self._push(data, body, height, turns[body].tolist(), groups, depths):
                 self._apply(model, data, self._force, self._torque, places[body], body, data.qfrc_passive)
 
+    def _warn(self, depth: float, name: str, limit: float) -> None:
+        """Warn that a part goes deeper than its parameters hold [m], once."""
+        self._warned = True
+        warnings.warn(
+            f"foot {name!r} goes {1e3 * depth:.3g} mm deep, and the parameters of its law hold to "
+            f"{1e3 * limit:.3g} mm: the force is extrapolated",
+            stacklevel=2,
+        )
+
     def _push(self, data: Any, body: int, height: float, m: list[float], groups: Any, depths: _Depths) -> bool:
         """Force and torque of a foot about its origin into `_force` and `_torque`; whether there are any."""
         mu_d, slow, remembers, rebound = self._mu_d, self._slip, self._law.has_memory, self._rebound
@@ -180,7 +193,7 @@ class FootForces(AbstractContextManager["FootForces"]):
         m0, m1, m2, m3, m4, m5, m6, m7, m8 = m
         fx = fy = fz = tx = ty = tz = 0.0
         moving = None
-        for gx, gy, gz, ex, ey, ez, law, radius, spreads, points in groups:
+        for gx, gy, gz, ex, ey, ez, law, radius, spreads, points, limit, name in groups:
             if height + m6 * gx + m7 * gy + m8 * gz > abs(m6) * ex + abs(m7) * ey + abs(m8) * ez:
                 continue
             self.points += len(points)
@@ -194,6 +207,8 @@ class FootForces(AbstractContextManager["FootForces"]):
                     depth += size
                 if depth <= 0.0:
                     continue
+                if depth > limit and not self._warned:
+                    self._warn(depth, name, limit)
                 if spreads:
                     size = size if size > 1e-300 else 1.0
                     cx -= (s0 * dx + s1 * dy + s2 * dz) / size
@@ -236,14 +251,15 @@ class FootForces(AbstractContextManager["FootForces"]):
 
 
 _Group = tuple[
-    float, float, float, float, float, float, Specialised, float, dict[int, list[float]], list[tuple[Any, ...]]
-]
+    float, float, float, float, float, float, Specialised, float, dict[int, list[float]], list[tuple[Any, ...]], float,
+    str,
+]  # fmt: skip
 """Points of a part. Of all: the middle and half the sides of a box around them [m], the law, the radius of the
 balls that they are the lowest points of [m], or 0. Of each on an ellipsoid: its S as xx, xy, xz, yy, yz, zz [m]. Of
-each: its centre [m], its place among all points of the feet."""
+each: its centre [m], its place among all points of the feet. Of all: the depth to which the law holds [m], the name."""
 
 
-def _groups(part: Part, law: Specialised, first: int) -> list[_Group]:
+def _groups(part: Part, law: Specialised, first: int, limit: float) -> list[_Group]:
     """The points of a part, the `first`th and on, in a lower and an upper half: mostly one of them is in the air.
 
     A part has balls of one radius, or ellipsoids.
@@ -261,5 +277,5 @@ def _groups(part: Part, law: Specialised, first: int) -> list[_Group]:
         spreads = {first + int(k): part.spreads[k][np.triu_indices(3)].tolist() for k in some}
         rows = [(*part.centres[k].tolist(), first + int(k)) for k in some]
         own = (radius, {}) if round_ else (0.0, spreads)
-        found.append((*middle.tolist(), *half.tolist(), law, *own, rows))
+        found.append((*middle.tolist(), *half.tolist(), law, *own, rows, limit, part.name))
     return found

@@ -31,6 +31,7 @@ class FeetLaw(TypedDict):
     law: str
     under: dict[str, Mapping[str, float]]  # Name of a part -> its parameters
     scales: dict[str, float]  # Name of a part -> how many times the law it has [1]
+    depths: dict[str, float]  # Name of a part -> depth to which its parameters hold [m]; empty where that is not known
 
 
 def plan_area(vertices: Any) -> float:
@@ -86,12 +87,15 @@ def law_under_feet(
     *,
     of: float,
     given: Collection[str] = (),
+    depth: float | None = None,
 ) -> FeetLaw:
     """A law of a tip of diameter `of` [m] as each part of `feet` has it: arguments of `LawFeet` and `FootForces`.
 
     ``matrices``: rotation of each foot from its own axes to the world's in the posture in which its size counts, shape
     (foot, 3, 3), as `foot_matrices` returns them. ``parameters``, ``given``: as `rigid.ground.soles.sized_law` has
-    them. Raises ValueError as it, and where the law takes a gravity that is not in ``parameters``.
+    them. ``depth``: to which the parameters hold under the tip [m], such as ``range["depth"][1]`` of a ground file; of
+    a foot it is as many of its diameters. Raises ValueError as `sized_law`, and where the law takes a
+    gravity that is not in ``parameters``.
 
     A law of a fitted tip under a round plate of 60 mm, which has 25 times the area of the tip:
 
@@ -108,7 +112,7 @@ def law_under_feet(
     (1, 3, 3)
     >>> own = law_under_feet(feet, matrices, sand.law, sand.values, of=sand.foot.diameter)
     >>> sorted(own)
-    ['law', 'scales', 'under']
+    ['depths', 'law', 'scales', 'under']
     >>> round(own["under"]["foot"]["stiffness"] / sand.values["stiffness"])
     25
     >>> FootForces(model, data, feet, **own, mu_d=0.3).points  # evaluated so far
@@ -120,12 +124,16 @@ def law_under_feet(
         raise ValueError(f"law = {law!r} takes the gravity of the grains [m/s2]: give gravity in parameters")
     under: dict[str, Mapping[str, float]] = {}
     scales: dict[str, float] = {}
+    depths: dict[str, float] = {}
     name = law
     for foot, matrix in zip(feet, np.asarray(matrices, dtype=float), strict=True):
         for part in foot.parts:
-            own = sized_law(law, parameters, sole_of(part, matrix, of=of), of=of, given=given)
+            sole = sole_of(part, matrix, of=of)
+            own = sized_law(law, parameters, sole, of=of, given=given)
+            if depth is not None:
+                depths[part.name] = depth * sole.diameter / of
             name, under[part.name], scales[part.name] = own.law, own.parameters, own.count
-    return {"law": name, "under": under, "scales": scales}
+    return {"law": name, "under": under, "scales": scales, "depths": depths}
 
 
 def foot_matrices(data: Any, feet: Sequence[Foot]) -> Vector:

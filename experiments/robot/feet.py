@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from coupling.robot import RobotRun
+from coupling.robot import LawFeet, RobotRun
 
 from . import say
 
-__all__ = ["FEW", "feet_quantities", "feet_reached", "heights_of"]
+__all__ = ["FEW", "feet_quantities", "feet_reached", "heights_of", "too_deep"]
 
 FEW = 6  # Most feet whose numbers are quantities of their own
 NAMES = ("clearance_largest", "clearance_end", "sinkage_largest", "sinkage_end")
@@ -38,6 +38,20 @@ def feet_reached(run: RobotRun, heights: Array) -> dict[str, dict[str, float]]:
         }
         for k, foot in enumerate(run.robot.feet)
     }  # fmt: skip
+
+
+def too_deep(run: RobotRun) -> list[str]:
+    """A sentence where a part of a foot went deeper than its law holds, of the part that did so most."""
+    limits, feet = run.ground.depths if isinstance(run.ground, LawFeet) else {}, run.feet
+    found: list[tuple[float, str, float]] = []
+    for k, foot in enumerate(run.robot.feet):
+        ups = _ups(feet[:, k, 3:7])
+        for part in foot.parts:
+            if part.name in limits:
+                depth = -float((feet[:, k, 2] + (part.vertices @ ups.T).min(axis=0)).min())
+                found.append((depth / limits[part.name], part.name, depth))
+    most, name, depth = max(found, default=(0.0, "", 0.0))
+    return [say("too_deep", name=name, depth=1e3 * depth, limit=1e3 * limits[name])] if most > 1 else []
 
 
 def feet_quantities(reached: dict[str, dict[str, float]]) -> dict[str, tuple[float, str, str]]:

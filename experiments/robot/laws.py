@@ -6,6 +6,7 @@ from typing import Any, TypedDict
 
 from coupling.robot import Foot, law_under_feet
 from coupling.robot.soles import TIP, FeetLaw
+from experiments.groundmap.maps import read_map
 from experiments.platform.settled import Number, open_stiffness
 from experiments.platform.surfaces import Surface
 from rigid.ground.flat_foot import DEPTHS, OVER_LAW
@@ -67,12 +68,13 @@ class UnderFeet:
     parameters: Mapping[str, float]
     of: float | None  # Diameter of the tip [m]; None where they are not scaled to the size of a foot
     given: Collection[str] = ()  # Names of parameters that are of one foot already
+    depth: float | None = None  # To which they hold under the tip [m]; None: not known
 
     def options(self, feet: Sequence[Foot], matrices: Sequence[Any]) -> FeetLaw | OneLaw:
         """Arguments of `LawFeet` for `feet`, turned by `matrices`."""
         if self.of is None:
             return {"law": self.law, "parameters": self.parameters}
-        return law_under_feet(feet, matrices, self.law, self.parameters, of=self.of, given=self.given)
+        return law_under_feet(feet, matrices, self.law, self.parameters, of=self.of, given=self.given, depth=self.depth)
 
 
 def law_of(
@@ -90,18 +92,27 @@ def law_of(
     ``ignore_foot_size`` they run as under a spike. The law of a file is always scaled.
     """
     if fitted is not None and not as_spring:
-        return UnderFeet(law=fitted.law, parameters=fitted.values, of=fitted.foot.diameter)
+        depth = fitted.range["depth"][1]
+        return UnderFeet(law=fitted.law, parameters=fitted.values, of=fitted.foot.diameter, depth=depth)
     if as_spring or settings.on_grains or settings.ground == "spring-damper":
         own = {key: numbers[key].value for key in ("stiffness", "damping")}
         given = [key for key in own if getattr(settings, key) is not None]
-        return UnderFeet(
-            law="spring-damper", parameters=own, of=surface.spike if surface.granular else None, given=given
-        )
+        tip = surface.spike if surface.granular else None
+        depth = None if tip is None or "stiffness" in given else _depth_of_map(surface, tip)
+        return UnderFeet(law="spring-damper", parameters=own, of=tip, given=given, depth=depth)
     given_here = given_parameters(settings)
     found = find_law(settings.ground)
     parameters = found.values(found.in_gravity(numbers["gravity"].value, given_here))
     unsized = not surface.granular or bool(ill_sized(settings.ground, given_here))  # the second: accepted
     return UnderFeet(law=settings.ground, parameters=parameters, of=None if unsized else SPIKE, given=tuple(given_here))
+
+
+def _depth_of_map(surface: Surface, tip: float) -> float | None:
+    """Depth to which K and C of `surface` hold under its spike [m], as its map has it; None without a map."""
+    try:
+        return read_map(surface.grains or "").deepest * tip
+    except ValueError:
+        return None
 
 
 def settle_spring(

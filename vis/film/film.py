@@ -28,13 +28,26 @@ from vis.pictures import canvas
 from vis.pictures.pictures import Picture, Pictures, carry_out
 from vis.pictures.render import main, write_pictures
 
-__all__ = ["ARROWS", "MOST_FRAMES", "Sheet", "draw_runs", "film_times", "moments", "run_film_job", "shown"]
+__all__ = [
+    "ARROWS",
+    "ARROWS_OF_FEET",
+    "MOST_FRAMES",
+    "Sheet",
+    "draw_runs",
+    "film_times",
+    "moments",
+    "run_film_job",
+    "shown",
+]
 
 say = Sentences(__package__)
-ARROWS = say("arrows")
+ARROWS, ARROWS_OF_FEET = say("arrows"), say("arrows_of_feet")
 MOST_FRAMES = 48
 _TALLEST = 2.0
-"""Weights that the longest arrow of a run in space stands for at most: a robot that hops pushes with several."""
+"""Weights whose arrow is as long as the longest arrow of a run in space: a robot that hops pushes with several."""
+_LEAST = 0.2
+"""Least scale of the arrows, over that at which none is shortened: a blow of more than ten weights is cut, with its
+number, so that others can be seen."""
 _WORDS = {"start": "when the torque begins", "half": "half way round", "end": "at the end"}
 
 
@@ -78,7 +91,7 @@ class Sheet:
         self.page = canvas.Page(size, by, max(reel.colour_top(by) for reel in self.reels) or 1.0)
         self.weight = max(reel.number("weight") for reel in self.reels)
         peak = max((reel.peak for reel in self.reels if isinstance(reel, SpaceReel)), default=0.0)
-        self.shorter = min(1.0, _TALLEST * self.weight / peak) if peak > 0.0 else 1.0
+        self.shorter = float(np.clip(_TALLEST * self.weight / peak, _LEAST, 1.0)) if peak > 0.0 else 1.0
         reach = max(reel.reach for reel in self.reels)
         self.panels = layout(self.reels)
         self.stages, self.ways = [], []

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rigid.result import read_result
 from vis.page.folder import read_columns
-from vis.page.plots import Array, mean_over
+from vis.page.plots import Array
 from vis.page.report import Result
 from vis.pictures.canvas import colour_top, moved_since
 from vis.pictures.frames import Frame, Frames, frames_of, grains_box, read_frames
@@ -112,26 +112,31 @@ class SpaceReel(_Filmed):
         """Its title."""
         return str(self.result["title"])
 
-    @cached_property
+    @property
     def centres(self) -> Array:
         """Middle of what the hull's corners span at every picture [m], shape (n, 3)."""
-        return np.array([np.asarray(frame.bodies["hull"][0].mean(axis=0), dtype=float) for frame in self.frames])
+        return self._seen[0]
+
+    @property
+    def peak(self) -> float:
+        """Largest force of one foot or spike in any picture [N]; 0: there is none."""
+        return self._seen[1]
+
+    @cached_property
+    def _seen(self) -> tuple[Array, float]:
+        """`centres` and `peak`, from one reading of the frames."""
+        centres, peak = [], 0.0
+        for frame in self.frames:
+            centres.append(np.asarray(frame.bodies["hull"][0].mean(axis=0), dtype=float))
+            force = frame.clouds["row_forces"][1]["force"] if "row_forces" in frame.clouds else np.zeros((0, 3))
+            peak = max(peak, float(np.linalg.norm(force, axis=1).max(initial=0.0)))
+        return np.array(centres), peak
 
     @cached_property
     def reach(self) -> float:
         """Largest distance of a tip from the centre [m]."""
         points = np.concatenate([part for part, _ in self.frames[0].bodies.values()])
         return float(np.linalg.norm(points - self.centres[0], axis=1).max())
-
-    @cached_property
-    def peak(self) -> float:
-        """Largest force of the ground on all of it [N], a mean over 5 ms; 0 where the folder does not have it."""
-        path = self.folder / "series" / "motion.csv"
-        motion = read_columns(path)[0] if path.exists() else {}
-        if "fz_N" not in motion:
-            return 0.0
-        means = mean_over(5e-3, motion["t_s"], (motion[f"f{axis}_N"] for axis in "xyz"))
-        return float(np.linalg.norm(means, axis=0).max())
 
     @cached_property
     def box(self) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vis.film.film import ARROWS, draw_runs, shown
+from vis.film.film import ARROWS_OF_FEET, draw_runs, shown
 from vis.film.reel import SpaceReel
 from vis.page.numbers import quantity
 from vis.page.page import Section, Tile, listing, table_of, text
@@ -56,7 +56,7 @@ def write_robot_report(
     seen = []
     if pictures and frames_of(home):
         made = draw_runs([SpaceReel(home)], home, "robot", by=colour, film=film, progress=report.rest())
-        notes = [text(ARROWS, small=True), *(text(note) for note in made.notes)]
+        notes = [text(ARROWS_OF_FEET, small=True), *(text(note) for note in made.notes)]
         seen = [Section("Pictures", [*report_scene(home), *shown(made), *notes])]
     quantities = result["quantities"]
     sections = [

@@ -1,23 +1,31 @@
 """How high and how deep each foot of a robot goes, and the frames that show it."""
 
+import warnings
+
 import numpy as np
 import pytest
 
-from coupling.robot import LawFeet, MujocoRobot, RobotRun
+from coupling.robot import FootForces, LawFeet, MujocoRobot, RobotRun, find_feet, law_under_feet, load_model
 from experiments.grains.tracked_frames import PlatformFrames
 from experiments.robot import experiment as robot
-from experiments.robot.feet import FEW, feet_quantities, feet_reached, heights_of
+from experiments.robot.feet import FEW, feet_quantities, feet_reached, heights_of, too_deep
+from experiments.robot.on_grains import RobotFollowed
+from experiments.robot.plan import plan_robot
 from experiments.robot.result import RobotFrames
 from experiments.robot.settings import RobotSettings
 from experiments.runs.folder import read_series
 from rigid.spatial.quaternions import to_matrix
+from vis.film.film import Sheet
+from vis.film.reel import SpaceReel
 from vis.pictures.frames import frame_names, frames_of, read_frames
 from vis.robot.report import write_robot_report
 from vis.view.sources import sources_of
 
-pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
 HOPPER = {"model": "hopper", "feet": ("foot",)}
+LUMP = """<mujoco><worldbody><body pos="0 0 0.2"><freejoint/><geom type="box" size=".05 .05 .03" mass="1"/>
+  <geom name="foot" size=".03" pos="0 0 -.1" mass=".5"/></body></worldbody></mujoco>"""
 PAIR = """<mujoco><worldbody>
   <body name="one" pos="0 0 0.13"><freejoint/><geom name="box" type="box" size=".04 .03 .01" euler="0 20 0" mass="1"/>
   </body><body name="two" pos="0.3 0 0.24"><freejoint/>
@@ -90,3 +98,56 @@ def test_frames_of_a_robot_are_named_so_and_older_ones_are_continued_and_shown(t
     run = dropped(tmp_path, duration=0.01)
     RobotFrames(run, tmp_path / "old", settings, resumed=True)
     assert frame_names(tmp_path / "old") == ["tumble"] and len(read_frames(tmp_path / "old", "tumble").times)
+
+
+def test_the_arrow_of_a_blow_of_several_weights_fits_into_its_picture(tmp_path, monkeypatch):
+    """1.5 kg fall by 20 mm on 20 kN/m: v sqrt(K m) is 108 N, seven weights."""
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    (tmp_path / "lump.xml").write_text(LUMP)
+    given = {"model": str(tmp_path / "lump.xml"), "feet": ("foot",), "height": 0.02, "stiffness": 2e4, "damping": 0.0}
+    robot.run(RobotSettings(**given, surface="brick", duration=0.11, frame_count=25), tmp_path / "run")
+    reel, cut = SpaceReel(tmp_path / "run"), []
+    monkeypatch.setattr("vis.pictures.canvas._note", lambda *given: cut.append(given[-1]))
+    sheet = Sheet([reel], (480, 300), by="displacement", opengl=False)
+    pushes = [reel.frame(k).clouds["row_forces"][1]["force"] for k in range(len(reel))]
+    largest = max(float(np.linalg.norm(force, axis=1).max(initial=0.0)) for force in pushes)
+    assert reel.peak == pytest.approx(largest) and largest > 4 * reel.number("weight")
+    assert sheet.shorter * largest == pytest.approx(2 * reel.number("weight"))
+    for time in reel.times:
+        sheet.draw(time)
+    assert not cut
+    sheet.shorter = 1.0  # as a blow in no frame would leave it
+    for time in reel.times:
+        sheet.draw(time)
+    assert cut
+    sheet.close()
+
+
+@pytest.mark.parametrize(("radius", "deep"), [(0.005, True), (0.03, False)])
+def test_a_foot_deeper_than_its_diameter_is_warned_of_by_runs_and_in_mujocos_own_loop(tmp_path, radius, deep):
+    """A ball of 1 kg on K = 39 N/m of 12 mm by area: 10 mm sink by over 0.3 m, 60 mm by 20 to 30 mm."""
+    file = tmp_path / "ball.xml"
+    file.write_text(
+        f"<mujoco><worldbody><body pos='0 0 {radius}'><joint type='slide' axis='0 0 1'/>"
+        f"<geom name='foot' size='{radius}' mass='1'/></body></worldbody></mujoco>"
+    )
+    settings = RobotSettings(model=str(file), feet=("foot",), ground="spring-damper", duration=0.1, frame_count=0)
+    plan = plan_robot(settings)
+    run = RobotFollowed(settings, plan).run_on_law()
+    run.run()
+    assert (run.feet[-1, 0, -1] > 2 * radius) == deep
+    told = too_deep(run)
+    limit = run.ground.depths["foot"]
+    assert limit == pytest.approx(2 * radius, rel=0.01)
+    assert [f"hold to {1e3 * limit:.3g} mm" in said for said in told] == [True] * deep
+    model = load_model(file)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    feet = find_feet(model, data, ["foot"])
+    own = {name: plan.numbers[name].value for name in ("stiffness", "damping")}
+    sized = law_under_feet(feet, [np.eye(3)], "spring-damper", own, of=0.012, depth=0.012)
+    with warnings.catch_warnings(record=True) as caught, FootForces(model, data, feet, **sized):
+        warnings.simplefilter("always")
+        for _ in range(200):
+            mujoco.mj_step(model, data)
+    assert [f"hold to {1e3 * limit:.3g} mm" in str(one.message) for one in caught] == [True] * deep
