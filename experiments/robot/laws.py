@@ -92,8 +92,8 @@ def law_of(
     ``ignore_foot_size`` they run as under a spike. The law of a file is always scaled.
     """
     if fitted is not None and not as_spring:
-        depth = fitted.range["depth"][1]
-        return UnderFeet(law=fitted.law, parameters=fitted.values, of=fitted.foot.diameter, depth=depth)
+        most = fitted.range["depth"][1]
+        return UnderFeet(law=fitted.law, parameters=fitted.values, of=fitted.foot.diameter, depth=most)
     if as_spring or settings.on_grains or settings.ground == "spring-damper":
         own = {key: numbers[key].value for key in ("stiffness", "damping")}
         given = [key for key in own if getattr(settings, key) is not None]
