@@ -11,6 +11,7 @@ phi of the grains. It is a lower bound here: a cone in `jsc-1a-loose` met some e
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ from .softening import PACKING, bearing_gradient
 
 __all__ = [
     "COHESIONS", "OF_PLATE", "STICKING", "UNSURE", "Bearing", "bearing_capacity", "bearing_of", "cohesion_of",
-    "friction_angle", "resistance_of", "strength",
+    "friction_angle", "resistance_of", "sinks_past", "strength",
 ]  # fmt: skip
 
 COHESIONS = (10.0, 30.0, 100.0, 300.0, 1000.0)
@@ -109,3 +110,8 @@ def bearing_of(material: Material, *, grain: float, gravity: float, area: float)
     plate = bearing_gradient(PACKING * material.density, gravity, material.friction) * area
     resistance = resistance_of(material, grain)
     return Bearing(OF_PLATE * strength(material) * plate, resistance * area, resistance)
+
+
+def sinks_past(bears: Bearing, load: float, depths: Sequence[float]) -> bool:
+    """Whether a `load` [N] sinks past all `depths` [m] even where the bed bears `UNSURE` times what is expected."""
+    return all(load > UNSURE * bears.load(depth) for depth in depths)

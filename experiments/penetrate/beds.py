@@ -10,7 +10,7 @@ from dem.contact.timestep import time_step_for
 from dem.grains.materials import material
 from dem.prepare import prepare
 from dem.prepare.bedfile import find_bed
-from experiments.grains.bearing import STICKING, UNSURE, Bearing, bearing_of, strength
+from experiments.grains.bearing import STICKING, Bearing, bearing_of, sinks_past, strength
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.recipes import recipe_of
 from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material, stable_overlap
@@ -212,6 +212,4 @@ def resting_load(settings: PenetrateSettings, *, sure: float = 1.0) -> float:
 
 def sinks_away(settings: PenetrateSettings) -> bool:
     """Whether the load is too much for the whole foot and for this bed, even if they bear twice what is expected."""
-    bears = expected_bearing(settings)
-    deep = settings.weight > UNSURE * bears.load(settings.foot)
-    return deep and settings.weight > resting_load(settings, sure=UNSURE)
+    return sinks_past(expected_bearing(settings), settings.weight, (settings.foot, deepest(settings)))

@@ -103,9 +103,16 @@ class Findings:
         fitted = {s: units for s, units in own.items() if any(unit.kind != "set_down" for unit in units)}
         return {s: fit_spring_damper({u.id: self.beds[u.id] for u in units}) for s, units in fitted.items()}
 
+    @property
+    def beds_separate(self) -> bool:
+        """Whether the runs that all beds have determine K and C of each bed by itself."""
+        return bool(self.seed_fits) and all(fit.separates for fit in self.seed_fits.values())
+
     def quantities(self) -> dict[str, Json]:
         """The headline numbers: name -> value, std between seeds, unit, note."""
-        fits, load, drops = list(self.seed_fits.values()), self.settings.weight, self.of("drop")
+        load, drops = self.settings.weight, self.of("drop")
+        # K and C of beds that do not separate them differ by how the fit splits one force.
+        fits = list(self.seed_fits.values()) if self.beds_separate else []
         sunk, model_sunk = self.sinkages(self.beds), self.law_sinkages()
         shared_runs, driven = self.shared_conditions(), [unit for unit in self.units if unit.kind == "driven"]
         gaps = [
@@ -113,7 +120,8 @@ class Findings:
             for seed in self.seeds
         ]
         law_sinkages = [load / fit.stiffness if fit.stiffness > 0 else None for fit in fits]
-        shared, error = say("shared_spread"), say("jackknife")
+        shared = say("shared_spread" if self.beds_separate or len(self.seeds) == 1 else "not_separated")
+        error = say("jackknife")
         return {
             "stiffness": _quantity(self.fit.stiffness, spread([fit.stiffness for fit in fits]), "N/m", shared),
             "damping": _quantity(self.fit.damping, spread([fit.damping for fit in fits]), "N s/m", shared),
@@ -178,7 +186,7 @@ class Findings:
         own = [mean_of([returned_work(run) for run in self.of("driven", seed)]) for seed in self.seeds]
         laws = [
             mean_of([returned_work(model_run(self.settings, u, self.beds[u.id], fit, self.time_step)) for u in driven])
-            for fit in self.seed_fits.values()
+            for fit in (self.seed_fits.values() if self.beds_separate else ())
         ]
         bed, law = (mean_of([returned_work(runs[unit.id]) for unit in driven]) for runs in (self.beds, self.models))
         note = "work of unloading over work of loading, driven runs"
@@ -211,6 +219,7 @@ class Findings:
             {"seed": seed}
             | {name: getattr(fit, name) for name in numbers}
             | {"drag_gap": drag_gap([self.beds[name] for name in fit.runs], fit), "runs": list(fit.runs)}
+            | {"separates": fit.separates}
             for seed, fit in self.seed_fits.items()
         ]
 

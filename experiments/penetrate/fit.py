@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from coupling import Penetration
 
 __all__ = [
+    "MOST_CORRELATED",
     "Fit",
     "Moments",
     "drag_gap",
@@ -30,6 +31,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+MOST_CORRELATED = 0.85
+"""Of K and C, up to which a fit determines both [1]: runs at one constant speed alone give 0.87, sqrt(3) / 2."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -42,6 +46,11 @@ class Fit:
     runs: tuple[str, ...]  # ids of the runs that counted
     correlation: float | None = None
     """Of the two estimates, -1 to 0: at -1 only a sum of both is known, not each (None where it was not fitted)."""
+
+    @property
+    def separates(self) -> bool:
+        """Whether the runs determine K and C each, and not only a sum of both; False where that is not known."""
+        return self.correlation is not None and abs(self.correlation) <= MOST_CORRELATED
 
     def force(self, depth: Array, velocity: Array) -> Array:
         """The law [N] at `depth` [m] and `velocity` [m/s], one shape."""

@@ -14,7 +14,41 @@ from rigid.ground_file import read_ground
 
 from .following import following, pace, sticking_of
 
-__all__ = ["settings_of_bed", "settings_of_gravity", "settings_of_ground", "settings_of_model"]
+__all__ = [
+    "drops_nothing",
+    "further_speeds",
+    "settings_of_bed",
+    "settings_of_gravity",
+    "settings_of_ground",
+    "settings_of_model",
+]
+
+
+def drops_nothing(settings: Any) -> bool:
+    """Whether nothing is dropped on the further beds of settings: no speeds, or a load that only sinks to the floor.
+
+    A material that cannot be read is refused later.
+    """
+    from dem.grains.materials import material
+    from experiments.grains.bearing import bearing_of, sinks_past
+
+    if not settings.other_drop_speeds:
+        return True
+    grain, area = settings.grain, math.pi * settings.tip_diameter**2 / 4
+    try:
+        stuff = material(settings.material, grain=grain)
+        bears = bearing_of(stuff, grain=grain, gravity=settings.gravity, area=area)
+        return sinks_past(bears, settings.weight, (settings.foot, settings.bed_size[2] - settings.tip_diameter))
+    except (OSError, ValueError, OverflowError):
+        return False
+
+
+def further_speeds(speeds: tuple[float, ...]) -> tuple[float, ...]:
+    """Speeds of pushes into further beds where nothing is dropped on them: the slowest and the fastest of the first's.
+
+    One speed does not separate K from C.
+    """
+    return (min(speeds), max(speeds)) if len(speeds) > 1 else speeds
 
 
 def settings_of_bed(given: Json) -> Json:

@@ -10,6 +10,7 @@ from typing import Any
 
 from experiments.runs.registry import Headline
 from vis.page.numbers import foldable, quote
+from vis.penetrate.summary_parts import as_foot
 
 from .sure import in_words
 
@@ -52,6 +53,8 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     shown = [*own[: max(_OF_FINDINGS, _SAID - len(warnings)) - len(moved)], *moved]
     left = len(said) - len(shown)
     shown = [*rest, *shown]
+    if result.get("spike", {}).get("tip") == "flat":
+        warnings, shown = as_foot(warnings), as_foot(shown)
     return Headline(
         ("", "bed", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
         tuple(map(foldable, warnings)), tuple(map(foldable, shown)), left,
@@ -60,10 +63,14 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
 
 def _with_errors(sure: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """The sinkage among real grains with the ends of its interval, or the depth to rest; as far as they are known."""
-    for name, words in (("depth_to_rest", "the same with its errors"), ("sinkage_dem", "among real grains, 95 %")):
+    for name, words in (
+        ("depth_to_rest", "the same with its errors, 95 %"),
+        ("sinkage_dem", "among real grains, 95 %"),
+    ):
         if name in sure:
             low, high = sure[name]["low"], sure[name]["high"]
-            return [(words, "not known" if low is None else in_words(low, high, "m"), "")]
+            known = "not known" if low is None else f"at least {quote(low, None, 'm', significant=2)}"
+            return [(words, known if high is None else in_words(low, high, "m"), "")]
     return []
 
 

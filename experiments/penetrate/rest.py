@@ -121,8 +121,9 @@ def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
     `rest` gets the sentence on its depth.
     """
     settings, sunk = findings.settings, sinkage_interval(findings, material)
-    stiffness = interval_of_stiffness(
-        findings.fit.stiffness, [fit.stiffness for fit in findings.seed_fits.values()], tip=settings.tip,
+    beds_k = [fit.stiffness for fit in findings.seed_fits.values()] if findings.beds_separate else []
+    stiffness = None if not findings.fit.separates else interval_of_stiffness(
+        findings.fit.stiffness, beds_k, tip=settings.tip,
         grain=settings.grain, real=REAL_GRAINS.get(material.name, 0.0), diameter=settings.tip_diameter,
         cohesive=material.cohesion != "none",
     )  # fmt: skip
@@ -138,11 +139,29 @@ def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
     beyond = settings.weight / force if force > 0 else None
     low, high = ends or (None, None)
     times = "" if beyond is None else say("far_beyond", times=_two_digits(beyond), force=f"{force:.2g}")
-    known = say("rest_unknown") if low is None or high is None else say("rest_within", ends=in_words(low, high, "m"))
+    if low is None:
+        known = say("rest_unknown", why=_why_unknown(findings, stiffness, cohesive=material.cohesion != "none"))
+    else:
+        known = (
+            say("rest_beyond", low=_length(low)) if high is None else say("rest_within", ends=in_words(low, high, "m"))
+        )
+    if low is not None and not findings.beds_separate:
+        known = f"{known}. {say('rest_as_of_one_bed')}"
     said = f"{times}{known}"
     rest["sentences"] = [rest["sentences"][0], said, *rest["sentences"][1:]]
     depth = {"unit": "m", "value": rest["depth"], "low": low, "high": high, "times_beyond": beyond, "sentence": said}
     return found | {"depth_to_rest": depth}
+
+
+def _why_unknown(findings: Findings, stiffness: Interval | None, *, cohesive: bool) -> str:
+    """What is missing for an interval of K, and so of the depth to rest."""
+    if findings.fit.stiffness <= 0:
+        return say("k_is_zero")
+    if not findings.fit.separates:
+        return say("k_not_separated")
+    if stiffness is not None and stiffness.chance is None and not cohesive:
+        return say("k_of_one_bed")
+    return say("k_among_sticky_grains")
 
 
 def _in_a_sentence(findings: Findings, name: str, interval: Interval, unit: str) -> str:
@@ -152,6 +171,8 @@ def _in_a_sentence(findings: Findings, name: str, interval: Interval, unit: str)
     what = "the sinkage at rest" if name == "sinkage_dem" else "K"
     if interval.low is not None and interval.high is not None:
         whence = say("chance_kept") if interval.one_bed else say("chance_beds", count=count)
+        if name == "stiffness" and interval.one_bed and len(findings.seeds) > 1:
+            whence = say("chance_not_separated")
         return say("sure_within", what=what, ends=in_words(interval.low, interval.high, unit), whence=whence)
     if interval.chance is None:
         return say("sure_unknown", what=what)

@@ -19,6 +19,7 @@ from . import beds
 from .amended import kept_law, run_beside
 from .departures import departures
 from .findings import BedFacts, Findings, bed_entry, bed_quantities, drop_note
+from .fit import MOST_CORRELATED
 from .reference import compare_with, read_reference
 from .rest import answer, how_sure, sinkage_interval
 from .settings import PenetrateSettings, say
@@ -52,6 +53,7 @@ def conclude(
     rest = answer(findings, material)
     sure = how_sure(findings, material, rest)
     quantities = findings.quantities() | bed_quantities(facts, overlap, _made(stiffened)) | _depth_needed(rest)
+    quantities |= _standing_unknown(quantities, sure)
     codes = ({note.get("code") for note in notes.values()} | {folder.code}) - {None, ""}
     doubts = {
         "fewer than three seeds: the spread between beds is not known well": len(settings.seeds) < 3,
@@ -116,6 +118,14 @@ def _depth_needed(rest: Json | None) -> Json:
     return {"depth_to_rest": {"value": rest["depth"], "std": None, "unit": "m", "note": note}}
 
 
+def _standing_unknown(quantities: Json, sure: Json) -> Json:
+    """No stiffness of a standing foot, with the reason, where its sinkage may be 0; else nothing."""
+    chance = sure.get("sinkage_dem", {}).get("chance")
+    if chance is None or chance[0] > 0 or "stiffness_standing" not in quantities:
+        return {}
+    return {"stiffness_standing": {"value": None, "std": None, "unit": "N/m", "note": say("standing_none_note")}}
+
+
 def _compare(settings: PenetrateSettings, result: Json) -> None:
     """Add the entry "reference" to the result, and what it says, where there is something to compare with."""
     reference, warnings, departures = settings.reference, result["warnings"], result["departures"]
@@ -137,8 +147,6 @@ def _compare(settings: PenetrateSettings, result: Json) -> None:
 
 LEAST_CONDITIONS = 3
 """Kinds and speeds that a fit of two numbers needs."""
-MOST_CORRELATED = 0.85
-"""Of K and C: runs at one constant speed alone give 0.87, sqrt(3) / 2."""
 LEAST_ACROSS = 5.0
 """Grains across a tip below which a result warns."""
 
@@ -193,7 +201,7 @@ def warnings_of(findings: Findings) -> Iterator[str]:
         listed = ", ".join(f"{kind} at {v:g} m/s" for kind, v in sorted(conditions))
         yield say("inseparable", shown=shown, listed=listed)
     own = [one.correlation for one in findings.seed_fits.values() if one.correlation is not None]
-    if len(own) >= 2 and min(own) < -MOST_CORRELATED:  # the spreads of K and C go together
+    if len(own) >= 2 and not findings.beds_separate:
         yield say("traded", least=min(own))
     yield from resolution_advice(
         tip=settings.tip_diameter, grain=settings.grain, size=settings.bed_size, depth=settings.depth,

@@ -7,7 +7,7 @@ the machine or the grains' material is refused by the experiment's `check`.
 import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
 from experiments.grains.advice import costs, times_as_long
 from experiments.grains.lammps import ON_GRAINS, RANKS, lammps_fault
@@ -111,9 +111,9 @@ class PenetrateSettings(StrictSettings):
     drop_time: Positive = Field(0.8, description="Longest time of a drop [s].")
     lowering_speed: Positive = Field(0.1, description="Speed at which a spike is set down [m/s].")
     rest_time: Positive = Field(0.04, description="Time for which a spike must stand still to count as at rest [s].")
-    other_speeds: tuple[Positive, ...] = Field(
-        (0.4,), description="Speeds of pushes into the second and further beds [m/s]."
-    )
+    other_speeds: tuple[Positive, ...] = (0.4,)
+    """Speeds of pushes into the second and further beds [m/s]; if not given and nothing is dropped on them, the slowest
+    and the fastest of `speeds`, which separate K from C."""
     other_drop_speeds: tuple[Positive, ...] = Field(
         (0.15,), description="Speeds of drops onto the second and further beds [m/s]."
     )
@@ -178,6 +178,19 @@ class PenetrateSettings(StrictSettings):
             given = settings_of_ground(given)
         given = settings_of_bed(given) if isinstance(given.get("bed"), str) and given["bed"] else given
         return given if given.get("ground") == "spring-damper" else settings_of_gravity(given, cls.model_fields)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _speeds_of_further_beds(cls, given: Any, made_of: ModelWrapValidatorHandler[Self]) -> Self:
+        """With `other_speeds` of beds on which nothing is dropped: by the settings, or as the load would sink away."""
+        made = made_of(given)
+        if not isinstance(given, dict) or "other_speeds" in given or not made.on_grains or len(made.seeds) == 1:
+            return made
+        from .given import drops_nothing, further_speeds
+
+        if not drops_nothing(made):
+            return made
+        return made_of(given | {"other_speeds": further_speeds(made.speeds)})
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

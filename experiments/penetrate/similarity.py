@@ -7,6 +7,7 @@ from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
 
 from .following import SPEEDS, TIMES, following, pace, sticking_of
+from .given import further_speeds
 from .settings import PenetrateSettings, say
 
 __all__ = ["fast_for_gravity", "pace_of", "similarity_of"]
@@ -26,6 +27,8 @@ def similarity_of(settings: PenetrateSettings) -> Json:
     own = {name: type(settings).model_fields[name].default for name in (*SPEEDS, *TIMES)}
     slower, sticking = pace_of(settings), _sticking(settings)
     wanted = own | following(slower, own)
+    if not settings.used("other_drop_speeds") or settings.other_speeds == further_speeds(settings.speeds):
+        wanted["other_speeds"] = further_speeds(wanted["speeds"])
     used = [name for name in (*SPEEDS, *TIMES) if settings.used(name) not in ((), None)]
     given = [name for name in used if getattr(settings, name) != wanted[name]]
     speeds, of = sorted(settings.driven_speeds), {"diameter": settings.tip_diameter}

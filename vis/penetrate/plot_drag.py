@@ -169,7 +169,7 @@ def gap_plot(run: RunFolder) -> Plot | None:
     bound = float(np.nanmax(np.abs(difference))) or 1.0
     figure, ((axis,),) = sheet(1, 1, max(2.6, 0.9 + (0.62 if counted else 0.42) * len(depths)))
     norm = TwoSlopeNorm(0.0, -bound, bound)
-    image = axis.imshow(difference, cmap="PuOr_r", norm=norm, aspect="auto")
+    image = axis.imshow(difference, cmap="RdBu_r", norm=norm, aspect="auto")
     axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
     axis.set_yticks(range(len(depths)), [f"{short(1e3 * a)} to {short(1e3 * b)}" for a, b in depths])
     axis.set(xlabel="speed [m/s]", ylabel="depth [mm]")
@@ -186,7 +186,7 @@ def gap_plot(run: RunFolder) -> Plot | None:
             text += f"   ({'+' if row.share > 0 else ''}{plain(100.0 * row.share, 2)} %)"
         if row.known:
             text += f"\n{row.known}"
-        dark = number < -0.45 * bound or number > 0.6 * bound  # of the map, purple is the darker end
+        dark = abs(number) > 0.55 * bound
         axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
     bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
     bar.set_label("spring-damper − bed [N]")

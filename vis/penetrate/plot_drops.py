@@ -177,7 +177,7 @@ def spread_plot(run: RunFolder) -> Plot | None:
         for key, title, unit in (("stiffness", "Stiffness K", "N/m"), ("damping", "Damping C", "N s/m"))
         if any(value_of(f, key) is not None for f in fits)
     ]
-    if not panels or len(fits) < 2:
+    if not panels or len(fits) < 2 or not all(f.get("separates", True) for f in fits):
         return None
     figure, axes = new_panels(len(panels), height=2.5)
     for axis, (key, title, unit) in zip(axes, panels, strict=True):
@@ -189,8 +189,9 @@ def spread_plot(run: RunFolder) -> Plot | None:
         values = np.array([value for _, value, _ in rows])
         spread = float(values.std(ddof=1)) if len(values) > 1 else None
         pooled = value_of(run.result.get("quantities"), key)
-        mean = float(values.mean()) if pooled is None else pooled
-        axis.axhline(mean, color=INK, lw=1.0)
+        mean = float(values.mean())
+        together = mean if pooled is None else pooled
+        axis.axhline(together, color=INK, lw=1.0)
         if spread:
             axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
         errors = [np.nan if error is None else error for *_, error in rows]
@@ -199,7 +200,10 @@ def spread_plot(run: RunFolder) -> Plot | None:
         axis.set(xlim=(-0.6, len(rows) - 0.4), xlabel="seed of the bed")
         axis.set(title=title, ylabel=f"{title.split()[1]} [{unit}]")
         reach = max(2.2 * (spread or 0.0), 0.1 * abs(mean), 1e-12)
-        axis.set_ylim(min(mean - reach, *axis.get_ylim()), max(mean + reach, *axis.get_ylim()))
+        axis.set_ylim(
+            min(mean - reach, together - 0.2 * reach, *axis.get_ylim()),
+            max(mean + reach, together + 0.2 * reach, *axis.get_ylim()),
+        )
         axis.grid(False, axis="x")
     known = any(fit_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
     bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"

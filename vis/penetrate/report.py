@@ -24,6 +24,7 @@ from vis.page.report import Progress, Report, Result, again, report_of, title_of
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
+from vis.penetrate.summary_parts import as_foot, mapping_of
 from vis.pictures.pictures import Picture, Pictures, make_pictures
 from vis.view.page import report_scene
 
@@ -65,7 +66,10 @@ def write_penetration_report(folder: str | Path, *, pictures: bool = True, progr
     context = summarise(run)
     context["answer"] = answer([Tile(**tile) for tile in context.pop("tiles")], run.result)
     context["missing"] = [*context["missing"], *(text for text in undrawn if _asked_for(run, text))]
-    context["plots"] = {plot.name: figure(path, title=plot.title, caption=plot.caption) for plot, path in plots}
+    named = as_foot if context["body"] == "foot" else str
+    context["plots"] = {
+        plot.name: figure(path, title=named(plot.title), caption=named(plot.caption)) for plot, path in plots
+    }
     context["scenes"] = report_scene(run.path) if pictures else []
     context["pictures"] = [_picture(picture) for picture in drawn.stills if picture.file.exists()]
     context["animation"] = _picture(drawn.animation) if drawn.animation and drawn.animation.file.exists() else None
@@ -109,9 +113,22 @@ def make_plots(run: RunFolder, folder: str | Path | None = None) -> tuple[list[t
             if plot is None:
                 missing.append(f"{what}: no data.")
             else:
+                if tip_of(run) == "flat":
+                    _label_as_foot(plot.figure)
                 title_above(plot.figure, title_of(run.result))
                 drawn.append((plot, plot.save(target)))
     return drawn, missing
+
+
+def tip_of(run: RunFolder) -> str:
+    """Kind of the tip; empty where it is not known."""
+    return str(mapping_of(run.result.get("spike")).get("tip") or "")
+
+
+def _label_as_foot(drawing: Figure) -> None:
+    """Name a foot on the axes."""
+    for axis in drawing.axes:
+        axis.set(xlabel=as_foot(axis.get_xlabel()), ylabel=as_foot(axis.get_ylabel()))
 
 
 # With effects that the spring-damper omits ----------------------------------------------------------------------------

@@ -26,38 +26,42 @@ REAL_GRAINS = {"sand": 2e-4, "sand-weak": 2e-4}
 def summarise(run: RunFolder) -> dict[str, Any]:
     """The whole content of the report but its images.
 
-    Returns a dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "rest" (what a
-    foot that does not come to rest needs), "similarity", "fit", "departures", "reference", "bed", "spike", "runs",
-    "numbers", "settings", "warnings", "missing", "frames" and "reproduce"; "caveat" is what to know before any number.
+    Returns a dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "rest"
+    (what a foot that does not come to rest needs), "body" (what it is called), "similarity", "fit", "departures",
+    "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing", "frames" and "reproduce";
+    "caveat" is what to know before any number.
     """
     result = run.result
     quantities, spike = words.mapping_of(result.get("quantities")), dict(words.mapping_of(result.get("spike")))
     if spike.get("tip") != "cone":
         spike.pop("cone_angle", None)
     experiment = str(result.get("experiment") or words.setting_of(run, "command") or "")
+    flat = spike.get("tip") == "flat"
+    named = words.as_foot if flat else lambda value: value
     return {
+        "body": "foot" if flat else "spike",
         "title": str(result.get("title") or (f"hedgebed {experiment}" if experiment else "A hedgebed run")),
         "experiment": experiment,
         "status": run.status,
         "banner": _banner(run),
         "lead": _lead(run, experiment),
         "seeds": len({r.seed for r in run.runs if r.seed is not None}),
-        "tiles": _with_errors(_tiles(run, quantities), words.mapping_of(result.get("sure"))),
+        "tiles": named(_with_errors(_tiles(run, quantities), words.mapping_of(result.get("sure")))),
         "caveat": _caveat(result, quantities),
-        "answers": _answers(run, quantities),
-        "rest": words.rest_part(result),
+        "answers": named(_answers(run, quantities)),
+        "rest": named(words.rest_part(result)),
         "similarity": words.sentence(str(words.mapping_of(result.get("similarity")).get("sentence") or "")),
         "fit": words.fit_part(result, quantities),
-        "departures": words.departures_part(result),
+        "departures": named(words.departures_part(result)),
         "reference": words.reference_part(result),
         "bed": words.bed_part(result, quantities),
         "spike": words.facts_table(
             {key: spike[key] for key in spike if key != "cone_angle" or spike.get("tip") == "cone"}
         ),
         "runs": words.runs_table(run),
-        "numbers": words.numbers_table(quantities),
+        "numbers": named(words.numbers_table(quantities)),
         "settings": words.settings_table(run.settings),
-        "warnings": [words.sentence(str(text)) for text in words.list_of(result.get("warnings"))],
+        "warnings": [named(words.sentence(str(text))) for text in words.list_of(result.get("warnings"))],
         "missing": list(run.missing),
         "frames": _frames(run),
         "reproduce": words.reproduce_part(run, experiment),
@@ -82,7 +86,8 @@ def _lead(run: RunFolder, experiment: str) -> list[str]:
 
 
 def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
-    tiles = []
+    tiles: list[tuple[str, str, str]] = []
+    beds = len({r.seed for r in run.runs if r.seed is not None})
     model = quantity(quantities.get("sinkage_spring_damper"))
     if (needed := words.value_of(quantities, "depth_to_rest")) is not None:
         under = f"under {quantity(quantities['load'])}; " if words.value_of(quantities, "load") is not None else ""
@@ -100,15 +105,22 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
         load = words.value_of(quantities, "load")
         under = f"under {quantity(quantities['load'])}" if load is not None else "under its load"
         note = f"{under}; the spring-damper predicts {model}"
-        tiles.append(("Sinks to rest at", _rests_at(quantities), note))
+        stood = {"sinkage_dem": _in_95(quantities["sinkage_dem"], beds)}
+        tiles.append(("Sinks to rest at", _rests_at(stood), note))
     if push := _push(run):
-        tiles.append(("Largest force of the sand", *push))
+        tiles.append(("Largest force of the sand", *_largest_push(run), push[1]))
     if words.value_of(quantities, "drag_gap") is not None:
         note = "rms difference over rms force, loading, all pushes"
-        tiles.append(("Error of the spring-damper", quantity(quantities["drag_gap"], unit="%"), note))
+        tiles.append(("Error of the spring-damper", quantity(_in_95(quantities["drag_gap"], beds), unit="%"), note))
     if words.value_of(quantities, "stiffness") is not None:
-        tiles.append(("Fitted stiffness K", words.fitted(quantities, "stiffness"), _fitted_note(run, quantities)))
+        shown = quantity(_in_95(quantities["stiffness"], beds))
+        tiles.append(("Fitted stiffness K", shown, _fitted_note(run, quantities)))
     return [{"label": label, "value": value, "note": note} for label, value, note in tiles]
+
+
+def _in_95(entry: Any, count: int) -> dict[str, Any]:
+    """A quantity with half of the 95 % interval of its mean over `count` beds in place of its standard deviation."""
+    return {**words.mapping_of(entry), "std": words.half_of_95(words.std_of({"it": entry}, "it"), count)}
 
 
 def _with_errors(tiles: list[dict[str, str]], sure: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -128,6 +140,9 @@ def _with_errors(tiles: list[dict[str, str]], sure: Mapping[str, Any]) -> list[d
                 ends = between(entry["low"], entry["high"], "m") if known else "not known"
                 note = say("of_real_grains") if known else words.sentence(str(entry["sentence"]))
                 rows.append({"label": "Sinkage among real grains (95 %)", "value": ends, "note": note})
+            elif entry["low"] is not None:
+                ends = between(entry["low"], entry["high"], "N/m")
+                rows.append({"label": "K among real grains (95 %)", "value": ends, "note": say("of_real_grains")})
         else:
             rows.append(tile)
     return rows
@@ -153,17 +168,19 @@ def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
     drops = [r for r in run.of_kind("drop") if words.value_of(r.quantities, "stop_time") is not None]
     depths = [float(r.bed.depth.max()) for r in (*run.of_kind("driven"), *drops) if r.bed is not None]
     parts[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
-    if words.value_of(quantities, "stiffness_standing") is not None:
+    if "stiffness_standing" in quantities:
         parts.append(_standing(run, quantities))
     if words.std_of(quantities, "stiffness") is None and words.value_of(quantities, "stiffness_error") is not None:
-        parts.append("± is the standard error of the fit")
+        parts.append(f"standard error of the fit: {quantity(quantities['stiffness_error'])}")
     return "; ".join(parts)
 
 
 def _needs(run: RunFolder) -> str:
     """The ends of the depth to rest and how far it is extrapolated, as far as result.json has them."""
     sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("depth_to_rest"))
-    ends = f" ({between(sure['low'], sure['high'], 'm')} with its errors)" if sure.get("low") else ""
+    ends = f" ({between(sure['low'], sure['high'], 'm')} with its errors, 95{words.NBSP}%)" if sure.get("high") else ""
+    if sure.get("low") and not ends:
+        ends = f" (at least {quote(sure['low'], None, 'm', significant=2)}, 95{words.NBSP}%)"
     times = sure.get("times_beyond")
     return ends + (say("beyond_pushes", times=plain(times, 2)) if times is not None else "")
 
@@ -204,6 +221,13 @@ def _frames(run: RunFolder) -> list[str]:
     return [
         f"{name}.pvd ({words.run_words(known[name]) if name in known else 'frames'})" for name in frame_names(run.path)
     ]
+
+
+def _largest_push(run: RunFolder) -> tuple[str]:
+    """The largest force of loading over all speeds, with half of its 95 % interval over the beds."""
+    speed, (force, std) = max(_peaks(run, "driven", "peak_force"), key=lambda peak: peak[1][0])
+    count = sum(r.kind == "driven" and r.speed == speed for r in run.runs)
+    return (quote(force, words.half_of_95(std, count), "N"),)
 
 
 def _push(run: RunFolder) -> tuple[str, str] | None:

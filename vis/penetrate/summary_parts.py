@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
+from scipy import stats
 
 from vis.page.folder import PYTHON_RUNS, Run, RunFolder, Setting
 from vis.page.numbers import column, plain, quantity, quote, short
 from vis.page.sentences import Sentences
 
 __all__ = [
-    "Departure", "MINUS", "NBSP", "SHARES", "Table", "bed_part", "cell_text", "departure_rows",
-    "departures_part",
-    "facts_table", "fit_error", "fit_part", "fitted", "joined", "label_of", "list_of", "mapping_of", "more_or_less",
-    "numbers_table", "percent", "plain_value", "reference_part", "reproduce_part", "rest_part",
-    "run_words", "runs_table",
-    "sentence", "setting_of", "settings_table", "signed_percent", "std_of", "value_of",
+    "as_foot", "bed_part", "cell_text", "Departure", "departure_rows", "departures_part", "facts_table",
+    "fit_error", "fit_part", "fitted", "half_of_95", "joined", "label_of", "list_of", "mapping_of", "MINUS",
+    "more_or_less", "NBSP", "numbers_table", "percent", "plain_value", "reference_part", "reproduce_part",
+    "rest_part", "run_words", "runs_table", "sentence", "setting_of", "settings_table", "SHARES", "signed_percent",
+    "std_of", "Table", "value_of",
 ]  # fmt: skip
 
 NBSP, MINUS = "\N{NO-BREAK SPACE}", "\N{MINUS SIGN}"
@@ -115,6 +115,25 @@ def cell_text(key: str, value: Any) -> str:
     return "unknown" if value is None else str(value)
 
 
+def as_foot(value: Any) -> Any:
+    """`value` with its strings, also those inside of lists and mappings, on a foot in place of a spike and its tip.
+
+    A spike with its size before it, "a 12 mm spike", is another one and stays, and so do names of options.
+    """
+    if isinstance(value, str):
+        text = re.sub(r"(?<![\w`-])(?<!mm[ \u00a0])([sS])pike(?![\w-])", _foot, value)
+        return re.sub(r"\b([Tt]he|[Aa]) tip\b", r"\1 foot", text)
+    if isinstance(value, Mapping):
+        return {key: as_foot(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(as_foot(item) for item in value)
+    return value
+
+
+def _foot(found: re.Match[str]) -> str:
+    return "Foot" if found[1] == "S" else "foot"
+
+
 def label_of(key: str) -> str:
     """The name of a key, as a person reads it."""
     return labels.templates.get(key, key.replace("_", " "))
@@ -146,6 +165,11 @@ def value_of(quantities: Any, key: str) -> float | None:
 def std_of(quantities: Any, key: str) -> float | None:
     """The standard deviation of a quantity; None where it is unknown."""
     return plain_value(mapping_of(mapping_of(quantities).get(key)).get("std"))
+
+
+def half_of_95(std: float | None, count: int) -> float | None:
+    """Half-width of Student's 95 % interval of a mean of `count` beds; None where beds show no spread."""
+    return None if std is None or count < 2 else float(stats.t.ppf(0.975, count - 1) * std / np.sqrt(count))
 
 
 def fit_error(fit: Mapping[str, Any], key: str) -> float | None:
@@ -212,6 +236,7 @@ def fit_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[s
         gap = quote(value_of(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}"
         units = {"stiffness": "N/m", "damping": "N s/m"}
         numbers = (quote(value_of(fit, key), fit_error(fit, key), unit) for key, unit in units.items())
+        numbers = numbers if fit.get("separates", True) else ("not separated" for _ in units)
         rows.append([f"bed {fit.get('seed', i + 1)} by itself", *numbers, gap])
     errors = [
         f"{name} {quantity(quantities[key])}"

@@ -2,7 +2,8 @@
 
 Chance. Several beds: Student's interval of their mean, t s / sqrt(n). One bed: t s of kept runs with the same kind of
 tip, s pooled over their grain sizes (trends.toml). A length scales with the grain diameter d, K is taken in the
-logarithm.
+logarithm. K of all runs and the mean K of the beds are two estimates, as beds may have different runs: the interval of
+K holds both. Where K of a bed is 0 there is no logarithm, and its lower end is Student's of the values, at least 0.
 
 Grain size. By the kept `converge` run of a sphere, K = K_0 (1 + growth (d - d_0) / D) and the sinkage is that among
 real grains less slope (d - d_0), with D the tip, d_0 the real grain. Its lines through fewer sizes and in (d / D)^2 and
@@ -85,28 +86,45 @@ def interval_of_sinkage(
 def interval_of_stiffness(
     value: float, values: Sequence[float], *, tip: str, grain: float, real: float, diameter: float, cohesive: bool
 ) -> Interval | None:
-    """Interval of K [N/m]; None where K is not positive in each bed.
+    """Interval of K [N/m]; None where K is not positive.
 
-    ``value``: Fitted to all beds. ``values``: Of each bed. ``diameter``: Of the tip [m]; the others as of
-    `interval_of_sinkage`.
+    ``value``: Fitted to all beds. ``values``: Of each bed whose runs separate K from C, at least 0; fewer than two of
+    them show no chance. ``diameter``: Of the tip [m]; the others as of `interval_of_sinkage`.
     """
-    if value <= 0 or not values or min(values) <= 0:
+    if value <= 0:
         return None
     trend = trends()["stiffness"]
-    half = _half([math.log(k) for k in values], None if cohesive else _kept(trend, tip, 1.0))
-    chance = None if half is None else (value * math.exp(-half), value * math.exp(half))
+    chance = _chance_of_stiffness(value, values, None if cohesive else _kept(trend, tip, 1.0))
     softer = trend.most * (1.0 + trend.slope * max(0.0, grain - real) / diameter)
     size = None if cohesive else (value / softer, value)
     if chance is None or size is None:
-        return Interval(value, chance, size, None, None, len(values) == 1)
-    return Interval(value, chance, size, chance[0] / softer, chance[1], len(values) == 1)
+        return Interval(value, chance, size, None, None, len(values) < 2)
+    return Interval(value, chance, size, chance[0] / softer, chance[1], len(values) < 2)
 
 
-def interval_of_rest(load: float, stiffness: Interval, other: float) -> tuple[float, float] | None:
-    """Ends of the depth load / K [m] with K in its interval and, as a further estimate, an ``other`` depth [m]."""
+def _chance_of_stiffness(
+    value: float, values: Sequence[float], kept: tuple[float, int] | None
+) -> tuple[float, float] | None:
+    """Ends of K by chance [N/m]; of one bed by the spread of ln K of kept runs, None where there are none."""
+    if len(values) > 1 and min(values) <= 0:
+        mean, half = float(np.mean(values)), _half(values, None) or 0.0
+        return max(0.0, min(value, mean) - half), max(value, mean) + half
+    known = [math.log(k) for k in values] if len(values) > 1 else [math.log(value)]
+    spread = _half(known, kept)
+    if spread is None:
+        return None
+    mean = math.exp(float(np.mean(known)))
+    return min(value, mean) * math.exp(-spread), max(value, mean) * math.exp(spread)
+
+
+def interval_of_rest(load: float, stiffness: Interval, other: float) -> tuple[float, float | None] | None:
+    """Ends of the depth load / K [m] with K in its interval and, as a further estimate, an ``other`` depth [m].
+
+    The far end is None where K may be 0.
+    """
     if stiffness.low is None or stiffness.high is None:
         return None
-    return min(load / stiffness.high, other), max(load / stiffness.low, other)
+    return min(load / stiffness.high, other), max(load / stiffness.low, other) if stiffness.low > 0 else None
 
 
 def _kept(trend: Trend, tip: str, scale: float) -> tuple[float, int] | None:

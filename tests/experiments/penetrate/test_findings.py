@@ -124,3 +124,57 @@ def test_an_overlap_near_its_bound_names_the_modulus_that_leaves_room():
     said = overlap_warning(0.048, settings, softening)
     assert "= 1.3e+07 Pa" in said and "(now 1e+07 Pa)" in said
     golden("penetrate/overlap_warning", said)
+
+
+def flat_run(tmp_path, name, **given):
+    """A flat foot whose load would sink away, on beds of K = 0.11, 0.12 and 0.13 N/m, speeds as a user leaves them."""
+    settings = PenetrateSettings(
+        gravity="1e-3g", tip="flat", tip_diameter=0.016, load=0.5, grain=0.0032, bed_size=(0.064, 0.064, 0.044),
+        frame_count=0, **given,
+    )  # fmt: skip
+    return penetrate.run(settings, tmp_path / name)
+
+
+@pytest.fixture
+def weak(monkeypatch):
+    """Beds of a thousandth of the stiffness of `fake`."""
+
+    def prepare(settings, seed, young, progress):
+        hardness = 0.1 + 0.01 * seed
+        return FakeBed(size=settings.bed_size, time_step=6e-4, seed=seed, hardness=hardness, rate=0.05, unload=4.0)
+
+    monkeypatch.setattr(beds, "prepare_bed", prepare)
+    monkeypatch.setattr(beds, "bed_step", lambda settings, young: 6e-4)
+
+
+def width(sure):
+    return sure["high"] / sure["low"]
+
+
+def test_three_beds_give_a_narrower_depth_to_rest_than_one(weak, tmp_path):
+    """Left to the command, further beds get the slowest and the fastest push, which separate K from C."""
+    one, three = (flat_run(tmp_path, str(len(s)), seeds=s) for s in ((1,), (1, 2, 3)))
+    assert [run["speed"] for run in three["runs"] if run["seed"] == 3] == [0.00316, 0.0126]
+    sure = three["sure"]["depth_to_rest"]
+    assert width(sure) < width(one["sure"]["depth_to_rest"])
+    beds_k = [fit["stiffness"] for fit in three["fits"]]
+    assert beds_k == pytest.approx([0.11, 0.12, 0.13], rel=1e-3)
+    ends = three["sure"]["stiffness"]["chance"]
+    assert ends[0] < min(beds_k) and max(beds_k) < ends[1]
+
+
+def test_further_beds_at_one_speed_have_no_k_and_the_interval_is_that_of_one_bed(weak, tmp_path):
+    """At one speed K z + C v is one force: K of such a bed is what the noise makes of it."""
+    one = flat_run(tmp_path, "one", seeds=(1,))
+    three = flat_run(tmp_path, "three", seeds=(1, 2, 3), other_speeds=(0.0126,))
+    assert not any(fit["separates"] for fit in three["fits"])
+    assert three["quantities"]["stiffness"]["std"] is None
+    sure = three["sure"]["depth_to_rest"]
+    assert width(sure) == pytest.approx(width(one["sure"]["depth_to_rest"]), rel=0.2)
+    assert "--other-speeds" in sure["sentence"] and "--seeds" not in sure["sentence"]
+
+
+def test_one_speed_on_one_bed_determines_no_depth_to_rest(weak, tmp_path):
+    sure = flat_run(tmp_path, "run", seeds=(1,), speeds=(0.0126,))["sure"]
+    assert "stiffness" not in sure and sure["depth_to_rest"]["low"] is None
+    assert "(--speeds)" in sure["depth_to_rest"]["sentence"]

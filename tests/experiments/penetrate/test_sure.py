@@ -102,6 +102,23 @@ def test_nothing_is_claimed_that_no_run_shows():
     assert interval_of_stiffness(0.0, [0.0], **own) is None
 
 
+def test_a_bed_whose_force_does_not_grow_with_depth_leaves_the_depth_to_rest_open():
+    """K of 0, 0.2 and 0.4 N/m: Student's interval begins below 0, so there is no deepest end."""
+    own = {"tip": "flat", "grain": 0.0032, "real": REAL, "diameter": 0.016, "cohesive": False}
+    k = interval_of_stiffness(0.2, [0.0, 0.2, 0.4], **own)
+    half = stats.t.ppf(0.975, 2) * 0.2 / math.sqrt(3)
+    assert k.chance == (0.0, pytest.approx(0.2 + half))
+    assert interval_of_rest(0.5, k, 3.0) == (pytest.approx(0.5 / k.high), None)
+
+
+def test_the_interval_of_k_holds_the_fit_of_all_runs_and_the_mean_of_the_beds():
+    """Beds of about 70 N/m, and 81 N/m by all runs, of which one bed has more: both estimates are in the interval."""
+    own = {"tip": "sphere", "grain": 0.0024, "real": REAL, "diameter": TIP, "cohesive": False}
+    values = [69.0, 68.0, 74.0]
+    low, high = interval_of_stiffness(81.0, values, **own).chance
+    assert low < min(values) and high > 81.0
+
+
 def test_the_depth_to_rest_has_the_ends_of_k_and_the_other_estimate():
     own = {"tip": "flat", "grain": 0.0032, "real": REAL, "diameter": 0.016, "cohesive": False}
     k = interval_of_stiffness(0.3, [0.2, 0.3, 0.4], **own)
