@@ -8,9 +8,13 @@ from vis.page.numbers import foldable, quote
 
 from .settings import say
 
-__all__ = ["SLACK", "Answer", "Number", "check_depth", "check_ranges", "times"]
+__all__ = ["SLACK", "Answer", "Number", "TooDeepError", "check_depth", "check_ranges", "times"]
 
 SLACK = 1e-9
+
+
+class TooDeepError(ValueError):
+    """A load sinks a spike deeper than the map goes: K and C are known, the sinkage is not."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,12 @@ def check_ranges(
 
 
 def check_depth(sinkage: float, *, load: float, own_load: float, grain: float, diameter: float, most: float) -> None:
-    """Raise ValueError, naming the load [N], for a sinkage beyond `most` diameters, or below a grain under less load.
+    """Refuse a sinkage beyond `most` diameters (TooDeepError), or below a grain under less load (ValueError).
 
     `own_load` [N] is that of the map, `grain` and `diameter` are in m.
     """
     if sinkage > most * diameter:
         about = foldable(quote(sinkage, None, "m", significant=2))
-        raise ValueError(say("beyond_load", load=load, sinkage=about, deepest=1e3 * most * diameter, most=most))
+        raise TooDeepError(say("beyond_load", load=load, sinkage=about, deepest=1e3 * most * diameter, most=most))
     if load < own_load and sinkage < grain:
         raise ValueError(say("below_load", load=load, sinkage=1e3 * sinkage, grain=1e3 * grain))

@@ -10,7 +10,7 @@ from rigid.ground.flat_foot import DEPTHS, OVER_BALL
 from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
 from rigid.platform.files import find_platform
 
-from .answers import Answer, Number
+from .answers import Answer, Number, TooDeepError
 from .cohesive import CohesiveMap
 from .maps import GroundMap, read_map
 from .settings import GroundSettings, say
@@ -37,7 +37,15 @@ def _answer(settings: GroundSettings) -> tuple[Map, Answer]:
 
 def check(settings: GroundSettings) -> None:
     """Raise ValueError for a material or a tip without a map and for numbers beyond it."""
-    _answer(settings)
+    _as_deep_as_known(settings)
+
+
+def _as_deep_as_known(settings: GroundSettings) -> tuple[Map, Answer, bool]:
+    """Map and answer; where the load sinks the spike deeper than the map goes, the answer without it, and True."""
+    try:
+        return *_answer(settings), False
+    except TooDeepError:
+        return *_answer(settings.model_copy(update={"load": None})), True
 
 
 def _interval(number: Number) -> tuple[float, float]:
@@ -86,29 +94,32 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
     if settings.threads is not None:
         progress.message(say("threads", s=settings))
     progress.stage("look up", total=1.0)
-    table, answer = _answer(settings)
+    table, answer, too_deep = _as_deep_as_known(settings)
     ground_file(settings, table, answer).write(folder.path / GROUND_FILE)
     progress.update(1.0)
     k, c, sinkage = answer.stiffness, answer.damping, answer.sinkage
+    load = answer.load if settings.load is None else settings.load
+    of_sinkage = quantity(sinkage.value, "m", say("of_sinkage", answer=answer), std=sinkage.std)
     quantities = {
         "stiffness": quantity(k.value, "N/m", say("of_stiffness"), std=k.std),
         "damping": quantity(c.value, "N s/m", say("of_damping"), std=c.std),
-        "sinkage": quantity(sinkage.value, "m", say("of_sinkage", answer=answer), std=sinkage.std),
-        "load": quantity(answer.load, "N", "of the sinkage"),
+        "sinkage": quantity(None, "m", say("of_no_sinkage", load=load)) if too_deep else of_sinkage,
+        "load": quantity(load, "N", "of the sinkage"),
         "speed": quantity(answer.speed, "m/s", say("of_speed")),
         "packing_fraction": quantity(answer.packing, "1", "of the bed"),
         "grain_ratio": quantity(answer.ratio, "1", "mean grain over tip diameter"),
     }
     words = table.words(answer, gravity=settings.gravity, diameter=settings.tip_diameter)
-    warnings = [*_of_no_platform(settings, table, answer), *words]
+    unknown = [say("too_deep", load=load, deepest=1e3 * table.deepest * settings.tip_diameter)] if too_deep else []
+    warnings = [*unknown, *_of_no_platform(settings, table, answer), *words]
     low, high = _interval(c)
     if low <= 0:
         warnings.append(say("unidentified", low=low, high=high))
     if answer.ratio < table.finest:
         warnings.append(say("extrapolated", answer=answer, finest=table.finest))
-    if not answer.deep:
+    if not answer.deep and not too_deep:
         warnings.append(say("shallow", depth=1e3 * table.reference["shallowest"] * settings.tip_diameter))
-    if sinkage.value < answer.grain:
+    if sinkage.value < answer.grain and not too_deep:
         warnings.append(say("below_grain", sinkage=1e3 * sinkage.value, grain=1e3 * answer.grain))
     return Result.make(
         "ground",

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dem.grains.materials import material
-from experiments.groundmap.answers import Answer
+from experiments.groundmap.answers import Answer, Number
 from experiments.groundmap.maps import POWERS, read_map
 from experiments.platform.surfaces import Surface
 from rigid.platform.rig import STANDARD_GRAVITY
@@ -35,6 +35,8 @@ class GravityRule:
     loose: bool  # Whether the surface is made of grains without cohesion
     answer: Answer | None = None  # Of the map for the surface's spike, where the map is used
     why_not: str = ""  # Why the map is not used, in words
+    of_foot: Number | None = None  # K of the map for a ball tip as large as the largest foot [N/m]
+    largest: float = 0.0  # Diameter of the circle of that foot's area [m]
 
     @property
     def share(self) -> float:
@@ -69,7 +71,13 @@ class GravityRule:
             told.append(f"{symbol} = {number.value:.3g} ± {number.std:.2g} {unit}")
         real = say("real_grains") if self.share < NEAR[0] else ""
         numbers = " and ".join(told)
-        return [say("of_map", gravity=self.gravity, spike=1e3 * surface.spike, numbers=numbers, real=real)]
+        told = [say("of_map", gravity=self.gravity, spike=1e3 * surface.spike, numbers=numbers, real=real)]
+        similar = self.answer.stiffness.value * (self.largest / surface.spike) ** POWERS["stiffness"][1]
+        if "stiffness" in names and self.of_foot is not None and abs(self.of_foot.value / similar - 1) > SAME:
+            told.append(
+                say("of_foot", own=similar, map=self.of_foot, largest=1e3 * self.largest, grain=1e3 * self.answer.grain)
+            )
+        return told
 
 
 def gravity_rule(
@@ -86,12 +94,25 @@ def gravity_rule(
         what = "made of grains with cohesion" if surface.granular else "hard ground"
         raise ValueError(say("scaled_surface", surface=surface.name, what=what))
     near = abs(gravity / STANDARD_GRAVITY - 1) <= SAME
-    answer, why_not = _of_map(surface, STANDARD_GRAVITY if near else gravity, diameters) if loose else (None, "")
+    at, largest = STANDARD_GRAVITY if near else gravity, max(diameters.values())
+    answer, why_not = _of_map(surface, at, diameters) if loose else (None, "")
     follows = bool(asked) or (asked is None and answer is not None and not near)
     used = answer if follows or near else None
+    of_foot = None if used is None or surface.grains is None else _of_tip(surface.grains, at, largest)
     return GravityRule(
-        gravity=gravity, follows=follows, loose=loose, answer=used, why_not=why_not if asked is None else ""
-    )
+        gravity=gravity, follows=follows, loose=loose, answer=used, why_not=why_not if asked is None else "",
+        of_foot=of_foot, largest=largest,
+    )  # fmt: skip
+
+
+def _of_tip(grains: str, gravity: float, diameter: float) -> Number | None:
+    """K of the map for a ball tip of this diameter [m] in its real grains [N/m]; None where they are too coarse."""
+    try:
+        return read_map(grains).answer(
+            gravity=gravity, diameter=diameter, grain=None, packing=None, load=None
+        ).stiffness  # fmt: skip
+    except ValueError:
+        return None
 
 
 def _of_map(surface: Surface, gravity: float, diameters: Mapping[str, float]) -> tuple[Answer | None, str]:

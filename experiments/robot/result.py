@@ -245,13 +245,18 @@ def quantities_of(run: RobotRun) -> dict[str, Json]:
 
 
 def _flights(run: RobotRun) -> tuple[list[tuple[int, int]], int | None]:
-    """Rows from and to which nothing touches after the first touch, for `APART` at least; the row of that touch."""
+    """Rows from and to which the robot flies, and the row of the first touch.
+
+    It flies while nothing touches, after the first touch, for `APART` at least, if at some time of it all feet are
+    above the undisturbed surface: a foot that loses contact in its own crater does not fly.
+    """
     free = run.columns["touching"] == 0
     if free.all():
         return [], None
     touched, lasting = int(np.argmin(free)), max(1, round(APART / run.macro_step))
+    lowest = heights_of(run).min(axis=1)
     found = [(touched + low, touched + high) for low, high in spells(free[touched:]) if high - low >= lasting]
-    return found, touched
+    return [(low, high) for low, high in found if lowest[low:high].max() > 0.0], touched
 
 
 def _airborne(run: RobotRun) -> bool:

@@ -140,7 +140,12 @@ def quantity(entry: Any, *, unit: str | None = None, significant: int | None = N
 
 
 def in_two_digits(entry: Mapping[str, Any]) -> str:
-    """A quantity of result.json with two digits of its value and of its std, also where the std is the larger one."""
+    """A quantity of result.json with two digits of its value and of its std, also where the std is the larger one.
+
+    Without a value: "not known".
+    """
+    if entry["value"] is None:
+        return "not known"
     scale, shown = _scale(entry["value"], entry["unit"])
     value, std = (plain(entry[key] / scale, 2) for key in ("value", "std"))
     return f"{value}{_SPACE}±{_SPACE}{std}{_SPACE}{shown}"

@@ -105,7 +105,6 @@ def test_of_real_grains_it_has_half_the_row_of_the_surface_and_its_whole_range_a
         (["--gravity", "20"], "gravity"),
         (["--packing", "0.6"], "packing"),
         (["--grain", "0.005"], "grain"),
-        (["--load", "3"], "load"),
     ],
 )
 def test_what_is_beyond_the_map_is_refused_by_name(options, named, tmp_path, capsys):

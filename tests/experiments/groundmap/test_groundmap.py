@@ -126,7 +126,6 @@ def test_a_denser_bed_is_stiffer_and_sinks_less_and_a_heavier_spike_sinks_more()
         (["--spike-diameter", "0.5"], "tip_diameter"),
         (["--packing", "0.7"], "packing"),
         (["--grain", "0.004"], "grain"),
-        (["--load", "5"], "load"),
         (["--load", "1e-9"], "grain"),
         (["--material", "mud"], "material"),
         (["--material", "jsc-1a-loose"], "docs/penetrate.md"),
@@ -140,6 +139,21 @@ def test_a_denser_bed_is_stiffer_and_sinks_less_and_a_heavier_spike_sinks_more()
 def test_what_is_beyond_the_map_is_refused_by_name(options, named, tmp_path, capsys):
     assert main(["ground", *options, "--out", str(tmp_path / "run"), "--quiet"]) == BAD_INPUT
     assert named in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("material", ["sand", "jsc-1a-loose-cut"])
+def test_a_load_that_sinks_the_spike_beyond_the_map_leaves_the_law_and_no_sinkage(material, tmp_path):
+    """K and C are those of another load: they do not depend on it."""
+    options = ["ground", "--material", material, "--spike-diameter", "0.016", "--quiet"]
+    for name, load in (("heavy", ["--load", "500"]), ("own", [])):
+        assert main([*options, *load, "--out", str(tmp_path / name)]) == DONE
+    heavy, own = (json.loads((tmp_path / name / "result.json").read_text("utf-8")) for name in ("heavy", "own"))
+    assert heavy["quantities"]["sinkage"]["value"] is None and heavy["quantities"]["load"]["value"] == 500.0
+    assert heavy["quantities"]["stiffness"]["value"] == own["quantities"]["stiffness"]["value"]
+    assert read_ground(tmp_path / "heavy" / "ground.toml") == read_ground(tmp_path / "own" / "ground.toml")
+    (said,) = [said for said in heavy["warnings"] if "sinkage" in said and "500 N" in said]
+    assert "not known" in said
+    assert "not known" in (tmp_path / "heavy" / "report.html").read_text("utf-8")
 
 
 def test_the_command_writes_a_ground_file_that_a_tumble_takes(tmp_path):

@@ -1,13 +1,19 @@
 """The law under a robot's feet: for which foot its numbers are, and what a ground file does not go with."""
 
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from experiments.groundmap import Settings as GroundSettings
 from experiments.groundmap import check as check_ground
+from experiments.groundmap.maps import read_map
+from experiments.robot.feet import heights_of
+from experiments.robot.on_grains import RobotFollowed
 from experiments.robot.plan import plan_robot
+from experiments.robot.result import quantities_of
 from experiments.robot.settings import RobotSettings
 from rigid.ground import flat_foot
 from rigid.ground.laws import find_law
@@ -160,3 +166,36 @@ def test_a_foot_of_the_size_and_shape_of_the_tip_is_told_nothing_of_its_area(tmp
         assert plan.scales["foot"] == pytest.approx(1.0, abs=0.02) and plan.scales["foot"] != 1.0
         told = [*plan.warnings, *(number.origin for number in plan.numbers.values())]
         assert not [said for said in told if "times the area" in said or "under a foot" in said]
+
+
+def test_a_foot_larger_than_the_spike_has_the_k_of_the_map_beside_that_by_similarity():
+    """The map's line of K over d / D: its grains keep their size, those of similarity grow with the foot."""
+
+    def told(**given):
+        plan = plan_robot(RobotSettings(**HOPPER, ground="spring-damper", **given))
+        return plan, [said for said in plan.warnings if "by similarity, which" in said]
+
+    for gravity in (9.81, 0.0980665):
+        plan, (said,) = told(gravity=gravity)
+        own, of_map = (float(text) for text in re.findall(r"(?:is|K =) ([0-9.]+) ", said))
+        assert own == pytest.approx(plan.scales["foot"] * plan.numbers["stiffness"].value, rel=2e-2)
+        expected = read_map("sand").answer(
+            gravity=min(gravity, 9.80665), diameter=plan.rule.largest, grain=2e-4, packing=None, load=None
+        )  # fmt: skip
+        assert of_map == pytest.approx(expected.stiffness.value, rel=5e-3) and of_map < own
+    assert not told(stiffness=900.0)[1]
+
+
+def test_a_foot_that_loses_contact_in_its_crater_does_not_fly():
+    """Of the times of 5 ms and more without contact, those do not count in which the foot stays below the surface."""
+    push = str(Path(__file__).parents[3] / "experiments/examples/mujoco-hopper/hop.py") + ":control"
+    settings = RobotSettings(**HOPPER, surface="sand", ground="rft", duration=1.0, controller=push)
+    run = RobotFollowed(settings, plan_robot(settings)).run_on_law()
+    free = run.run()["touching"] == 0
+    heights = heights_of(run)[:, 0]
+    begins = np.flatnonzero(np.diff(free.astype(int)) == 1) + 1
+    lengths = [int(np.argmin(np.append(free[begin:], False))) for begin in begins]
+    long = [(b, n) for b, n in zip(begins, lengths, strict=True) if n * run.macro_step >= 5e-3]
+    rising = [b for b, n in long if heights[b : b + n].max() > 0]
+    assert len(long) > len(rising) > 1
+    assert quantities_of(run)["flights"]["value"] == len(rising)
