@@ -6,7 +6,7 @@ stands beside the result.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,8 @@ from .settings import RobotSettings
 __all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed"]
 
 SEEN = 200  # Moments of the forecast at which the extent of the feet is taken
+WIDE = 4.0
+"""Width of a bed over that of the widest foot below which a run starts with a warning [1]: of `hedgebed penetrate`."""
 FEWEST_ACROSS = 5.0  # Grains across the widest part of a foot, below which it is refused [1]
 
 
@@ -156,7 +158,16 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
     def told(self) -> RobotPlan:
         """The plan, whose words name K of the parts that go into the ground."""
         feet = zip(self._robot.feet, self.forecast.sunk, strict=True)
-        return self.plan.standing_on(foot.parts[k].name for foot, sunk in feet for k in sunk)
+        plan = self.plan.standing_on(foot.parts[k].name for foot, sunk in feet for k in sunk)
+        return replace(plan, warnings=(*plan.warnings, *self._narrow()))
+
+    def _narrow(self) -> list[str]:
+        """A warning of a bed that is narrow for the widest foot that goes into the ground, as `penetrate` refuses."""
+        s, wide = self.settings, max(width for width, _ in self._standing)
+        least = WIDE * wide
+        if min(s.bed_size[:2]) >= least * (1 - 1e-6):
+            return []
+        return [say("narrow_bed", s=s, wide=wide, least=least)]
 
     def announce(self, progress: Progress) -> None:
         self.progress = progress

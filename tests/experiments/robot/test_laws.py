@@ -11,7 +11,7 @@ from experiments.groundmap import Settings as GroundSettings
 from experiments.groundmap import check as check_ground
 from experiments.groundmap.maps import read_map
 from experiments.robot.feet import heights_of
-from experiments.robot.on_grains import RobotFollowed
+from experiments.robot.on_grains import RobotFollowed, RobotOnBed
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import quantities_of
 from experiments.robot.settings import RobotSettings
@@ -199,3 +199,12 @@ def test_a_foot_that_loses_contact_in_its_crater_does_not_fly():
     rising = [b for b, n in long if heights[b : b + n].max() > 0]
     assert len(long) > len(rising) > 1
     assert quantities_of(run)["flights"]["value"] == len(rising)
+
+
+@pytest.mark.parametrize(("wide", "said"), [(0.2, ["at least 0.24 m"]), (0.25, [])])
+def test_a_bed_narrower_than_four_feet_is_told_before_it_is_made(wide, said):
+    """A plate of 60 mm, and the bound of `hedgebed penetrate`."""
+    given = {"ground": "bed", "height": 0.012, "grain": 0.012, "bed_size": (wide, 0.25, 0.17), "duration": 0.05}
+    settings = RobotSettings(**HOPPER | given)
+    told = RobotOnBed(settings, plan_robot(settings)).told.warnings
+    assert re.findall("at least 0.24 m", " ".join(told)) == said
