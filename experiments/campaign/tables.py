@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from rigid.platform.rig import STANDARD_GRAVITY
 
 __all__ = [
+    "BASE_NOTE",
     "FORMAT",
     "DepthSensor",
     "EffectTable",
@@ -40,6 +41,9 @@ __all__ = [
 ]
 
 FORMAT = "hedgehog-campaign/1"
+
+BASE_NOTE = "fitted_without_effects"
+"""Note of model.toml: K and C by diameter of the spring-damper that was fitted without the effects."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -230,6 +234,7 @@ def trial_faults(
     """What is wrong with trials (number in the file, trial): an id twice, no file, a sensor without its noise.
     `sensors`: those that [sensors] has; `odd` states what else is wrong with a trial, None where nothing is."""
     seen: dict[str, int] = {}
+    without: dict[tuple[str, str], list[tuple[int, str]]] = {}
     faults = []
     for number, trial in trials:
         where = f"[[trial]] {number} (id {trial.id!r}): "
@@ -238,14 +243,22 @@ def trial_faults(
             faults.append(f"{where}id = {trial.id!r} is that of [[trial]] {first} too: each id once was expected")
         if not trial.files:
             faults.append(f"{where}it names no file: at least one of {', '.join(trial.sensor_names)} was expected")
-        faults += [
-            f"{where}{key} is given, but [sensors.{sensor}] is missing: its std was expected"
-            for sensor, key in trial.needed.items()
-            if sensor not in sensors
-        ]
+        for sensor, key in trial.needed.items():
+            if sensor not in sensors:
+                without.setdefault((sensor, key), []).append((number, trial.id))
         if fault := odd(trial):
             faults.append(where + fault)
-    return faults
+    return faults + [_without_noise(sensor, key, found) for (sensor, key), found in without.items()]
+
+
+def _without_noise(sensor: str, key: str, trials: Sequence[tuple[int, str]]) -> str:
+    """That trials (number in the file, id) name a file of a sensor without a stated noise, once for all of them."""
+    (number, id), *others = trials
+    where = f"[[trial]] {number} (id {id!r})" + (f" and {len(others)} more [[trial]]" if others else "")
+    return (
+        f"{where}: {key} is given, but [sensors.{sensor}] is missing: its std was expected; if it is not known, give "
+        f"the scatter of readings at rest, or the step of the display divided by 3.5"
+    )
 
 
 class _Tables(Table):

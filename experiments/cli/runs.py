@@ -22,7 +22,7 @@ from experiments.runs.registry import Headline
 from experiments.runs.result import Result
 from experiments.runs.streams import RefusedError, file_words, say, stdout_to_stderr
 from experiments.runs.whole_runs import draw_report, keeping_status
-from vis.page.numbers import digits_for
+from vis.page.numbers import beside
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "redraw_old_report", "show_folder"]
 
@@ -135,8 +135,7 @@ def _number(value: Any, std: Any = 0.0) -> str:
         return f"{value:.0f}" if whole else f"{value:.2g}" if abs(value) < 100 or abs(value) >= 1e6 else f"{value:.0f}"
     if not std or not math.isfinite(std):
         return f"{value:.4g}"
-    decimals = digits_for(std)
-    return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else f"{value:.4g}"
+    return beside(value, std)
 
 
 def _interval(ends: Sequence[float] | None) -> str:

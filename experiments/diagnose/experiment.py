@@ -9,7 +9,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, read_campaign
-from experiments.check import find_implausible, missing_sensors, said_once
+from experiments.check import find_implausible, find_unstated, missing_sensors, said_once
 from experiments.diagnose.settings import DiagnoseSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.kernel_cache import free_kernel_cache
@@ -56,7 +56,8 @@ def diagnose_campaign(
         shown.update(done)
 
     odd = [finding for finding in find_implausible(measured) if not problem.explains(finding)]
-    for finding in odd:  # before the long part: a wrong number in campaign.toml is soon corrected
+    unstated = find_unstated(measured)
+    for finding in (*unstated, *odd):  # before the long part: a wrong number in campaign.toml is soon corrected
         shown.message(f"before anything is fitted: {finding.what}")
     gates = None
     if thorough:
@@ -66,7 +67,7 @@ def diagnose_campaign(
     with threadpool_limits(1):  # matrices are small: threads of the linear algebra slow one another down
         found = diagnose(problem, thorough=thorough, seed=seed, tell=tell, gates=gates)
     odd = [finding for finding in odd if not problem.explains(finding)]  # by now zeros may be taken into account
-    return replace(found, findings=(*missing_sensors(measured), *odd, *findings_in_words(found.findings)))
+    return replace(found, findings=(*missing_sensors(measured), *unstated, *odd, *findings_in_words(found.findings)))
 
 
 def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Campaign, Problem]:

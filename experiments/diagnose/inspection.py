@@ -15,7 +15,14 @@ from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, read_campaign
 from experiments.campaign.tables import PenetrationTrial
-from experiments.check import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
+from experiments.check import (
+    find_implausible,
+    find_unstated,
+    loud_sensors,
+    missing_sensors,
+    said_once,
+    without_companions,
+)
 from experiments.check.replicas import condition_of, condition_words, odd_replicates
 from experiments.grains.spells import spells
 from experiments.runs.folder import RunFolder
@@ -46,7 +53,14 @@ def find_faults(campaign: Campaign) -> list[Finding]:
         found = _faults_of_data(campaign)
     jumped = {finding.trial for finding in found if _jumps(finding)}
     odd = [finding for finding in odd_replicates(campaign) if finding.trial not in jumped]
-    told = [*missing_sensors(campaign), *find_implausible(campaign), *found, *odd, *loud_sensors(campaign)]
+    told = [
+        *missing_sensors(campaign),
+        *find_unstated(campaign),
+        *find_implausible(campaign),
+        *found,
+        *odd,
+        *loud_sensors(campaign),
+    ]
     return without_companions(campaign, told)
 
 

@@ -6,7 +6,7 @@ are those of the model's diameter: on another one forces on a section scale with
 those of the spring with the K that the model gives.
 
 With a bed, every run of it is made on the law as well. Without one (``--ground spring-damper``), the runs of one seed
-are made on the model's own K and C alone, and on the law.
+are made on the base model as it was fitted without effects, and on the law.
 """
 
 import math
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from coupling import Penetration
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.files import MODEL_COPY, keep_model
-from experiments.campaign.tables import EffectTable
+from experiments.campaign.tables import BASE_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, given_way, push, slot_places, slot_table
@@ -135,7 +135,11 @@ class AmendedLaw:
     @cached_property
     def by_diameter(self) -> dict[float, tuple[float, float]]:
         """K [N/m] and C [N s/m] of each diameter [m] that was fitted, rising; empty where the model has only one."""
-        fitted = self.model.notes.get("fitted_by_diameter")
+        return self._noted("fitted_by_diameter")
+
+    def _noted(self, name: str) -> dict[float, tuple[float, float]]:
+        """K and C by diameter in a note of model.toml."""
+        fitted = self.model.notes.get(name)
         if not isinstance(fitted, Mapping):
             return {}
         return {float(size): (float(fitted[size]["stiffness"]), float(fitted[size]["damping"]))
@@ -146,12 +150,28 @@ class AmendedLaw:
         """K [N/m] and C [N s/m] of this diameter. Of a model with several: those that were fitted to it; between and
         beyond them a power law of the diameter, which is a straight line through the nearest two in logarithms. Of a
         model with one diameter: its own."""
-        own, fitted = self.settings.tip_diameter, self.by_diameter
+        return self._pair_of(self.by_diameter, (self.model.surface.stiffness, self.model.surface.damping))
+
+    @property
+    def has_base(self) -> bool:
+        """Whether the file has the base model's own fit, or needs none: it has no effects."""
+        return bool(self._noted(BASE_NOTE)) or not self.effects
+
+    @cached_property
+    def pair_without_effects(self) -> tuple[float, float]:
+        """K [N/m] and C [N s/m] of the base model as it was fitted without the effects, by the rule of `pair`. Of a
+        file that does not have them, `pair`: the spring of the effects' model, which is no fit by itself."""
+        fitted = self._noted(BASE_NOTE)
+        return self._pair_of(fitted, next(iter(fitted.values()), self.pair))
+
+    def _pair_of(self, fitted: Mapping[float, tuple[float, float]], single: tuple[float, float]) -> tuple[float, float]:
+        """K and C of this diameter, from those in `fitted`; `single` where there are fewer than two."""
+        own = self.settings.tip_diameter
         for size, pair in fitted.items():
             if math.isclose(size, own, rel_tol=1e-6):
                 return pair
         if len(fitted) < 2:
-            return self.model.surface.stiffness, self.model.surface.damping
+            return single
         stiffness, damping = (_at(own, {size: pair[k] for size, pair in fitted.items()}) for k in (0, 1))
         return stiffness, damping
 
@@ -203,8 +223,8 @@ class AmendedLaw:
         return [speed for speed in driven if speed], dropped, None in driven or 0.0 in driven
 
     def plain(self, time_step: float) -> SpringDamper:
-        """The spring-damper of the model without its effects, as a ground."""
-        stiffness, damping = self.pair
+        """The spring-damper as it was fitted without the effects, as a ground."""
+        stiffness, damping = self.pair_without_effects
         return SpringDamper(stiffness=stiffness, damping=damping, time_step=time_step)
 
     def numbers(self, *, speed: float = 1.0, creep: float = 0.02) -> Array:
@@ -330,7 +350,7 @@ def run_beside(
 
 
 def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
-    """The runs of the first seed on the model's K and C, and on the law; write and return the result."""
+    """The runs of the first seed on the base model's spring-damper, and on the law; write and return the result."""
     with folder.lock():
         keep_model(settings.model, folder.path)
         law = kept_law(settings, folder.path)
@@ -345,10 +365,14 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             folder.write_series(unit.id, plain[unit.id].columns())
             folder.write_series(f"{unit.id}.amended", runs[unit.id].columns())
             progress.update(done)
-        stiffness, damping = law.pair
+        (stiffness, damping), (plain_stiffness, plain_damping) = law.pair, law.pair_without_effects
+        beside = f"with {law.words}" if law.effects else "without effects"
+        of_plain = "of the spring-damper fitted without effects" if law.has_base else say("no_base_fit")
         found: dict[str, tuple[float | None, str, str]] = {
-            "stiffness": (stiffness, "N/m", "of the model"),
-            "damping": (damping, "N s/m", "of the model"),
+            "stiffness": (stiffness, "N/m", f"of the model {beside}"),
+            "damping": (damping, "N s/m", f"of the model {beside}"),
+            "stiffness_spring_damper": (plain_stiffness, "N/m", of_plain),
+            "damping_spring_damper": (plain_damping, "N s/m", of_plain),
             "load": (settings.weight, "N", "on the spike, set down and dropped"),
             "sinkage_spring_damper": (_rest(units, plain), "m", "depth at rest under the load"),
             "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
@@ -358,6 +382,8 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
         falls = f"; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N" if settings.drop_speeds else ""
         spike = say("model_spike", s=settings, tip_mm=1e3 * settings.tip_diameter, falls=falls)
         fitted = [f"The model was fitted to {law.fitted_to}."] if law.fitted_to else []
+        which = "compared" if law.has_base else "compared_inflated"
+        compared = [say(which, law=law, plain=plain_stiffness)] if law.effects else []
         made = Result.make(
             "penetrate",
             ground=settings.ground,
@@ -380,7 +406,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             ],
             spike=asdict(make_spike(settings)) | {"load": settings.weight},
             model={"file": settings.model, "effects": list(law.effects)},
-            departures={"sentences": [spike, *fitted]},
+            departures={"sentences": [spike, *fitted, *compared]},
             warnings=[
                 *law.warnings(),
                 *without_rest(settings, units, plain, "the spring-damper"),

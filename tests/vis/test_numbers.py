@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vis.page.numbers import column, plain, quantity, quote, typeset
+from vis.page.numbers import beside, column, plain, quantity, quote, typeset
 
 SPACE = "\N{NO-BREAK SPACE}"
 
@@ -31,6 +31,12 @@ SPACE = "\N{NO-BREAK SPACE}"
 )
 def test_quote(given, words):
     assert quote(*given).replace(SPACE, " ") == words
+
+
+def test_a_number_smaller_than_its_error_is_not_shown_as_zero():
+    assert beside(0.3749, 2.387) == "0.4" and beside(-0.3749, 2.387) == "-0.4"
+    assert beside(299.3846, 0.3395) == "299.4" and beside(4.068, 0.026) == "4.07"
+    assert beside(0.3749, None) == "0.3749" and beside(0.0, 2.4) == "0.0"
 
 
 def test_quantity_takes_what_result_json_holds():

@@ -17,7 +17,7 @@ from vis.diagnose.figures import (
     worst,
 )
 from vis.diagnose.usable import has_numbers_to_use
-from vis.page.numbers import plain, short
+from vis.page.numbers import beside, plain, short
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.report import Report, Result, again, report_of, unit_text
 from vis.page.sentences import Sentences
@@ -25,6 +25,7 @@ from vis.page.sentences import Sentences
 __all__ = ["write_diagnosis_report"]
 
 say = Sentences(__package__)
+_IN_UNITS = ("rms_before", "rms_after", "noise_after")
 _MOST_PLACES = 8
 """Stretches that are listed."""
 _DASH = "\N{EN DASH}"
@@ -139,17 +140,17 @@ def _in_units(diagnosis: Result) -> list[Block]:
     cells = {(row["channel"], row["held_out"]): row for row in diagnosis.get("by_channel", [])}
 
     def rms(name: str, held: bool, stage: str) -> str:
-        row = cells.get((name, held))
-        return _DASH if row is None else short(row[f"rms_{stage}"], 3)
+        value = cells.get((name, held), {}).get(stage)
+        return _DASH if value is None else short(value, 3)
 
     names = dict.fromkeys((row["channel"], row["unit"]) for row in diagnosis.get("by_channel", []))
     if names:
         rows = [
-            (name, unit, *(rms(name, held, stage) for held in (False, True) for stage in ("before", "after")))
+            (name, unit, *(rms(name, held, stage) for held in (False, True) for stage in _IN_UNITS))
             for name, unit in names
         ]
-        head = ("channel", "unit", "fitted: before", "after", "held out: before", "after")
-        blocks.append(table(head, rows, title="Recorded less modelled, root mean square, the sensors' noise included"))
+        head = ("channel", "unit", "fitted: before", "after", "noise", "held out: before", "after", "noise")
+        blocks += [table(head, rows, title=say("in_units")), text(say("in_units_noise"), small=True)]
     conditions = diagnosis.get("by_condition", [])
     if len(conditions) > 1:
         common = _common([row["settings"] for row in conditions])
@@ -252,7 +253,7 @@ def _evidence(diagnosis: Result) -> list[Block]:
         title = "One line for each set of names, in its best form; the most likely first"
         blocks.append(table(head, better, title=title, words=True))
     if worse:
-        blocks.append(text(f"No better than the base model with its parameters fitted: {', '.join(worse)}."))
+        blocks.append(text(say("worse", names=", ".join(worse))))
     blocks.append(text(say("searched"), small=True))
     return blocks
 
@@ -268,6 +269,11 @@ def _sizes(diagnosis: Result) -> list[Block]:
     return table_of(head, rows, title=say("sizes"))
 
 
+def _value(entry: Result) -> str:
+    """A number beside its standard error, with the digits that the terminal shows."""
+    return beside(entry["value"], entry["std"]).replace("-", "\N{MINUS SIGN}")
+
+
 def _error(diagnosis: Result, entry: Result, name: str, stage: str) -> str:
     """The standard error of a number, or why it has none."""
     if any(bound["parameter"] == name and bound["at_bound"] for bound in diagnosis.get("at_bounds", {}).get(stage, [])):
@@ -279,7 +285,7 @@ def _error(diagnosis: Result, entry: Result, name: str, stage: str) -> str:
 def _effects(diagnosis: Result) -> list[tuple[str, str, str, str, str]]:
     """A row for each parameter of the effects that were added: effect, parameter, value, standard error, unit."""
     return [
-        (effect["id"], name, short(entry["value"], 4), _error(diagnosis, entry, f"{effect['id']}.{name}", "after"),
+        (effect["id"], name, _value(entry), _error(diagnosis, entry, f"{effect['id']}.{name}", "after"),
          unit_text(entry["unit"]))
         for effect in diagnosis["effects"] for name, entry in effect["parameters"].items()
     ]  # fmt: skip
@@ -290,7 +296,7 @@ def _to_use(diagnosis: Result) -> list[Block]:
     if not has_numbers_to_use(diagnosis):
         return []
     rows = [
-        (name, short(entry["value"], 4), _error(diagnosis, entry, name, "after"), unit_text(entry["unit"]))
+        (name, _value(entry), _error(diagnosis, entry, name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["after"].items()
     ] + [(f"{effect} {name}", *numbers) for effect, name, *numbers in _effects(diagnosis)]  # fmt: skip
     return table_of(("number to use", "value", "standard error (random)", "unit"), rows, title=say("to_use"))
@@ -299,7 +305,7 @@ def _to_use(diagnosis: Result) -> list[Block]:
 def _numbers(diagnosis: Result) -> list[Block]:
     effects, after = _effects(diagnosis), diagnosis["base"]["after"]
     base = [
-        (name, short(entry["value"], 4), _error(diagnosis, entry, name, "before"), short(after[name]["value"], 4),
+        (name, _value(entry), _error(diagnosis, entry, name, "before"), _value(after[name]),
          _error(diagnosis, after[name], name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["before"].items() if name in after
     ]  # fmt: skip

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 __all__ = [
+    "beside",
     "between",
     "column",
     "digits_for",
@@ -43,6 +44,20 @@ def digits_for(std: float) -> int:
     exponent = math.floor(math.log10(std))
     leading = std / 10.0**exponent
     return -exponent + (1 if leading < 1.95 else 0)
+
+
+def beside(value: float, std: float | None) -> str:
+    """A number as tables show it next to a column of its standard error: to the digits that `std` allows.
+
+    Of a number smaller than its error as many digits as the error is shown with, two: 0.3749 ± 2.39 is 0.4, not 0.
+    ``std``: None where unknown, 0 for what is exact; then four digits.
+    """
+    if not std or not math.isfinite(std) or not math.isfinite(value):
+        return short(value)
+    decimals = digits_for(std)
+    if abs(value) < std:
+        decimals = 1 - math.floor(math.log10(std))
+    return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else short(value)
 
 
 def plain(value: float, significant: int = 3) -> str:

@@ -302,8 +302,9 @@ class Problem(Protocol):
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """Channel -> {"t_s", "measured", "model"} for plots, at the samples; units those of the channel."""
 
-    def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
-        """model.toml: the tables with the fitted values, and [[effect]] tables."""
+    def write_model(self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None) -> None:
+        """model.toml: the tables with the fitted values, and [[effect]] tables. `base`: values of the base model that
+        was fitted without these effects, which a comparison needs."""
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """One sentence: the trial or bench measurement that would distinguish the two."""

@@ -13,12 +13,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, PenetrationModel, write_model
+from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, write_model
 from experiments.diagnose.core.effect_texts import push_advice
 from experiments.diagnose.fit.forms import PENETRATION_HOOKS, OwnEffect, shapes_of
 from experiments.diagnose.fit.localise import acceleration
@@ -41,6 +40,7 @@ from .design import best_push
 from .doubt import off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
+from .model_file import Pairs, model_of
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, scatter_parameters, speeds_of
 from .remarks import SURE, Push, contradict, facts
 from .zeros import find_force_zeros
@@ -408,18 +408,11 @@ class PenetrationProblem(Problem):
             if rows.any()  # a sensor without readings here is none of its channels
         }  # fmt: skip
 
-    def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
+    def write_model(self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None) -> None:
         """model.toml. The slots of `penetration_law` are the parameters of an effect; where trials have several
         diameters the middle one's K and C stand in [surface] and its diameter in [spike], all of them in [notes]. A
-        trial without a diameter of its own gets that of the campaign's [spike]."""
-        pairs = {
-            f"{diameter:g}": {name: float(self._number(values, name, diameter)) for name in ("stiffness", "damping")}
-            for diameter in self._diameters
-        }
-        own = pairs[f"{self._middle:g}"]
-        notes: dict[str, Any] = dict(self.tables.notes)
-        if len(pairs) > 1:
-            notes["fitted_by_diameter"] = pairs
+        trial without a diameter of its own gets that of the campaign's [spike]. [notes] also has K and C of `base`,
+        the model without effects, where there are effects."""
         effects = tuple(
             EffectTable(id=form.effect, parameters={
                 **({} if self._file(form) else {"reference": self._scales.depth}),
@@ -427,13 +420,15 @@ class PenetrationProblem(Problem):
             }, file=self._file(form))
             for form in forms
         )  # fmt: skip
-        tables = {name: getattr(self.tables, name) for name in ("format", "kind", "name", "uncertainty", "sensors")}
-        surface, spike, trials = self.tables.surface.model_copy(update=own), self.tables.spike, self.tables.trial
-        if spike.diameter != self._middle:
-            trials = tuple(trial.model_copy(update={"diameter": self.tables.diameter_of(trial)}) for trial in trials)
-            spike = spike.model_copy(update={"diameter": self._middle})
-        model = PenetrationModel(**tables, spike=spike, surface=surface, notes=notes, trial=trials, effect=effects)
-        write_model(Path(path), model)
+        plain = self._pairs(base) if forms and base is not None else {}
+        write_model(Path(path), model_of(self.tables, self._middle, self._pairs(values), plain, effects))
+
+    def _pairs(self, values: Values) -> Pairs:
+        """Diameter [m] as text -> K [N/m] and C [N s/m]."""
+        return {
+            f"{diameter:g}": {name: float(self._number(values, name, diameter)) for name in ("stiffness", "damping")}
+            for diameter in self._diameters
+        }
 
     def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str], *, is_open: bool) -> list[str]:
         """Sentences on K, its spread, and whether C can be determined, where it was not known; none with drops."""

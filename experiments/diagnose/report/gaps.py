@@ -26,6 +26,7 @@ class Gaps:
     def __init__(self) -> None:
         self._phases: dict[tuple[str, str, bool], list[float]] = {}
         self._channels: dict[tuple[str, bool], list[float]] = {}
+        self._noises: dict[tuple[str, bool], list[float]] = {}  # sums of variances beside either model
         self._beyond: dict[str, list[float]] = {}  # of the best model: readings, sums of squares and variances
         self._conditions: dict[tuple[tuple[str, float], ...], list[float]] = {}
         self._trials: dict[tuple[tuple[str, float], ...], set[str]] = {}
@@ -38,13 +39,15 @@ class Gaps:
         """One channel of one trial: measured less modelled of both models and the noise of each, in the channel's SI
         unit; shapes [n]. A reading whose noise is infinite beside a model, as while a contact switches, does not count
         there."""
-        condition, zeros = tuple(sorted(settings.items())), [0.0] * 4
+        condition, zeros = _condition(settings), [0.0] * 4
         sums = self._channels.setdefault((channel, held_out), zeros.copy())
+        noises = self._noises.setdefault((channel, held_out), [0.0] * 2)
         over = self._conditions.setdefault(condition, zeros.copy())
         self._trials.setdefault(condition, set()).add(trial)
         own = {phase: phases == phase for phase in dict.fromkeys(phases.tolist())}
         for at, rest, noise in ((0, before, std), (2, after, std_after)):
             counts = np.isfinite(noise)
+            noises[at // 2] += float(np.sum(noise[counts] ** 2))
             for target, values in ((sums, rest[counts]), (over, rest[counts] / noise[counts])):
                 target[at] += len(values)
                 target[at + 1] += float(np.sum(values**2))
@@ -77,12 +80,21 @@ class Gaps:
 
     @property
     def by_channel(self) -> list[Row]:
-        """Root mean square of measured less modelled, in the channel's unit (mm, degrees)."""
-        return [
-            {"channel": channel, "unit": unit_of(channel)[0], "held_out": held_out, "samples": cell["samples"]}
-            | {f"rms_{stage}": unit_of(channel)[1] * math.sqrt(cell[stage]) for stage in ("before", "after")}
-            for (channel, held_out), sums in sorted(self._channels.items()) if (cell := _cell(sums))
-        ]  # fmt: skip
+        """Root mean square of measured less modelled, and of the noise as the gap takes it beside that model, in the
+        channel's unit (mm, degrees)."""
+        rows = []
+        for (channel, held_out), sums in sorted(self._channels.items()):
+            if cell := _cell(sums):
+                unit, factor = unit_of(channel)
+                row: Row = {"channel": channel, "unit": unit, "held_out": held_out, "samples": cell["samples"]}
+                for at, stage in enumerate(("before", "after")):
+                    noise = self._noises[channel, held_out][at] / sums[2 * at]
+                    row |= {
+                        f"rms_{stage}": factor * math.sqrt(cell[stage]),
+                        f"noise_{stage}": factor * math.sqrt(noise),
+                    }
+                rows.append(row)
+        return rows
 
     @property
     def residue(self) -> list[Row]:
@@ -108,6 +120,13 @@ class Gaps:
     def parted(self) -> list[Row]:
         """When each channel of each trial first leaves the base model: its running mean is beyond 5 errors."""
         return sorted(self._parted, key=lambda row: (row["trial"], row["at_s"]))
+
+
+def _condition(settings: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    """Settings by name, the speed of a push to three digits: where none is stated it is measured, and never the same
+    twice."""
+    shown = {name: float(f"{value:.3g}") if name == "speed_m_s" else value for name, value in settings.items()}
+    return tuple(sorted(shown.items()))
 
 
 def _cell(sums: list[float]) -> Row:

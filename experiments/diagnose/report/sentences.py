@@ -86,7 +86,18 @@ def size_sentences(diagnosis: Row) -> list[str]:
     if not sizes:
         return []
     most = max(size["signature"] for size in sizes)
-    return [f"How large: {'; '.join(_size_words(size, is_small=_is_small(size, most)) for size in sizes)}."]
+    words = "; ".join(_size_words(size, is_small=_is_small(size, most)) for size in sizes)
+    return [f"How large: {words}. {say('refitted')}{_own_forces(sizes)}"]
+
+
+def _own_forces(sizes: Sequence[Row]) -> str:
+    """What each effect itself pushes with at the deepest reading; empty where no push shows it."""
+    shown = [(size["effect"], own) for size in sizes if (own := size.get("own_force"))]
+    if not shown:
+        return ""
+    own = shown[0][1]
+    forces = " and ".join(f"that of {effect} is {numeral(one['force_N'], 2)} N" for effect, one in shown)
+    return " " + say("own_force", depth_mm=1e3 * own["depth_m"], of=numeral(own["of_N"], 2), forces=forces)
 
 
 def remark_sentences(diagnosis: Row) -> list[str]:
@@ -223,7 +234,7 @@ def told_tables(diagnosis: Row) -> list[dict[str, Any]]:
         tables += _in_units(diagnosis)
         tables.append({
             "title": "chi-square per sample by phase and channel", "head": ["phase", "channel", *_STAGES],
-            "rows": _by_stage(diagnosis["by_phase"], ("phase", "channel"), "", numeral),
+            "rows": _by_stage(diagnosis["by_phase"], ("phase", "channel"), ("before", "after"), numeral),
         })  # fmt: skip
     if aside := diagnosis.get("set_aside", []):
         tables.append({
@@ -235,11 +246,12 @@ def told_tables(diagnosis: Row) -> list[dict[str, Any]]:
         })  # fmt: skip
     rows = candidate_rows(diagnosis)
     if rows:
-        worse = no_better(rows)
+        worse, better = no_better(rows), [row for row in rows if row["better"]]
+        title = "candidates, the best form of each" + (f" ({worse})" if worse else "")
         tables.append({
-            "title": "candidates, the best form of each" + (f" ({worse})" if worse else ""),
+            "title": title if better else say("none_better"),
             "head": ["candidate", "evidence over the base model [nats]", "chi-square a sample beyond noise"],
-            "rows": [[row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}"] for row in rows if row["better"]],
+            "rows": [[row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}"] for row in better or rows],
         })  # fmt: skip
     return tables
 
@@ -248,11 +260,11 @@ _STAGES = ("fitted: before", "after", "held out: before", "after")
 
 
 def _by_stage(
-    rows: Sequence[Row], keys: tuple[str, str], prefix: str, written: Callable[[float], str]
+    rows: Sequence[Row], keys: tuple[str, str], stages: Sequence[str], written: Callable[[float], str]
 ) -> list[list[str]]:
-    """A row for each pair of `keys`, with the numbers of `_STAGES`; - where there is none."""
+    """A row for each pair of `keys`: the numbers of `stages`, fitted and then held out; - where there is none."""
     cells = {(row[keys[0]], row[keys[1]], row["held_out"]): row for row in rows}
-    places = [(held, f"{prefix}{stage}") for held in (False, True) for stage in ("before", "after")]
+    places = [(held, stage) for held in (False, True) for stage in stages]
     return [
         [*pair, *(written(cells[*pair, held][stage]) if (*pair, held) in cells else "-" for held, stage in places)]
         for pair in dict.fromkeys((first, second) for first, second, _ in cells)
@@ -264,9 +276,10 @@ def _in_units(diagnosis: Row) -> list[dict[str, Any]]:
     tables = []
     if channels := diagnosis.get("by_channel", []):
         tables.append({
-            "title": "recorded less modelled, root mean square (after: with the sensors' noise)",
-            "head": ["channel", "unit", *_STAGES],
-            "rows": _by_stage(channels, ("channel", "unit"), "rms_", "{:.3g}".format),
+            "title": say("in_units"),
+            "head": ["channel", "unit", "fitted: before", "after", "noise", "held out: before", "after", "noise"],
+            "rows": _by_stage(channels, ("channel", "unit"), ("rms_before", "rms_after", "noise_after"),
+                              "{:.3g}".format),
         })  # fmt: skip
     conditions = diagnosis.get("by_condition", [])
     if len(conditions) > 1:

@@ -194,7 +194,8 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
         if not rows:
             return ["No effect of the library could be tried."]
         listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_SHOWN])
-        return [f"No effect of the library explains the misfit. Of the misfit beyond the noise, {listed}."]
+        costs = "" if any(row["score"] > 0 for row in rows) else f" {say('costs_more')}"
+        return [f"No effect of the library explains the misfit. Of the misfit beyond the noise, {listed}.{costs}"]
     if worsens_held_out(diagnosis):
         gaps = {stage: numeral(diagnosis["gap"][stage]["held_out"]) for stage in ("before", "after")}
         return [say("worse_held_out", names=" + ".join(leading["effects"]), **gaps)]

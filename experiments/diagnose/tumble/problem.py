@@ -288,7 +288,7 @@ class TumbleProblem(Problem):
                 channels[name] = {"t_s": data.time[mine], "measured": data.value[mine], "model": value[mine]}
         return channels
 
-    def write_model(self, path: str, values: Values, forms: Sequence[Form]) -> None:
+    def write_model(self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None) -> None:
         """model.toml, which `hedgebed tumble --model` runs."""
         tables = self.data.tables
         numbers = {name: float(values.get(name, self.forward.nominal[name])) for name in SHARED}

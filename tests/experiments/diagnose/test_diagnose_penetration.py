@@ -8,6 +8,7 @@ import pytest
 from penetration_campaigns import DAMPING, DEPTH_STD, GRAVITY, MASS, STIFFNESS, campaign_of, driven_trial, drop_trial
 
 from experiments.campaign import Recording, read_model
+from experiments.campaign.tables import BASE_NOTE
 from experiments.diagnose.core.scatter_gap import weighed_residuals
 from experiments.diagnose.fit.bounds import is_strained
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
@@ -386,10 +387,12 @@ def test_nothing_that_can_be_told_is_said_where_no_sensor_tells_a_force():
 def test_a_fitted_model_file_reads_back_with_its_effects(tmp_path):
     problem = make_problem(campaign_of([("d", "driven", 0.01, driven_trial(base, speed=0.01))]))
     form = next(form for form in problem.forms if form.id == "depth-hardening:power")
-    problem.write_model(str(tmp_path / "model.toml"), {"stiffness": 800.0, form.amplitude: 0.2}, [form])
+    plain = {"stiffness": 950.0, "damping": 3.0}
+    problem.write_model(str(tmp_path / "model.toml"), {"stiffness": 800.0, form.amplitude: 0.2}, [form], plain)
     model = read_model(tmp_path / "model.toml")
     assert model.surface.stiffness == 800.0
     assert [(effect.id, effect.parameters["hardening_power"]) for effect in model.effect] == [("depth-hardening", 0.2)]
+    assert model.notes[BASE_NOTE] == {"0.012": plain}
 
 
 def test_in_a_model_of_several_diameters_spike_and_surface_are_of_one_of_them(tmp_path):

@@ -9,6 +9,7 @@ from golden import golden
 
 from dem.grains.materials import Material
 from experiments.campaign import read_campaign
+from experiments.campaign.tables import BASE_NOTE
 from experiments.cli.main import main
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
@@ -257,3 +258,22 @@ def test_an_effect_of_ones_own_is_part_of_the_law(law, tmp_path):
     assert amended.force == pytest.approx(closed, abs=1e-9)
     with pytest.raises(ValueError, match="c is missing"):
         law(effect.replace("c = 3.0", ""))
+
+
+def test_the_spring_damper_beside_the_law_is_that_of_the_fit_without_effects(tmp_path):
+    """W = K z at rest, K of the base model's own fit; without that fit K of the amended law, which is reported."""
+    hardened = MODEL + CRATER
+    own = f'[notes.{BASE_NOTE}."0.012"]\nstiffness = {2 * K}\ndamping = {C}\n'
+    found = {}
+    for name, text in (("with", hardened + own), ("without", hardened)):
+        (tmp_path / f"{name}.toml").write_text(text)
+        settings = PenetrateSettings(
+            ground="spring-damper", model=str(tmp_path / f"{name}.toml"), tip_diameter=0.012, load=0.1, speeds=(0.1,),
+            other_speeds=(), drop_speeds=(), other_drop_speeds=(), frame_count=0,
+        )  # fmt: skip
+        found[name] = penetrate.run(settings, tmp_path / name)
+    rest = {name: result["quantities"]["sinkage_spring_damper"]["value"] for name, result in found.items()}
+    assert rest["with"] == pytest.approx(0.1 / (2 * K), rel=0.01)
+    assert rest["without"] == pytest.approx(0.1 / K, rel=0.01)
+    said = {name: result["departures"]["sentences"][-1] for name, result in found.items()}
+    golden("penetrate/compared", [said["with"], said["without"]])

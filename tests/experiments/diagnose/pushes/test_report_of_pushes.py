@@ -15,10 +15,12 @@ from experiments.check.shifted import shifted_depths
 from experiments.diagnose.experiment import diagnose_campaign, run
 from experiments.diagnose.push.remarks import Push, contradict
 from experiments.diagnose.report.document import document
+from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
 from experiments.diagnose.report.summary import summary_sentences
 from experiments.diagnose.report.to_use import use_sentences
 from experiments.diagnose.settings import DiagnoseSettings
+from rigid.series import read_series
 
 OFF = 0.4e-3
 """By which the depth of trial n2 is too large [m]."""
@@ -87,6 +89,28 @@ def test_what_was_set_aside_is_in_no_gap_and_in_a_table_of_its_own(result):
         assert max(row["after"] for row in rows) < 1.3
     assert "n2" not in {trial for row in said["by_condition"] for trial in row["trials"]}
     assert said["residue"] == []
+
+
+def test_the_force_of_an_effect_is_that_of_the_law_at_the_deepest_reading(result):
+    """depth-hardening adds K z (z / D)^p - K z to K z: what the law has beyond the spring of the same K."""
+    _, said, folder = result
+    (size,) = said["sizes"]
+    own = size["own_force"]
+    series = read_series(folder / "series" / f"{own['trial']}.force.csv", text=("phase",))
+    deepest = int(np.argmax(series["depth_m"]))
+    assert own["depth_m"] == series["depth_m"][deepest] and own["of_N"] == series["after"][deepest]
+    stiffness = said["base"]["after"][f"stiffness@{0.06 if own['trial'][0] == 'n' else 0.08:g}"]["value"]
+    assert own["force_N"] == pytest.approx(own["of_N"] - stiffness * own["depth_m"], abs=0.01 * own["of_N"])
+
+
+def test_the_noise_to_expect_is_the_root_mean_square_of_each_models_own():
+    """sqrt((3 * 0.02^2 + 0.2^2) / 4): a reading at the first contact counts with its larger noise."""
+    gaps, std = Gaps(), np.array([0.2, 0.02, 0.02, 0.02])
+    gaps.add("a", "force", np.arange(4.0), 0.3 * std, 0.1 * std, std, 2 * std, phases=np.full(4, "in"), settings={},
+             held_out=False)  # fmt: skip
+    (row,) = gaps.by_channel
+    assert row["noise_before"] == pytest.approx(np.sqrt(0.0103)) and row["noise_after"] == 2 * row["noise_before"]
+    assert row["rms_after"] == pytest.approx(0.1 * row["noise_before"])
 
 
 def test_there_is_one_k_to_use_for_each_plate_before_all_else(result):
