@@ -134,6 +134,16 @@ def test_the_cursor_of_the_curves_follows_and_a_click_sets_the_time(browser, pag
     assert 0 < browser.value(f"{STATE}.frame") < 5
 
 
+def test_depth_points_down_and_one_legend_stands_before_panels_of_the_same_lines(browser, page):
+    browser.open(page)
+    depth = ".scene .curves svg[aria-label^=depth]"
+    points = browser.value(f"document.querySelector('{depth} polyline').getAttribute('points')")
+    heights = [float(point.split(",")[1]) for point in points.split()]
+    assert heights[0] < min(heights) + 1 < max(heights) - 50
+    assert browser.value(f"document.querySelector('{depth}').previousSibling.querySelectorAll('text').length") == 2
+    assert browser.value("document.querySelectorAll('.scene .curves svg:not([aria-label])').length") == 1
+
+
 def test_colours_cut_and_runs_can_be_chosen(browser, page):
     browser.open(page, "frame=4&colour=displacement")
     one = seen(browser)

@@ -33,10 +33,11 @@ class Line(TypedDict):
 
 
 class Panel(TypedDict):
-    """Lines over time; the label has their unit."""
+    """Lines over time; the label has their unit. ``down``: larger values are lower, as depths are."""
 
     label: str
     lines: list[Line]
+    down: bool
 
 
 Band = TypedDict("Band", {"from": float, "to": float, "state": str, "colour": str})
@@ -76,7 +77,7 @@ def line(name: str, time: Array, values: Array, *, colour: str = BED, dashed: bo
 def panel(label: str, *lines: Line) -> list[Panel]:
     """The lines that have two points at least, in one panel; none where there are none."""
     shown = [one for one in lines if len(one["t"]) > 1]
-    return [{"label": label, "lines": shown}] if shown else []
+    return [{"label": label, "lines": shown, "down": label.startswith("depth")}] if shown else []
 
 
 def bands(time: Array, states: States) -> list[Band]:

@@ -33,9 +33,13 @@ class Curves {
     this.low = times.reduce((a, b) => Math.min(a, b), Infinity);
     this.high = times.reduce((a, b) => Math.max(a, b), -Infinity);
     if (!(this.high > this.low)) return;
-    this.drawLegend(scene.panels.flatMap((panel) => (panel.lines.length > 1 ? panel.lines : [])));
     if (scene.states.length) this.drawStates(scene.states, choose);
-    scene.panels.forEach((panel, k) => this.drawPanel(panel, k === scene.panels.length - 1, choose));
+    let listed = "";
+    scene.panels.forEach((panel, k) => {
+      const lines = panel.lines.length > 1 ? panel.lines : [], key = lines.map((line) => `${line.name} ${line.colour}`).join();
+      if (key && key !== listed) this.drawLegend(lines), (listed = key);
+      this.drawPanel(panel, k === scene.panels.length - 1, choose);
+    });
   }
 
   x(time) {
@@ -55,9 +59,9 @@ class Curves {
     return sheet;
   }
 
+  /** The lines of the panel below it, and of those after it that have the same ones. */
   drawLegend(lines) {
     const names = new Map(lines.map((line) => [line.name, line]));
-    if (!names.size) return;
     const sheet = svg("svg", {});
     let x = EDGE.left, y = 10;
     for (const { name, colour, dashed } of names.values()) {
@@ -91,7 +95,8 @@ class Curves {
     let low = values.reduce((a, b) => Math.min(a, b), Infinity), high = values.reduce((a, b) => Math.max(a, b), -Infinity);
     const room = 0.05 * (high - low) || 0.5 * Math.abs(high) || 1;
     [low, high] = [low - room, high + room];
-    const y = (value) => EDGE.top + ((high - value) / (high - low)) * (TALL - EDGE.top - EDGE.foot);
+    const share = (value) => (panel.down ? value - low : high - value) / (high - low);
+    const y = (value) => EDGE.top + share(value) * (TALL - EDGE.top - EDGE.foot);
     const floor = TALL - EDGE.foot;
     for (const value of ticks(low, high)) {
       sheet.append(svg("line", { x1: EDGE.left, x2: WIDE - EDGE.right, y1: y(value), y2: y(value), class: "grid" }));
