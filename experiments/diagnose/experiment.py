@@ -26,7 +26,7 @@ from .fit.forms import OwnEffect, load_own
 from .fit.problem import Problem
 from .noise.colour import together
 from .report.document import write_diagnosis
-from .report.sentences import findings_in_words, told_tables, where_sentences
+from .report.sentences import findings_in_words, say, told_tables, where_sentences
 from .report.summary import summary_sentences, title_words
 
 __all__ = ["check", "diagnose_campaign", "make_problem", "resume", "run"]
@@ -148,13 +148,12 @@ def _result(found: Diagnosis, diagnosis: Json) -> Result:
     sentences = [*where_sentences(diagnosis), *found.remarks, *found.facts]
     noises = [together([colour]) for colour in found.colours.values()]
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
-    whose = "the bed's" if found.problem.granular else "the surface's, the rig's or the start's"
+    whose = "the bed" if found.problem.granular else "the surface, the rig or the start"
     sentences += [
-        f"Replicates differ by more than the sensors: {kind}, standard deviation {std:.3g} "
-        + _UNITS.get(kind, "(relative)")
-        + f"; it is {'the zero of a sensor, or of where it was set up' if kind.endswith(' zero') else whose}."
+        say("scatter", kind=kind, std=std, unit=_UNITS.get(kind, "(relative)"),
+            of=say("scatter_zero") if kind.endswith(" zero") else whose)
         for kind, std in found.model_std.items()
-    ]
+    ]  # fmt: skip
     warnings = [finding.what for finding in said_once(found.findings)]
     beside = "beside the effects named it means another thing"
     if is_strained(found.best):

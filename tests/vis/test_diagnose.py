@@ -75,8 +75,8 @@ def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left
         ('[notes]\n"made_by" = "hedgebed 0.1.0 tumble on a bed of sand"\n', "simulated on grains"),
         ('[notes]\n"made_by" = "hedgebed 0.1.0 tumble on the spring-damper of sand"\n', "simulated"),
         ('[notes]\n"made_by" = "hedgebed 0.1.0 campaign"\n', "simulated"),
-        ('[notes]\n"made_by" = "the rig in hall 3, on a bed of sand"\n', "measured"),
-        ('format = "hedgehog-model/1"\n', "measured"),
+        ('[notes]\n"made_by" = "the rig in hall 3, on a bed of sand"\n', "as given"),
+        ('format = "hedgehog-model/1"\n', "as given"),
         (None, "recorded"),
     ],
 )
@@ -104,7 +104,7 @@ def test_a_legend_says_measured_only_of_trials_that_hedgebed_did_not_make(tmp_pa
 def test_the_force_of_a_push_is_drawn_over_its_depth_and_what_is_left_too_where_it_only_goes_in(phases, over):
     one, depth = np.ones(4), np.array([0.001, 0.002, 0.0015, 0.0005])
     channel = Channel("a", "force", np.arange(4.0), one, one, one, one, one, np.array(phases), None, depth)
-    drawing = draw_trajectories([channel], set(), ("base", "best"), "measured")
+    drawing = draw_trajectories([channel], set(), ("base", "best"), "as given")
     left, right = drawing.axes
     assert (left.get_xlabel(), right.get_xlabel()) == ("depth [mm]", over)
     assert left.lines[0].get_xdata() == pytest.approx(1e3 * depth)
@@ -129,6 +129,15 @@ def test_the_worst_channels_are_drawn_and_held_out_ones_among_them(tmp_path):
     write_folder(tmp_path, trials={name: float(size) for name, size in zip("abcdefgh", range(9, 1, -1), strict=True)})
     channels = [read_channel(path) for path in sorted((tmp_path / "series").glob("*.csv"))]
     assert [channel.trial for channel in worst(channels, {"h", "g", "f"})] == ["a", "b", "c", "d", "f", "g"]
+
+
+def test_trials_are_drawn_in_the_order_of_the_campaign_and_dots_over_lines(tmp_path):
+    write_folder(tmp_path, trials={name: float(size) for name, size in zip("abc", (2, 9, 5), strict=True)})
+    channels = [read_channel(path) for path in sorted((tmp_path / "series").glob("*.csv"))]
+    assert [channel.trial for channel in worst(channels, set())] == ["a", "b", "c"]
+    lines = draw_trajectories(channels[:1], set(), ("base", "best"), "as given").axes[0].lines
+    order = {line.get_marker(): line.get_zorder() for line in lines}
+    assert order["."] > order["None"]
 
 
 def test_held_out_pushes_are_drawn_where_all_drops_were_fitted():

@@ -212,6 +212,7 @@ def _draw_coverage(result: Result) -> Figure:
     drawing, ((axis,),) = sheet(1, 1, 0.8 + 0.17 * max(4, len(entries)))
     of = {"x": "pose", "y": "pose", "theta": "pose", "gyro": "imu", "ax": "imu", "ay": "imu", "depth": "data",
           "force": "data", "accel": "data", None: "data"}  # fmt: skip
+    marked = False
     for place, entry in enumerate(entries):
         start, end = entry["from_s"], entry["to_s"]
         axis.barh(place, end - start, left=start, height=0.62, color=colours[entry["sensor"]], lw=0)
@@ -221,6 +222,7 @@ def _draw_coverage(result: Result) -> Figure:
             channel = finding["channel"]
             own = finding["trial"] == entry["trial"] and of.get(channel, channel) == entry["sensor"]
             if own and finding["from_s"] is not None:
+                marked = True
                 wide = max(finding["to_s"] - finding["from_s"], 0.004 * (end - start))
                 axis.barh(place, wide, left=finding["from_s"], height=0.3, color=RED, lw=0)
     words = [f"{entry['trial']}  {entry['sensor'] if entry['sensor'] != 'data' else ''}".strip() for entry in entries]
@@ -229,7 +231,8 @@ def _draw_coverage(result: Result) -> Figure:
     axis.grid(False, axis="y")
     axis.set_xlabel("time [s]")
     kinds = list(dict.fromkeys(entry["sensor"] for entry in entries))
-    handles = [Patch(color=colours[kind], label=kind) for kind in kinds] + [Patch(color=RED, label="found")]
+    handles = [Patch(color=colours[kind], label=kind) for kind in kinds]
+    handles += [Patch(color=RED, label="found")] if marked else []
     legend_above(drawing, handles, 4, fontsize=7.5)
     return drawing
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rigid.series import read_series
 from vis.diagnose.held_out import worsens_held_out
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
-from vis.page.report import Result, capital
+from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
 
@@ -108,17 +108,17 @@ def read_channel(path: Path) -> Channel:
 
 
 def source_of(folder: Path) -> str:
-    """How the trials of a diagnosis came about: "simulated on grains", "simulated" or "measured".
+    """How the trials of a diagnosis came about: "simulated on grains", "simulated" or "as given".
 
     hedgebed signs the campaigns that it makes: `made_by` in the notes of campaign.toml, which model.toml repeats. A
-    campaign without its signature counts as measured; without model.toml the word is "recorded".
+    campaign without its signature is as given, measured or not; without model.toml the word is "recorded".
     """
     path = folder / "model.toml"
     if not path.exists():
         return "recorded"
     made_by = str(tomllib.loads(path.read_text(encoding="utf-8")).get("notes", {}).get("made_by", ""))
     if not made_by.startswith("hedgebed "):
-        return "measured"
+        return "as given"
     return "simulated on grains" if " penetrate, grains" in made_by or " on a bed of " in made_by else "simulated"
 
 
@@ -131,25 +131,30 @@ def trials_of(folder: Path) -> str:
     if not path.exists():
         return ""
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    name, surface = str(tables.get("name", "trials")), str(tables.get("surface", {}).get("kind", ""))
+    name, surface = (
+        f'"{tables["name"]}"' if "name" in tables else "a campaign",
+        str(tables.get("surface", {}).get("kind", "")),
+    )
     words = name if not surface or surface in name else f"{name}, on {surface}"
     local = tables.get("rig", {}).get("gravity")
     found = {trial.get("gravity_sim", trial.get("gravity", local)) for trial in tables.get("trial", ())} - {None}
     if found:
         ends = dict.fromkeys(f"{gravity:.3g}" for gravity in (min(found), max(found)))
         words += f", {' to '.join(ends)} m/s\N{SUPERSCRIPT TWO}"
-    return f"{capital(words)}: {source_of(folder)}"
+    return f"Trials of {words}: {source_of(folder)}"
 
 
 def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
     """At most six channels in which the base model fails most, two of them held out where some are.
 
-    Of the fitted ones, and of those held out, no channel is shown more than its share while there are others.
+    Of the fitted ones, and of those held out, no channel is shown more than its share while there are others. Each part
+    is in the order of `channels`.
     """
     order = sorted(channels, key=lambda c: -float(np.mean(c.residual("before") ** 2)))
     kinds = len({c.name for c in channels})
     each = max(2, math.ceil(_MOST_ROWS / max(1, kinds)))
     kept = min(2, sum(c.trial in held for c in channels))
+    places = {id(channel): place for place, channel in enumerate(channels)}
     chosen: list[Channel] = []
     for part, most in ((False, _MOST_ROWS - kept), (True, _MOST_ROWS)):
         here: list[Channel] = []
@@ -157,7 +162,7 @@ def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
             alike = sum(c.name == channel.name for c in here)
             if (channel.trial in held) is part and alike < each and len(chosen) + len(here) < most:
                 here.append(channel)
-        chosen += here
+        chosen += sorted(here, key=lambda c: places[id(c)])
     return chosen
 
 
@@ -187,7 +192,7 @@ def draw_trajectories(
         place = time if depth is None else depth
         if depth is not None and c.goes_in:
             time, over_time = depth, "depth [mm]"
-        step = max(1, len(time) // 160)
+        step = max(1, len(time) // 80)
         if c.scatter is not None:
             wide = 2 * np.hypot(1.0, c.scatter / c.std_after)
             right.fill_between(time, -wide, wide, color="#f1ead8", lw=0, zorder=0)
@@ -195,7 +200,7 @@ def draw_trajectories(
         for stage, colour, dash, _ in models:
             left.plot(place, factor * c.model(stage), color=colour, ls=dash, lw=1.4, zorder=3)
             right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
-        left.plot(place[::step], factor * c.measured[::step], ".", color=INK, ms=2.4, zorder=2)
+        left.plot(place[::step], factor * c.measured[::step], ".", color=INK, ms=2.6, zorder=4)
         for axis in (left, right):
             low, high = axis.get_ylim()
             axis.set_ylim(low, high + 0.07 * (high - low))  # the band along the top hides nothing

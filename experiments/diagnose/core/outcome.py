@@ -187,10 +187,20 @@ class Diagnosis(Known):
 
     @cached_property
     def planned(self) -> Planned | None:
-        """The further trial that would separate the first effect from the likeliest alternative best."""
-        if self.verdict != "ambiguous" or self.choice is None:
+        """The further trial that would separate the first effect best from the likeliest alternative, or, where it is
+        named, from the nearest rival."""
+        if self.choice is None:
             return None
-        return self.problem.planned(self.best, smallest(self.choice)[0].fit)
+        if self.verdict == "ambiguous":
+            return self.problem.planned(self.best, smallest(self.choice)[0].fit)
+        near = self._nearest
+        return None if near is None else self.problem.planned(self.best, near.hypothesis.fit)
+
+    @property
+    def _nearest(self) -> Rival | None:
+        """The rival that a named effect leads by least; None of other verdicts, and without rivals."""
+        rivals = self.choice.rivals if self.choice is not None and self.verdict == "named" else ()
+        return min(rivals, key=lambda rival: rival.lead, default=None)
 
     @property
     def facts(self) -> tuple[str, ...]:
@@ -218,7 +228,7 @@ class Diagnosis(Known):
         if self.choice is None:  # unknown for the readings' noise alone
             return say("measure_noise")
         if self.verdict == "named":
-            return confirmation(self.choice.best.effects[0], self.problem.kind)
+            return confirmation(self.choice.best.effects[0], self.problem.kind) + self._expected
         if self.verdict == "ambiguous":
             told = self.problem.next_experiment(self.forms[0], self.rivals[0], self.best.values)
             if (plan := self.planned) is None:
@@ -230,6 +240,19 @@ class Diagnosis(Known):
             self.problem, self.own_values, self.forms, self.left, self.dependence[1], beside=self.choice.best.effects,
             is_scatter=bool(self.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
         )  # fmt: skip
+
+    @property
+    def _expected(self) -> str:
+        """The best further push for a named effect, and what it and its nearest rival predict there; empty without."""
+        near, plan = self._nearest, self.planned
+        if near is None or plan is None or plan.apart is None:
+            return ""
+        first, apart = self.effects[0], plan.apart
+        ways = {-1.0: "on the way back", 0.0: "in the hold", 1.0: "on the way in"}
+        way = ways[float(np.sign(apart["speed_m_s"]))]
+        errors = {key: f"{apart[f'{key}_N']:.3g} ± {apart[f'{key}_std_N']:.1g} N" for key in ("one", "other")}
+        return " " + say("confirming", plan=plan, first=first, rival=near.effect, depth_mm=1e3 * apart["depth_m"],
+                         way=way, **errors)  # fmt: skip
 
     def base_parameters(self, one: Fit) -> dict[str, Estimated]:
         """The base model's shared numbers in one of the fits: name -> value, std (standard error; None where data and

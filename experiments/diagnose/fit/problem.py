@@ -165,12 +165,16 @@ class Planned:
     what: str  # the trial in words
     nats: float  # evidence to be expected
     tried: int  # trials of the search
+    apart: Mapping[str, float] | None = None
+    """Where the two predictions differ most over their errors: ``depth_m``, ``speed_m_s`` (negative on the way back),
+    ``one_N`` and ``other_N`` with ``one_std_N`` and ``other_std_N``."""
 
 
 class Problem(Protocol):
     """One campaign as the statistics see it."""
 
     kind: str  # ``penetration`` or ``tumble``
+    counted_as: str = ""  # ``pushes``, ``rig`` or ``tumbles``: which count of right verdicts is of such campaigns
     whole: str  # all that takes part in a trial, as in "what comes back is in ..."
     trials: tuple[TrialInfo, ...]  # the trials that can be used, in the campaign's order
     base: tuple[Parameter, ...]

@@ -8,6 +8,7 @@ not count (Box and Hill, Discrimination among mechanistic models, Technometrics 
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -45,16 +46,27 @@ def best_push(
     for diameter, speed, part, hold, returns in itertools.product(diameters, paces, _DEPTHS, _HOLDS, (False, True)):
         time, z, v = _path(speed, part * depth, hold, returns)
         d, noise = np.zeros(len(time)), np.eye(len(time))
+        forces: list[tuple[Array, Array]] = []
         for sign, fit in ((1.0, one), (-1.0, other)):
             force, errors = _predicted(fit, predict, diameter, time, z, v)
+            forces.append((force, np.linalg.norm(errors, axis=1)))
             weight = np.sqrt(rows / _ROWS) / std
             d += sign * weight * force
             noise += weight**2 * (errors @ errors.T)
         settings = {"diameter_m": diameter, "speed_m_s": speed, "depth_m": part * depth, "hold_s": hold,
                     "returns": float(returns)}  # fmt: skip
-        found.append(Planned(settings, "", float(0.5 * d @ np.linalg.solve(noise, d)), 0))
+        nats = float(0.5 * d @ np.linalg.solve(noise, d))
+        found.append(Planned(settings, "", nats, 0, _apart(z, v, forces, std)))
     best = max(found, key=lambda push: push.nats)
-    return Planned(best.settings, _words(best.settings, len(diameters) > 1), best.nats, len(found))
+    return replace(best, what=_words(best.settings, len(diameters) > 1), tried=len(found))
+
+
+def _apart(z: Array, v: Array, forces: Sequence[tuple[Array, Array]], std: float) -> dict[str, float]:
+    """The reading at which two predictions, each a force with its standard error [N], differ most over their errors."""
+    (one, one_std), (other, other_std) = forces
+    at = int(np.argmax(np.abs(one - other) / np.sqrt(one_std**2 + other_std**2 + std**2)))
+    return {"depth_m": float(z[at]), "speed_m_s": float(v[at]), "one_N": float(one[at]), "other_N": float(other[at]),
+            "one_std_N": float(one_std[at]), "other_std_N": float(other_std[at])}  # fmt: skip
 
 
 def _words(push: Mapping[str, float], says_diameter: bool) -> str:

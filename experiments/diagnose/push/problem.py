@@ -64,6 +64,7 @@ class PenetrationProblem(Problem):
     """One campaign of penetration."""
 
     kind = "penetration"
+    counted_as = "pushes"
     whole = "the bed or the tip"
     clocks = (("force",), ("depth", "accel"))
     by_path = True
@@ -453,11 +454,12 @@ class PenetrationProblem(Problem):
         if self.tables.uncertainty.damping < 1 or not all(trial.driven for trial in self._trials.values()):
             return []
         still = {**values, **{named("damping", diameter, self._diameters): 0.0 for diameter in self._diameters}}
-        return [
-            Push(trial.diameter, *(column[trial.has_other] for column in (
-                trial.path.depth, trial.path.speed, trial.other, self._run([still], forms, [trial])[0][0])))
-            for trial in (self._trials[id] for id in trials)
-        ]  # fmt: skip
+        found = []
+        for trial in (self._trials[id] for id in trials):
+            spring, whole = (self._run([point], forms, [trial])[0][0] for point in (still, values))
+            columns = (trial.path.depth, trial.path.speed, trial.other, spring, whole - spring)
+            found.append(Push(trial.diameter, *(column[trial.has_other] for column in columns)))
+        return found
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """See `Problem`."""

@@ -22,13 +22,14 @@ class Push:
     speed: Array
     force: Array
     spring: Array  # force of the best model with C = 0 [N]
+    damper: Array | float = 0.0  # force of its C [N]
 
 
 def facts(pushes: Sequence[Push], added: Sequence[str], *, is_open: bool) -> list[str]:
     """Sentences. `added`: names of what the best model has beyond the base. `is_open`: whether C is not determined."""
     if not pushes:
         return []
-    sentences = _stiffness(pushes)
+    sentences = _stiffness(pushes, is_open=is_open)
     if not is_open:
         return sentences
     straight, bent = _each(pushes, added)
@@ -57,18 +58,20 @@ def _each(pushes: Sequence[Push], added: Sequence[str]) -> tuple[_Fitted, _Fitte
     return straight, [_two(push, lambda p: p.spring) for push in pushes] if added else []
 
 
-def _stiffness(pushes: Sequence[Push]) -> list[str]:
+def _stiffness(pushes: Sequence[Push], *, is_open: bool) -> list[str]:
+    """K of each push alone: F less the model's C v, where C is determined, over z by least squares."""
     by_size: dict[float, list[float]] = {}
     for push in pushes:
         z = np.maximum(push.depth, 0.0)
-        by_size.setdefault(push.diameter, []).append(float(z @ push.force / max(float(z @ z), 1e-300)))
+        force = push.force if is_open else push.force - push.damper
+        by_size.setdefault(push.diameter, []).append(float(z @ force / max(float(z @ z), 1e-300)))
     parts = []
     for size, found in sorted(by_size.items()):
         spread = f" ± {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
         parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m at {1e3 * size:g} mm ({len(found)})")
     sentences = [
-        f"K of a straight spring, fitted to each push alone (number of pushes): {', '.join(parts)}. This shows how "
-        f"much pushes differ; it is not the K of the model."
+        f"K of a straight spring, fitted to each push alone{'' if is_open else ' with C of the model'} (number of "
+        f"pushes): {', '.join(parts)}. It shows by how much pushes differ; where an effect is named, use the model's K."
     ]
     if len(by_size) > 2:
         sizes = np.log(sorted(by_size))

@@ -10,6 +10,7 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 """
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -35,6 +36,7 @@ from .sentences import candidate_rows
 
 __all__ = ["document", "write_diagnosis"]
 
+COUNTS = tomllib.loads(Path(__file__).with_name("counts.toml").read_text(encoding="utf-8"))
 _ROUNDS = 8  # of refits without one of the effects
 _SIGNALS = ("force", "accel", "ax", "ay")  # channels that read 0 where nothing pushes: a change is a share of these
 
@@ -67,6 +69,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
             name: {"stated": one.stated, "found": one.found, "unit": si_unit_of(name)} for name, one in noise.items()
         }
     diagnosis["kind"] = found.problem.kind
+    if count := COUNTS.get(found.problem.counted_as):
+        diagnosis["counted"] = {"of": found.problem.counted_as, **count}
     diagnosis["base"] = {"before": _base(found, found.base), "after": _base(found, found.best)}
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
     diagnosis["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
@@ -89,6 +93,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
     diagnosis["next_experiment"] = found.next_experiment
     if (plan := found.planned) is not None:
         diagnosis["planned"] = {**plan.settings, "expected_nats": plan.nats, "tried": plan.tried}
+        if plan.apart is not None:
+            diagnosis["planned"]["apart"] = dict(plan.apart)
     return diagnosis
 
 

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from scipy.stats import beta
+
 from experiments.diagnose.core.effect_texts import meaning
 from experiments.diagnose.core.rivals import LEAD
 from experiments.diagnose.fit.gaps import numeral
@@ -32,6 +34,7 @@ _SMALL_SHARE, _SMALL_BESIDE = 0.05, 0.2  # of the force, and of the largest sign
 _STANDING = 2.0  # chi-square per sample of a platform that stands from which on it is explained
 _WORSE_OF_ALL, _WORSE_CELL, _WORSE_SHOWN = 1.1, 1.5, 3
 """Factor from which a condition, and a channel in a phase, has got worse; how many of each are reported."""
+_BOUND = 0.95  # confidence of the one-sided bound on a rate (Clopper and Pearson, Biometrika 26 (1934), 404)
 _MAINLY = 0.5  # share of what is beyond the noise from which a phase, a channel or a setting holds most of it
 
 
@@ -66,7 +69,17 @@ def sure_sentences(diagnosis: Row) -> list[str]:
             sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)}, "
         sure += f"and its change of the data is {near['angle_deg']:.0f} degrees away (0: the same): {apart}"
     return [*sentences, *size_sentences(diagnosis), *remark_sentences(diagnosis), *([f"{sure}."] if sure else []),
-            *unnamed_sentence(diagnosis)]  # fmt: skip
+            *_how_often(diagnosis), *unnamed_sentence(diagnosis)]  # fmt: skip
+
+
+def _how_often(diagnosis: Row) -> list[str]:
+    """How often a named verdict was right in the independent count of such campaigns, and what nats are."""
+    counted = diagnosis.get("counted")
+    if diagnosis["verdict"] != "named" or counted is None:
+        return []
+    named, right = counted["named"], counted["right"]
+    least = 100 * float(beta.ppf(1 - _BOUND, right, named - right + 1))
+    return [say("how_often", of=say(f"of_{counted['of']}"), named=named, right=right, least=least)]
 
 
 def behind_words(rival: Row) -> str:

@@ -63,6 +63,7 @@ class TumbleProblem(Problem):
                 raise ValueError(f"effect_file = {str(effect.file)!r}: the hook {inner[0]!r} cannot be fitted yet")
             _ = effect.tumble  # refused here where it has no forms
         self.data = data
+        self.counted_as = "tumbles" if data.tables.rig is None else "rig"
         self.own = {effect.id: effect for effect in own}
         self.forward = Forward(data, **({"time_step": _COARSE} if coarse else {}), threads=threads, own=own)
         self.findings = tuple(findings)

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose.experiment import diagnose_campaign, run
 from experiments.diagnose.push.remarks import Push, contradict
-from experiments.diagnose.report.document import document
+from experiments.diagnose.report.document import COUNTS, document
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
 from experiments.diagnose.report.summary import summary_sentences
@@ -211,3 +212,26 @@ def test_the_shipped_plates_have_no_push_with_another_zero():
     from experiments.campaign.files import TEMPLATES
 
     assert list(shifted_depths(read_campaign(TEMPLATES / "cmu-plate-sinkage"))) == []
+
+
+def test_the_push_that_confirms_a_name_is_stated_with_both_predictions(result):
+    """F = K z (z / 7.5 mm)^0.3 beyond 10 mm, which the named effect predicts within its errors."""
+    _, said, _ = result
+    (first,), plan = said["effects"], said["planned"]
+    rival = min(said["equivalence"][1:], key=lambda row: row["lead"])["effect"]
+    asked = said["next_experiment"]
+    assert first["id"] in asked and rival in asked and f"{1e3 * plan['depth_m']:.3g} mm deep" in asked
+    apart = plan["apart"]
+    truth = STIFFNESS[plan["diameter_m"]] * apart["depth_m"] * (apart["depth_m"] / 0.0075) ** 0.3
+    error = np.hypot(apart["one_std_N"], 0.01 * truth)
+    assert abs(apart["one_N"] - truth) < 4 * error < abs(apart["one_N"] - apart["other_N"])
+
+
+@pytest.mark.parametrize(("name", "of"), [("push-981", "pushes"), ("rig-981", "rig"), ("tumble-981", "tumbles")])
+def test_how_often_a_name_is_right_is_what_the_kept_count_has(name, of):
+    path = Path(__file__).parents[4] / "docs" / "results" / "diagnose-second" / name / "cases.jsonl"
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    named = [row for row in rows if row["verdict"] == "named"]
+    right = [row for row in named if row["outside"] is None and set(row["effects"]) == set(row["truth"])]
+    assert COUNTS[of] == {"named": len(named), "right": len(right)}
+    assert {row["case"]["seed"] // 1000 for row in rows} == {COUNTS["seed"]}
