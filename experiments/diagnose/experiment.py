@@ -26,7 +26,7 @@ from .fit.forms import OwnEffect, load_own
 from .fit.problem import Problem
 from .noise.colour import together
 from .report.document import write_diagnosis
-from .report.sentences import findings_in_words, say, told_tables, where_sentences
+from .report.sentences import findings_in_words, spread_sentences, told_tables, where_sentences
 from .report.summary import summary_sentences, title_words
 
 __all__ = ["check", "diagnose_campaign", "make_problem", "resume", "run"]
@@ -109,11 +109,6 @@ def _quantity(entry: Json, *, at_end: bool) -> Json:
     return {**number, "note": "standard error of the fit, right if the model is and the noise is as it was found"}
 
 
-_UNITS = {"force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",
-          "depth zero": "m", "force zero": "N"}  # fmt: skip
-"""Of channels and zeros in `model_std`, which holds relative numbers otherwise."""
-
-
 def _result(found: Diagnosis, diagnosis: Json) -> Result:
     parts = [(stage, part) for stage in ("before", "after") for part in ("fit", "held_out")]
     quantities: Json = {
@@ -148,12 +143,7 @@ def _result(found: Diagnosis, diagnosis: Json) -> Result:
     sentences = [*where_sentences(diagnosis), *found.remarks, *found.facts]
     noises = [together([colour]) for colour in found.colours.values()]
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
-    whose = "the bed" if found.problem.granular else "the surface, the rig or the start"
-    sentences += [
-        say("scatter", kind=kind, std=std, unit=_UNITS.get(kind, "(relative)"),
-            of=say("scatter_zero") if kind.endswith(" zero") else whose)
-        for kind, std in found.model_std.items()
-    ]  # fmt: skip
+    sentences += spread_sentences(found.model_std, granular=found.problem.granular)
     warnings = [finding.what for finding in said_once(found.findings)]
     beside = "beside the effects named it means another thing"
     if is_strained(found.best):

@@ -131,10 +131,8 @@ def trials_of(folder: Path) -> str:
     if not path.exists():
         return ""
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    name, surface = (
-        f'"{tables["name"]}"' if "name" in tables else "a campaign",
-        str(tables.get("surface", {}).get("kind", "")),
-    )
+    name = f'"{tables["name"]}"' if "name" in tables else "a campaign"
+    surface = str(tables.get("surface", {}).get("kind", ""))
     words = name if not surface or surface in name else f"{name}, on {surface}"
     local = tables.get("rig", {}).get("gravity")
     found = {trial.get("gravity_sim", trial.get("gravity", local)) for trial in tables.get("trial", ())} - {None}

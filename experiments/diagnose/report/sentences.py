@@ -17,7 +17,7 @@ from vis.page.sentences import Sentences
 
 __all__ = [
     "behind_words", "candidate_rows", "findings_in_words", "remark_sentences", "say", "setting_words", "shares_words",
-    "size_sentences", "small_names", "sure_sentences", "told_tables", "unnamed_sentence",
+    "size_sentences", "small_names", "spread_sentences", "sure_sentences", "told_tables", "unnamed_sentence",
     "where_sentences", "worse_sentences",
 ]  # fmt: skip
 
@@ -80,6 +80,24 @@ def _how_often(diagnosis: Row) -> list[str]:
     named, right = counted["named"], counted["right"]
     least = 100 * float(beta.ppf(1 - _BOUND, right, named - right + 1))
     return [say("how_often", of=say(f"of_{counted['of']}"), named=named, right=right, least=least)]
+
+
+_SPREAD_UNITS = {
+    "force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",
+    "depth zero": "m", "force zero": "N",
+}  # fmt: skip
+"""Of channels and zeros in `model_std`, which holds relative numbers otherwise."""
+
+
+def spread_sentences(model_std: Mapping[str, float], *, granular: bool) -> list[str]:
+    """By what replicates differ beyond the sensors, a sentence for each kind. `model_std`: kind -> standard deviation;
+    `granular`: whether the ground is a bed of grains."""
+    whose = "the bed" if granular else "the surface, the rig or the start"
+    return [
+        say("spread", kind=kind, std=std, unit=_SPREAD_UNITS.get(kind, "(relative)"),
+            of=say("spread_zero") if kind.endswith(" zero") else whose)
+        for kind, std in model_std.items()
+    ]  # fmt: skip
 
 
 def behind_words(rival: Row) -> str:
