@@ -327,6 +327,21 @@ def test_the_worst_place_is_named_in_newtons_and_at_the_top(made_once):
     golden.golden("report/worst_place", answer)
 
 
+@pytest.mark.parametrize("below", [9.0, 1.0])
+def test_the_top_is_judged_in_newtons_not_in_shares(tmp_path, make_run, below):
+    """At the top the law misses 0.6 N (60 %) at 1 m/s and 2 N (50 %) at 2 m/s; below it misses 9 or 1 N."""
+    names = ("speed", "depth_from", "depth_to", "bed_force", "model_force")
+    rows = ((1.0, 0.0, 0.003, 1.0, 0.4), (2.0, 0.0, 0.003, 4.0, 2.0), (1.0, 0.003, 0.006, 10.0, 10.0 - below))
+    table = [dict(zip(names, row, strict=True)) for row in rows]
+    run = edit_result(make_run(tmp_path, frames=0), lambda result: result["departures"].update(table=table))
+    answer = next(item["answer"] for item in summarise(run)["answers"] if "error" in item["question"])
+    answer = answer.replace("\N{NO-BREAK SPACE}", " ")
+    deep = below > 2.0
+    assert ("At the top" in answer) == deep and ("is at the top" in answer) != deep
+    top = answer.split("At the top")[1] if deep else answer
+    assert "2 m/s" in top and "2.0 N" in top and "60 %" not in top
+
+
 def test_one_bed_is_called_one_bed(tmp_path, make_run):
     def keep_one(result):
         result["runs"] = [run for run in result["runs"] if run["seed"] == 1]

@@ -321,17 +321,17 @@ def _returned(quantities: Mapping[str, Any]) -> str:
 
 
 def _worst(result: Mapping[str, Any]) -> str:
+    """Where law and bed differ by most newtons, at any depth and in the topmost band; "" without a table."""
     rows = [row for row in words.departure_rows(result) if row.bed_force > 0]
     if not rows:
         return ""
     worst = max(rows, key=lambda row: abs(row.difference))
     text = f"In newtons it is farthest off {_off(worst)}."
     top = min(row.depth_to for row in rows)
-    shallow = [row for row in rows if row.depth_to == top and row is not worst]
-    if shallow:
-        near = max(shallow, key=lambda row: abs(row.difference / row.bed_force))
-        text += f" At the top, where a foot stands, it is farthest off {_off(near)}."
-    return text
+    if worst.depth_to == top:
+        return text + (" This is at the top, where a foot stands." if len({row.depth_to for row in rows}) > 1 else "")
+    near = max((row for row in rows if row.depth_to == top), key=lambda row: abs(row.difference))
+    return f"{text} At the top, where a foot stands, it is farthest off {_off(near)}."
 
 
 def _off(row: words.Departure) -> str:
