@@ -337,7 +337,7 @@ def test_the_top_is_judged_in_newtons_not_in_shares(tmp_path, make_run, below):
     answer = next(item["answer"] for item in summarise(run)["answers"] if "error" in item["question"])
     answer = answer.replace("\N{NO-BREAK SPACE}", " ")
     deep = below > 2.0
-    assert ("At the top" in answer) == deep and ("is at the top" in answer) != deep
+    assert ("At the top" in answer) == deep and ("This is at" in answer) != deep
     top = answer.split("At the top")[1] if deep else answer
     assert "2 m/s" in top and "2.0 N" in top and "60 %" not in top
 
