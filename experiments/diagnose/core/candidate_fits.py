@@ -11,7 +11,7 @@ from experiments.diagnose.fit.fitting import Fit, Model, fit, fit_each
 from experiments.diagnose.fit.gate import Verdict, open_gate
 from experiments.diagnose.fit.problem import Finding, Form, Values
 
-from .pairs import FormsStart
+from .pairs import FormsStart, pair_starts
 
 __all__ = ["FOLLOWED", "WORTH", "CandidateFits", "Tell"]
 
@@ -19,6 +19,9 @@ WORTH = 3.0  # nats by which an effect must raise the tempered evidence
 BEHIND = 30.0  # nats behind the best beyond which a fit stops early: the chi-square is seven times as large
 _FINISHED, _NEAR_BY = 8, 8.0  # number of candidates fitted to the end, and all within so many nats of the best
 FOLLOWED = 3
+_EVERY = 1000  # pairs of effects: all of them
+_BENT_PAIRS = 4  # pairs of effects that are fitted with forms bent
+_ROUNDS, _ROUNDS_BENT = 5, 3  # steps of their short fits
 _SEEN = 0.5  # standard deviations of chi-square from which on a fit leaves something for another shape
 _SMALL_PART, _PARTS = 0.3, (0.1, 1.0)  # of a form's amplitude alone, and of its starts, for fits beside other forms
 
@@ -30,16 +33,18 @@ class CandidateFits:
 
     `recoloured`: a fit with the noise as that fit leaves it. `find_diverging`: trials whose divergence is all that
     contradicts the base model or the best single effect; asked before a second effect is searched. `known`: where each
-    form by its id ended in an earlier search of the same trials, by other weights, from which it is fitted then.
+    form by its id ended in an earlier search of the same trials, by other weights, from which it is fitted then;
+    `known_pairs`: the same of pairs of effects (`pairs`), which are not looked for again.
     """
 
     def __init__(
         self, base: Fit, *, tell: Tell, seed: int = 0, recoloured: Callable[[Fit], Fit] | None = None,
         find_diverging: Callable[[Fit, Fit], tuple[Finding, ...]] | None = None,
-        known: Mapping[str, Values] | None = None,
+        known: Mapping[str, Values] | None = None, known_pairs: Sequence[FormsStart] = (),
     ) -> None:  # fmt: skip
         self.base = Hypothesis.of(base)
-        self._known = known or {}
+        self._known, self._known_pairs = known or {}, known_pairs
+        self.pairs: tuple[FormsStart, ...] = tuple(known_pairs)
         self._find_diverging = find_diverging
         self.tell = tell
         self.seed = seed
@@ -263,10 +268,52 @@ class CandidateFits:
         begun.sort(key=lambda found: found.objective)
         return [self._kept(found) for found in fit_each([(one.model, one.values) for one in begun[:FOLLOWED]])]
 
+    def _in_all_forms(self) -> list[Hypothesis]:
+        """Fits of pairs of effects on smooth trials: those pairs that leave least, in their best forms, bent or not.
+
+        What a form leaves while it is straight, or while the other effect is missing, does not show how well the two
+        do together: each form of an effect is kept with its best partner, and bent with it, before any is dropped.
+        """
+        base = self.base.fit
+        if self._known_pairs:
+            known = [(base.model.with_forms(one.forms), {**base.values, **one.values}) for one in self._known_pairs]
+            return [self._kept(found) for found in fit_each(known)]
+        starts = pair_starts(base.model, base.values, base.model.problem.forms, most=_EVERY, every_form=True)
+        begun = fit_each([(base.model.with_forms(start.forms), start.values) for start in starts], rounds=_ROUNDS)
+        pairs: dict[tuple[str, ...], list[Fit]] = {}
+        for found in sorted(begun, key=lambda one: one.objective):
+            pairs.setdefault(tuple(form.effect for form in found.model.forms), []).append(found)
+        near: list[list[Fit]] = []
+        for own in list(pairs.values())[:_BENT_PAIRS]:
+            partners: dict[str, Fit] = {}
+            for found in own:
+                for form in found.model.forms:
+                    partners.setdefault(form.id, found)
+            kept = list({id(found): found for found in partners.values()}.values())
+            bent = fit_each([start for found in kept for start in _bends(found)], rounds=_ROUNDS_BENT)
+            near.append(sorted((*kept, *bent), key=lambda one: one.objective)[:2])
+        near.sort(key=lambda own: own[0].objective)
+        finished = fit_each([(one.model, one.values) for own in near[:FOLLOWED] for one in own])
+        self.pairs = tuple(FormsStart(one.model.forms, one.values) for one in finished)
+        return [self._kept(found) for found in finished]
+
     def _best_forms(self, effect: str) -> list[Form]:
         """Forms of an effect, the one that did best alone first."""
         alone = [h for h in self.table if len(h.forms) == 1 and h.effects == (effect,)]
         return [h.forms[0] for h in sorted(alone, key=lambda h: -h.score)]
+
+
+def _bends(found: Fit) -> list[tuple[Model, Values]]:
+    """Where each form of a fit begins in another shape, one at a time."""
+    begun: list[tuple[Model, Values]] = []
+    forms = found.model.forms
+    for form in forms:
+        known = {p.name for p in form.parameters}
+        for finer in found.model.problem.shapes.get(form.id, ()):
+            model = found.model.with_forms([finer if one is form else one for one in forms])
+            places = dict.fromkeys(tuple((k, v) for k, v in point.items() if k not in known) for point in finer.starts)
+            begun += [(model, {**found.values, **dict(place)}) for place in places]
+    return begun
 
 
 def _sums_to_little(found: Fit) -> bool:

@@ -21,6 +21,7 @@ from experiments.diagnose.noise.wander import Wander
 
 from . import deciding, matters, renoised, too_noisy
 from .outcome import Diagnosis, Known, finish
+from .pairs import FormsStart
 from .search import Choice, Search
 
 __all__ = ["diagnose"]
@@ -85,6 +86,7 @@ class _Course:
         self.model_std: Mapping[str, float] = {}
         self.alone: Fit | None = None  # the base model's fit as its own weights have it
         self.known: dict[str, Values] = {}  # where forms ended alone in the searches so far
+        self.pairs: tuple[FormsStart, ...] = ()  # and pairs
 
     def run(self) -> Diagnosis:
         """All steps; some findings begin the course anew."""
@@ -98,8 +100,7 @@ class _Course:
         choice = self._chosen(may_diverge=not (asked.aside or asked.patient))
         if choice.diverging:
             self.tell("a trial goes its own way: once more without it", 0.0)
-            anew = self._again(aside=choice.diverging, looked_at=asked.looked_at)
-            if self._stands(anew, choice.diverging):
+            if self._stands(anew := self._again(aside=choice.diverging, looked_at=asked.looked_at), choice.diverging):
                 return anew
             return self._again(looked_at=asked.looked_at, patient=True)
         if self.base.objective < begun.objective - _ON:
@@ -201,9 +202,9 @@ class _Course:
             return self._diverging(base) or (self._diverging(best) if best.model.forms else ())
 
         search = Search(self.base, tell=self.tell, seed=self.asked.seed, recoloured=self._recoloured, known=self.known,
-                        find_diverging=diverging if may_diverge else None)  # fmt: skip
+                        known_pairs=self.pairs, find_diverging=diverging if may_diverge else None)  # fmt: skip
         choice = search.choose()
-        self.known |= search.alone
+        self.known, self.pairs = self.known | search.alone, search.pairs
         if not choice.diverging:
             self.base = choice.base.fit
         return choice
@@ -396,8 +397,7 @@ class _Course:
             gone = deciding.diverging_beside(self.base, choice, verdict, self._diverging)
             if gone:
                 self.tell("a trial goes its own way: once more without it", 0.0)
-                anew = self._again(aside=gone, looked_at=asked.looked_at)
-                if self._stands(anew, gone):
+                if self._stands(anew := self._again(aside=gone, looked_at=asked.looked_at), gone):
                     return anew
         explains = verdict == "unknown" and bool(choice.best.effects) and choice.left.passed
         if explains and not (asked.looked_at or asked.aside):

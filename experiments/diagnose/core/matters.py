@@ -91,6 +91,20 @@ def undecided(choice: Choice) -> tuple[Hypothesis, ...]:
     return tuple(rival.hypothesis for rival in choice.rivals if rival.lead < LEAD)
 
 
+def _calls_for_both(choice: Choice, alone: Hypothesis, held_out: tuple[str, ...], scatter: Scatter) -> bool:
+    """Whether two effects each matter although one `alone` closes nearly all: what the other explains is more than
+    `MOST`, nothing that matters is left by both, and it leads all others in its place, and none, by `LEAD`."""
+    best = choice.best
+    if len(best.effects) != 2:
+        return False
+    others = [h.score for h in choice.table if set(h.effects) != set(best.effects) and len(h.effects) <= 2]
+    if best.score - max([alone.score, *others]) < LEAD:
+        return False
+    singly, both = (left_by(one.fit, held_out, scatter) for one in (alone, best))
+    seen = [(a, b) for a, b in ((singly.fit, both.fit), (singly.held_out, both.held_out)) if a is not None]
+    return all(a > MOST and b is not None and b <= MOST for a, b in seen)
+
+
 def fewest(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> Choice:
     """The choice with one of its effects alone where that explains what matters; else the same."""
     best, base = choice.best, choice.base.fit
@@ -109,7 +123,7 @@ def fewest(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> Choic
         near = sorted(singles.values(), key=lambda h: -h.score)[:_COMPARED]
         rivals = tuple(compare(h.effects[0], found, h, base) for h in near)
         shorter = replace(choice, best=found, rivals=rivals, alternatives=(), predicted=None)
-        if explains(shorter, held_out, scatter):
+        if explains(shorter, held_out, scatter) and not _calls_for_both(choice, found, held_out, scatter):
             return shorter
     return choice
 

@@ -32,8 +32,11 @@ class FormsStart:
     values: Values
 
 
-def pair_starts(model: Model, values: Values, forms: Sequence[Form], *, most: int) -> list[FormsStart]:
-    """The likeliest start of each of the `most` likeliest pairs of effects, beside what `model` holds at `values`."""
+def pair_starts(
+    model: Model, values: Values, forms: Sequence[Form], *, most: int, every_form: bool = False
+) -> list[FormsStart]:
+    """The likeliest start of each of the `most` likeliest pairs of effects, beside what `model` holds at `values`.
+    `every_form`: of each form of these effects with its likeliest partner, instead of the likeliest two forms."""
     seen = _Projected(model, values, forms)
     whose = seen.whose
     if len(whose) < 2:
@@ -42,17 +45,23 @@ def pair_starts(model: Model, values: Values, forms: Sequence[Form], *, most: in
     effects = np.array([form.effect for form in whose])
     left[effects[:, None] == effects[None, :]] = np.inf
     left[np.tril_indices(len(left))] = np.inf
-    found: dict[tuple[str, str], FormsStart] = {}
+    found: list[FormsStart] = []
+    taken: set[tuple[str, str]] = set()
+    seen_with: set[tuple[str, str]] = set()  # a form, and the other effect
     for flat in np.argsort(left, axis=None):
         i, j = divmod(int(flat), len(whose))
-        if not np.isfinite(left[i, j]) or len(found) >= most:
+        if not np.isfinite(left[i, j]):
             break
         pair = (str(effects[i]), str(effects[j]))
-        if pair in found:
+        sides = {(whose[i].id, pair[1]), (whose[j].id, pair[0])}
+        if pair in taken and not (every_form and sides - seen_with):
             continue
-        start = seen.start((i, j), (sizes[0][i, j], sizes[1][i, j]))
-        found[pair] = FormsStart((whose[i], whose[j]), start)
-    return list(found.values())
+        if pair not in taken and len(taken) >= most:
+            continue
+        taken.add(pair)
+        seen_with |= sides
+        found.append(FormsStart((whose[i], whose[j]), seen.start((i, j), (sizes[0][i, j], sizes[1][i, j]))))
+    return found
 
 
 def next_starts(model: Model, values: Values, forms: Sequence[Form], *, most: int) -> list[FormsStart]:

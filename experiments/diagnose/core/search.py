@@ -33,7 +33,7 @@ _UNEXPLAINED, _HOPELESS = 1.3, 0.1
 _SHOWN = 3  # rivals that are compared
 _MOST = 3  # effects at once
 _BEST = 5  # single effects that are tried as a further one
-_PAIRS = 8  # pairs of effects that are fitted where no single effect suffices
+_PAIRS = 8  # pairs of effects that are fitted where no single effect suffices; of pushes and drops all are begun
 
 
 @dataclass(frozen=True)
@@ -161,6 +161,8 @@ class Search(CandidateFits):
         """Pairs of effects, begun where projected changes promise most."""
         base = self.base.fit
         self.tell("trying pairs", 0.5)
+        if base.model.problem.contacts is None:  # a fit costs little: every pair
+            return self._in_all_forms()
         return self._begun(base.model, pair_starts(base.model, base.values, base.model.problem.forms, most=_PAIRS))
 
     def _swapped(self, best: Hypothesis) -> Hypothesis:
@@ -210,7 +212,7 @@ class Search(CandidateFits):
         return _ordered(best)
 
     def _rivals(self, best: Hypothesis, first: Sequence[Hypothesis]) -> tuple[Rival, ...]:
-        """The likeliest other effects in place of the first one, compared with it."""
+        """The likeliest other effects in place of the first one, compared with it; also other pairs in place of two."""
         rest = best.without(best.effects[0])
         found: dict[str, Hypothesis] = {}
         for other in first[:_BEST]:
@@ -223,7 +225,24 @@ class Search(CandidateFits):
                 found[name] = self._kept(fit(model, values)) if rest else other
         chosen = sorted(found.items(), key=lambda item: -item[1].score)[:_SHOWN]
         without = fit(best.fit.model.with_forms(rest), best.fit.values) if rest else self.base.fit
-        return tuple(compare(name, best, hypothesis, without) for name, hypothesis in chosen)
+        near = [compare(name, best, hypothesis, without) for name, hypothesis in chosen]
+        known = {rival.effect: rival.hypothesis.score for rival in near}
+        for name, hypothesis in self._other_pairs(best).items():
+            if hypothesis.score > known.get(name, -np.inf):  # from the base model: the two may share no form
+                near = [rival for rival in near if rival.effect != name]
+                near.append(compare(name, best, hypothesis, self.base.fit))
+        return tuple(sorted(near, key=lambda rival: rival.behind)[:_SHOWN])
+
+    def _other_pairs(self, best: Hypothesis) -> dict[str, Hypothesis]:
+        """The likeliest pairs that were fitted without the first of two effects, by the effect that is in its place."""
+        found: dict[str, Hypothesis] = {}
+        for tried in self.table if len(best.effects) == 2 else ():
+            others = [effect for effect in tried.effects if effect not in best.effects]
+            if len(tried.effects) != 2 or not others or best.effects[0] in tried.effects:
+                continue
+            if others[0] not in found or tried.score > found[others[0]].score:
+                found[others[0]] = tried
+        return found
 
     def _predicted(self, best: Hypothesis, rivals: Sequence[Rival]) -> tuple[Predicted | None, tuple[Rival, ...]]:
         """The best's cross-validation, and the rivals with theirs."""
