@@ -213,6 +213,24 @@ def test_a_spike_that_never_rests_has_no_sinkage_and_the_report_says_so(tmp_path
     golden.golden("report/never_rests", [said["answers"][0]["answer"], caption])
 
 
+def test_a_set_down_is_drawn_from_letting_go_to_rest(tmp_path, make_run):
+    """No curve begins before the spike is let go, and each bed's curve ends at its dot, at rest."""
+    folder = make_run(tmp_path, frames=0)
+    for file in (folder / "series").glob("set_down*.csv"):  # lowered for the first 2 ms
+        head, *rows = file.read_text().splitlines()
+        later = [f"{float(time) - 0.002!r},{rest}" for time, rest in (row.split(",", 1) for row in rows)]
+        file.write_text("\n".join([head, *later]) + "\n")
+    run = read_folder(folder)
+    sets = [r.bed for r in run.of_kind("set_down")]
+    axis = plot_called("set_down", run).figure.axes[0]
+    dots = [line.get_xydata()[0] for line in axis.lines if line.get_marker() == "o"]
+    assert np.allclose(dots, [(1e3 * bed.time[-1], 1e3 * bed.depth[-1]) for bed in sets])
+    assert axis.get_xlim()[0] == 0 and axis.get_xlim()[1] > max(x for x, _ in dots)
+    assert any(bed.time[0] < 0 for bed in sets)
+    curves = [line.get_xdata() for line in axis.lines if len(line.get_xdata()) > 2]
+    assert curves and min(min(times) for times in curves) >= 0
+
+
 @pytest.mark.parametrize("word", ["error", "std"])
 def test_the_error_of_each_fit_is_read_under_both_its_names(tmp_path, word, make_run):
     def rename(result):

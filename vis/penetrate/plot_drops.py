@@ -110,18 +110,18 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     if not sets:
         return None
     figure, ((axis,),) = sheet(1, 1, 3.1)
-    end, begin = 1.15 * max(_settled(r) + _touch(r.bed) for r in sets if r.bed is not None), 0.0
+    # A set-down ends where it is at rest: its whole series is shown, and of the law what fits beside it.
+    end = 1.04 * max(float(r.bed.time[-1]) for r in sets if r.bed is not None)
     dots: list[Line2D] = []
     for i, r in enumerate(sets):
         # One law: its runs differ in where they start only, and dashes that overlap look like a full line.
         model = None if any(s.model is not None for s in sets[:i]) else r.model
         for series, colour, style in ((r.bed, BED, "-"), (model, MODEL, DASHED)):
             if series is not None:
-                shown = (series.time <= end) & (series.time >= -0.1 * end)
+                shown = (series.time <= end) & (series.time >= 0.0)  # before, both are lowered
                 axis.plot(1e3 * series.time[shown], 1e3 * series.depth[shown], color=colour, ls=style, lw=1.4)
-                begin = min(begin, float(series.time[shown].min(initial=0.0)))
         assert r.bed is not None
-        if value_of(r.quantities, "sinkage") is not None and r.bed.time[-1] <= end:
+        if value_of(r.quantities, "sinkage") is not None:
             dots = [handle("at rest", BED, marker="o", ls="", ms=5)]
             end_of = 1e3 * r.bed.time[-1], 1e3 * r.bed.depth[-1]
             axis.plot(*end_of, "o", color=BED, ms=5, mec="white", mew=0.8, zorder=5)
@@ -145,7 +145,7 @@ def set_down_plot(run: RunFolder) -> Plot | None:
         last = max(depth, last + gap)
         number = quote(1e-3 * depth, None if spread is None else 1e-3 * spread, "m", significant=2)
         axis.text(1.01, last, f"{what}: {number}", color=colour, va="center", transform=axis.get_yaxis_transform())
-    axis.set_xlim(1e3 * begin, 1e3 * end)
+    axis.set_xlim(0.0, 1e3 * end)
     axis.axhline(0.0, color=GREY, lw=0.8)
     axis.set(xlabel="time since the spike was let go [ms]", ylabel="depth of the tip [mm]")
     legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots])
