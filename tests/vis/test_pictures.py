@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
+from dem.grains.materials import MATERIALS
 from vis.pictures import canvas, pictures
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.pictures import make_pictures, opengl_available
@@ -181,3 +183,14 @@ def test_the_deepest_picture_is_from_before_the_pull_out(tmp_path, make_run):
         assert time < out
         before = [d for d, t in zip(story.depth, story.frames.times, strict=True) if t < out]
         assert depth == pytest.approx(max(before), rel=3e-3)
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("gravity", ["9.81 m/s²", "0.00981 m/s²"])
+def test_a_title_ends_left_of_a_foot_as_wide_as_a_quarter_of_the_bed(material, gravity):
+    """Its left edge is at 0.428 of the page of 8 inches; the title begins at 0.03, in bold type of 16 points."""
+    figure = Figure(figsize=(8.0, 6.0))
+    title = pictures._above("Set down", f"{material}, {gravity}")
+    assert title.replace("\n", " ") == f"Set down {material}, {gravity}"
+    box = figure.text(0.03, 0.9, title, fontsize=16, fontweight="bold").get_window_extent()
+    assert box.x1 < 0.42 * figure.bbox.width

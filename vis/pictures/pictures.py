@@ -65,6 +65,7 @@ assert image.GetScalarComponentAsDouble(32, 32, 0, 2) < 200
 _STILLS = 6
 _STILL_COSTS = 4.0  # in frames of the animation, as measured in software
 _ANIMATED = 48
+_WIDE = 22  # letters of a title that reach the shaft of a foot as wide as a quarter of the bed
 _TILTS = (0.06, 0.40)
 """Least and greatest slope of the view down on a bed [1]."""
 
@@ -342,6 +343,11 @@ def _plan(
     return job, stills, animation
 
 
+def _above(what: str, surface: str) -> str:
+    """The title of a picture; a long name of the surface has its gravity below it, beside the shaft in the middle."""
+    return "\n".join(filter(None, (what, surface.replace(", ", ",\n") if len(surface) > _WIDE else surface)))
+
+
 def _choose(stories: list[_Story]) -> list[_Story]:
     """The slowest and fastest driven run, the fastest drop and one set down; the first is animated."""
     driven = sorted((s for s in stories if s.run.kind == "driven"), key=lambda s: (s.run.speed or 0.0, -len(s.frames)))
@@ -397,7 +403,7 @@ def _view(
         surface = float(stated)
     high[2] = max(min(high[2], surface + 0.25 * (surface - low[2])), surface)  # a grain that flies does not count
     count = f"{len(position):,}".replace(",", "\N{NO-BREAK SPACE}")
-    title = "\n".join(filter(None, (story.title, run.surface)))
+    title = _above(story.title, run.surface)
     return {
         "name": story.name, "frames": frames, "by": by, "top": top, "title": title,
         "lines": [story.line(index) for index in frames], "note": f"{count} grains; {CUT}", "low": low.tolist(),
