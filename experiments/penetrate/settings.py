@@ -186,6 +186,8 @@ class PenetrateSettings(StrictSettings):
         made = made_of(given)
         if not isinstance(given, dict) or "other_speeds" in given or not made.on_grains or len(made.seeds) == 1:
             return made
+        if not cls.model_fields["other_speeds"].default:  # a command whose beds all have the same runs
+            return made
         from .given import drops_nothing, further_speeds
 
         if not drops_nothing(made):

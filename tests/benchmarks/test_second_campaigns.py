@@ -121,8 +121,8 @@ def test_what_cannot_be_hidden_is_refused():
 
 
 def record(truth, verdict, effects=(), *, outside=None, structure=1.0, **more):
-    return {"case": {"structure": structure}, "truth": truth, "outside": outside, "verdict": verdict,
-            "effects": list(effects), "alternatives": [], **more}  # fmt: skip
+    return {"kind": "second-push", "case": {"structure": structure}, "truth": truth, "outside": outside,
+            "verdict": verdict, "effects": list(effects), "alternatives": [], **more}  # fmt: skip
 
 
 def test_a_figure_of_sizes_of_structure_counts_what_became_of_each_class(tmp_path):
