@@ -78,15 +78,17 @@ def test_a_seed_makes_one_campaign_and_it_is_valid(kind, tmp_path):
 
 
 @pytest.mark.long
-def test_a_crater_beside_loose_first_grains_is_not_called_adhesion():
+def test_a_crater_beside_loose_first_grains_is_not_named_adhesion_alone():
     """Adhesion with eight numbers imitates both better than a crater alone does, by 10 nats; not so beside a layer.
 
-    Loose first grains are the structure of 0.27 noises that this simulator adds.
+    Loose first grains are the structure of 0.27 noises that this simulator adds. Which of the two leads depends on the
+    pairs that are searched (docs/notes/diagnose-method.md).
     """
     campaign, told = KINDS["second-push"].make(seed=301004, kind="plastic-sinkage", strength=2.287, trials=8)
     assert told.effects == ("plastic-sinkage",)
     found = diagnose(make_problem(campaign))
-    assert found.effects == ("plastic-sinkage",)
+    assert found.verdict == "ambiguous"
+    assert sorted((*found.effects, *found.alternatives)) == ["adhesion", "plastic-sinkage"]
     assert found.after.held_out < 1.2
 
 
