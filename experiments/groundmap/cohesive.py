@@ -18,7 +18,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from .answers import SLACK, Answer, Number, check_depth, check_ranges, times
+from .answers import SLACK, Answer, Number, asked_of, check_depth, times
 from .settings import say
 
 __all__ = ["CohesiveMap"]
@@ -49,28 +49,23 @@ class CohesiveMap:
         self, *, gravity: float, diameter: float, grain: float | None, packing: float | None, load: float | None
     ) -> Answer:
         """The numbers of a spike; SI units. Raises ValueError for what is beyond the map, naming the key."""
-        packing = self.packing if packing is None else packing
-        grain = self.reference["grain"] if grain is None else grain
-        ratio = grain / diameter
-        asked = {"gravity": gravity, "tip_diameter": diameter, "packing": packing, "grain": ratio}
-        check_ranges(self.name, self.ranges, asked, diameter)
+        asked = asked_of(self, gravity=gravity, diameter=diameter, grain=grain, packing=packing, load=load)
         most = self.reference["most"]
         if gravity * diameter > most * (1 + SLACK):
             raise ValueError(say("beyond_weight", name=self.name, diameter=diameter, gravity=gravity,
                                  lightest=most / diameter, smallest=most / gravity))  # fmt: skip
-        g, size, share = gravity / self.reference["gravity"], diameter / self.reference["diameter"], self.law["share"]
-        logarithm, error = self._of_grains(ratio)
+        g, size, share = asked.gravities, asked.sizes, self.law["share"]
+        logarithm, error = self._of_grains(asked.ratio)
         value = math.exp(logarithm) * ((1 - share) * g * size**2 + share * size)
         stiffness = Number(value, value * error)
         damping = Number(self.law["damping"] * size**2, self.law["damping_std"] * size**2)
-        own_load = self.reference["load"] * g * size**3
-        load = own_load if load is None else load
-        sinkage = load / value
-        check_depth(sinkage, load=load, own_load=own_load, grain=grain, diameter=diameter, most=self.deepest)
+        sinkage = asked.load / value
+        check_depth(sinkage, asked, most=self.deepest)
         deep = sinkage >= self.reference["shallowest"] * diameter
         uncertain = times(Number(sinkage, sinkage * error), Number(1.0, self.law["shape"]))
         return Answer(
-            stiffness, damping, uncertain, load, grain, ratio, packing, self.reference["speed"], deep
+            stiffness, damping, uncertain, asked.load, asked.grain, asked.ratio, asked.packing,
+            self.reference["speed"], deep,
         )  # fmt: skip
 
     def _of_grains(self, ratio: float) -> tuple[float, float]:

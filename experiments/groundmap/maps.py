@@ -21,7 +21,7 @@ import numpy as np
 
 from dem.grains.materials import MATERIALS
 
-from .answers import Answer, Number, check_depth, check_ranges, times
+from .answers import Answer, Number, asked_of, check_depth, times
 from .cohesive import CohesiveMap
 from .settings import say
 
@@ -88,32 +88,26 @@ class GroundMap:
         self, *, gravity: float, diameter: float, grain: float | None, packing: float | None, load: float | None
     ) -> Answer:
         """The numbers of a spike; SI units. Raises ValueError for what is beyond the map, naming the key."""
-        packing = self.packing if packing is None else packing
-        grain = self.reference["grain"] if grain is None else grain
-        ratio = grain / diameter
-        asked = {"gravity": gravity, "tip_diameter": diameter, "packing": packing, "grain": ratio}
-        check_ranges(self.name, self.ranges, asked, diameter)
-        g, size = gravity / self.reference["gravity"], diameter / self.reference["diameter"]
+        asked = asked_of(self, gravity=gravity, diameter=diameter, grain=grain, packing=packing, load=load)
+        g, size, ratio = asked.gravities, asked.sizes, asked.ratio
         scaled = {}
         for name in NAMES:
             power_g, power_d = POWERS[name]
             found, scale = self.lines[name].at(ratio), g**power_g * size**power_d
             scaled[name] = Number(scale * found.value, scale * found.std)
-        factor = self._factor(packing, ratio)
+        factor = self._factor(asked.packing, ratio)
         exponent, scatter = self.reference["exponent"], self.reference["exponent_std"]
-        own_load = self.reference["load"] * g * size**3
-        load = own_load if load is None else load
         stiffness = times(scaled["stiffness"], factor)
-        share = load / own_load / factor.value
+        share = asked.load / asked.own_load / factor.value
         more = share ** (1 / exponent)
         of_factor, of_exponent = factor.std / factor.value / exponent, math.log(share) * scatter / exponent**2
         sinkage = times(scaled["sinkage"], Number(more, more * math.hypot(of_factor, of_exponent)))
-        check_depth(
-            sinkage.value, load=load, own_load=own_load, grain=grain, diameter=diameter, most=self.deepest
-        )  # fmt: skip
+        check_depth(sinkage.value, asked, most=self.deepest)
         speed = self.reference["speed"] * (g * size) ** 0.5
         deep = share == 1.0 or sinkage.value >= self.reference["shallowest"] * diameter
-        return Answer(stiffness, scaled["damping"], sinkage, load, grain, ratio, packing, speed, deep)
+        return Answer(
+            stiffness, scaled["damping"], sinkage, asked.load, asked.grain, ratio, asked.packing, speed, deep
+        )  # fmt: skip
 
     def words(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:
         """What a person must know of this map besides its numbers; gravity [m/s2] and diameter [m] change nothing."""

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from coupling.robot.soles import FeetLaw
-from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .laws import OneLaw
@@ -36,7 +35,6 @@ def law_of_run(model: Any, feet: Sequence[str], **settings: Any) -> LawOfRun:
     if own.on_grains:
         raise ValueError(say("no_law", s=own))
     plan = plan_robot(own, model=model)
-    robot = plan.robot()
-    law = plan.feet_law().options(robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)])
+    law = plan.feet_options(plan.robot())
     mu_s, mu_d = (plan.numbers[name].value for name in ("mu_s", "mu_d"))
     return LawOfRun(law=law, mu_s=mu_s, mu_d=mu_d, notes=tuple(plan.announcement()))

@@ -14,7 +14,7 @@ import numpy as np
 
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
-from coupling.robot.soles import plan_area, sole_of
+from coupling.robot.soles import FeetLaw, plan_area, sole_of
 from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number, refuse_other_grains
 from experiments.platform.surfaces import Surface, find_surface, surface_of_grains
@@ -28,7 +28,7 @@ from .gravity import GravityRule, gravity_rule
 from .laws import (
     SPIKE,
     Largest,
-    UnderFeet,
+    OneLaw,
     fitted_words,
     law_notes,
     law_of,
@@ -70,15 +70,14 @@ class RobotPlan:
 
     def law_feet(self, robot: MujocoRobot, *, as_spring: bool = False) -> LawFeet:
         """The surface law under the robot's feet; `as_spring`: the spring-damper, whatever the settings say."""
-        options = self.feet_law(as_spring=as_spring).options(
-            robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)]
-        )
+        options = self.feet_options(robot, as_spring=as_spring)
         mu_s, mu_d = (self.numbers[name].value for name in ("mu_s", "mu_d"))
         return LawFeet(robot.feet, mu_s=mu_s, mu_d=mu_d, time_step=LAW_STEP, **options)
 
-    def feet_law(self, *, as_spring: bool = False) -> UnderFeet:
-        """The law of `law_feet`, before it is scaled to each foot."""
-        return law_of(self.settings, self.surface, self.fitted, self.numbers, as_spring=as_spring)
+    def feet_options(self, robot: MujocoRobot, *, as_spring: bool = False) -> FeetLaw | OneLaw:
+        """The law of `law_feet`, scaled to each foot: arguments of `LawFeet` and `FootForces`."""
+        own = law_of(self.settings, self.surface, self.fitted, self.numbers, as_spring=as_spring)
+        return own.options(robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)])
 
     @property
     def law(self) -> str:

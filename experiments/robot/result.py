@@ -141,10 +141,10 @@ def conclude(
     across: float = 0.0,
 ) -> Result:
     """The result, its series written. On grains `beside` is the robot on the spring-damper."""
+    robot, heights = run.robot, heights_of(run)
     write_series_of(run, folder)
-    robot = run.robot
     title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
-    sentences = [*_sentences(run), *plan.notes]
+    sentences = [*_sentences(run, heights), *plan.notes]
     if run.energy_residual > MOST_RESIDUAL:
         title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
     warnings: list[str | None] = [
@@ -152,18 +152,18 @@ def conclude(
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
-        say("airborne") if _airborne(run) else None,
+        say("airborne") if _airborne(run, heights) else None,
         *(too_deep(run) if plan.fitted is None else []),
     ]  # fmt: skip
     if plan.fitted is not None:
         warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]
     result: Json = {
-        "title": title, "status": "done", "quantities": quantities_of(run),
+        "title": title, "status": "done", "quantities": quantities_of(run, heights),
         "departures": {"sentences": sentences},
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
         "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
         "duration": settings.duration,
-        "feet": [foot.name for foot in robot.feet], "feet_reached": feet_reached(run, heights_of(run)),
+        "feet": [foot.name for foot in robot.feet], "feet_reached": feet_reached(run, heights),
         "warnings": warnings, "macro_step": run.macro_step, "robot_step": robot.step, "steps": run.master.count,
     }  # fmt: skip
     if softening is not None and beside is not None and isinstance(run.ground, BedFeet):
@@ -176,7 +176,8 @@ def conclude(
         result["code"] = fingerprint()
         result["grains"] = grains.bed_numbers(settings, run, bed, softening, in_rig=False) | {
             "mode": say("one_gravity", gravity=plan.numbers["gravity"].value),
-            "origin": [float(number) for number in run.ground.origin], "beside": quantities_of(beside),
+            "origin": [float(number) for number in run.ground.origin],
+            "beside": quantities_of(beside, heights_of(beside)),
         }  # fmt: skip
         warnings += [
             grains.reversal_warning(run.dissipation_reversal),
@@ -211,10 +212,13 @@ def _beyond(plan: RobotPlan, run: RobotRun) -> list[str]:
     return fitted.beyond(**{name: max(value, fitted.range[name][0]) for name, value in found.items()})
 
 
-def quantities_of(run: RobotRun) -> dict[str, Json]:
-    """The numbers that every run of a robot has, as result.json holds them; a value is null where there is none."""
+def quantities_of(run: RobotRun, heights: Array) -> dict[str, Json]:
+    """The numbers that every run of a robot has, as result.json holds them; a value is null where there is none.
+
+    `heights`: as of `heights_of`.
+    """
     rows, balance = run.columns, run.balance_numbers
-    flights, touched = _flights(run)
+    flights, touched = _flights(run, heights)
     longest = max((end - begin for begin, end in flights), default=0)
     force = np.linalg.norm([rows[name] for name in ("fx", "fy", "fz")], axis=0)
     found: dict[str, tuple[float | None, str, str]] = {
@@ -227,7 +231,7 @@ def quantities_of(run: RobotRun) -> dict[str, Json]:
         "longest_flight": (longest * run.macro_step, "s", say("longest_flight")),
         "sinkage_largest": (float(rows["sinkage"].max()), "m", "of the lowest point of any foot"),
         "sinkage_end": (float(rows["sinkage"][-1]), "m", "the same, at the end"),
-        **feet_quantities(feet_reached(run, heights_of(run))),
+        **feet_quantities(feet_reached(run, heights)),
         "largest_force": (float(force.max()), "N", say("whole_force")),
         "actuator_work": (float(rows["actuator_work"][-1]), "J", say("actuator_work")),
         "ground_work": (float(rows["taken"][-1]), "J", say("ground_work")),
@@ -244,7 +248,7 @@ def quantities_of(run: RobotRun) -> dict[str, Json]:
     return as_quantities(found, std=None)
 
 
-def _flights(run: RobotRun) -> tuple[list[tuple[int, int]], int | None]:
+def _flights(run: RobotRun, heights: Array) -> tuple[list[tuple[int, int]], int | None]:
     """Rows from and to which the robot flies, and the row of the first touch.
 
     It flies while nothing touches, after the first touch, for `APART` at least, if at some time of it all feet are
@@ -254,21 +258,21 @@ def _flights(run: RobotRun) -> tuple[list[tuple[int, int]], int | None]:
     if free.all():
         return [], None
     touched, lasting = int(np.argmin(free)), max(1, round(APART / run.macro_step))
-    lowest = heights_of(run).min(axis=1)
+    lowest = heights.min(axis=1)
     found = [(touched + low, touched + high) for low, high in spells(free[touched:]) if high - low >= lasting]
     return [(low, high) for low, high in found if lowest[low:high].max() > 0.0], touched
 
 
-def _airborne(run: RobotRun) -> bool:
+def _airborne(run: RobotRun, heights: Array) -> bool:
     """Whether the run ends in a flight."""
-    flights, _ = _flights(run)
+    flights, _ = _flights(run, heights)
     return bool(flights) and flights[-1][1] == len(run.columns["touching"])
 
 
-def _sentences(run: RobotRun) -> list[str]:
+def _sentences(run: RobotRun, heights: Array) -> list[str]:
     """What happened, in words."""
     rows = run.columns
-    flights, touched = _flights(run)
+    flights, touched = _flights(run, heights)
     if touched is None:
         return [say("touches_nothing")]
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))

@@ -164,16 +164,12 @@ def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
     )]  # fmt: skip
 
 
-def _gap_words(gap: float, error: float | None) -> str:
-    """A gap with its standard error, where it has one."""
-    return numeral(gap) if error is None else f"{gap:.2f} ± {error:.1g}"
-
-
 def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -> str:
     """A gap, fitted and held out, with its standard errors."""
 
     def written(key: str) -> str:
-        return _gap_words(gap[key] or 0.0, errors.get(key))
+        error = errors.get(key)
+        return numeral(gap[key] or 0.0) if error is None else f"{gap[key]:.2f} ± {error:.1g}"
 
     out = "" if gap["held_out"] is None else f" ({written('held_out')} held out)"
     return f"{written('fit')} fitted{out}"

@@ -198,7 +198,7 @@ def test_a_foot_that_loses_contact_in_its_crater_does_not_fly():
     long = [(b, n) for b, n in zip(begins, lengths, strict=True) if n * run.macro_step >= 5e-3]
     rising = [b for b, n in long if heights[b : b + n].max() > 0]
     assert len(long) > len(rising) > 1
-    assert quantities_of(run)["flights"]["value"] == len(rising)
+    assert quantities_of(run, heights_of(run))["flights"]["value"] == len(rising)
 
 
 @pytest.mark.parametrize(("wide", "said"), [(0.2, ["0.24 m"]), (0.25, [])])
