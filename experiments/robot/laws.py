@@ -145,6 +145,8 @@ def settle_other_law(
     ill = ill_sized(law.name, given)
     law.values(given)  # refuses a name or value that cannot be, before what it would do
     _refuse_unsized(settings, surface, law, ill)
+    if not gravity > 0 and "gravity" not in given and any(p.name == "gravity" for p in law.parameters):
+        raise ValueError(say("weightless", law=law, gravity=numbers["gravity"]))
     values = law.values(law.in_gravity(gravity, given))
     unsized = bool(ill) or not surface.granular
     powers = {} if unsized else diameter_powers(law.name, values)

@@ -1,7 +1,7 @@
 """A robot followed on a surface law, and on a bed of grains.
 
-On a bed the same robot on the spring-damper is stepped first: it says how far and how deep the bed must reach, and
-stands beside the result.
+On a bed the same robot on the spring-damper is stepped first: it says how far and how deep the bed must reach. The same
+robot on the default law of the surface stands beside the result.
 """
 
 import math
@@ -138,6 +138,21 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         return low, high, tuple(sunk)
 
     @cached_property
+    def beside(self) -> RobotRun:
+        """The same robot on the default law of the surface, to compare with.
+
+        Size and modulus of the bed follow from the spring-damper nevertheless: a flat foot goes deeper on it.
+        """
+        law = self.settings.default_law
+        if law == "spring-damper":
+            return self.forecast.run
+        plan = self.plan.on_law(law)
+        robot = plan.robot()
+        run = RobotRun(robot, plan.law_feet(robot), duration=self.duration)
+        run.run()
+        return run
+
+    @cached_property
     def _standing(self) -> list[tuple[float, float]]:
         """Of each foot: width of the widest of its `RobotForecast.sunk` parts [m], and the area of these parts [m2]."""
         found = []
@@ -171,6 +186,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
 
     def announce(self, progress: Progress) -> None:
         self.progress = progress
+        _ = self.beside  # before the bed is made: a failure loses no work on grains
         for sentence in self.told.announcement():
             progress.message(sentence)
 
@@ -207,6 +223,10 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             super().check()
         except RuntimeError as error:
             raise ValueError(say("forecast_fails", error=error)) from error
+        try:
+            _ = self.beside
+        except RuntimeError as error:
+            raise ValueError(say("beside_fails", law=s.default_law, error=error)) from error
         self.check_exchange()
 
     def check_extent(self) -> None:
@@ -259,6 +279,6 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
         return conclude(
-            self.settings, self.told, run, folder, beside=self.forecast.run, softening=self.softening(),
+            self.settings, self.told, run, folder, beside=self.beside, softening=self.softening(),
             across=self.narrowest / self.settings.grain,
         )  # fmt: skip

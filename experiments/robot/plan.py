@@ -97,14 +97,19 @@ class RobotPlan:
         told = dict(zip(of_all, of_some, strict=True))
         return replace(self, numbers=numbers, warnings=tuple(told.get(said, said) for said in self.warnings))
 
+    def on_law(self, law: str) -> "RobotPlan":
+        """The same on this surface law with its defaults, in place of grains."""
+        return replace(self, settings=self.settings.model_copy(update={"ground": law, "ground_parameters": ()}))
+
     def announcement(self) -> list[str]:
         """What was not given, then the warnings."""
+        chosen = [] if "ground" in self.settings.model_fields_set else [say("default_law", law=self.law)]
         told = [
             f"{name} = {number.value:.6g}{'' if number.unit == '1' else f' {number.unit}'} ({number.origin})"
             for name, number in self.numbers.items()
             if number.origin != "given"
         ]
-        return [*told, *self.notes, *(f"warning: {warning}" for warning in self.warnings)]
+        return [*chosen, *told, *self.notes, *(f"warning: {warning}" for warning in self.warnings)]
 
 
 def find_model(name: str) -> Path:
@@ -152,7 +157,8 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None, model: An
     robot = MujocoRobot(model, settings.feet, keyframe=settings.keyframe, height=settings.height)
     of_model = f"model {robot.name}"
     numbers["mass"] = Number(robot.mass, "kg", of_model)
-    numbers["gravity"] = Number(robot.gravity, "m/s2", "given" if settings.gravity is not None else of_model)
+    origin = "given" if settings.gravity is not None else of_model
+    numbers["gravity"] = Number(robot.gravity + 0.0, "m/s2", origin)  # 0, not -0, of a model without gravity
     fitted = fitted_ground(settings.ground)
     surface, of_friction = _surface(settings, fitted)
     warnings = of_friction + [part.note for foot in robot.feet for part in foot.parts if part.note]

@@ -140,7 +140,7 @@ def conclude(
     softening: Softening | None = None,
     across: float = 0.0,
 ) -> Result:
-    """The result, its series written. On grains `beside` is the robot on the spring-damper."""
+    """The result, its series written. On grains `beside` is the robot on the default law of the surface."""
     robot, heights = run.robot, heights_of(run)
     write_series_of(run, folder)
     title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
@@ -169,7 +169,7 @@ def conclude(
     if softening is not None and beside is not None and isinstance(run.ground, BedFeet):
         rows = beside.columns
         write_series(
-            folder / "series" / "spring-damper.csv",
+            folder / "series" / f"{settings.default_law}.csv",
             {UNITS[name]: rows[name] for name in ("time", "x", "y", "z", "touching", "fz", "sinkage")},
         )
         bed = run.ground.bed
@@ -177,7 +177,7 @@ def conclude(
         result["grains"] = grains.bed_numbers(settings, run, bed, softening, in_rig=False) | {
             "mode": say("one_gravity", gravity=plan.numbers["gravity"].value),
             "origin": [float(number) for number in run.ground.origin],
-            "beside": quantities_of(beside, heights_of(beside)),
+            "beside": quantities_of(beside, heights_of(beside)), "beside_law": settings.default_law,
         }  # fmt: skip
         warnings += [
             grains.reversal_warning(run.dissipation_reversal),

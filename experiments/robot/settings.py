@@ -102,6 +102,12 @@ class RobotSettings(GrainsSettings):
         """Whether the ground is made of grains."""
         return self.ground in ON_GRAINS
 
+    @property
+    def default_law(self) -> str:
+        """The surface law of this robot where no ground is given."""
+        of_spring = any(getattr(self, name) is not None for name in OF_THE_SPRING)
+        return "spring-damper" if of_spring or self.surface not in OF_DEFAULT else DEFAULT
+
     @model_validator(mode="before")
     @classmethod
     def _choose_ground(cls, given: Any) -> Any:

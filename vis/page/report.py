@@ -77,8 +77,8 @@ class Report:
         start = self.done
         return lambda done: self.tell(start + (0.95 - start) * done)
 
-    def numbers(self, *, std: bool = False, beside: Result | None = None) -> Section:
-        """Every number of the result with its note, its spread if `std`, and that of the spring-damper `beside` it."""
+    def numbers(self, *, std: bool = False, beside: Result | None = None, law: str = "spring-damper") -> Section:
+        """Every number of the result with its note, its spread if `std`, and that `beside` it, of the `law`."""
         digits, none = 5 if std else 6, "null" if not std and beside is None else "\N{EN DASH}"
         rows = []
         for name, entry in self.result["quantities"].items():
@@ -86,7 +86,7 @@ class Report:
             cells += [number_text(entry["std"], 2)] if std else []
             cells += [number_text((beside.get(name) or {}).get("value"))] if beside else []
             rows.append((name, *cells, unit_text(entry["unit"]), entry.get("note", "")))
-        more = [*(["std"] if std else []), *(["spring-damper"] if beside else [])]
+        more = [*(["std"] if std else []), *([law] if beside else [])]
         blocks = [table(("quantity", "value", *more, "unit", "note"), rows, words=True)]
         return Section("Every number of the result", blocks)
 

@@ -17,7 +17,7 @@ from vis.page.report import Report, given, report_of
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frames_of
 from vis.spatial.report import draw_energy, pair, say_grains
-from vis.view.curves import MOST_LINES, joint_columns
+from vis.view.curves import MOST_LINES, joint_columns, law_beside
 from vis.view.page import report_scene
 
 __all__ = ["write_robot_report"]
@@ -49,9 +49,8 @@ def write_robot_report(
     home, result = report.folder, report.result
     motion, feet, joints = (report.columns(f"series/{name}.csv") for name in ("motion", "feet", "joints"))
     drawn = [report.draw("path", _draw_path(motion)), report.draw("ground", _draw_ground(motion, feet, result["feet"]))]
-    beside = home / "series" / "spring-damper.csv"
-    if beside.exists():
-        drawn.append(report.draw("beside", _draw_beside(motion, report.columns("series/spring-damper.csv"))))
+    if (law := law_beside(home)) is not None:
+        drawn.append(report.draw("beside", _draw_beside(motion, report.columns(f"series/{law}.csv"), law), law=law))
     drawn += [report.draw("joints", _draw_joints(joints)), report.draw("energy", draw_energy(motion, "the robot"))]
     seen = []
     if pictures and frames_of(home):
@@ -65,7 +64,7 @@ def write_robot_report(
         Section("Over time", [*drawn, *say_grains(result)]),
         *_feet(result.get("feet_reached") or {}),
         Section("The trial", [given(result["trial"])]),
-        report.numbers(beside=(result.get("grains") or {}).get("beside") or {}),
+        report.numbers(beside=(result.get("grains") or {}).get("beside") or {}, law=law or ""),
         report.again("hedgebed mujoco run.toml"),
     ]
     tiles = [
@@ -108,12 +107,12 @@ def _draw_ground(motion: Columns, feet: Columns, names: list[str]) -> Figure:
     return drawing
 
 
-def _draw_beside(motion: Columns, other: Columns) -> Figure:
+def _draw_beside(motion: Columns, other: Columns, law: str) -> Figure:
     drawing, height, depth = pair("rise of the centre of mass [mm]", "depth of the deepest foot [mm]")
     for columns, style in ((motion, {"color": BED, "label": "grains"}), (other, {"color": MODEL, "ls": DASHED})):
         height.plot(columns["t_s"], 1e3 * (columns["z_m"] - columns["z_m"][0]), **style)
         depth.plot(columns["t_s"], 1e3 * columns["sinkage_m"], **style)
-    height.lines[-1].set_label("spring-damper")
+    height.lines[-1].set_label(law)
     depth.invert_yaxis()
     legend_above(drawing, height.lines, 2)
     return drawing

@@ -17,8 +17,8 @@ from vis.page.states import States, state_runs
 from vis.pictures.frames import Frames
 
 __all__ = [
-    "MOST_LINES", "Band", "Line", "Panel", "bands", "joint_columns", "line", "of_frames", "of_penetration", "of_robot",
-    "of_space", "of_tumble", "panel",
+    "MOST_LINES", "Band", "Line", "Panel", "bands", "joint_columns", "law_beside", "line", "of_frames",
+    "of_penetration", "of_robot", "of_space", "of_tumble", "panel",
 ]  # fmt: skip
 
 
@@ -148,7 +148,7 @@ def of_space(folder: Path, series: Mapping[str, Array]) -> list[Panel]:
 
 
 def of_robot(folder: Path) -> list[Panel]:
-    """Way, force, depths of feet, joints and motors of a robot; dashed is the spring-damper beside a bed, if kept."""
+    """Way, force, depths of feet, joints and motors of a robot; dashed is the law beside a bed, if kept."""
     motion, feet, joints = (read_columns(folder / "series" / f"{name}.csv")[0] for name in ("motion", "feet", "joints"))
     time = motion["t_s"]
     ways = [
@@ -161,12 +161,11 @@ def of_robot(folder: Path) -> list[Panel]:
             AXES.items(), mean_over(_SMOOTH, time, [motion[f"f{axis}_N"] for axis in AXES]), strict=True
         )
     ]
-    beside = folder / "series" / "spring-damper.csv"
-    if beside.exists():
-        law = read_columns(beside)[0]
-        ways.append(line("z, spring-damper", law["t_s"], 1e3 * (law["z_m"] - law["z_m"][0]), colour=INK, dashed=True))
+    if (name := law_beside(folder)) is not None:
+        law = read_columns(folder / "series" / f"{name}.csv")[0]
+        ways.append(line(f"z, {name}", law["t_s"], 1e3 * (law["z_m"] - law["z_m"][0]), colour=INK, dashed=True))
         (mean,) = mean_over(_SMOOTH, law["t_s"], [law["fz_N"]])
-        forces.append(line("z, spring-damper", law["t_s"], mean, colour=INK, dashed=True))
+        forces.append(line(f"z, {name}", law["t_s"], mean, colour=INK, dashed=True))
     depths = [name for name in feet if name.endswith("_depth_m")][:MOST_LINES]
     moved, driven = joint_columns(joints)
     return [
@@ -177,6 +176,11 @@ def of_robot(folder: Path) -> list[Panel]:
         *_many("joints [rad, m]", joints, moved),
         *_many("force of the motors [N, N m]", joints, driven, "_force"),
     ]
+
+
+def law_beside(folder: Path) -> str | None:
+    """Name of the surface law whose series stands beside that of a robot on grains; None on a law."""
+    return next((law for law in ("rft", "spring-damper") if (folder / "series" / f"{law}.csv").exists()), None)
 
 
 def joint_columns(joints: Mapping[str, Array]) -> tuple[list[str], list[str]]:

@@ -153,8 +153,21 @@ def test_a_law_that_springs_back_or_does_not_take_gravity_says_so():
 def test_a_robot_that_is_given_no_ground_has_rft_on_sand_and_the_spring_damper_elsewhere(given, law):
     settings = RobotSettings(**HOPPER | given)
     assert settings.ground == law and RobotSettings(**settings.model_dump()) == settings
-    notes = plan_robot(settings).notes
-    assert [law for said in notes if "default on sand" in said] == ["rft"] * (law == "rft")
+    plan = plan_robot(settings)
+    assert len([said for said in plan.notes if "3D-RFT" in said]) == (law == "rft")
+    chosen = [said for said in plan.announcement() if "(default on" in said]
+    assert len(chosen) == (law == "rft")
+    assert not [said for said in plan_robot(RobotSettings(**settings.model_dump())).announcement() if said in chosen]
+
+
+def test_a_weightless_robot_on_a_law_of_weight_is_refused_by_the_gravity_that_was_given(tmp_path):
+    (tmp_path / "ball.xml").write_text(BALL.replace("<mujoco>", '<mujoco><option gravity="0 0 0"/>'))
+    own = {"model": str(tmp_path / "ball.xml"), "feet": ("foot",)}
+    for given, origin in ((HOPPER | {"gravity": 0.0}, "given"), (own, "model ")):
+        with pytest.raises(ValueError, match=rf"^gravity = 0 m/s2 \({origin}.*ground = 'rft'"):
+            plan_robot(RobotSettings(**given))
+    spring = {"ground": "spring-damper", "stiffness": 900.0, "damping": 3.0}
+    assert plan_robot(RobotSettings(**HOPPER, gravity=0.0, **spring)).numbers["gravity"].value == 0.0
 
 
 def test_a_foot_of_the_size_and_shape_of_the_tip_is_told_nothing_of_its_area(tmp_path):

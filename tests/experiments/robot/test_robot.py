@@ -471,9 +471,12 @@ def test_on_a_small_bed_a_stopped_run_goes_on_to_the_same_bits_and_is_drawn(tmp_
     assert whole.quantities["largest_force"].value > 1.0 and whole.quantities["energy_residual"].value < 0.02
     assert (tmp_path / "whole" / "figures" / "robot-end.png").exists()
     assert (tmp_path / "whole" / "report.html").read_text().count('class="head"') == 1  # the scene that can be turned
+    assert (tmp_path / "whole" / "series" / "rft.csv").exists() and "Grains and rft" in (
+        tmp_path / "whole" / "report.html"
+    ).read_text()
     (seen,) = sources_of(tmp_path / "whole")
     assert not seen.block and len(seen.times) >= 2 and len(seen.frame(0).grains["position"]) == 768
-    assert [line["dashed"] for line in seen.panels[0]["lines"]] == [False, False, False, True]  # and the spring-damper
+    assert [line["dashed"] for line in seen.panels[0]["lines"]] == [False, False, False, True]  # and the law
     assert json.loads((tmp_path / "whole" / "result.json").read_text())["grains"]["grain_count"] == 768
 
 
