@@ -9,14 +9,15 @@ import pytest
 from PIL import Image
 
 from vis.compare.report import _alike
-from vis.film.cameras import _Space
+from vis.film.cameras import _Space, layout
 from vis.film.film import Sheet, film_times, moments, run_film_job
-from vis.film.reel import Reel
+from vis.film.reel import Reel, SpaceReel
+from vis.page.plots import AXES, AXIS_LINES, DASHED, line_styles
 from vis.pictures import canvas
 from vis.pictures.canvas import moved_since
 from vis.pictures.frames import FrameWriter
 from vis.pictures.meshes import spike_mesh
-from vis.pictures.scene import Eye
+from vis.pictures.scene import GROUND, PARTS, Eye
 from vis.pictures.tracks import height_map
 from vis.tumble.report import draw_tracks
 from vis.view.sources import sources_of
@@ -244,3 +245,71 @@ def test_an_arrow_is_cut_where_it_leaves_the_picture_and_left_out_where_it_misse
     for foot, head in (([1.2, 0.2], [1.2, 0.9]), ([1.2, 0.2], [1.1, 0.9])):
         low, high = canvas._inside(np.array(foot), np.array(head))
         assert low >= high
+
+
+# A robot on a law, from the side --------------------------------------------------------------------------------------
+
+BLOCK = 0.05
+"""Edge of the cube that stands for a robot, and of its foot below it [m]."""
+
+
+@pytest.fixture(params=[0.06, 0.6])
+def hop(request, tmp_path):
+    """A cube on a cubic foot that hops so high [m] over a law, in 20 frames; it begins 5 mm in the ground."""
+    rise, time = request.param, np.linspace(0.0, 1.0, 20)
+    trial = {"weight": {"value": 2.0}}
+    result = {"title": "cube on sand", "experiment": "mujoco", "ground": "rft", "trial": trial}
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    (tmp_path / "trajectory.csv").write_text("t_s,z_m\n0.0,0.0\n1.0,0.0\n")
+    cube = BLOCK * (np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) - [0.5, 0.5, 0.0])
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    faces = np.array([corner for a, b, c, d in sides for corner in ([a, b, c], [a, c, d])])
+    writer = FrameWriter(tmp_path, name="robot")
+    for now in time:
+        low = np.array([0.2 * now, 0.0, rise * 4 * now * (1 - now) - 0.005])
+        nothing = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
+        writer.write(float(now), nothing, {"spikes": (cube + low, faces), "hull": (cube + low + [0, 0, BLOCK], faces)})
+    return tmp_path, rise
+
+
+def test_a_robot_on_a_law_is_seen_level_with_the_surface_and_its_height_in_scale(hop):
+    """Rows of the picture: what lies between ground and foot, over the pixels of a metre, is the height of the foot."""
+    folder, rise = hop
+    reel = SpaceReel(folder)
+    sheet = Sheet([reel], (1600, 1000), by="displacement", opengl=False)
+    (stage,), (way,), (panel,) = sheet.stages, sheet.ways, sheet.panels
+    image = sheet.draw(0.5).astype(int)
+    index = reel.nearest(0.5)
+    up = reel.lowest(reel.frame(index))[2]
+    assert up == pytest.approx(4 * rise * reel.times[index] * (1 - reel.times[index]) - 5e-3, abs=1e-6)
+    assert reel.line(index).endswith(f"lowest foot {1e3 * up:.3g} mm above the undisturbed surface")
+    assert "5 mm below" in reel.line(0) and sheet.panels[0].camera.arrow
+    beside = round((panel.place[0] + 0.3 * panel.place[2]) * 1600)
+    ground = np.flatnonzero((abs(image[:, beside] - np.round(255 * np.array(GROUND))) < 4).all(axis=1))
+    if rise > 0.5:  # the camera follows: the ground has left the picture, and the robot is in its middle
+        assert not len(ground) and way[index, 1] == pytest.approx(up + BLOCK, abs=0.02)
+        return
+    middle = round((panel.place[0] + 0.5 * panel.place[2]) * 1600) - 8
+    foot = np.flatnonzero((abs(image[:, middle] - np.round(255 * np.array(PARTS["spikes"]))) < 4).all(axis=1))
+    pixel = stage.height / (panel.place[3] * 1000)
+    # the line of the surface and the rims of ground and foot cover a pixel or so each
+    assert (ground[0] - foot[-1]) * pixel == pytest.approx(up, abs=4 * pixel)
+    assert np.ptp(way[:, 1]) == 0.0  # the picture stays as high as it was
+
+
+def test_two_robots_on_laws_share_a_scale_and_one_beside_grains_is_seen_from_above_as_that_is(hop):
+    reel = SpaceReel(hop[0])
+    sheet = Sheet([reel, SpaceReel(hop[0])], (800, 500), by="displacement", opengl=False, labels=["one", "other"])
+    assert sheet.stages[0].height == sheet.stages[1].height
+    assert "Both robots" in moments([reel, reel], ["one", "other"])[0][3]
+    kinds = {type(panel.camera).__name__ for panel in layout([reel, SpaceReel(hop[0])])}
+    reel.__dict__["_first"] = SimpleNamespace(grains={"position": np.zeros((1, 3)), "radius": np.ones(1)})
+    assert kinds == {"_Level"} and {type(p.camera) for p in layout([reel, SpaceReel(hop[0])])} == {_Space}
+
+
+def test_lines_of_x_and_y_on_one_another_both_show_and_joints_have_none_of_the_axes_colours():
+    assert AXIS_LINES["x"]["lw"] > 1.5 * AXIS_LINES["y"]["lw"] and AXIS_LINES["y"]["ls"] == DASHED
+    assert AXIS_LINES["x"]["zorder"] < AXIS_LINES["z"]["zorder"] < AXIS_LINES["y"]["zorder"]
+    beside = line_styles(range(15), beside_axes=True)
+    assert not {style["color"] for style in beside.values()} & set(AXES.values())
+    assert len({(style["color"], str(style["ls"])) for style in beside.values()}) == 15

@@ -1,4 +1,8 @@
-"""The cameras that follow a platform: in the plane the whole of it and its feet from near, in space the whole of it."""
+"""The cameras that follow a platform or robot.
+
+In the plane: the whole of it, and its feet from near. In space: the whole of it, from above on grains, from the side on
+a law.
+"""
 
 from __future__ import annotations
 
@@ -33,6 +37,10 @@ _RULER = 0.2
 """Longest ruler of a picture, over its width; lines on the ground of a law in space are one ruler apart."""
 _LINE = 0.0315
 """From one line of a key to the next, over the height of the sheet."""
+_SEEN = 0.04
+"""Length of the arrow of a height below which it is left out, over the picture's height."""
+_MEASURE = {"arrowstyle": "<->", "color": INK, "lw": 1.2, "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 11.0}
+"""Of the height of a foot."""
 _STEADY = 0.03
 """Over which a camera's way is smoothed (standard deviation), over the run's duration."""
 
@@ -162,6 +170,81 @@ class _Space(Camera):
 
     def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
         _frame_and_ruler(axis, stage)
+        _mark_lowest(axis, reel, stage, frame, focus)
+
+
+class _Level(Camera):
+    """From the side, level, over a ground without grains that is cut open in front of the body.
+
+    The picture has a line of the undisturbed surface, a scale of heights above it, and the height of the lowest foot.
+    It holds the whole way up and down where that is at most `most` times as high as the body; else it follows.
+    ``reels``: All runs on the sheet, which share a scale.
+    """
+
+    width, arrow, most = 3.1, 0.22, 3.0
+    margin = 0.14
+    """Above what is seen and below it, over the picture's height."""
+
+    def __init__(self, reels: Sequence[SpaceReel]) -> None:
+        ends = [reel.ends for reel in reels]
+        tall = max(float((each[:, 1] - each[:, 0]).max()) for each in ends)
+        self.bottom = min(0.0, *(float(each[:, 0].min()) for each in ends))
+        self.rise = max(float(each[:, 1].max()) for each in ends) - self.bottom
+        self.shown = min(self.rise, self.most * tall)
+
+    def set_up(self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
+        (low, high), ends = reel.box, reel.ends
+        width = max(self.width * reach, self.shown / (1.0 - 2.0 * self.margin) * pixels[0] / pixels[1])
+        height = width * pixels[1] / pixels[0]
+        low = np.array([low[0] - width, low[1], self.bottom - 2.0 * height])
+        high = np.array([high[0] + width, high[1], 0.0])
+        seen: dict[str, Any] = {
+            "width": width, "cut": float(low[1]), "pitch": 0.0, "low": low, "high": high, "radius": reel.radius
+        }  # fmt: skip
+        stage = Stage(pixels, **seen, opacity=OPACITY) if opengl else FlatStage(pixels, **seen)
+        stage.reach = 0.5 * width + 2.0 * float(high[1] - low[1])
+        still = self.bottom + (0.5 - self.margin) * height
+        follows = self.rise > self.shown
+        middle = np.maximum(still, 0.5 * ends.sum(axis=1)) if follows else np.full(len(ends), still)
+        return stage, _steady(np.column_stack([reel.centres[:, 0], middle]))
+
+    def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
+        _frame_and_ruler(axis, stage)
+        level = float(stage.place(np.array([[focus[0], stage.cut, 0.0]]), focus)[0, 1])
+        if 0.0 < level < 1.0:
+            axis.plot([0.0, 1.0], [level, level], color=INK, lw=1.0)
+            axis.text(0.988, level + 0.012, "undisturbed surface", fontsize=9, ha="right", va="bottom", color=INK)
+        _heights(axis, stage, focus)
+        _mark_lowest(axis, reel, stage, frame, focus)
+
+
+def _heights(axis: Any, stage: Stage | FlatStage, focus: Focus) -> None:
+    """A scale of heights over the undisturbed surface along the left edge of a level picture."""
+    step = nice_below(_RULER * stage.height)
+    low, high = ((focus[1] + share * stage.height) / step for share in (-0.44, 0.42))
+    for count in range(int(np.ceil(low)), int(np.floor(high)) + 1):
+        y = 0.5 + (count * step - focus[1]) / stage.height
+        axis.plot([0.0, 0.01], [y, y], color=INK, lw=1.0)
+        number = f"{1e3 * count * step:g}".replace("-", "\N{MINUS SIGN}")
+        axis.text(0.015, y, number, fontsize=9, va="center", color=INK, bbox=HALO)
+    axis.text(0.015, 0.975, "height [mm]", fontsize=9, va="center", color=INK, bbox=HALO)
+
+
+def _mark_lowest(axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
+    """An arrow from the undisturbed surface to the lowest point of the feet, where it can be seen."""
+    lowest = reel.lowest(frame)
+    if lowest is None or reel.surface is None:
+        return
+    height = float(lowest[2]) - reel.surface
+    ends = stage.place(np.array([[*lowest[:2], reel.surface], lowest]), focus)
+    if abs(ends[1, 1] - ends[0, 1]) < _SEEN:
+        return
+    x = float(ends[0, 0])
+    low, high = sorted((float(ends[0, 1]), float(ends[1, 1])))
+    low, high = max(low, 0.0), min(high, 1.0)
+    axis.annotate("", (x, high), (x, low), arrowprops=_MEASURE)
+    words = f"{1e3 * abs(height):.3g} mm"
+    axis.text(x + 0.012, 0.5 * (low + high), words, fontsize=10, va="center", color=INK, bbox=HALO)
 
 
 def _frame_and_ruler(axis: Any, stage: Stage | FlatStage) -> None:
@@ -179,10 +262,16 @@ def _frame_and_ruler(axis: Any, stage: Stage | FlatStage) -> None:
 def layout(reels: Sequence[AnyReel]) -> list[Panel]:
     """The pictures of one run or two: in space one each; in the plane the whole beside the feet, or above them."""
     if isinstance(reels[0], SpaceReel):
+        spaces = [reel for reel in reels if isinstance(reel, SpaceReel)]
+        level = not any(reel.on_grains for reel in spaces)
         if len(reels) == 1:
             foot = 0.17 if len(reels[0].states) else 0.03  # below it the states, where there are any
+            if level:  # there is no bar of colours beside it
+                return [Panel(0, _Level(spaces), (0.015, foot, 0.97, 0.885 - foot))]
             return [Panel(0, _Space(whole=True), (0.015, foot, 0.895, 0.885 - foot))]
-        return [Panel(run, _Space(), (left, 0.18, 0.445, 0.70)) for run, left in enumerate((0.015, 0.47))]
+        wide = 0.485 if level else 0.445
+        places = [(left, 0.18, wide, 0.70) for left in (0.015, 0.025 + wide)]
+        return [Panel(run, _Level(spaces) if level else _Space(), place) for run, place in enumerate(places)]
     if len(reels) == 1:
         return [Panel(0, _Plane(), (0.02, 0.17, 0.40, 0.70)), Panel(0, _Near(), (0.435, 0.17, 0.465, 0.70))]
     panels = []

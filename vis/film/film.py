@@ -165,9 +165,10 @@ def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> li
         end = min(float(reel.times[-1]) for reel in reels)
         wanted = dict.fromkeys(float(coarse.times[coarse.nearest(time)]) for time in (0.0, 0.5 * end, end))
         names = ("start", "middle", "end") if len(wanted) == 3 else ("start", "end")
-        seen = "Both platforms" if len(reels) == 2 else "The whole platform"
+        seen = f"Both {first.what}s" if len(reels) == 2 else f"The whole {first.what}"
+        whence = " from above" if any(reel.on_grains for reel in reels) else ""
         return [
-            (name, f"At the {name}", time, f"{seen}, seen along y from above, at {time:.4g} s.")
+            (name, f"At the {name}", time, f"{seen}, seen along y{whence}, at {time:.4g} s.")
             for name, time in zip(names, wanted, strict=False)
         ]
     end = min(float(reel.series["t_s"][-1]) for reel in reels)

@@ -27,6 +27,8 @@ __all__ = ["AnyReel", "Reel", "SpaceReel"]
 _SPIKE, _CLEAR, _WIDE = 0.012, 0.04, 0.06
 """Of the platform on a law, which sees points only: diameter and length of a spike, width of the hull as they are
 drawn, all of spikes that end 0.2 m from the centre [m]."""
+_TOUCHES = 0.05
+"""Distance from the surface below which a foot is at it [mm]."""
 _BLOCK, _THIN = 0.08, 0.06
 """Depth of the ground that is drawn where there are no grains [m], in the plane and in space."""
 
@@ -122,15 +124,45 @@ class SpaceReel(_Filmed):
         """Largest force of one foot or spike in any picture [N]; 0: there is none."""
         return self._seen[1]
 
+    @property
+    def ends(self) -> Array:
+        """z of the lowest and the highest point of the body at every picture [m], shape (n, 2)."""
+        return self._seen[2]
+
     @cached_property
-    def _seen(self) -> tuple[Array, float]:
-        """`centres` and `peak`, from one reading of the frames."""
-        centres, peak = [], 0.0
+    def _seen(self) -> tuple[Array, float, Array]:
+        """`centres`, `peak` and `ends`, from one reading of the frames."""
+        centres, peak, ends = [], 0.0, []
         for frame in self.frames:
             centres.append(np.asarray(frame.bodies["hull"][0].mean(axis=0), dtype=float))
             force = frame.clouds["row_forces"][1]["force"] if "row_forces" in frame.clouds else np.zeros((0, 3))
             peak = max(peak, float(np.linalg.norm(force, axis=1).max(initial=0.0)))
-        return np.array(centres), peak
+            heights = np.concatenate([points[:, 2] for points, _ in frame.bodies.values()])
+            ends.append((float(heights.min()), float(heights.max())))
+        return np.array(centres), peak, np.array(ends)
+
+    @property
+    def surface(self) -> float | None:
+        """Height of the undisturbed surface [m]; None where the folder of a run on grains does not say it."""
+        if not self.on_grains:
+            return 0.0
+        origin = (self.result.get("grains") or {}).get("origin")
+        return None if origin is None else float(origin[2])
+
+    @property
+    def what(self) -> str:
+        """What it is, in a word."""
+        return "robot" if self.result.get("experiment") == "mujoco" else "platform"
+
+    def lowest(self, frame: Frame) -> Array | None:
+        """The lowest point of the feet or spikes of a frame [m], shape (3,), of the body where they are points.
+
+        None where the height of the surface is not known.
+        """
+        if self.surface is None:
+            return None
+        points = frame.bodies.get("spikes", frame.bodies["hull"])[0]
+        return np.asarray(points[int(np.argmin(points[:, 2]))], dtype=float)
 
     @cached_property
     def reach(self) -> float:
@@ -148,9 +180,20 @@ class SpaceReel(_Filmed):
         return low, high
 
     def line(self, index: int) -> str:
-        """Time and state, as text on a picture."""
+        """Time, state, and where the lowest foot or spike is, as text on a picture."""
         state = f"    {self.states[self.row(index)]}" if len(self.states) else ""
-        return f"t = {self.times[index]:.3f} s{state}"
+        return f"t = {self.times[index]:.3f} s{state}{self._height(self.frames[index])}"
+
+    def _height(self, frame: Frame) -> str:
+        """How far the lowest foot, spike or point is from the undisturbed surface, in words."""
+        lowest = self.lowest(frame)
+        if lowest is None or self.surface is None:
+            return ""
+        height, foot = 1e3 * (float(lowest[2]) - self.surface), "foot" if self.what == "robot" else "spike"
+        foot = foot if "spikes" in frame.bodies else "point"
+        if abs(height) < _TOUCHES:
+            return f"    lowest {foot} at the undisturbed surface"
+        return f"    lowest {foot} {abs(height):.3g} mm {'above' if height > 0 else 'below'} the undisturbed surface"
 
     def frame(self, index: int) -> Frame:
         """The frame of a picture."""

@@ -21,9 +21,9 @@ from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
 __all__ = [
-    "AXES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES", "WIDTH", "Array", "as_it_lies",
-    "handle", "legend_above", "line_handles", "line_styles", "mean_over", "new_figure", "new_panels", "nice_below",
-    "shades", "sheet", "smooth_ratio", "styled", "title_above",
+    "AXES", "AXIS_LINES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES", "WIDTH", "Array",
+    "as_it_lies", "handle", "legend_above", "line_handles", "line_styles", "mean_over", "new_figure", "new_panels",
+    "nice_below", "shades", "sheet", "smooth_ratio", "styled", "title_above",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -36,6 +36,12 @@ _DASHES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (1, 1.4)))
 BED = "#0072B2"  # what the grains do
 MODEL = "#D55E00"  # what the spring-damper does; always dashed as well, for print in grey
 AXES: dict[str, str] = {"x": BED, "y": "#009E73", "z": MODEL}
+AXIS_LINES: dict[str, dict[str, Any]] = {
+    "x": {"color": AXES["x"], "lw": 3.4, "zorder": 2.0},
+    "y": {"color": AXES["y"], "lw": 1.8, "ls": DASHED, "zorder": 2.2},
+    "z": {"color": AXES["z"], "lw": 1.8, "zorder": 2.1},
+}
+"""Lines of the three axes in one panel: each shows where they lie on one another, as where all are 0."""
 INK = "#222222"
 GREY = "#8a8a8a"
 STATES = {"stand": "#a4a4a4", "pivot": BED, "slip": MODEL, "hop": "#882255"}
@@ -182,14 +188,16 @@ def smooth_ratio(way: Array, columns: dict[str, Array]) -> tuple[Array, Array]:
     return way[count // 2 : count // 2 + len(shear)], shear / normal
 
 
-def line_styles(keys: Sequence[Hashable]) -> dict[Hashable, Mapping[str, Any]]:
+def line_styles(keys: Sequence[Hashable], *, beside_axes: bool = False) -> dict[Hashable, Mapping[str, Any]]:
     """Colour and dash of a line for each different key, in their order: replicates that share a key share a line.
 
-    Beyond 24 keys they begin again.
+    ``beside_axes``: Whether x, y and z are in the same figure or report, so that their colours are left out. Beyond 24
+    keys, or 15, they begin again.
     """
-    count = len(_COLOURS)
+    colours = tuple(colour for colour in _COLOURS if not (beside_axes and colour in AXES.values()))
+    count = len(colours)
     return {
-        key: {"color": _COLOURS[place % count], "ls": _DASHES[place // count % len(_DASHES)]}
+        key: {"color": colours[place % count], "ls": _DASHES[place // count % len(_DASHES)]}
         for place, key in enumerate(dict.fromkeys(keys))
     }
 

@@ -12,7 +12,7 @@ from vis.film.film import ARROWS_OF_FEET, draw_runs, shown
 from vis.film.reel import SpaceReel
 from vis.page.numbers import quantity
 from vis.page.page import Section, Tile, listing, table_of, text
-from vis.page.plots import AXES, BED, DASHED, INK, MODEL, Array, legend_above, line_styles, mean_over
+from vis.page.plots import AXES, AXIS_LINES, BED, DASHED, INK, MODEL, Array, legend_above, line_styles, mean_over
 from vis.page.report import Report, given, report_of
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frames_of
@@ -85,8 +85,8 @@ def _feet(reached: Mapping[str, Mapping[str, float]]) -> list[Section]:
 
 def _draw_path(motion: Columns) -> Figure:
     drawing, way, feet = pair("way of the centre of mass [mm]", "feet that touch")
-    for axis, colour in AXES.items():
-        way.plot(motion["t_s"], 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0]), color=colour, label=axis)
+    for axis, style in AXIS_LINES.items():
+        way.plot(motion["t_s"], 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0]), label=axis, **style)
     feet.step(motion["t_s"], motion["touching"], color=INK, where="post", lw=1.0)
     feet.yaxis.set_major_locator(MaxNLocator(integer=True))
     legend_above(drawing, way.lines, 3)
@@ -97,9 +97,9 @@ def _draw_ground(motion: Columns, feet: Columns, names: list[str]) -> Figure:
     drawing, force, depth = pair("force of the ground [N]", "depth of the feet [mm]")
     time = motion["t_s"]
     means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in AXES))
-    for (axis, colour), mean in zip(AXES.items(), means, strict=True):
-        force.plot(time, mean, color=colour, label=axis)
-    for name, style in line_styles(names[:MOST_LINES]).items():
+    for (axis, style), mean in zip(AXIS_LINES.items(), means, strict=True):
+        force.plot(time, mean, label=axis, **style)
+    for name, style in line_styles(names[:MOST_LINES], beside_axes=True).items():
         depth.plot(time, 1e3 * feet[f"{name}_depth_m"], label=str(name), **style)
     depth.invert_yaxis()
     depth.legend(loc="best")
@@ -122,9 +122,9 @@ def _draw_joints(joints: Columns) -> Figure:
     drawing, place, force = pair("position [rad, m]", "force [N, N m]")
     time = joints["t_s"]
     moved, driven = joint_columns(joints)
-    for name, style in zip(moved, line_styles(moved).values(), strict=True):
+    for name, style in zip(moved, line_styles(moved, beside_axes=True).values(), strict=True):
         place.plot(time, joints[name], label=name.rpartition("_")[0], **style)
-    for name, style in zip(driven, line_styles(driven).values(), strict=True):
+    for name, style in zip(driven, line_styles(driven, beside_axes=True).values(), strict=True):
         force.plot(time, joints[name], label=name.removesuffix("_force"), **style)
     for axis in (place, force):
         if axis.lines:

@@ -14,7 +14,19 @@ from vis.film.reel import SpaceReel
 from vis.page.folder import read_columns
 from vis.page.numbers import quantity
 from vis.page.page import Block, Section, Tile, listing, text
-from vis.page.plots import AXES, BED, DASHED, DOTTED, GREY, INK, MODEL, Array, legend_above, mean_over, sheet
+from vis.page.plots import (
+    AXIS_LINES,
+    BED,
+    DASHED,
+    DOTTED,
+    GREY,
+    INK,
+    MODEL,
+    Array,
+    legend_above,
+    mean_over,
+    sheet,
+)  # fmt: skip
 from vis.page.report import Report, Result, given, report_of
 from vis.page.states import States, draw_bands, draw_states, passages
 from vis.pictures.canvas import COLOURS
@@ -116,18 +128,18 @@ def pair(left: str, right: str) -> tuple[Figure, Axes, Axes]:
 
 def _draw_path(path: Columns) -> Figure:
     drawing, way, speed = pair("way of the centre of mass [mm]", "velocity [m/s]")
-    for axis, colour in AXES.items():
-        way.plot(path["t_s"], 1e3 * (path[f"{axis}_m"] - path[f"{axis}_m"][0]), color=colour, label=axis)
-        speed.plot(path["t_s"], path[f"v{axis}_m_s"], color=colour)
+    for axis, style in AXIS_LINES.items():
+        way.plot(path["t_s"], 1e3 * (path[f"{axis}_m"] - path[f"{axis}_m"][0]), label=axis, **style)
+        speed.plot(path["t_s"], path[f"v{axis}_m_s"], **style)
     legend_above(drawing, way.lines, 3)
     return drawing
 
 
 def _draw_turning(path: Columns, motion: Columns) -> Figure:
     drawing, spin, wheels = pair("angular velocity [rad/s]", "wheels [rad/s]")
-    for axis, colour in AXES.items():
-        spin.plot(path["t_s"], path[f"w{axis}_rad_s"], color=colour, label=axis)
-        wheels.plot(motion["t_s"], motion[f"wheel_{axis}_rad_s"], color=colour)
+    for axis, style in AXIS_LINES.items():
+        spin.plot(path["t_s"], path[f"w{axis}_rad_s"], label=axis, **style)
+        wheels.plot(motion["t_s"], motion[f"wheel_{axis}_rad_s"], **style)
     legend_above(drawing, spin.lines, 3)
     return drawing
 
@@ -135,9 +147,9 @@ def _draw_turning(path: Columns, motion: Columns) -> Figure:
 def _draw_ground(motion: Columns) -> Figure:
     drawing, force, depth = pair("force of the ground [N]", "sinkage of the deepest spike [mm]")
     time = motion["t_s"]
-    means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in AXES))
-    for (axis, colour), mean in zip(AXES.items(), means, strict=True):
-        force.plot(time, mean, color=colour, label=axis)
+    means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in AXIS_LINES))
+    for (axis, style), mean in zip(AXIS_LINES.items(), means, strict=True):
+        force.plot(time, mean, label=axis, **style)
     depth.plot(time, 1e3 * motion["sinkage_m"], color=INK)
     depth.invert_yaxis()
     legend_above(drawing, force.lines, 3)

@@ -48,6 +48,8 @@ _BINS = 300
 """A line keeps the least and the largest value of each of so many parts of its time."""
 _SMOOTH = 5e-3
 """Forces on a platform or robot are means over this [s], as in its report."""
+_DASHED = "y"
+"""The axis whose line is dashed, so that the one of x shows below it where both are 0."""
 _MEAN = f"mean over {1e3 * _SMOOTH:g} ms"
 """In the label of each panel of such a mean."""
 
@@ -152,11 +154,11 @@ def of_robot(folder: Path) -> list[Panel]:
     motion, feet, joints = (read_columns(folder / "series" / f"{name}.csv")[0] for name in ("motion", "feet", "joints"))
     time = motion["t_s"]
     ways = [
-        line(axis, time, 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0]), colour=colour)
+        line(axis, time, 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0]), colour=colour, dashed=axis == _DASHED)
         for axis, colour in AXES.items()
     ]
     forces = [
-        line(axis, time, mean, colour=colour)
+        line(axis, time, mean, colour=colour, dashed=axis == _DASHED)
         for (axis, colour), mean in zip(
             AXES.items(), mean_over(_SMOOTH, time, [motion[f"f{axis}_N"] for axis in AXES]), strict=True
         )
@@ -199,7 +201,7 @@ def _many(
     called = [name.removesuffix(ending) if ending else name.rpartition("_")[0] for name in names]
     lines = [
         line(own, columns["t_s"], scale * columns[name], colour=str(style["color"]), dashed=style["ls"] != "-")
-        for own, name, style in zip(called, names, line_styles(names).values(), strict=True)
+        for own, name, style in zip(called, names, line_styles(names, beside_axes=True).values(), strict=True)
     ]
     return panel(f"{label}: {called[0]}" if len(lines) == 1 else label, *lines)
 
