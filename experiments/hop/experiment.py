@@ -147,10 +147,11 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
     if by_brake and plan.distance is not None:  # on either ground: the speed of rigid ground alone is no plan for a hop
         answer = f", by a wheel at {speed:.4g} rad/s from rigid ground"
         if given is not None:
-            answer += f", none from {plan.surface}" if sought is None else f", {sought:.4g} from {plan.surface}"
+            found = "none" if sought is None else f"at {sought:.4g} rad/s"
+            answer += f", {found} from {plan.surface}"
     return Result.make(
         "hop",
-        title=f"{plan.platform.name}: a hop {asked[settings.asks_for]} at {settings.gravity:g} m/s2{answer}",
+        title=f"{plan.platform.name}: a hop {asked[settings.asks_for]} at {settings.gravity:.4g} m/s2{answer}",
         quantities=quantities,
         numbers={name: asdict(number) for name, number in plan.numbers.items()},
         actuator=settings.actuator,

@@ -14,6 +14,7 @@ from vis.compare.report import titles_of
 from vis.diagnose.figures import trials_of
 from vis.page.plots import title_above
 from vis.page.report import Report, title_of
+from vis.penetrate.converge import titled
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "docs" / "results"
@@ -94,3 +95,12 @@ def test_figures_of_two_runs_have_a_line_for_each_with_its_surface() -> None:
 )
 def test_the_title_of_a_sweep_is_what_all_its_runs_share(titles: list[str], shared: str) -> None:
     assert shared_title([*(json.dumps({"title": title}) for title in titles), ""]) == shared
+
+
+def test_the_title_of_a_convergence_has_the_gravity_of_its_settings(tmp_path: Path) -> None:
+    for name in ("result.json", "run.toml"):
+        shutil.copyfile(RESULTS / "converge-flagship" / name, tmp_path / name)
+    title = titled(Report(tmp_path))
+    assert "sand, at 9.81 m/s\N{SUPERSCRIPT TWO}, with" in title
+    (tmp_path / "run.toml").unlink()
+    assert titled(Report(tmp_path)) == title_of(Report(tmp_path).result)

@@ -237,6 +237,25 @@ def test_the_arrow_of_four_weights_is_cut_at_the_edge_and_says_its_number(folder
     assert words == f"{'10.0' if aside else '8.00'}\N{NO-BREAK SPACE}N, arrow cut"
 
 
+@pytest.mark.parametrize("words", ["made up", "made up of " + "many words " * 14])
+def test_a_title_ends_where_the_panels_end(folder, monkeypatch, words):
+    """In full size where it has room; a long one in smaller letters, none of which is cut off."""
+    reel, pixels, ends = Reel(folder), canvas.pixels, []
+    reel.result["title"] = words
+
+    def measured(page):
+        title = next(text for text in page.texts if text.get_text().startswith("Made up"))
+        ends.append((title.get_window_extent().x1 / page.bbox.width, title.get_fontsize()))
+        return pixels(page)
+
+    monkeypatch.setattr(canvas, "pixels", measured)
+    sheet = Sheet([reel], (640, 360), by="displacement", opengl=False)
+    sheet.draw(0.0)
+    ((end, size),) = ends
+    last = max(panel.place[0] + panel.place[2] for panel in sheet.panels)
+    assert end <= 1.005 * last and (size == 15.0) == (words == "made up")
+
+
 def test_an_arrow_is_cut_where_it_leaves_the_picture_and_left_out_where_it_misses_it():
     """From (0.5, 0.2) straight up by 1.2: inside for 0.79 / 1.2 of the way. One beside the picture is nowhere in it."""
     inside = canvas._inside(np.array([0.5, 0.2]), np.array([0.5, 1.4]))

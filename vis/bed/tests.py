@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
@@ -18,6 +19,7 @@ from vis.page.page import Block, Section, Tile, text
 from vis.page.plots import BED, MODEL, Array, handle, legend_above, new_panels, shades, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
 from vis.page.sentences import Sentences
+from vis.pictures.canvas import colourmap
 from vis.pictures.frames import read_frames
 
 __all__ = [
@@ -31,6 +33,8 @@ __all__ = [
 ]
 
 say = Sentences(__package__)
+RIM = [withStroke(linewidth=4.0, foreground="white")]
+"""Keeps a line apart from the grains that it lies on."""
 Grains = Mapping[str, NDArray[Any]]
 
 
@@ -83,7 +87,7 @@ def _side_plot(
     drawing, (axis,) = new_panels(1, height=min(5.5, 0.7 + 6.9 * highest / period))
     drawn = _draw_grains(axis, grains, period=period, unit=run["grain"], top=top)
     draw(axis)
-    drawing.colorbar(drawn, ax=axis, shrink=0.8, extend="max", label="way since it was made [d]")
+    drawing.colorbar(drawn, ax=axis, shrink=0.8, extend="max", label="displacement since the start [grain diameters]")
     return [report.draw(key, drawing, name="side")]
 
 
@@ -95,7 +99,7 @@ def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top:
     size, way = 2e3 * radius[order], np.linalg.norm(grains["displacement"][order], axis=1) / unit
     drawn = EllipseCollection(
         size, size, np.zeros(len(size)), units="xy", offsets=1e3 * np.column_stack([x, position[order, 2]]),
-        offset_transform=axis.transData, array=way, cmap="cividis", edgecolors="#00000055", linewidths=0.25,
+        offset_transform=axis.transData, array=way, cmap=colourmap(), edgecolors="#00000055", linewidths=0.25,
     )  # fmt: skip
     drawn.set_clim(0.0, top)
     axis.add_collection(drawn)
@@ -188,7 +192,7 @@ def _forces_of_plates(report: Report) -> list[Block]:
     names = [f"{row['body']}{'' if row['beta'] is None else '°'}, {row['gamma']:g}°" for row in rows]
     place = np.arange(len(rows))
     drawing, panels = new_panels(2, height=1.2 + 0.24 * len(rows), sharey=True)
-    for axis, key, label in zip(panels, ("x", "z"), ("backwards, −F_x", "upwards, F_z"), strict=True):
+    for axis, key, label in zip(panels, ("x", "z"), ("backwards, $-F_x$", "upwards, $F_z$"), strict=True):
         sign = -1.0 if key == "x" else 1.0
         measured = [sign * row[f"force_{key}"] for row in rows]
         axis.errorbar(
@@ -199,7 +203,8 @@ def _forces_of_plates(report: Report) -> list[Block]:
         axis.set(xlabel=f"force {label} [N]")
     panels[0].set_yticks(place, names)
     panels[0].invert_yaxis()
-    legend_above(drawing, [handle("bed, ± std between beds", BED), handle("fitted law", MODEL)])
+    bed = handle("bed, ± standard deviation of the beds", BED, marker="o", ms=4)
+    legend_above(drawing, [bed, handle("fitted law", MODEL, marker="x", ms=6, ls="")])
     return [report.draw("plates", drawing)]
 
 
@@ -307,7 +312,7 @@ def flank_lines(axis: Axes, run: Result, *, start: float, period: float, colour:
             x = sign * (start + ends)
             x = np.where(np.abs(x) > 0.5 * period, np.nan, x)
             height = base + slope * (ends - flank["foot"])
-            axis.plot(1e3 * x, 1e3 * height, color=colour, ls=style, lw=2.0, zorder=3)
+            axis.plot(1e3 * x, 1e3 * height, color=colour, ls=style, lw=2.0, zorder=3, path_effects=RIM)
 
 
 def _repose_side(report: Report) -> list[Block]:
@@ -326,15 +331,13 @@ def _repose_side(report: Report) -> list[Block]:
 
 
 def _repose_profiles(report: Report) -> list[Block]:
-    colours = iter(shades(len(report.result["runs"])))
-
     def draw(axis: Axes, run: Result, x: Array, thickness: Array, standing: Array | None) -> str:
-        axis.plot(x, thickness, color=next(colours), marker=".", ls="none")
+        axis.plot(x, thickness, color=BED, marker=".", ls="none")
         flank_lines(axis, run, start=0.5 * run["slot"], period=run["size"][0], colour=MODEL)
         axis.axhline(1e3 * run["surface"], color="#888888", lw=0.8, ls="--")
         return f"{run['id']}: {run['angle']:.1f} ± {run['error']:.1f}°"
 
-    dots, fit = handle("bed", "black", marker=".", ls="none"), handle("fit", MODEL)
+    dots, fit = handle("bed", BED, marker=".", ls="none"), handle("fit", MODEL)
     before = handle("surface before", "#888888", ls="--", lw=0.8)
     handles = [dots, fit, before]
     return thicknesses(report, report.result["runs"], draw, "repose_profiles", name="profiles", handles=handles)

@@ -43,6 +43,8 @@ __all__ = [
 say = Sentences(__package__)
 ARROWS, ARROWS_OF_FEET = say("arrows"), say("arrows_of_feet")
 MOST_FRAMES = 48
+_TITLE = 15.0
+"""Size of a title [points]."""
 _TALLEST = 2.0
 """Weights whose arrow is as long as the longest arrow of a run in space: a robot that hops pushes with several."""
 _LEAST = 0.2
@@ -110,7 +112,8 @@ class Sheet:
             for number, reel in enumerate(self.reels):
                 left = next(panel.place[0] for panel in self.panels if panel.run == number)
                 title = str(reel.result["title"]) if len(self.reels) == 1 else _with_surface(self.labels[number], reel)
-                sheet.text(left, 0.975, typeset(capital(title)), fontsize=15, fontweight="bold", va="top")
+                right = max(p.place[0] + p.place[2] for p in self.panels if p.run == number)
+                _entitle(sheet, typeset(capital(title)), left, right)
                 sheet.text(left, 0.93, reel.line(reel.nearest(time)), fontsize=13, va="top", color="#444444")
             for panel in self.panels:
                 if panel.camera.arrow:
@@ -147,6 +150,14 @@ class Sheet:
             for point, force in zip(points, fields.get("force", np.zeros((0, 3))), strict=True):
                 ends = stage.place(np.array([point, point + long * np.asarray(force, dtype=float)]), focus)
                 canvas.draw_force(axis, ends[0], ends[1], float(np.linalg.norm(force)))
+
+
+def _entitle(sheet: Figure, words: str, left: float, right: float) -> None:
+    """The title of a run over its panels, `left` to `right` in shares of the sheet; a longer one in smaller letters."""
+    drawn = sheet.text(left, 0.975, words, fontsize=_TITLE, fontweight="bold", va="top")
+    for _ in range(2):  # letters are whole pixels wide: the second step takes off what the first left
+        wide = drawn.get_window_extent().width / sheet.bbox.width
+        drawn.set_fontsize(drawn.get_fontsize() * min(1.0, (right - left) / wide))
 
 
 def _with_surface(label: str, reel: AnyReel) -> str:

@@ -268,7 +268,7 @@ def figure_8(paper: PaperRun) -> Block:
         for stated in (0.0, 22.5, 60.0):
             axes[0, j].axhline(stated, color=GREY, lw=0.9, ls=_DASHED, zorder=1)
     for row in axes[1:]:
-        row[0].set_ylim(bottom=0.0)
+        row[0].set_ylim(bottom=-0.04 * row[0].get_ylim()[1])  # a mark at 0 is whole
     dashed = handle("0°, 22.5°, 60° of the text", GREY, lw=0.9, ls=_DASHED)
     hollow = handle("the paper's 1 ms step", INK, marker="o", mfc="none", ls="", ms=7)
     dots = [handle(paper.label(t), paper.colour(t), marker="o", ls="", ms=5) for t in paper.torques]
@@ -318,9 +318,9 @@ def figure_signs(paper: PaperRun) -> Block | None:
         axis.set_xlim(-0.5, len(places) - 0.5)
     axes[0, 0].set(ylabel="launch angle [degrees]", ylim=(-45.0, 62.0))
     legend_above(drawing, [
-        handle(f"spring-damper of {' and '.join(surfaces)}", BED, marker="o", ls="", ms=6),
-        handle(f"{_grains_of(kept['one_bed'], surfaces)}: one bed each", MODEL, marker="s", mfc="none", ls="", ms=6),
-        handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three beds, 95 %", MODEL, marker="s", ls="", ms=6),
+        handle(f"spring-damper of {' and '.join(surfaces)}", MODEL, marker="o", ls="", ms=6),
+        handle(f"{_grains_of(kept['one_bed'], surfaces)}: one bed each", BED, marker="s", mfc="none", ls="", ms=6),
+        handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three beds, 95 %", BED, marker="s", ls="", ms=6),
         Patch(color=GREY, alpha=0.22, lw=0, label="the paper: motors about +22.5°, brakes below 0"),
     ], 2)  # fmt: skip
     named = " and ".join(_SOILS[name] for name in surfaces)
@@ -346,14 +346,14 @@ def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, floa
     band = [value for value in paper.variants(surface, rig, torque, "trajectory_angle")[:3] if value is not None]
     nominal = paper.case(surface, rig, torque)["trajectory_angle"]
     if nominal is not None:
-        axis.plot([place - 0.2] * 2, np.degrees([min(band), max(band)]), color=BED, lw=3.0, alpha=0.4)
-        axis.plot(place - 0.2, math.degrees(nominal), "o", color=BED, ms=5.5)
+        axis.plot([place - 0.2] * 2, np.degrees([min(band), max(band)]), color=MODEL, lw=3.0, alpha=0.4)
+        axis.plot(place - 0.2, math.degrees(nominal), "o", color=MODEL, ms=5.5)
     for entry in of_this(kept["one_bed"]):
-        axis.plot(place, entry["angle"], "s", color=MODEL, mfc="none", ms=5.5)
+        axis.plot(place, entry["angle"], "s", color=BED, mfc="none", ms=5.5)
     for entry in of_this(kept["beds"]):
         angles = np.array(entry["angles"])
         half = stdtrit(len(angles) - 1, 0.975) * angles.std(ddof=1) / math.sqrt(len(angles))
-        axis.errorbar(place + 0.2, angles.mean(), half, fmt="s", color=MODEL, ms=5.5, capsize=3)
+        axis.errorbar(place + 0.2, angles.mean(), half, fmt="s", color=BED, ms=5.5, capsize=3)
 
 
 def figure_sweep(paper: PaperRun) -> Block | None:

@@ -17,6 +17,9 @@ from vis.page.states import by_state, legend_of_states, panels
 
 __all__ = ["write_hop_report"]
 
+_BEYOND = 1.25
+"""Length of the line of the launch on rigid ground, over that of the path [1]."""
+
 
 @report_of(dpi=130, named=True)
 def write_hop_report(report: Report) -> Path:
@@ -71,7 +74,8 @@ def _launch(report: Report) -> Block:
     rates.set(xlabel="time [ms]", ylabel="speed of the centre [m/s]")
     by_state(path, x, y, states, lw=2.4)
     far = float(np.hypot(x, y).max())
-    path.plot([0, far * math.cos(angle)], [0, far * math.sin(angle)], **dashed)
+    beyond = _BEYOND * far  # where the path lies on the line, its end shows it
+    path.plot([0, beyond * math.cos(angle)], [0, beyond * math.sin(angle)], **dashed)
     path.set(xlabel="centre along the ground [mm]", ylabel="centre upwards [mm]")
     path.set_aspect("equal", adjustable="datalim")
     legend_of_states(drawing, states, (handle("launch on rigid ground", **dashed),), columns=6)

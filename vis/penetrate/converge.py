@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,9 +14,9 @@ from matplotlib.patches import Patch
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, listing
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, handle, legend_above, new_figure
-from vis.page.report import Report, Result, capital, report_of, tables
+from vis.page.report import Report, Result, capital, report_of, tables, title_of
 
-__all__ = ["write_converge_report"]
+__all__ = ["titled", "write_converge_report"]
 
 _SHOWN = {"m": (1e3, "mm"), "J": (1e3, "mJ"), "1": (1.0, "")}
 """SI unit -> how many of the unit shown it has, and that unit."""
@@ -28,6 +29,7 @@ _TILES = ("stiffness", "damping", "sinkage", "stiffness_standing")
 def write_converge_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a sweep, and return the report."""
     result = report.result
+    report.about = titled(report)
     first, *others = tables(result)
     drawn = [_figure(report, name, told) for name, told in result["convergence"].items()]
     sections = [
@@ -39,6 +41,14 @@ def write_converge_report(report: Report) -> Path:
     ]
     counted = f"{result['quantities']['members']['value']} runs"
     return report.write(sections, lead=["converge", counted], tiles=list(_tiles(result)))
+
+
+def titled(report: Report) -> str:
+    """Title of the figures: what was run, with the gravity of all beds, which run.toml has, and the rest."""
+    settings = report.folder / "run.toml"
+    given = tomllib.loads(settings.read_text(encoding="utf-8")) if settings.exists() else {}
+    body, comma, rest = str(report.result["title"]).partition(", ")
+    return title_of({"title": body, "bed": given.get("settings")}) + comma + rest
 
 
 def _tiles(result: Result) -> list[Tile]:
@@ -153,5 +163,5 @@ def _changes(axis: Axes, changes: Sequence[Result], scale: float, unit: str) -> 
 
 def _label(one: Result) -> str:
     what, value = one["what"], one["value"]
-    shown = {"overlap": f"{100 * value:g} %", "speed": f"x {value:g}"}.get(what, f"{value:g} D")
+    shown = {"overlap": f"{100 * value:g} %", "speed": f"\N{MULTIPLICATION SIGN} {value:g}"}.get(what, f"{value:g} D")
     return f"{what}\n{shown}"

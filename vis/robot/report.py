@@ -84,7 +84,7 @@ def _feet(reached: Mapping[str, Mapping[str, float]]) -> list[Section]:
 
 
 def _draw_path(motion: Columns) -> Figure:
-    drawing, way, feet = pair("way of the centre of mass [mm]", "feet that touch")
+    drawing, way, feet = pair("displacement of the centre of mass [mm]", "feet that touch")
     for axis, style in AXIS_LINES.items():
         way.plot(motion["t_s"], 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0]), label=axis, **style)
     feet.step(motion["t_s"], motion["touching"], color=INK, where="post", lw=1.0)

@@ -36,7 +36,7 @@ from vis.view.page import report_scene
 __all__ = ["draw_energy", "pair", "say_grains", "write_spatial_report"]
 
 Columns = Mapping[str, Array]
-_TURN = "turn from the start [degrees]"
+_TURN = "rotation from the start [degrees]"
 
 
 @report_of(dpi=130, named=True)
@@ -127,7 +127,7 @@ def pair(left: str, right: str) -> tuple[Figure, Axes, Axes]:
 
 
 def _draw_path(path: Columns) -> Figure:
-    drawing, way, speed = pair("way of the centre of mass [mm]", "velocity [m/s]")
+    drawing, way, speed = pair("displacement of the centre of mass [mm]", "velocity [m/s]")
     for axis, style in AXIS_LINES.items():
         way.plot(path["t_s"], 1e3 * (path[f"{axis}_m"] - path[f"{axis}_m"][0]), label=axis, **style)
         speed.plot(path["t_s"], path[f"v{axis}_m_s"], **style)
@@ -136,7 +136,7 @@ def _draw_path(path: Columns) -> Figure:
 
 
 def _draw_turning(path: Columns, motion: Columns) -> Figure:
-    drawing, spin, wheels = pair("angular velocity [rad/s]", "wheels [rad/s]")
+    drawing, spin, wheels = pair("angular velocity [rad/s]", "wheel speeds [rad/s]")
     for axis, style in AXIS_LINES.items():
         spin.plot(path["t_s"], path[f"w{axis}_rad_s"], label=axis, **style)
         wheels.plot(motion["t_s"], motion[f"wheel_{axis}_rad_s"], **style)

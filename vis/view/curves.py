@@ -134,7 +134,7 @@ def of_space(folder: Path, series: Mapping[str, Array]) -> list[Panel]:
     """Turn, height, speed and force of a platform in space."""
     time = series["t_s"]
     speed = np.sqrt(sum(series[f"v{axis}_m_s"] ** 2 for axis in "xyz"))
-    turn = panel("turn from the start [degrees]", line("", time, np.degrees(series["turn_rad"])))
+    turn = panel("rotation from the start [degrees]", line("", time, np.degrees(series["turn_rad"])))
     motion = folder / "series" / "motion.csv"
     force: list[Panel] = []
     if motion.exists():
@@ -171,7 +171,7 @@ def of_robot(folder: Path) -> list[Panel]:
     depths = [name for name in feet if name.endswith("_depth_m")][:MOST_LINES]
     moved, driven = joint_columns(joints)
     return [
-        *panel("way of the centre of mass [mm]", *ways),
+        *panel("displacement of the centre of mass [mm]", *ways),
         *panel(f"force of the ground, {_MEAN} [N]", *forces),
         *_many("depth of the feet [mm]", feet, depths, "_depth_m", 1e3),
         *panel("feet that touch", line("", time, motion["touching"], colour=INK)),

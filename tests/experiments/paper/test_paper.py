@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from golden import golden
+from matplotlib.colors import to_hex
 
 import experiments
 from experiments.cli.main import main
@@ -25,6 +26,7 @@ from experiments.runs.folder import RunFolder
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
 from rigid.planar.simulate import simulate
+from vis.page.plots import BED, MODEL
 from vis.paper.figures import PaperRun, figure_5, figure_signs
 
 RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
@@ -190,6 +192,10 @@ def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
     assert words[0] == "spring-damper of sand"
     assert words[1:3] == list(LEGEND)
     assert [text.get_text() for text in figure.axes[0].texts] == ["sand"]
+    law, *grains = (to_hex(entry.get_color()) for entry in figure.legends[0].get_lines())
+    assert (law, set(grains)) == (MODEL.lower(), {BED.lower()})  # as in every figure
+    marks = {line.get_marker(): to_hex(line.get_color()) for line in figure.axes[0].lines}
+    assert (marks["o"], marks["s"]) == (law, grains[0])
     for entry in paper.result["kept_on_grains"]["one_bed"]:
         del entry["grains"]
     figure_signs(paper)
