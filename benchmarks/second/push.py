@@ -64,8 +64,9 @@ class Law:
             force = force + s["shaft"] * (deep / self.depth) ** s["shaft_power"] * np.tanh(v / s["shaft_speed"])
         if "jam" in s:
             force = force + s["jam"] * np.sin(2 * np.pi * deep / s["jam_length"]) * deep / self.depth
-        if "relax" in s:  # a spring in series with a dashpot, beside the bed
-            self.slow = (self.slow + s["relax"] * np.maximum(v, 0.0) * dt * there) * np.exp(-dt / s["relax_time"])
+        if "relax" in s:  # a spring in series with a dashpot, beside the bed; it gives way when it would pull
+            stretched = (self.slow + s["relax"] * v * dt * there) * np.exp(-dt / s["relax_time"])
+            self.slow = np.maximum(stretched, 0.0)
             force = force + self.slow
         return np.where(z >= 0.0, force, 0.0)  # a drop begins at 0, in touch
 
