@@ -43,7 +43,17 @@ with Path(bed).open() as file:
         elif len(words) == 7:
             rows.append([float(word) for word in words[2:]])
 
-stuff = O.materials.append(FrictMat(young=5e7, poisson=0.3, frictionAngle=math.atan(0.5), density=rows[0][1]))
+YOUNG, POISSON = 5e7, 0.3
+stuff = O.materials.append(FrictMat(young=YOUNG, poisson=POISSON, frictionAngle=math.atan(0.5), density=rows[0][1]))
+# The floor of the others is rigid and flat: springs twice those of two grains of the same radii. YADE gives a facet
+# twice the radius of the grain, so sqrt(2/3) of a plane's springs. These two numbers are no material: they make YADE's
+# means of the two moduli (Ip2_FrictMat_FrictMat_MindlinPhys) larger by both factors, in kno and kso alike.
+stiffer = 2 * math.sqrt(1.5)
+share = 1 / ((1 - 2 / stiffer) * (1 - POISSON**2))
+shear = (2 - POISSON) * share * (1 + POISSON)
+poisson = ((4 - POISSON) * stiffer - (2 - POISSON) + shear) / (shear + stiffer)
+young = YOUNG * share * (poisson**2 - 1)
+rigid = O.materials.append(FrictMat(young=young, poisson=poisson, frictionAngle=math.atan(0.5), density=rows[0][1]))
 O.periodic = True
 O.cell.setBox(period[0], period[1], 4 * top)
 for diameter, _, x, y, z in rows:
@@ -53,8 +63,8 @@ a, b = period[0] / cuts, period[1] / cuts
 for i in range(cuts):
     for j in range(cuts):
         corners = [((i + p) * a, (j + q) * b, top) for p, q in ((0, 0), (1, 0), (1, 1), (0, 1))]
-        O.bodies.append(utils.facet([corners[0], corners[1], corners[2]], material=stuff, fixed=True))
-        O.bodies.append(utils.facet([corners[0], corners[2], corners[3]], material=stuff, fixed=True))
+        O.bodies.append(utils.facet([corners[0], corners[1], corners[2]], material=rigid, fixed=True))
+        O.bodies.append(utils.facet([corners[0], corners[2], corners[3]], material=rigid, fixed=True))
 O.engines = [
     ForceResetter(),
     InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Facet_Aabb()], verletDist=skin),
