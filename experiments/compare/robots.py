@@ -60,6 +60,8 @@ def check_alike(runs: Sequence[str], results: Sequence[Mapping[str, Any]]) -> No
 
 def read_moved(folder: Path, result: Mapping[str, Any]) -> MovedRobot:
     """What the run in `folder` did. Raises ValueError, naming file and column, where a series is missing."""
+    if "beds" in result:
+        raise ValueError(say("name_a_bed", folder=str(folder), bed=str(folder / result["beds"][0]["folder"])))
     found, again = {}, say("again_robot", file=folder / "run.toml")
     names = tuple(str(name) for name in result["feet"])
     of_feet = tuple(f"{name}_{what}" for name in names for what in ("fz_N", "depth_m"))

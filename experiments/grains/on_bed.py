@@ -75,6 +75,8 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     reach: float  # From the centre to the farthest tip [m]
     repeats = 1  # How often the prepared bed is laid end to end [1]
     given_stages: tuple[str, ...] | None = None  # Stages of the bed that are set; None: those of its material
+    bed_stage = "bed"  # What the progress calls the preparation
+    plans = True  # Whether it reports the stages to come; one of several beds does not
 
     # What differs
 
@@ -211,7 +213,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         with held_back() as asked_to_stop:
             if self.stages is None:
                 packing = None if graded is None else recipe_of(self.material).rained
-                shown = BedProgress(progress, "bed", asked_to_stop, tapped=packing is not None)
+                shown = BedProgress(progress, self.bed_stage, asked_to_stop, tapped=packing is not None)
                 return Bed.prepare(self.material, packing=packing, **options, progress=shown)
             return staged_bed(self.material, self.stages, **options, progress=progress, asked_to_stop=asked_to_stop)
 
@@ -245,10 +247,17 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         """Options of stepping, as every stepper accepts them."""
         return {"duration": self.duration, "lowering_speed": self.lowering_speed, **self.settings.stepping()}
 
+    @property
+    def costs(self) -> dict[str, float]:
+        """Stage -> about how long it is [s] of simulated time; the placement counts for 0.3 s."""
+        placed = 0.0 if self.lowering_speed is None else 0.3
+        return {self.bed_stage: 1.0, self.stage: self.duration + placed}
+
     def carry_out(self, folder: RunFolder, progress: Progress) -> Result:
         """Prepare the bed and step the run in `folder`, from its checkpoint if there is one; returns the result."""
         self.announce(progress)
         if self.given_stages is None and self.stages is not None:
             progress.message(say("by_recipe", material=self.material, stages=" ".join(self.stages)))
-        progress.plan({"bed": 1.0, self.stage: self.duration + 0.3}, seconds={"report": 10.0})  # with the placement
+        if self.plans:
+            progress.plan(self.costs, seconds={"report": 10.0})
         return self.finish(self.stepper(self.bed(self.softening(), progress)), folder, progress)

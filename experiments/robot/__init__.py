@@ -3,8 +3,8 @@
 `Settings`, `check`, `run` and `resume` are those of `hedgebed mujoco`; calling one imports what computes.
 `experiments.robot.own_loop.law_of_run` is its surface law for a loop of one's own.
 
-Imports `coupling`, `coupling.robot`, `dem`, `experiments.grains`, `experiments.groundmap`, `experiments.platform`,
-`experiments.runs`, `rigid`, `vis`.
+Imports `coupling`, `coupling.robot`, `dem`, `experiments.converge`, `experiments.grains`, `experiments.groundmap`,
+`experiments.platform`, `experiments.runs`, `rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

@@ -1,5 +1,7 @@
 """`hedgebed mujoco`: a robot of MuJoCo on a surface law or on a bed of grains."""
 
+from dataclasses import replace
+
 from coupling.robot import RobotRun
 from experiments.platform.ground_file import with_kept_ground
 from experiments.runs.folder import RunFolder
@@ -31,6 +33,13 @@ def _carry_out(settings: RobotSettings, folder: RunFolder, progress: Progress) -
         keep_files(settings, folder.path)
         settings = with_kept_ground(settings, folder.path)
         plan = plan_robot(settings, folder=folder.path)
+        if len(settings.seeds) > 1:
+            from .beds import carry_out_beds  # loads the statistics of SciPy
+
+            return carry_out_beds(settings, plan, folder, progress)
+        if settings.seeds:
+            settings = settings.of_bed(settings.seeds[0])
+            plan = replace(plan, settings=settings)
         if settings.on_grains:
             return RobotOnBed(settings, plan).carry_out(folder, progress)
         followed = RobotFollowed(settings, plan)

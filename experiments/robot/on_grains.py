@@ -30,9 +30,11 @@ from experiments.runs.result import Result
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
+from .feet import feet_reached, heights_of
 from .plan import RobotPlan, width_of
-from .result import RobotFrames, conclude, deepest_at_start, write_series_of
+from .result import RobotFrames, conclude, deepest_at_start, quantities_of, write_series_of
 from .settings import RobotSettings
+from .sure import answer_of, sure_of_law
 
 __all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed"]
 
@@ -67,7 +69,20 @@ class RobotFollowed(Followed[RobotRun]):
             progress.message(sentence)
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
-        return conclude(self.settings, self.plan, run, folder)
+        sure, said = sure_of_law(self.plan, _answer(run), self._answer_of)
+        return conclude(self.settings, self.plan, run, folder, sure=sure, sure_words=said)
+
+    def _answer_of(self, plan: RobotPlan) -> dict[str, float]:
+        """The answer of the same robot on the law of another plan."""
+        run = RobotFollowed(self.settings, plan).run_on_law()
+        run.run()
+        return _answer(run)
+
+
+def _answer(run: RobotRun) -> dict[str, float]:
+    """The answer of a run."""
+    heights = heights_of(run)
+    return answer_of(quantities_of(run, heights), feet_reached(run, heights))
 
 
 def _stepping(settings: RobotSettings) -> Mapping[str, Any]:

@@ -38,7 +38,10 @@ from .laws import (
 )  # fmt: skip
 from .settings import RobotSettings
 
-__all__ = ["LAW_STEP", "RobotPlan", "find_model", "keep_files", "plan_robot", "try_controller", "width_of"]
+__all__ = [
+    "CONTROLLER", "LAW_STEP", "MODEL", "RobotPlan", "find_model", "keep_files", "plan_robot", "try_controller",
+    "width_of",
+]  # fmt: skip
 
 LAW_STEP = 4e-5  # Of a surface law [s], ten of which make an exchange by default
 DEFAULT_SURFACE = "sand"

@@ -139,12 +139,18 @@ def conclude(
     beside: RobotRun | None = None,
     softening: Softening | None = None,
     across: float = 0.0,
+    sure: Json | None = None,
+    sure_words: str = "",
 ) -> Result:
-    """The result, its series written. On grains `beside` is the robot on the default law of the surface."""
+    """The result, its series written. On grains `beside` is the robot on the default law of the surface.
+
+    `sure`, `sure_words`: what a law leaves open, as `sure_of_law` has it.
+    """
     robot, heights = run.robot, heights_of(run)
     write_series_of(run, folder)
     title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
-    sentences = [*_sentences(run, heights), *plan.notes]
+    told = [sure_words] if sure_words else []
+    sentences = [*(told if sure else []), *_sentences(run, heights), *([] if sure else told), *plan.notes]
     if run.energy_residual > MOST_RESIDUAL:
         title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
     warnings: list[str | None] = [
@@ -163,6 +169,7 @@ def conclude(
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
         "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
         "duration": settings.duration,
+        **({"sure": sure} if sure else {}),
         "feet": [foot.name for foot in robot.feet], "feet_reached": feet_reached(run, heights),
         "warnings": warnings, "macro_step": run.macro_step, "robot_step": robot.step, "steps": run.master.count,
     }  # fmt: skip

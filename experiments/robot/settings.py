@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from experiments.grains.lammps import ON_GRAINS, RANKS, lammps_fault
 from experiments.grains.settings import HIDDEN, GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
+from experiments.runs.strict import SeedNumber
 from rigid.checks import nearest
 from rigid.ground.laws import GROUNDS
 from rigid.ground_file import is_ground_file
@@ -96,11 +97,18 @@ class RobotSettings(GrainsSettings):
     """On a bed: its size along x and y (both periodic) and its depth [m]; the feet start over its middle."""
     grain: Positive = Field(0.006, description="On a bed: mean grain diameter [m].")
     ranks: int | None = Field(None, ge=1, le=4096, description=RANKS)
+    seeds: tuple[SeedNumber, ...] = ()
+    """On a bed: seeds; each prepares one bed, and the result is the mean over the beds with its 95 % interval. One bed,
+    that of seed, if not given."""
 
     @property
     def on_grains(self) -> bool:
         """Whether the ground is made of grains."""
         return self.ground in ON_GRAINS
+
+    def of_bed(self, seed: int) -> Self:
+        """The same on the one bed of this seed."""
+        return self.model_copy(update={"seed": seed, "seeds": ()})
 
     @property
     def default_law(self) -> str:
@@ -164,6 +172,12 @@ class RobotSettings(GrainsSettings):
         for name in NOT_OURS:
             if getattr(self, name) != fields[name].default:
                 return say(f"no_{name}", value=getattr(self, name))
+        if self.seeds and not self.on_grains:
+            return say("of_a_bed", name="seeds", value=" ".join(map(str, self.seeds)))
+        if self.seeds and self.seed != fields["seed"].default:
+            return say("seed_and_seeds", s=self)
+        if len(set(self.seeds)) < len(self.seeds):
+            return say("seed_twice", seeds=" ".join(map(str, self.seeds)))
         if self.on_grains or self.ranks is not None:
             return self.sleep_fault() or lammps_fault(self)
         for name in GrainsSettings.model_fields:

@@ -44,7 +44,10 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     rows = [_row(tile) for tile in tiles]
     on_grains = kind_of(result) in _ON_GRAINS
     errors = (say("of_the_law"), *_ERRORS[1:]) if "ground_file" in result else _ERRORS
-    errors = (say("of_95"), *errors[1:]) if errors is _ERRORS and result.get("experiment") == "penetrate" else errors
+    if errors is _ERRORS and (result.get("experiment") == "penetrate" or "beds" in result):
+        errors = (say("of_95"), *errors[1:])
+    elif "sure" in result and not on_grains:
+        errors = (say("left_open"), *errors[1:])
     shown = [k for k in range(3) if on_grains or any(row[2 + k] for row in rows)]
     head = ("", "value", *(errors[k] for k in shown), "")
     cells = [(*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), row[5]) for row in rows]

@@ -10,8 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from vis.film.film import ARROWS_OF_FEET, draw_runs, shown
 from vis.film.reel import SpaceReel
-from vis.page.numbers import quantity
-from vis.page.page import Section, Tile, listing, table_of, text
+from vis.page.page import Section, listing, table_of, text
 from vis.page.plots import AXES, AXIS_LINES, BED, DASHED, INK, MODEL, Array, legend_above, line_styles, mean_over
 from vis.page.report import Report, given, report_of
 from vis.pictures.canvas import COLOURS
@@ -19,6 +18,8 @@ from vis.pictures.frames import frames_of
 from vis.spatial.report import draw_energy, pair, say_grains
 from vis.view.curves import MOST_LINES, joint_columns, law_beside
 from vis.view.page import report_scene
+
+from .beds import answer_tiles, write_beds_report
 
 __all__ = ["write_robot_report"]
 
@@ -47,6 +48,8 @@ def write_robot_report(
     if colour not in COLOURS:
         raise ValueError(f"colour is {colour!r}; it must be one of {', '.join(COLOURS)}")
     home, result = report.folder, report.result
+    if "beds" in result:
+        return write_beds_report(report)
     motion, feet, joints = (report.columns(f"series/{name}.csv") for name in ("motion", "feet", "joints"))
     drawn = [report.draw("path", _draw_path(motion)), report.draw("ground", _draw_ground(motion, feet, result["feet"]))]
     if (law := law_beside(home)) is not None:
@@ -57,7 +60,6 @@ def write_robot_report(
         made = draw_runs([SpaceReel(home)], home, "robot", by=colour, film=film, progress=report.rest())
         notes = [text(ARROWS_OF_FEET, small=True), *(text(note) for note in made.notes)]
         seen = [Section("Pictures", [*report_scene(home), *shown(made), *notes])]
-    quantities = result["quantities"]
     sections = [
         Section("", [listing(result["departures"]["sentences"])]),
         *seen,
@@ -67,13 +69,7 @@ def write_robot_report(
         report.numbers(beside=(result.get("grains") or {}).get("beside") or {}, law=law or ""),
         report.again("hedgebed mujoco run.toml"),
     ]
-    tiles = [
-        Tile("Highest", quantity(quantities["highest"]), "of the centre of mass over its start"),
-        Tile("Deepest", quantity(quantities["sinkage_largest"]), "of any foot"),
-        Tile("Largest force", quantity(quantities["largest_force"]), "of the ground"),
-        Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was"),
-    ]
-    return report.write(sections, lead=["mujoco", f"{result['duration']:g} s"], tiles=tiles)
+    return report.write(sections, lead=["mujoco", f"{result['duration']:g} s"], tiles=answer_tiles(result))
 
 
 def _feet(reached: Mapping[str, Mapping[str, float]]) -> list[Section]:

@@ -1,10 +1,26 @@
 """Several beds under one robot: their mean and its interval, what a law leaves open, and what stands beside grains."""
 
-import pytest
+import math
 
+import numpy as np
+import pytest
+from scipy import stats
+from spatial_runs import EXAMPLES, grain_bed
+
+from experiments.compare.robots import read_moved
+from experiments.platform.law_spread import moved
+from experiments.robot import experiment as robot
+from experiments.robot.feet import heights_of
 from experiments.robot.on_grains import RobotFollowed, RobotOnBed
 from experiments.robot.plan import plan_robot
+from experiments.robot.result import quantities_of, write_series_of
 from experiments.robot.settings import RobotSettings
+from experiments.robot.sure import ANSWER
+from experiments.runs.folder import RunFolder, write_series
+from experiments.runs.result import Result
+from rigid.ground.laws import find_law
+from rigid.ground_file import GroundFile
+from vis.robot.beds import answer_tiles
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
@@ -27,3 +43,146 @@ def test_beside_a_robot_on_grains_stands_its_run_on_the_law_that_is_the_default(
     alone = followed(**HOPPER, height=0.012, duration=0.2, **more)
     assert settings.default_law == law == RobotSettings(**HOPPER, **more).ground
     assert (beside.columns["z"] == alone.columns["z"]).all() and beside.columns["sinkage"].max() > 0.001
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"seeds": (1, 2)}, "seeds = 1 2 belongs to ground = 'bed'"),
+        ({"ground": "bed", "seeds": (1, 2), "seed": 3}, "seed = 3 and seeds are both given"),
+        ({"ground": "bed", "seeds": (1, 2, 1)}, "seeds = 1 2 1 holds a seed twice"),
+    ],
+)
+def test_seeds_are_of_several_beds_and_each_is_given_once(given, said):
+    with pytest.raises(ValueError, match=said):
+        RobotSettings(**HOPPER | given)
+
+
+def law_in_place_of_grains(computed):
+    """A `RobotOnBed.carry_out` that follows the robot on `rft` from a height that goes with the seed."""
+
+    def carry_out(self, folder, progress):
+        seed = self.settings.seed
+        computed.append(seed)
+        if computed == [1, 2]:
+            raise KeyboardInterrupt
+        run = followed(**HOPPER, height=0.01 * seed, duration=0.12)
+        numbers, heights, rows = quantities_of(run, heights_of(run)), heights_of(run), run.columns
+        write_series_of(run, folder.path)
+        columns = {"t_s": rows["time"], "z_m": rows["z"], "sinkage_m": rows["sinkage"]}
+        write_series(folder.path / "series" / "rft.csv", columns)
+        folder.write_result(Result.make(
+            "mujoco", title="a robot on a bed of sand", quantities=numbers, code="of grains",
+            departures={"sentences": ["said of all"]}, trial={}, surface="sand", ground="bed", duration=0.12,
+            feet=["foot"], feet_reached={"foot": {"clearance_largest": float(heights.max())}},
+            warnings=["on all", f"on {seed}"], grains={"seed": seed, "beside": numbers, "beside_law": "rft"},
+        ))  # fmt: skip
+
+    return carry_out
+
+
+def test_several_beds_have_means_with_students_interval_and_a_stopped_run_computes_no_bed_twice(tmp_path, monkeypatch):
+    """Mean ± t s / sqrt(n), t of Student at 97.5 % and n - 1 degrees of freedom."""
+    computed = []
+    monkeypatch.setattr(RobotOnBed, "carry_out", law_in_place_of_grains(computed))
+    monkeypatch.setattr(RobotOnBed, "check", lambda _: None)
+    settings = RobotSettings(**ON_BED, seeds=(1, 2, 3), controller=f"{EXAMPLES / 'mujoco-hopper' / 'hop.py'}:control")
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(RobotOnBed, "forecast", None)
+        patch.setattr(RobotOnBed, "beside", None)
+        robot.run(settings, tmp_path)
+    assert RunFolder.open(tmp_path / "beds" / "seed-2").status == "stopped"
+    with monkeypatch.context() as patch:
+        patch.setattr(RobotOnBed, "forecast", None)
+        patch.setattr(RobotOnBed, "beside", None)
+        result = robot.resume(tmp_path)
+    assert computed == [1, 2, 2, 3]
+    of_beds = [RunFolder.open(tmp_path / "beds" / f"seed-{seed}").read_result() for seed in (1, 2, 3)]
+    for name in ("sinkage_largest", "largest_force"):
+        values = [one["quantities"][name]["value"] for one in of_beds]
+        half = stats.t.ppf(0.975, 2) * np.std(values, ddof=1) / math.sqrt(3)
+        assert result.quantities[name].value == pytest.approx(np.mean(values)) and np.ptp(values) > 0
+        assert result.quantities[name].std == pytest.approx(np.std(values, ddof=1))
+        assert result["sure"][name]["high"] == pytest.approx(np.mean(values) + half)
+    largest = max(one["quantities"]["energy_residual"]["value"] for one in of_beds)
+    assert result.quantities["energy_residual"].value == largest
+    assert result.warnings == ["on all", "seed 1: on 1", "seed 2: on 2", "seed 3: on 3"]
+    assert "3 beds" in result.title and "±" in result.departures.sentences[0]
+    assert (tmp_path / "beds" / "seed-3" / "controller.py").read_bytes() == (tmp_path / "controller.py").read_bytes()
+    report = (tmp_path / "report.html").read_text()
+    assert "chance (95" in report and (tmp_path / "figures" / "beds.png").exists()
+    with pytest.raises(ValueError, match=r"name one of them.*seed-1"):
+        read_moved(tmp_path, result)
+
+
+@pytest.mark.long
+def test_two_beds_of_grains_have_an_interval_that_holds_both(tmp_path, monkeypatch):
+    monkeypatch.setattr(RobotOnBed, "prepare", lambda self, *_: grain_bed(young=5e6 * self.settings.seed))
+    monkeypatch.setattr(RobotOnBed, "check", lambda _: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    given = ON_BED | {"grain": 0.006, "bed_size": (0.096, 0.096, 0.05), "duration": 0.03, "height": 0.003}
+    result = robot.run(RobotSettings(**given, frame_count=0, seeds=(1, 2)), tmp_path)
+    forces = [bed["answer"]["largest_force"] for bed in result["beds"]]
+    sure = result["sure"]["largest_force"]
+    assert forces[0] != forces[1] and min(forces) > 1.0
+    assert sure["low"] <= min(forces) and max(forces) <= sure["high"]
+    assert not [said for said in result.warnings if "one bed" in said]
+
+
+def surely(path, **given):
+    """The result of a short run on a law."""
+    return robot.run(RobotSettings(**HOPPER | given, height=0.012, duration=0.12, frame_count=0), path)
+
+
+def of_the_largest_foot():
+    """K [N/m] and C [N s/m] of the foot of the leg on sand, as similarity has them."""
+    plan = plan_robot(RobotSettings(**HOPPER, ground="spring-damper"))
+    own = plan.feet_options(plan.robot())["under"]["foot"]
+    return own["stiffness"], own["damping"]
+
+
+def test_a_hop_on_a_law_has_the_range_that_k_of_the_surface_leaves_open(tmp_path, monkeypatch):
+    """Ends of the range: the same robot on K of the map one standard deviation lower and higher."""
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    result = surely(tmp_path / "sand", ground="spring-damper")
+    known = plan_robot(RobotSettings(**HOPPER, ground="spring-damper")).rule.answer.stiffness
+    k, c = of_the_largest_foot()
+    ends = [
+        surely(tmp_path / name, ground="spring-damper", stiffness=k * (1 + sign * known.std / known.value), damping=c)
+        for name, sign in (("low", -1), ("high", 1))
+    ]
+    for name in ("sinkage_largest", "largest_force"):
+        values = [one.quantities[name].value for one in (result, *ends)]
+        sure = result["sure"][name]
+        assert (sure["low"], sure["high"]) == pytest.approx((min(values), max(values)), rel=1e-3)
+        assert sure["high"] > 1.05 * sure["low"]
+    assert set(result["sure"]) == set(ANSWER) and "52%" in result.departures.sentences[0]
+    tile = next(tile for tile in answer_tiles(result) if tile.label == "Deepest")
+    assert " to " in tile.errors[0]
+    assert "sure" not in ends[0] and [said for said in ends[0].departures.sentences if "is not known" in said]
+
+
+@pytest.mark.parametrize("given", [{}, {"surface": "brick"}, {"ground": "katsuragi-durian"}])
+def test_a_law_whose_numbers_have_no_range_says_that_its_error_is_not_known(given, tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    result = surely(tmp_path, **given)
+    assert "sure" not in result and len([x for x in result.departures.sentences if "is not known" in x]) == 1
+
+
+def test_a_ground_file_gives_the_range_of_one_standard_deviation_of_its_parameters(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    values = find_law("spring-damper").values({"stiffness": 39.0, "damping": 0.16})
+    file = GroundFile(
+        format="hedgebed-ground/1", law="spring-damper", material="sand", source="a test",
+        foot={"tip": "sphere", "diameter": 0.012},
+        range={"load": (0, 50), "depth": (0, 0.1), "speed": (0, 5), "gravity": (9.8, 9.9), "diameter": (0.012, 0.012)},
+        parameters={name: {"value": values[name], "std": 10.0 * (name == "stiffness")} for name in values},
+    )  # fmt: skip
+    assert [name for name, *_ in moved(file)] == ["stiffness"]
+    result = surely(tmp_path / "run", ground=str(file.write(tmp_path / "ground.toml")))
+    ends = [
+        surely(tmp_path / f"{k}", ground=str(other.write(tmp_path / f"{k}.toml"))).quantities["sinkage_largest"].value
+        for k, other in enumerate(moved(file)[0][1:])
+    ]
+    sure = result["sure"]["sinkage_largest"]
+    assert sure["high"] - sure["value"] == pytest.approx(abs(ends[0] - ends[1]) / 2, rel=1e-6)

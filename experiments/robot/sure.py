@@ -1,0 +1,100 @@
+"""How sure the answer of a robot's run is: on a law what its numbers leave open, over several beds their scatter.
+
+On a law the same robot runs again at both ends of what is known: K of the surface one standard deviation lower and
+higher, or at the ends of its range; of a ground file each uncertain parameter by itself (`law_spread`).
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from experiments.platform.law_spread import moved, spread_of_law
+from experiments.runs.types import Json
+from vis.page.numbers import between, foldable, quote
+
+from . import say
+from .plan import RobotPlan
+
+__all__ = ["ANSWER", "Answer", "answer_of", "entry", "in_words", "sure_of_law"]
+
+ANSWER = {
+    "highest": "m", "longest_flight": "s", "clearance_largest": "m", "sinkage_largest": "m", "largest_force": "N",
+}  # fmt: skip
+"""Numbers that answer how well a robot hops, with their units; all are at least 0. The clearance is of any foot."""
+
+Answer = Mapping[str, float]
+
+
+def answer_of(quantities: Mapping[str, Json], reached: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+    """The numbers of `ANSWER` from the quantities and ``feet_reached`` of a result."""
+    clearance = max(foot["clearance_largest"] for foot in reached.values())
+    return {name: clearance if name == "clearance_largest" else float(quantities[name]["value"]) for name in ANSWER}
+
+
+def entry(name: str, value: float, low: float, high: float) -> Json:
+    """An entry of ``sure`` in result.json: a number of `ANSWER` with the ends of its interval, none below 0."""
+    return {"unit": ANSWER[name], "value": value, "low": max(0.0, low), "high": max(0.0, high)}
+
+
+def in_words(sure: Mapping[str, Json], *, half: bool) -> str:
+    """The entries in words: mean and half-width (`half`), or both ends."""
+    told = {
+        name: quote(one["value"], one["high"] - one["value"], one["unit"])
+        if half
+        else between(one["low"], one["high"], one["unit"])
+        for name, one in sure.items()
+    }
+    return foldable(say("answer", **told))
+
+
+def sure_of_law(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Answer]) -> tuple[Json, str]:
+    """The entries of a run on a law, and a sentence on them; no entries, and why, where nothing is known.
+
+    ``best``: answer of the run. ``follow``: runs the robot of a plan and returns its answer.
+    """
+    try:
+        return _of_file(plan, best, follow) if plan.fitted is not None else _of_stiffness(plan, best, follow)
+    except RuntimeError as error:
+        return {}, say("not_known", why=say("end_fails", error=error))
+
+
+def _of_file(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Answer]) -> tuple[Json, str]:
+    """One standard deviation of the parameters of a ground file."""
+    assert plan.fitted is not None
+    if not moved(plan.fitted):
+        return {}, say("not_known", why=say("no_range_of_law", law=plan.law))
+    stds = spread_of_law(plan.fitted, lambda file: follow(replace(plan, fitted=file)), best)
+    spreads = {name: std or 0.0 for name, std in stds.items()}
+    sure = {name: entry(name, best[name], best[name] - std, best[name] + std) for name, std in spreads.items()}
+    return sure, say("of_file", words=in_words(sure, half=False))
+
+
+def _of_stiffness(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Answer]) -> tuple[Json, str]:
+    """K of the surface at the ends of what is known of it."""
+    surface, known = plan.surface, plan.rule.answer
+    if plan.law != "spring-damper":
+        return {}, say("not_known", why=say("no_range_of_law", law=plan.law))
+    if plan.settings.stiffness is not None:
+        return {}, say("not_known", why=say("k_given"))
+    share = known.stiffness.std / known.stiffness.value if known is not None else 1.0
+    if share < 1.0:
+        factors, how = (1 - share, 1 + share), {"key": "k_of_map", "share": share}
+    elif surface.stiffness_range is not None:
+        low, high = surface.stiffness_range
+        factors = (low / surface.stiffness, high / surface.stiffness)
+        how = {"key": "k_in_range", "factor": math.sqrt(high / low)}
+    else:
+        return {}, say("not_known", why=say("no_range_of_k", surface=surface.name))
+    found = [best, *(follow(_times(plan, factor)) for factor in factors)]
+    sure = {
+        name: entry(name, best[name], min(one[name] for one in found), max(one[name] for one in found))
+        for name in ANSWER
+    }
+    key = str(how.pop("key"))
+    return sure, say(key, surface=surface.name, words=in_words(sure, half=False), **how)
+
+
+def _times(plan: RobotPlan, factor: float) -> RobotPlan:
+    """The plan with K of the surface times a factor."""
+    stiffness = plan.numbers["stiffness"]
+    return replace(plan, numbers={**plan.numbers, "stiffness": replace(stiffness, value=factor * stiffness.value)})

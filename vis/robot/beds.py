@@ -1,0 +1,83 @@
+"""The answer of a robot's run with its errors, and the report of a robot on several beds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from vis.page.numbers import between, quantity, quote
+from vis.page.page import Section, Tile, listing, text
+from vis.page.plots import BED, DASHED, MODEL, Array, legend_above
+from vis.page.report import Report, given, tables
+from vis.spatial.report import pair
+
+__all__ = ["answer_tiles", "write_beds_report"]
+
+Columns = Mapping[str, Array]
+LABELS = {
+    "highest": ("Highest", "of the centre of mass over its start"),
+    "longest_flight": ("Longest flight", "no foot touches"),
+    "clearance_largest": ("Clearance", "lowest point of the highest foot, over the undisturbed surface"),
+    "sinkage_largest": ("Deepest", "of any foot"),
+    "largest_force": ("Largest force", "of the ground"),
+}
+"""Number of the answer -> its label and note."""
+OWN = "Pictures, film and figures of each bed are in the report of its folder: {folders}."
+
+
+def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
+    """Rows of the table at the top of a report: what the robot did, with the errors that are known."""
+    quantities, sure, several = result["quantities"], result.get("sure") or {}, "beds" in result
+    reached = (result.get("feet_reached") or {}).values()
+    found = dict(quantities)
+    if "clearance_largest" not in quantities and reached:  # of several feet each has its own
+        highest = max(foot["clearance_largest"] for foot in reached)
+        found["clearance_largest"] = {"value": highest, "std": None, "unit": "m"}
+    rows = []
+    for name, (label, note) in LABELS.items():
+        if name not in found:  # a folder of an older hedgebed
+            continue
+        one = sure.get(name)
+        if one is None:
+            rows.append(Tile(label, quantity(found[name]), note))
+        elif several:
+            rows.append(Tile(label, quote(one["value"], one["high"] - one["value"], one["unit"]), note))
+        else:
+            ends = between(one["low"], one["high"], one["unit"])
+            rows.append(Tile(label, quantity(found[name]), note, errors=(ends, "", "")))
+    return [*rows, Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was")]
+
+
+def write_beds_report(report: Report) -> Path:
+    """The report of a robot on several beds. Raises FileNotFoundError where the series of a bed is missing."""
+    result, law = report.result, report.result["beside_law"]
+    folders = [bed["folder"] for bed in result["beds"]]
+    runs = [report.columns(f"{folder}/series/motion.csv") for folder in folders]
+    beside = report.columns(f"{folders[0]}/series/{law}.csv")
+    drawn = report.draw("beds", _draw_beds(runs, beside, law), law=law)
+    sections = [
+        Section("", [listing(result["departures"]["sentences"])]),
+        Section("Over time", [drawn]),
+        Section("Each bed", [*tables(result), text(OWN.format(folders=", ".join(folders)), small=True)]),
+        Section("The trial", [given(result["trial"])]),
+        report.numbers(std=True),
+        report.again("hedgebed mujoco run.toml"),
+    ]
+    return report.write(sections, lead=["mujoco", f"{result['duration']:g} s"], tiles=answer_tiles(result))
+
+
+def _draw_beds(runs: list[Columns], beside: Columns, law: str) -> Figure:
+    """Rise and deepest foot over time: one line for each bed, and the law."""
+    drawing, height, depth = pair("rise of the centre of mass [mm]", "depth of the deepest foot [mm]")
+    styles = [*({"color": BED, "lw": 0.8} for _ in runs), {"color": MODEL, "ls": DASHED}]
+    for columns, style in zip([*runs, beside], styles, strict=True):
+        height.plot(columns["t_s"], 1e3 * (columns["z_m"] - columns["z_m"][0]), **style)
+        depth.plot(columns["t_s"], 1e3 * columns["sinkage_m"], **style)
+    height.lines[0].set_label("each bed")
+    height.lines[-1].set_label(law)
+    depth.invert_yaxis()
+    legend_above(drawing, [height.lines[0], height.lines[-1]], 2)
+    return drawing
