@@ -106,7 +106,7 @@ def test_several_beds_have_means_with_students_interval_and_a_stopped_run_comput
         assert result["sure"][name]["high"] == pytest.approx(np.mean(values) + half)
     largest = max(one["quantities"]["energy_residual"]["value"] for one in of_beds)
     assert result.quantities["energy_residual"].value == largest
-    assert result.warnings == ["on all", "seed 1: on 1", "seed 2: on 2", "seed 3: on 3"]
+    assert result.warnings == ["on all", *(f"seed {k}: on {k}" for k in (1, 2, 3))]
     assert "3 beds" in result.title and "±" in result.departures.sentences[0]
     assert (tmp_path / "beds" / "seed-3" / "controller.py").read_bytes() == (tmp_path / "controller.py").read_bytes()
     report = (tmp_path / "report.html").read_text()
