@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import combinations
 from types import SimpleNamespace
 
 import numpy as np
@@ -332,3 +333,14 @@ def test_lines_of_x_and_y_on_one_another_both_show_and_joints_have_none_of_the_a
     beside = line_styles(range(15), beside_axes=True)
     assert not {style["color"] for style in beside.values()} & set(AXES.values())
     assert len({(style["color"], str(style["ls"])) for style in beside.values()}) == 15
+
+
+def test_words_above_two_pictures_do_not_lie_on_each_other(hop, monkeypatch):
+    """Titles, lines of time and state, and the weight's; at the size of a report's picture."""
+    pixels, pages = canvas.pixels, []
+    monkeypatch.setattr(canvas, "pixels", lambda page: pages.append(page) or pixels(page))
+    reels = [SpaceReel(hop[0]), SpaceReel(hop[0])]
+    Sheet(reels, SpaceReel.still, by="displacement", opengl=False, labels=["bed of sand", "spring-damper"]).draw(0.0)
+    boxes = [text.get_window_extent() for text in pages[0].texts]
+    assert len(boxes) >= 6
+    assert not [(a, b) for a, b in combinations(boxes, 2) if a.overlaps(b)]

@@ -7,6 +7,7 @@ states over time with a cursor. `python -m vis.film.film <job.json>` draws a job
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -43,6 +44,8 @@ __all__ = [
 say = Sentences(__package__)
 ARROWS, ARROWS_OF_FEET = say("arrows"), say("arrows_of_feet")
 MOST_FRAMES = 48
+_GRAVITY = re.compile(r"\b(?:rig|free) at \S+ m/s2")
+"""In the title of a tumble."""
 _TITLE = 15.0
 """Size of a title [points]."""
 _TALLEST = 2.0
@@ -114,7 +117,8 @@ class Sheet:
                 title = str(reel.result["title"]) if len(self.reels) == 1 else _with_surface(self.labels[number], reel)
                 right = max(p.place[0] + p.place[2] for p in self.panels if p.run == number)
                 _entitle(sheet, typeset(capital(title)), left, right)
-                sheet.text(left, 0.93, reel.line(reel.nearest(time)), fontsize=13, va="top", color="#444444")
+                line = reel.line(reel.nearest(time), short=len(self.reels) > 1)  # beside it stands the weight
+                sheet.text(left, 0.93, line, fontsize=13, va="top", color="#444444")
             for panel in self.panels:
                 if panel.camera.arrow:
                     share = self.shorter * panel.camera.arrow
@@ -154,16 +158,19 @@ class Sheet:
 
 def _entitle(sheet: Figure, words: str, left: float, right: float) -> None:
     """The title of a run over its panels, `left` to `right` in shares of the sheet; a longer one in smaller letters."""
-    drawn = sheet.text(left, 0.975, words, fontsize=_TITLE, fontweight="bold", va="top")
+    size = _TITLE
+    drawn = sheet.text(left, 0.975, words, fontsize=size, fontweight="bold", va="top")
     for _ in range(2):  # letters are whole pixels wide: the second step takes off what the first left
-        wide = drawn.get_window_extent().width / sheet.bbox.width
-        drawn.set_fontsize(drawn.get_fontsize() * min(1.0, (right - left) / wide))
+        size *= min(1.0, (right - left) / (drawn.get_window_extent().width / sheet.bbox.width))
+        drawn.set_fontsize(size)
 
 
 def _with_surface(label: str, reel: AnyReel) -> str:
-    """What to call one of two runs on a picture: the surface is named."""
+    """What to call one of two runs on a picture: the surface is named, and the gravity, as its title has it."""
     surface = str(reel.result.get("surface") or "")
-    return label if not surface or surface in label else f"{label}, {surface}"
+    named = label if not surface or surface in label else f"{label}, {surface}"
+    gravity = _GRAVITY.search(str(reel.result["title"]))
+    return f"{named}: {gravity[0]}" if gravity and gravity[0] not in named else named
 
 
 def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> list[tuple[str, str, float, str]]:

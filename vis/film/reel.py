@@ -179,10 +179,10 @@ class SpaceReel(_Filmed):
         low[2], high[2] = -_THIN, 0.0
         return low, high
 
-    def line(self, index: int) -> str:
-        """Time, state, and where the lowest foot or spike is, as text on a picture."""
+    def line(self, index: int, *, short: bool = False) -> str:
+        """Time, state, and unless it is to be `short` where the lowest foot or spike is, as text on a picture."""
         state = f"    {self.states[self.row(index)]}" if len(self.states) else ""
-        return f"t = {self.times[index]:.3f} s{state}{self._height(self.frames[index])}"
+        return f"t = {self.times[index]:.3f} s{state}{'' if short else self._height(self.frames[index])}"
 
     def _height(self, frame: Frame) -> str:
         """How far the lowest foot, spike or point is from the undisturbed surface, in words."""
@@ -217,8 +217,8 @@ class Reel(_Filmed):
         if self.frames is None:
             self.times = np.linspace(0.0, float(self.series["t_s"][-1]), max(2, count))
 
-    def line(self, index: int) -> str:
-        """Time, angle and state, as text on a picture."""
+    def line(self, index: int, *, short: bool = False) -> str:
+        """Time, angle and state, as text on a picture; always `short`."""
         row = self.row(index)
         theta = math.degrees(float(self.series["theta_rad"][row]))
         return f"t = {self.times[index]:.3f} s    θ = {theta:.1f}°    {self.states[row]}".replace("-", "−")

@@ -28,7 +28,7 @@ from vis.penetrate.summary_parts import as_foot, mapping_of
 from vis.pictures.pictures import Picture, Pictures, make_pictures
 from vis.view.page import report_scene
 
-__all__ = ["AMENDED", "PLOTS", "make_plots", "words_of_effects", "write_penetration_report"]
+__all__ = ["AMENDED", "PLOTS", "draw_amended", "make_plots", "words_of_effects", "write_penetration_report"]
 
 AMENDED = "#009E73"
 """The amended law (Okabe and Ito's green)."""
@@ -139,7 +139,7 @@ def _is_amended(run: RunFolder) -> bool:
 
 
 def _amended_plot(run: RunFolder) -> Plot | None:
-    drawing = _draw_amended(run)
+    drawing = draw_amended(run)
     return None if drawing is None else Plot.of("amended", drawing)
 
 
@@ -150,7 +150,7 @@ def words_of_effects(result: Result) -> str:
     return " and ".join(map(str, effects)) if effects else "nothing added"
 
 
-def _draw_amended(run: RunFolder) -> Figure | None:
+def draw_amended(run: RunFolder) -> Figure | None:
     """Force against depth of driven runs, depth against time of drops and set-downs; None where there is no law."""
     alone = "ground_file" in run.result
     driven, drops, stood = (
@@ -177,7 +177,7 @@ def _draw_amended(run: RunFolder) -> Figure | None:
 @report_of(named=True)
 def _write_law_report(report: Report) -> Path:
     """Make figures/ and report.html of a run without a bed, and return the report."""
-    numbers, drawing = report.result["quantities"], _draw_amended(read_folder(report.folder))
+    numbers, drawing = report.result["quantities"], draw_amended(read_folder(report.folder))
     of_file = "ground_file" in report.result
     key = "law" if of_file else "amended"
     blocks = [text("There is nothing to draw.")] if drawing is None else [report.draw(key, drawing)]
@@ -213,7 +213,7 @@ def _draw_panel(axis: Axes, runs: Sequence[Run]) -> None:
     driven = runs[0].kind == "driven"
     bed: Mapping[str, Any] = {"color": BED, "lw": 0.7, "alpha": 0.6} if driven else {"color": BED, "lw": 0.9}
     lines: list[tuple[Series | None, Mapping[str, Any]]] = [(r.bed, bed) for r in runs]
-    lines.append((runs[0].model, {"color": MODEL, "ls": DASHED, "lw": 1.8}))
+    lines.append((runs[0].model, {"color": MODEL, "ls": DASHED, "lw": 1.8, "zorder": 3}))  # seen on the other law
     lines.append((runs[0].amended, {"color": AMENDED, "lw": 1.8}))
     for series, style in lines:
         if series is None:

@@ -95,8 +95,8 @@ def _draw_ground(motion: Columns, feet: Columns, names: list[str]) -> Figure:
     means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in AXES))
     for (axis, style), mean in zip(AXIS_LINES.items(), means, strict=True):
         force.plot(time, mean, label=axis, **style)
-    for name, style in line_styles(names[:MOST_LINES], beside_axes=True).items():
-        depth.plot(time, 1e3 * feet[f"{name}_depth_m"], label=str(name), **style)
+    for name, own in line_styles(names[:MOST_LINES], beside_axes=True).items():
+        depth.plot(time, 1e3 * feet[f"{name}_depth_m"], label=str(name), **own)
     depth.invert_yaxis()
     depth.legend(loc="best")
     legend_above(drawing, force.lines, 3)
