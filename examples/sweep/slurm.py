@@ -1,6 +1,6 @@
 """A cluster of hedgebed's workers on SLURM, for `hedgebed sweep --scheduler`: a file to start from.
 
-    pip install 'hedgebed[sweep]' dask-jobqueue
+    pip install '.[sweep]' dask-jobqueue
     python examples/sweep/slurm.py scheduler.json &        # on the login node; ends with Ctrl-C
     hedgebed sweep sweep.toml --scheduler scheduler.json --out /shared/sweep
 

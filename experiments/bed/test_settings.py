@@ -138,7 +138,9 @@ class BedCutSettings(BedTestSettings):
 class BedShearSettings(StrictSettings):
     """A bed sheared under a rough lid at several pressures: friction angles, peak and critical, and cohesion."""
 
-    bed: str = Field(description="The bed: a file, the folder of a run of bed make, or a name on the shelf.")
+    bed: str = Field(
+        description="The bed: a file, the folder of a run of bed make, or its name in the folder HEDGEBED_BEDS."
+    )
     pressures: tuple[Positive, ...] = Field((1.0, 2.0, 4.0), min_length=2)
     """Pressures on the lid, over the pressure at the floor of the bed [1]; at most 4."""
     way: Positive = Field(8.0, ge=2, le=200, description="Horizontal travel of the lid [mean diameters].")

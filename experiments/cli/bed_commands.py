@@ -37,7 +37,9 @@ def _in_si(kind: str) -> Parameter:
 
 _Length = Annotated[float, _in_si("length")]
 _Gravity = Annotated[float, _in_si("acceleration")]
-_Bed = Annotated[str, Parameter(help="A file, the folder of a run of bed make, or a name on the shelf.")]
+_Bed = Annotated[
+    str, Parameter(help="A file, the folder of a run of bed make, or its name in the folder HEDGEBED_BEDS.")
+]
 
 
 def add_bed_commands(home: App) -> None:
@@ -49,14 +51,12 @@ def add_bed_commands(home: App) -> None:
 
 
 def _list(
-    folder: Annotated[
-        Path | None, Parameter(help="Folder of bed files; the shelf (HEDGEBED_BEDS) if not given.")
-    ] = None,
+    folder: Annotated[Path | None, Parameter(help="Folder of bed files; that of HEDGEBED_BEDS if not given.")] = None,
     /,
     *,
     json: _Json = False,
 ) -> int:
-    """List the beds on the shelf, or those in a folder."""
+    """List the kept beds: those in the folder HEDGEBED_BEDS, or in another one."""
     from dem.prepare.bedfile import bed_shelf, list_beds
 
     where = bed_shelf() if folder is None else folder
@@ -123,8 +123,8 @@ def _show(bed: _Bed, /, *, json: _Json = False) -> int:
     return 0
 
 
-def _share(bed: _Bed, to: Annotated[Path, Parameter(help="The file to write; must not be there.")], /) -> int:
-    """Write a bed with all that is known of it to one compressed file, to be sent and used elsewhere."""
+def _share(bed: _Bed, to: Annotated[Path, Parameter(help="The file to write; must be new.")], /) -> int:
+    """Write a bed with its settings and preparation to one compressed file, for use on another machine."""
     from dem.prepare.bedfile import find_bed, share_bed
 
     with refusing():

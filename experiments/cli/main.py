@@ -145,10 +145,10 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         first = first.replace(name=experiment.subject, annotation=Annotated[Path | None, about])
     parameters = [first]
     if pair:
-        about = Parameter(help="The other of the two.", negative="", show_default=False)
+        about = Parameter(help="Folder of the second run.", negative="", show_default=False)
         parameters.append(first.replace(name="other", annotation=Annotated[Path | None, about]))
     if many:
-        about = Parameter(help="Further ones.", negative="", show_default=False)
+        about = Parameter(help="Further folders of the same kind.", negative="", show_default=False)
         further = inspect.Parameter("others", inspect.Parameter.VAR_POSITIONAL, annotation=Annotated[Path, about])
         parameters.append(further)
     parameters += [option_of(name, field) for name, field in fields.items() if name != experiment.subject]

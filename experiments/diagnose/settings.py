@@ -16,7 +16,9 @@ class DiagnoseSettings(StrictSettings):
     same design)."""
     effect_file: tuple[str, ...] = Field((), json_schema_extra={"option_alias": "--effects-from"})
     """Python files with effects of your own, added to the candidates (docs/diagnose.md)."""
-    seed: int = Field(0, ge=0, description="Seed of the simulated campaigns that calibrate this test.")
+    seed: int = Field(
+        0, ge=0, description="Seed of the simulated campaigns that calibrate the test for a missing effect."
+    )
 
 
 class CheckSettings(StrictSettings):

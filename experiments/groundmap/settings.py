@@ -21,7 +21,9 @@ class GroundSettings(StrictSettings):
     tip_diameter: Positive = Field(
         0.012, description="Diameter of the tip [m].", json_schema_extra={"option_alias": "--spike-diameter"}
     )
-    tip: Literal["sphere", "cone", "flat"] = Field("sphere", description="Shape of the tip: sphere, a ball tip.")
+    tip: Literal["sphere", "cone", "flat"] = Field(
+        "sphere", description="Shape of the tip; the map has only sphere, a ball tip."
+    )
     packing: Annotated[float, Field(gt=0, lt=1)] | None = None
     """Packing fraction [1]; that of the rained bed of the map if not given."""
     grain: Positive | None = None

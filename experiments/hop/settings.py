@@ -40,7 +40,7 @@ class HopSettings(PlatformSettings, _Question):
 
     ground: str = "spring-damper"
     """Law under the spikes: spring-damper, with K and C of the surface, or a ground.toml of one spike."""
-    threads: int | None = Field(None, ge=1, description="CPU threads, as elsewhere; a hop uses one.")
+    threads: int | None = Field(None, ge=1, description="CPU threads; a hop uses one.")
 
     @model_validator(mode="after")
     def _one_question(self) -> Self:

@@ -152,9 +152,7 @@ class PenetrateSettings(StrictSettings):
 
     # What is kept
     frame_count: int = Field(30, ge=0, le=2000, description="Frames of each pictured run [1]; 0: none.")
-    checkpoint_interval: Positive = Field(
-        20.0, description="Time between two checkpoints, of your clock [s of waiting]."
-    )
+    checkpoint_interval: Positive = Field(20.0, description="Time between two checkpoints, in real time [s].")
     reference: str | None = None
     """A result.json whose stiffness, damping and sinkage are compared with these, or 'shipped' for the kept result of
     the default case."""

@@ -23,7 +23,8 @@ class PlatformSettings(StrictSettings):
     stiffness: Positive | None = None
     """Stiffness K under a row of spikes [N/m]; that of the surface if not given (brick: 1.5e4)."""
     damping: NotNegative | None = None
-    """Damping C under a row of spikes that moves in [N s/m]; that of the surface if not given (brick: 60)."""
+    """Damping C under a row of spikes that moves into the ground [N s/m]; that of the surface if not given
+    (brick: 60)."""
     mu_s: NotNegative | None = Field(
         None, description="Coefficient of static friction [1]; that of the surface if not given (brick: 0.5)."
     )

@@ -47,7 +47,7 @@ class RobotSettings(GrainsSettings):
     duration: Positive = Field(2.0, le=3600, description="Simulated time [s].")
 
     surface: str | None = None
-    """Material: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; if not given, that of the grains of a
+    """Material: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; if not given, that of the grains in a
     ground.toml, else sand."""
     ground: str = DEFAULT
     """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, power-irreversible,
@@ -55,19 +55,20 @@ class RobotSettings(GrainsSettings):
     lammps (a bed whose grains are in LAMMPS; the feet move in the plane of x and z). If not given: rft on sand;
     spring-damper on other surfaces, and with stiffness, damping or scale_with_gravity."""
     ground_parameters: tuple[str, ...] = ()
-    """Parameters of another law than the spring-damper, as exponent=1.5, SI units; of one foot. Defaults are those of a
-    spike of 12 mm, scaled to the size of each foot."""
+    """Parameters of a law other than the spring-damper, for one foot, as name=value in SI units (exponent=1.5).
+    Defaults are those of a spike of 12 mm, scaled to the size of each foot."""
     ignore_foot_size: bool = False
-    """Whether to run a law whose defaults do not fit this ground, as they are, whatever the size of the foot: those of
-    a spike on brick (hunt-crossley, power) on grains, or those of a spike in sand (power-irreversible,
-    katsuragi-durian, bekker, rft) on hard ground."""
+    """Run a law whose default numbers belong to another ground; without it this is refused. The numbers are those of a
+    spike on brick (hunt-crossley, power), here used on grains, or of a spike in sand (power-irreversible,
+    katsuragi-durian, bekker, rft), here used on hard ground. They are not scaled to the foot."""
     ignore_gravity_range: bool = False
-    """Whether to run a ground.toml under a gravity outside its range."""
+    """Run a ground.toml under a gravity outside its range; without it this is refused."""
     stiffness: Positive | None = None
     """K of one foot [N/m]; that of one spike on the surface if not given, on sand times the area of the foot over the
     spike's."""
     damping: NotNegative | None = None
-    """C of one foot, while going in [N s/m]; likewise, on sand times that ratio of areas to the power 1.25."""
+    """C of one foot that moves into the ground [N s/m]; if not given, that of one spike on the surface, on sand times
+    that ratio of areas to the power 1.25."""
     scale_with_gravity: bool | None = None
     """Whether K and C of the surface, which are those of 1 g, follow gravity: K in proportion, C with its square root,
     as in grains without cohesion. If not given: on sand, where the map of hedgebed ground covers gravity (1e-6 g to

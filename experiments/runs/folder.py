@@ -271,7 +271,10 @@ class RunFolder:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
         if table.get("format") not in RUN_FORMATS or not isinstance(table.get("settings"), dict):
-            raise ValueError(f"{str(path / 'run.toml')!r} is not of the format {RUN_FORMAT}")
+            found = f"has format = {table.get('format')!r}, not {RUN_FORMAT!r}"
+            if "experiment" in table and "format" not in table:  # as `save` of a script's run writes it
+                found = "is of a script, not of a command: vis.write_report draws it"
+            raise ValueError(f"{str(path / 'run.toml')!r} {found}")
         check_digests(path, "run.toml")
         command, version, code = (str(table.get(key, "")) for key in ("command", "version", "code"))
         folder = cls(path, command, version, settings_in(table), code)

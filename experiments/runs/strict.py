@@ -25,8 +25,8 @@ Workers = Annotated[
     Field(
         ge=1,
         le=MOST_WORKERS,
-        description="Processes here that compute a run each; 1 takes this process alone, and needs no dask. If not "
-        "given: as many as there are cores, but 1 for less than a minute of work or where dask is not installed.",
+        description="Number of processes on this machine, each with one run at a time; 1 needs no dask. If not "
+        "given: one for each core, but 1 for less than a minute of work or where dask is not installed.",
     ),
 ]
 Scheduler = Annotated[

@@ -32,7 +32,7 @@ class SpatialSettings(GrainsSettings):
     stiffness: Positive | None = None
     """Stiffness K under one spike [N/m]; if not given, half of the surface's, which is for a row of two."""
     damping: NotNegative | None = None
-    """Damping C under one spike that moves in [N s/m]; half of the surface's if not given."""
+    """Damping C under one spike that moves into the ground [N s/m]; half of the surface's if not given."""
     mu_s: NotNegative | None = Field(
         None, description="Coefficient of static friction [1]; that of the surface if not given (brick: 0.5)."
     )

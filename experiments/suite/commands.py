@@ -23,9 +23,13 @@ from rigid.result import read_result
 __all__ = ["add_suite_commands"]
 
 RESULTS, WORK = Path("docs/results"), Path("runs/experiments")
-_Names = Annotated[tuple[str, ...], Parameter(help="Only these cases, or those whose names begin so.", negative="")]
-_Results = Annotated[Path, Parameter(help="Where results are kept, a folder a case.", negative="")]
-_Work = Annotated[Path, Parameter(help="Where cases run, a run folder each.", negative="")]
+_Names = Annotated[
+    tuple[str, ...], Parameter(help="Names of cases, or the beginnings of names; all if not given.", negative="")
+]
+_Results = Annotated[
+    Path, Parameter(help="Folder of the kept results; each case has its own folder in it.", negative="")
+]
+_Work = Annotated[Path, Parameter(help="Folder of the runs; each case has its own run folder in it.", negative="")]
 
 
 def add_suite_commands(home: App) -> None:
@@ -93,9 +97,10 @@ def _run(
     scheduler: Annotated[str | None, Parameter(help=described(Scheduler), negative="")] = None,
     quiet: Annotated[bool, Parameter(help="Show no progress.", negative="")] = False,
 ) -> int:
-    """Do the cases that have no result yet; a stopped one is gone on with, beds come from the cache.
+    """Run the cases that have no result yet; stopped ones continue, beds come from the cache.
 
-    What would take more than an hour by its estimate, or cannot be run yet, is left out unless it is named in full.
+    A case that would take more than an hour by its estimate, or cannot be run yet, is left out unless its full name is
+    given.
     """
     where = Where.of(Where(scheduler, workers))
     with refusing(), stdout_to_stderr():
@@ -107,7 +112,7 @@ def _run(
         if row["standing"] in ("done", "not yet") or (row["standing"] == "too long" and case.name not in names):
             say(f"{case.name}: {row['standing']}{': ' + row['why'] if row['standing'] == 'not yet' else ''}")
         elif row["standing"] == "failed" and case.name not in names:
-            say(f"{case.name}: failed before ({row['why']}); named in full it is gone on with")
+            say(f"{case.name}: failed before ({row['why']}); give its full name to continue it")
             failed.append(case.name)
         else:
             if row["standing"] == "to do" and row["why"]:
@@ -128,10 +133,10 @@ def _run(
         try:
             run_all(list(todo.values()), where=where, progress=progress, on_outcomes=take, report=0.0)
         except KeyboardInterrupt:
-            say("stopped; the same command goes on")
+            say("stopped; the same command continues")
             return 3
         except (OSError, RuntimeError) as error:
-            say(f"failed: {error}; the same command goes on")
+            say(f"failed: {error}; the same command continues")
             return 1
     if failed:
         say(f"without a result: {', '.join(failed)}")
@@ -139,7 +144,7 @@ def _run(
 
 
 def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
-    """Say of several tumbles in a row, over the beds whose results are kept, whether the platform goes on sinking.
+    """State whether the platform sinks further with each of several tumbles in a row, from the kept results.
 
     Cases that differ only in the seed of their bed are one group, and each group has its verdict.
     """

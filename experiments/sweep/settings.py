@@ -44,8 +44,8 @@ class SweepSettings(StrictSettings):
 
     # Where it is computed
     workers: int | None = Field(None, ge=1, le=1024)
-    """Processes here that compute a run each; 1 takes this process alone, and needs no dask; as many as there are
-    cores if not given."""
+    """Number of processes on this machine, each with one run at a time; 1 needs no dask; one for each core if not
+    given."""
     threads: Threads = None
     """CPU threads of each run; the cores here shared out evenly, or 1 on a cluster, if not given."""
     scheduler: Scheduler = None
