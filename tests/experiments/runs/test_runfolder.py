@@ -125,7 +125,7 @@ def test_ensure_takes_up_the_same_run_and_refuses_another(folder):
 
 def test_open_refuses_another_format(folder):
     write_text(folder.path / "run.toml", 'format = "other"\n')
-    with pytest.raises(ValueError, match="'other', not 'hedgebed-run/3'"):
+    with pytest.raises(ValueError, match="not 'hedgebed-run/3'"):
         RunFolder.open(folder.path)
     write_text(folder.path / "run.toml", 'experiment = "driven"\n')
     with pytest.raises(ValueError, match="of a script"):
