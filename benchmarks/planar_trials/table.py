@@ -97,8 +97,8 @@ def _final(trial: Trial, duration: float, longest: float, tolerance: float) -> n
 def draw_orders(path: Path) -> None:
     """Error at the end of a tumble over the step, three integrators, two trials with events."""
     trials = (
-        ("brick, 0.125 N m (motor), 0.4 s:\nslips, sticks, a row lifts off", case(0.0085, 0.125, 0.5), 0.4),
-        ("steel, 6 N m (brake), 0.1 s:\nslips, the wheel stops, hops", case(0.0085, 6.0, 0.25), 0.1),
+        ("brick, 0.0085 g, 0.125 N m (motor), 0.4 s:\nslips, sticks, a row lifts off", case(0.0085, 0.125, 0.5), 0.4),
+        ("steel, 0.0085 g, 6 N m (brake), 0.1 s:\nslips, the wheel stops, hops", case(0.0085, 6.0, 0.25), 0.1),
     )
     with styled():
         drawing, (axes,) = sheet(1, 2, 4.0, sharey=True)

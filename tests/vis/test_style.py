@@ -10,8 +10,8 @@ from matplotlib.text import Text
 from PIL import Image, ImageColor
 
 from vis.compare.report import _draw_path
-from vis.diagnose.figures import _PHASES
-from vis.page.plots import STATES, as_it_lies, handle, new_figure, title_above
+from vis.diagnose.figures import _KINDS, _PHASES
+from vis.page.plots import AMENDED, BED, MODEL, STATES, as_it_lies, handle, new_figure, title_above
 from vis.pictures.render import write_gif
 
 
@@ -119,3 +119,8 @@ def test_a_film_keeps_the_colours_of_the_states_as_they_are_however_rare(tmp_pat
     with Image.open(tmp_path / "film.gif") as film:
         page = np.asarray(film.convert("RGB"))
     assert [tuple(page[6, 10 * place + 2]) for place in range(4)] == colours
+
+
+def test_an_added_effect_has_one_colour_in_all_figures_and_shares_it_with_no_state_and_no_other_line() -> None:
+    assert AMENDED not in {BED, MODEL, *STATES.values()}
+    assert _KINDS["named"] == _KINDS["with confidence"] == AMENDED

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rigid.series import read_series
 from vis.diagnose.held_out import worsens_held_out
-from vis.page.plots import BED, DASHED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
+from vis.page.plots import AMENDED, DASHED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
@@ -178,7 +178,7 @@ def draw_trajectories(
     if not channels:
         return None
     drawing, axes = sheet(len(channels), 2, 0.8 + 1.72 * len(channels))
-    models = [("before", MODEL, DASHED, labels[0]), ("after", BED, "-", labels[1])]
+    models = [("before", MODEL, DASHED, labels[0]), ("after", AMENDED, "-", labels[1])]
     models = [entry for entry in models if entry[3]]
     for (left, right), c in zip(axes, channels, strict=True):
         what, unit = _QUANTITIES.get(c.name, (c.name, "SI"))
@@ -260,7 +260,7 @@ def draw_phases(rows: Sequence[Result], labels: tuple[str, str]) -> Figure | Non
             before, after = (max(float(row[stage]), 1e-3) for stage in ("before", "after"))
             if labels[1]:
                 axis.plot([before, after], [place, place], color=GREY, lw=1.2, zorder=2)
-                axis.plot(after, place, "o", color=BED, ms=5.5, zorder=4)
+                axis.plot(after, place, "o", color=AMENDED, ms=5.5, zorder=4)
             axis.plot(before, place, "D", color=MODEL, ms=4.8, zorder=3)
         shown = [float(row[stage]) for row in rows for stage in ("before", "after")]
         if max(shown) < _NARROW:
@@ -273,7 +273,7 @@ def draw_phases(rows: Sequence[Result], labels: tuple[str, str]) -> Figure | Non
     axes[0].set_ylim(len(keys) - 0.4, -0.6)
     handles = [handle(labels[0], MODEL, ls="", marker="D", ms=4.8)]
     if labels[1]:
-        handles.append(handle(labels[1], BED, ls="", marker="o", ms=5.5))
+        handles.append(handle(labels[1], AMENDED, ls="", marker="o", ms=5.5))
     legend_above(drawing, handles, 2, fontsize=8)
     return drawing
 
@@ -327,7 +327,7 @@ def draw_evidence(diagnosis: Result) -> Figure | None:
 
 
 _WORSE = "fits best, but predicts held-out trials worse than the base model"
-_KINDS = {"named": BED, "with confidence": BED, "most likely, without confidence": "#7fb8d9", _WORSE: "#d9b87f",
+_KINDS = {"named": AMENDED, "with confidence": AMENDED, "most likely, without confidence": "#80cfb9", _WORSE: "#d9b87f",
           "cannot be distinguished from it": MODEL, "other": "#b5b5b5"}  # fmt: skip
 """What a candidate is -> its colour."""
 

@@ -21,9 +21,9 @@ from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
 __all__ = [
-    "AXES", "AXIS_LINES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES", "WIDTH", "Array",
-    "as_it_lies", "handle", "legend_above", "line_handles", "line_styles", "mean_over", "new_figure", "new_panels",
-    "nice_below", "shades", "sheet", "smooth_ratio", "styled", "title_above",
+    "AMENDED", "AXES", "AXIS_LINES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES",
+    "WIDTH", "Array", "as_it_lies", "handle", "legend_above", "line_handles", "line_styles", "mean_over",
+    "new_figure", "new_panels", "nice_below", "shades", "sheet", "smooth_ratio", "styled", "title_above",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -35,6 +35,7 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222", "#E69F00", "#
 _DASHES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (1, 1.4)))
 BED = "#0072B2"  # what the grains do
 MODEL = "#D55E00"  # what the spring-damper does; always dashed as well, for print in grey
+AMENDED = "#009E73"  # what the spring-damper does with an effect added
 AXES: dict[str, str] = {"x": BED, "y": "#009E73", "z": MODEL}
 AXIS_LINES: dict[str, dict[str, Any]] = {
     "x": {"color": AXES["x"], "lw": 3.4, "zorder": 2.0},

@@ -114,7 +114,7 @@ class Report:
         warned = [capital(str(warning)) for warning in result["warnings"]] if warnings is None else warnings
         top = [f"hedgebed {result['version']}", *lead] if version else lead
         words = str(result["title"]) if title is None else title
-        page = Page(words, top, sections, tiles, warned, missing, limits_words(result))
+        page = Page(typeset(words), top, sections, tiles, warned, missing, limits_words(result))
         report = write_page(self.folder / "report.html", page, result)
         self.tell(1.0)
         return report

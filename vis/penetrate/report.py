@@ -19,7 +19,7 @@ from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
 from vis.page.limits import limits_words
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, figure, table, text, write_template
-from vis.page.plots import BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
+from vis.page.plots import AMENDED, BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
 from vis.page.report import Progress, Report, Result, again, report_of, title_of
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
@@ -28,10 +28,8 @@ from vis.penetrate.summary_parts import as_foot, mapping_of
 from vis.pictures.pictures import Picture, Pictures, make_pictures
 from vis.view.page import report_scene
 
-__all__ = ["AMENDED", "PLOTS", "draw_amended", "make_plots", "words_of_effects", "write_penetration_report"]
+__all__ = ["PLOTS", "draw_amended", "make_plots", "words_of_effects", "write_penetration_report"]
 
-AMENDED = "#009E73"
-"""The amended law (Okabe and Ito's green)."""
 _MOST = 4
 """Panels in a row at most."""
 #: Plot -> the kind of run it is of.
