@@ -129,16 +129,18 @@ def numbers_over_time(
     Times in s; events are None where they never happen.
     """
     series, time = moved.series, moved.time
+    touching = series["touching"] > 0
+    begun = np.cumsum(touching) > 0
+    rise = series["z_m"] - series["z_m"][0]
     largest = {
-        "highest": (time, series["z_m"] - series["z_m"][0]), "sinkage_largest": (time, series["sinkage_m"]),
+        "highest": (time, np.where(begun, rise, rise.min()) if begun.any() else rise),
+        "sinkage_largest": (time, series["sinkage_m"]),
         "largest_force": (time, np.asarray(np.linalg.norm([series[name] for name in FORCES.values()], axis=0))),
     }  # fmt: skip
     final = {f"displacement_{axis}": (time, series[f"{axis}_m"] - series[f"{axis}_m"][0]) for axis in "xyz"}
     final |= {"sinkage_end": (time, series["sinkage_m"]), "actuator_work": (time, series["actuator_work_J"])}
     final |= {"ground_work": (time, series["taken_J"])}
-    touching = series["touching"] > 0
     first = float(time[int(np.argmax(touching))]) if touching.any() else None
-    begun = np.cumsum(touching) > 0
     for name in moved.names:
         one = "" if len(moved.names) == 1 else f"_{name}"
         if (height := moved.feet.get(f"{name}_height_m")) is not None:  # an older run does not have it

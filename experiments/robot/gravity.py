@@ -3,13 +3,18 @@
 Forces in slow motion among rigid grains without cohesion are in proportion to their weight. So K goes with gravity g,
 and C, a force over a speed, with sqrt(g), as speeds do in similar motions (`experiments.groundmap.maps`). The map adds
 the ranges within which this is used, and the standard deviations.
+
+Where grains stick, cohesion carries a part of K that does not go with gravity, and goes with the diameter of a foot in
+place of its area (`experiments.groundmap.cohesive`). There every foot has the K and C of the map for a ball tip of its
+area.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from dem.grains.materials import material
 from experiments.groundmap.answers import Answer, Number
+from experiments.groundmap.cohesive import CohesiveMap
 from experiments.groundmap.maps import POWERS, read_map
 from experiments.platform.surfaces import Surface
 from rigid.platform.rig import STANDARD_GRAVITY
@@ -37,6 +42,8 @@ class GravityRule:
     why_not: str = ""  # Why the map is not used, in words
     of_foot: Number | None = None  # K of the map for a ball tip as large as the largest foot [N/m]
     largest: float = 0.0  # Diameter of the circle of that foot's area [m]
+    sticky: CohesiveMap | None = None  # The map of grains that stick, where it is used
+    feet: Mapping[str, Answer] = field(default_factory=dict)  # Its answer for each part of the feet
 
     @property
     def share(self) -> float:
@@ -45,15 +52,30 @@ class GravityRule:
 
     def scale(self, name: str) -> float:
         """Factor on K (``stiffness``) or C (``damping``) of 1 g [1]."""
+        if self.sticky is not None and self.answer is not None:
+            earth = _of_spike(self.sticky, STANDARD_GRAVITY, self.sticky.reference["diameter"])
+            return float(getattr(self.answer, name).value / getattr(earth, name).value)
         return float(self.share ** POWERS[name][0]) if self.follows else 1.0
 
     def origin(self, name: str) -> str:
         """The factor in words; empty without one."""
+        if self.sticky is not None:
+            return f", {self.scale(name):.3g} times for gravity" if abs(self.scale(name) - 1) > SAME else ""
         return f" times (g / {STANDARD_GRAVITY:g} m/s2)^{POWERS[name][0]:g}" if self.follows else ""
+
+    def times(self, name: str, similar: float) -> float:
+        """K or C of the largest foot over that of the surface's spike [1]; ``similar``: by similarity."""
+        if self.answer is None or not self.feet:
+            return similar
+        return float(max(getattr(foot, name).value for foot in self.feet.values()) / getattr(self.answer, name).value)
+
+    def of_part(self, part: str) -> dict[str, float]:
+        """K and C of the map of grains that stick for a part of a foot; empty where it is not used."""
+        return {name: getattr(self.feet[part], name).value for name in SYMBOLS} if part in self.feet else {}
 
     def warning(self, surface: Surface, stiffness: float) -> list[str]:
         """That K and C are those of 1 g, where gravity is far from it; ``stiffness``: of one foot at 1 g [N/m]."""
-        if self.follows or NEAR[0] <= self.share <= NEAR[1]:
+        if self.follows or self.feet or NEAR[0] <= self.share <= NEAR[1]:
             return []
         key = "of_earth" if self.loose else "of_earth_cohesive"
         scaled = self.share * stiffness
@@ -69,9 +91,13 @@ class GravityRule:
         for name in names:
             (symbol, unit), number = SYMBOLS[name], getattr(self.answer, name)
             told.append(f"{symbol} = {number.value:.3g} ± {number.std:.2g} {unit}")
-        real = say("real_grains") if self.share < NEAR[0] else ""
-        numbers = " and ".join(told)
-        told = [say("of_map", gravity=self.gravity, spike=1e3 * surface.spike, numbers=numbers, real=real)]
+        real = say("real_grains") if self.share < NEAR[0] and self.sticky is None else ""
+        numbers, grains = " and ".join(told), surface.name
+        told = [
+            say("of_map", grains=grains, gravity=self.gravity, spike=1e3 * surface.spike, numbers=numbers, real=real)
+        ]
+        if self.sticky is not None:
+            return [*told, *self.sticky.words(self.answer, gravity=self.gravity, diameter=self.largest)]
         similar = self.answer.stiffness.value * (self.largest / surface.spike) ** POWERS["stiffness"][1]
         if "stiffness" in names and self.of_foot is not None and abs(self.of_foot.value / similar - 1) > SAME:
             told.append(
@@ -95,7 +121,9 @@ def gravity_rule(
         raise ValueError(say("scaled_surface", surface=surface.name, what=what))
     near = abs(gravity / STANDARD_GRAVITY - 1) <= SAME
     at, largest = STANDARD_GRAVITY if near else gravity, max(diameters.values())
-    answer, why_not = _of_map(surface, at, diameters) if loose else (None, "")
+    if not loose:
+        return _of_sticky(surface, gravity, at, diameters, used=asked is not False)
+    answer, why_not = _of_map(surface, at, diameters)
     follows = bool(asked) or (asked is None and answer is not None and not near)
     used = answer if follows or near else None
     of_foot = None if used is None or surface.grains is None else _of_tip(surface.grains, at, largest)
@@ -103,6 +131,34 @@ def gravity_rule(
         gravity=gravity, follows=follows, loose=loose, answer=used, why_not=why_not if asked is None else "",
         of_foot=of_foot, largest=largest,
     )  # fmt: skip
+
+
+def _of_sticky(
+    surface: Surface, gravity: float, at: float, diameters: Mapping[str, float], *, used: bool
+) -> GravityRule:
+    """The rule where grains stick, or on hard ground: that of the map of every foot, where it covers them all.
+
+    ``at``: gravity that the map is asked for [m/s2]. ``used``: Whether K and C may follow it.
+    """
+    none = GravityRule(gravity=gravity, follows=False, loose=False)
+    if not used or surface.grains is None or surface.spike is None:
+        return none
+    try:
+        found = read_map(surface.grains)
+    except ValueError:
+        return none
+    assert isinstance(found, CohesiveMap)
+    try:
+        feet = {name: _of_spike(found, at, diameter) for name, diameter in diameters.items()}
+        answer = _of_spike(found, at, surface.spike)
+    except ValueError as error:
+        return replace(none, why_not=say("beyond_gravity", error=error))
+    return replace(none, answer=answer, feet=feet, sticky=found, largest=max(diameters.values()))
+
+
+def _of_spike(found: CohesiveMap, gravity: float, diameter: float) -> Answer:
+    """The map's answer for a ball tip of this diameter [m] in real grains. Raises ValueError beyond the map."""
+    return found.answer(gravity=gravity, diameter=diameter, grain=None, packing=None, load=None)
 
 
 def _of_tip(grains: str, gravity: float, diameter: float) -> Number | None:

@@ -69,12 +69,20 @@ class UnderFeet:
     of: float | None  # Diameter of the tip [m]; None where they are not scaled to the size of a foot
     given: Collection[str] = ()  # Names of parameters that are of one foot already
     depth: float | None = None  # To which they hold under the tip [m]; None: not known
+    rule: GravityRule | None = None  # Has K and C of each part where grains stick
 
     def options(self, feet: Sequence[Foot], matrices: Sequence[Any]) -> FeetLaw | OneLaw:
         """Arguments of `LawFeet` for `feet`, turned by `matrices`."""
         if self.of is None:
             return {"law": self.law, "parameters": self.parameters}
-        return law_under_feet(feet, matrices, self.law, self.parameters, of=self.of, given=self.given, depth=self.depth)
+        found = law_under_feet(
+            feet, matrices, self.law, self.parameters, of=self.of, given=self.given, depth=self.depth
+        )  # fmt: skip
+        if self.rule is not None:
+            for part, parameters in found["under"].items():
+                of_map = {name: value for name, value in self.rule.of_part(part).items() if name not in self.given}
+                found["under"][part] = {**parameters, **of_map}
+        return found
 
 
 def law_of(
@@ -83,6 +91,7 @@ def law_of(
     fitted: GroundFile | None,
     numbers: Mapping[str, Number],
     *,
+    rule: GravityRule,
     as_spring: bool,
 ) -> UnderFeet:
     """The law of `settings`, or the spring-damper where `as_spring` or on grains.
@@ -99,7 +108,7 @@ def law_of(
         given = [key for key in own if getattr(settings, key) is not None]
         tip = surface.spike if surface.granular else None
         depth = None if tip is None or "stiffness" in given else _depth_of_map(surface, tip)
-        return UnderFeet(law="spring-damper", parameters=own, of=tip, given=given, depth=depth)
+        return UnderFeet(law="spring-damper", parameters=own, of=tip, given=given, depth=depth, rule=rule)
     given_here = given_parameters(settings)
     found = find_law(settings.ground)
     parameters = found.values(found.in_gravity(numbers["gravity"].value, given_here))
@@ -125,7 +134,9 @@ def settle_spring(
     powers = diameter_powers("spring-damper", {})
     for key, unit in (("stiffness", "N/m"), ("damping", "N s/m")):
         given, own = getattr(settings, key), rule.scale(key) * getattr(surface, key) / SPIKES_PER_ROW
-        origin = f"surface {surface.name}{rule.origin(key)}, of one spike{_times(largest, powers[key])}"
+        whose = f"a ball tip of {1e3 * surface.spike:g} mm" if surface.spike is not None else "a spike of the platform"
+        times = rule.times(key, largest ** (0.5 * powers[key]))
+        origin = f"surface {surface.name}{rule.origin(key)}, of {whose}{_times(times, 2.0)}"
         numbers[key] = Number(own, unit, origin) if given is None else Number(given, unit, "given")
     if settings.stiffness is not None or not surface.granular:
         return []
@@ -153,7 +164,7 @@ def settle_other_law(
     replaced = () if unsized or "radius" in given else OWN_SCALE.get(law.name, ())
     for parameter in law.parameters:
         name = parameter.name
-        whose = "dry sand" if law.name in OWN_SCALE and not unsized else "one spike"
+        whose = "dry sand" if law.name in OWN_SCALE and not unsized else f"a tip of {1e3 * SPIKE:g} mm"
         sized = _times(largest.times, powers.get(name, 0.0))
         origin = f"default of {law.name}, of {whose}{_in_gravity(law, name)}{sized}"
         origin = "given" if name in given else origin
@@ -207,10 +218,12 @@ def spring_words(settings: RobotSettings, surface: Surface, largest: Largest, ru
         return []
     if surface.spike is None:
         size = say("size_hard", most=largest)
+    elif rule.feet:
+        size = say("size_of_map", shape=_unlike(largest, Sole.of_spike(surface.spike)))
     else:
         size = _similar(largest, Sole.of_spike(surface.spike), say("tip_sphere"), surface.spike, surface.name)
     told = [say("spring_defaults", names=" and ".join(left), surface=surface, size=size), *rule.errors(surface, left)]
-    if "stiffness" in left:
+    if "stiffness" in left and not rule.feet:
         told += open_stiffness(surface)
     if surface.granular:
         told.append(say("springs_back", share=find_law("rft").rebound({})))

@@ -31,6 +31,7 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .feet import feet_reached, heights_of
+from .flight import fall_warning
 from .plan import RobotPlan, width_of
 from .result import RobotFrames, conclude, deepest_at_start, quantities_of, write_series_of
 from .settings import RobotSettings
@@ -65,7 +66,12 @@ class RobotFollowed(Followed[RobotRun]):
 
     def announce(self, progress: Progress) -> None:
         """Every default, and the warnings."""
-        for sentence in self.plan.announcement():
+        self._announce(self.plan, progress)
+
+    def _announce(self, plan: RobotPlan, progress: Progress) -> None:
+        """What `plan` announces, and that the robot is still in free fall at the end, if it is."""
+        falls = fall_warning(self.settings, plan.robot())
+        for sentence in [*plan.announcement(), *(f"warning: {warning}" for warning in falls)]:
             progress.message(sentence)
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:

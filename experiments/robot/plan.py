@@ -79,7 +79,7 @@ class RobotPlan:
 
     def feet_options(self, robot: MujocoRobot, *, as_spring: bool = False) -> FeetLaw | OneLaw:
         """The law of `law_feet`, scaled to each foot: arguments of `LawFeet` and `FootForces`."""
-        own = law_of(self.settings, self.surface, self.fitted, self.numbers, as_spring=as_spring)
+        own = law_of(self.settings, self.surface, self.fitted, self.numbers, rule=self.rule, as_spring=as_spring)
         return own.options(robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)])
 
     @property

@@ -23,6 +23,7 @@ from rigid.spatial.quaternions import to_matrix
 from . import say
 from .energy import MOST_RESIDUAL, balance_warning
 from .feet import feet_quantities, feet_reached, heights_of, too_deep
+from .flight import launched, to_landing
 from .laws import of_sand
 from .plan import RobotPlan
 from .settings import RobotSettings
@@ -158,7 +159,7 @@ def conclude(
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
-        say("airborne") if _airborne(run, heights) else None,
+        say("airborne", landing=to_landing(run, heights)) if _airborne(run, heights) else None,
         *(too_deep(run) if plan.fitted is None else []),
     ]  # fmt: skip
     if plan.fitted is not None:
@@ -232,7 +233,7 @@ def quantities_of(run: RobotRun, heights: Array) -> dict[str, Json]:
         "displacement_x": (float(rows["x"][-1] - rows["x"][0]), "m", say("displacement")),
         "displacement_y": (float(rows["y"][-1] - rows["y"][0]), "m", "likewise"),
         "displacement_z": (float(rows["z"][-1] - rows["z"][0]), "m", "the same, upwards"),
-        "highest": (float(rows["z"].max() - rows["z"][0]), "m", say("highest")),
+        "highest": (_highest(run, touched), "m", say("highest")),
         "first_touch": (None if touched is None else float(rows["time"][touched]), "s", say("first_touch")),
         "flights": (float(len(flights)), "1", say("flights", apart=1e3 * APART)),
         "longest_flight": (longest * run.macro_step, "s", say("longest_flight")),
@@ -270,6 +271,15 @@ def _flights(run: RobotRun, heights: Array) -> tuple[list[tuple[int, int]], int 
     return [(low, high) for low, high in found if lowest[low:high].max() > 0.0], touched
 
 
+def _highest(run: RobotRun, touched: int | None) -> float:
+    """Largest height of the centre of mass from row `touched` on, or of all where nothing touches, over its start [m].
+
+    A robot that is dropped is highest at its start: that says nothing of how it moves on the ground.
+    """
+    z = run.columns["z"]
+    return float(z[touched or 0 :].max() - z[0])
+
+
 def _airborne(run: RobotRun, heights: Array) -> bool:
     """Whether the run ends in a flight."""
     flights, _ = _flights(run, heights)
@@ -281,10 +291,13 @@ def _sentences(run: RobotRun, heights: Array) -> list[str]:
     rows = run.columns
     flights, touched = _flights(run, heights)
     if touched is None:
-        return [say("touches_nothing")]
+        return [f"{say('touches_nothing')} {to_landing(run, heights)}."]
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
-    told = [say("went", way=1e3 * way, rise=1e3 * float(rows["z"].max() - rows["z"][0]))]
+    rise = 1e3 * _highest(run, touched)
+    rose = say("rose", rise=rise) if rise >= 0 else say("stayed_below", rise=-rise)
+    told = [say("went", way=1e3 * way, rose=rose)]
     longest = 1e3 * run.macro_step * max((end - begin for begin, end in flights), default=0)
     told.append(say("flew", count=len(flights), apart=1e3 * APART, longest=longest) if flights else say("stayed"))
+    told += launched(run, flights[0][0]) if flights else []
     told.append(say("sank", depth=1e3 * float(rows["sinkage"].max()), end=1e3 * float(rows["sinkage"][-1])))
     return told

@@ -56,19 +56,19 @@ class RobotSettings(GrainsSettings):
     spring-damper on other surfaces, and with stiffness, damping or scale_with_gravity."""
     ground_parameters: tuple[str, ...] = ()
     """Parameters of a law other than the spring-damper, for one foot, as name=value in SI units (exponent=1.5).
-    Defaults are those of a spike of 12 mm, scaled to the size of each foot."""
+    Defaults are those of a ball tip of 12 mm, scaled to the size of each foot."""
     ignore_foot_size: bool = False
     """Run a law whose default numbers belong to another ground; without it this is refused. The numbers are those of a
-    spike on brick (hunt-crossley, power), here used on grains, or of a spike in sand (power-irreversible,
+    tip of 12 mm on brick (hunt-crossley, power), here used on grains, or of one in sand (power-irreversible,
     katsuragi-durian, bekker, rft), here used on hard ground. They are not scaled to the foot."""
     ignore_gravity_range: bool = False
     """Run a ground.toml under a gravity outside its range; without it this is refused."""
     stiffness: Positive | None = None
-    """K of one foot [N/m]; that of one spike on the surface if not given, on sand times the area of the foot over the
-    spike's."""
+    """K of one foot [N/m]. If not given, on hard surfaces that of a spike of the platform; on grains that of a ball tip
+    of 12 mm times the area of the foot over the tip's."""
     damping: NotNegative | None = None
-    """C of one foot that moves into the ground [N s/m]; if not given, that of one spike on the surface, on sand times
-    that ratio of areas to the power 1.25."""
+    """C of one foot that moves into the ground [N s/m]; if not given, found as K is, with that ratio of areas to the
+    power 1.25."""
     scale_with_gravity: bool | None = None
     """Whether K and C of the surface, which are those of 1 g, follow gravity: K in proportion, C with its square root,
     as in grains without cohesion. If not given: on sand, where the map of hedgebed ground covers gravity (1e-6 g to

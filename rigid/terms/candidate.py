@@ -145,7 +145,7 @@ class Candidate:
     """An effect among the candidates of a diagnosis."""
 
     meaning: str  # What it is, a clause
-    confirm: str  # The measurement that shows it by itself, and what should be seen
+    confirm: str  # The measurement that shows it by itself, and what should be seen; {one}, {body}: a spike or a tip
     tumble: Tumble | None = None
     push: Push | None = None
 

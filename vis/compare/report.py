@@ -130,7 +130,7 @@ def _drives(report: Report, labels: Labels) -> list[Block]:
             if series is not None:
                 axis.plot(1e3 * series.depth, series.force, **style)
         axis.set(title=name, xlabel="depth [mm]")
-    axes[0].set_ylabel("force on the spike [N]")
+    axes[0].set_ylabel("force of the ground [N]")
     legend_of_runs(drawing, labels)
     return [report.draw("drives", drawing)]
 

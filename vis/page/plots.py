@@ -37,7 +37,7 @@ BED = "#0072B2"  # what the grains do
 MODEL = "#D55E00"  # what the spring-damper does; always dashed as well, for print in grey
 AMENDED = "#009E73"  # what the spring-damper does with an effect added
 AXES: dict[str, str] = {"x": BED, "y": "#009E73", "z": MODEL}
-AXIS_LINES: dict[str, dict[str, Any]] = {
+AXIS_LINES: dict[str, Mapping[str, Any]] = {
     "x": {"color": AXES["x"], "lw": 3.4, "zorder": 2.0},
     "y": {"color": AXES["y"], "lw": 1.8, "ls": DASHED, "zorder": 2.2},
     "z": {"color": AXES["z"], "lw": 1.8, "zorder": 2.1},

@@ -78,7 +78,7 @@ def _laws(report: Report, laws: list[Result], cell: str) -> Block | None:
             axis.plot(depth, law_force, lw=1.5, **styles[law["name"]])
         axis.set(title=f"{speeds[place]:.3g} m/s", xlabel="depth of the tip [mm]")
         axis.axhline(0.0, color=GREY, lw=0.8)
-    axes[0].set_ylabel("force on the spike [N]")
+    axes[0].set_ylabel("force of the ground [N]")
     marks = [handle("a run on grains", BED, marker=".", ls="", alpha=0.5)] if columns is not None else []
     marks.append(handle("grains, mean of the beds", INK, marker="o", ms=4, ls=""))
     lines = [handle(law["name"], lw=1.5, **styles[law["name"]]) for law in laws]

@@ -129,7 +129,7 @@ def drag_plot(run: RunFolder) -> Plot | None:
             axis.axvline(0.0, color=GREY, lw=0.8, ls=(0, (2, 2)))
         axis.set_xlim(left=1e3 * min((float(part.depth.min()) for part in above), default=0.0))
         axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-    _label(axes, "depth of the tip [mm]", "force on the spike [N]")
+    _label(axes, "depth of the tip [mm]", "force of the ground [N]")
     handles = [handle("bed, loading", BED, lw=2.2)]
     out = any(((r.bed.phase == "out") & (r.bed.depth >= 0.0)).any() for r in driven if r.bed is not None)
     handles += [handle("bed, unloading", BED, lw=1.8, ls=_UNLOADING)] if out else []

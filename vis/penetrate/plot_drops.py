@@ -62,7 +62,7 @@ def drops_plot(run: RunFolder) -> Plot | None:
         free = free or bool(early)
         below.set_xlabel("time since touch-down [ms]")
     axes[0, 0].set_ylabel("depth of the tip [mm]")
-    axes[1, 0].set_ylabel("force on the spike [N]")
+    axes[1, 0].set_ylabel("force of the ground [N]")
     axes[0, 0].invert_yaxis()
     recorded = handle("bed, as recorded", **RECORDED)
     peaks = handle("peak force, as recorded", GREY, marker="o", ls="", ms=5)
@@ -147,7 +147,7 @@ def set_down_plot(run: RunFolder) -> Plot | None:
         axis.text(1.01, last, f"{what}: {number}", color=colour, va="center", transform=axis.get_yaxis_transform())
     axis.set_xlim(0.0, 1e3 * end)
     axis.axhline(0.0, color=GREY, lw=0.8)
-    axis.set(xlabel="time since the spike was let go [ms]", ylabel="depth of the tip [mm]")
+    axis.set(xlabel="time since the release [ms]", ylabel="depth of the tip [mm]")
     legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots])
     still = sum(value_of(r.quantities, "sinkage") is not None for r in sets)
     many = len(sets) > 1

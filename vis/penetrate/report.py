@@ -224,7 +224,7 @@ def _draw_panel(axis: Axes, runs: Sequence[Run]) -> None:
         axis.plot(across, up, **style)
     axis.axhline(0.0, color=GREY, lw=0.8)
     if driven:
-        axis.set(xlabel="depth of the tip [mm]", ylabel="force on the spike [N]")
+        axis.set(xlabel="depth of the tip [mm]", ylabel="force of the ground [N]")
     else:
         axis.invert_yaxis()
         axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")

@@ -55,7 +55,7 @@ _MEAN = f"mean over {1e3 * _SMOOTH:g} ms"
 
 _VALUES = {
     "depth": ("depth of the tip [mm]", 1e3), "velocity": ("velocity, downwards [mm/s]", 1e3),
-    "force": ("force on the spike [N]", 1.0), "theta_deg": ("θ [degrees]", 1.0),
+    "force": ("force of the ground [N]", 1.0), "theta_deg": ("θ [degrees]", 1.0),
     **{f"force_{axis}": (f"force of the ground, {axis} [N]", 1.0) for axis in AXES},
 }  # fmt: skip
 """Of the values in frames: label and factor from the unit there."""
@@ -107,7 +107,7 @@ def of_penetration(run: Run) -> list[Panel]:
 
     return [
         *panel("depth of the tip [mm]", *each("depth", 1e3)),
-        *panel("force on the spike [N]", *each("force")),
+        *panel("force of the ground [N]", *each("force")),
         *panel("velocity, downwards [mm/s]", *each("velocity", 1e3)),
     ]
 

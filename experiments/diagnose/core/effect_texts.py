@@ -48,6 +48,9 @@ PENETRATION = {id: text for effect, known in CANDIDATES.items() for id, text in 
 TUMBLE = {id: known.tumble.equation for id, known in CANDIDATES.items() if known.tumble is not None}
 """By the name of the effect, whose forms have parameters of one equation."""
 
+_BODY = {True: {"{one}": "the tip", "{body}": "tip"}, False: {"{one}": "one spike", "{body}": "spike"}}
+"""What goes into the ground, in trials of penetration and in others."""
+
 SYMBOLS = (
     "F is the force on the spike [N], z the depth and v the speed, downwards, z_m the deepest depth so far, "
     "r = z_m - z the way back, D the typical depth (`reference` in model.toml), H the height over which the tip "
@@ -66,12 +69,14 @@ def meaning(effect: str) -> str:
 
 
 def confirmation(effect: str, kind: str) -> str:
-    """One sentence: the trial or bench measurement that would show the effect by itself. In trials of penetration the
-    body is whatever goes down: a tip."""
+    """One sentence: the trial or bench measurement that would show the effect by itself. What goes down is a tip in
+    trials of penetration, and one spike of a platform in others: `_BODY` has the words for {one} and {body}."""
     found = find_candidate(effect)
     otherwise = "change what is thought to cause it and repeat a trial: the effect should follow"
-    said = f"To confirm {effect}: {found.confirm if found is not None else otherwise}."
-    return said.replace("one spike", "the tip").replace("spike", "tip") if kind == "penetration" else said
+    said = found.confirm if found is not None else otherwise
+    for place, words in _BODY[kind == "penetration"].items():  # braces of other files than ours stay as they are
+        said = said.replace(place, words)
+    return f"To confirm {effect}: {said}."
 
 
 def advice(first: str, second: str) -> str:

@@ -122,7 +122,7 @@ _HELDS = ("held", "held by depth", "held wherever it has been")
 
 CANDIDATE = fit.Candidate(
     meaning="the tip is held as it leaves",
-    confirm="lift one spike off slowly and read the pull",
+    confirm="lift {one} off slowly and read the pull",
     tumble=fit.Tumble(
         rank=90, forms=forms,
         bends=(fit.bent("of any shape", ("mobilised", "that friction does not lose"),

@@ -99,7 +99,7 @@ def _form(name: str, how: str, std: float, lowest: float, highest: float, starts
 
 CANDIDATE = fit.Candidate(
     meaning="the force grows other than linearly with depth",
-    confirm="press one spike in slowly, deeper than here, and read force over depth",
+    confirm="press {one} in slowly, deeper than here, and read force over depth",
     tumble=fit.Tumble(
         rank=70, forms=forms,
         equation="the law's force times (z / reference)^(exponent - 1), or times 1 + bend * z (bend below 0: over 1 - "

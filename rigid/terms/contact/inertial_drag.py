@@ -87,7 +87,7 @@ _ONSET = " * (1 - exp(-z / drag_reach))"
 
 CANDIDATE = fit.Candidate(
     meaning="the surface resists with the square of the tip's speed",
-    confirm="drop one spike at two speeds: the excess force should go with the square",
+    confirm="drop {one} at two speeds: the excess force should go with the square",
     tumble=fit.Tumble(
         rank=60, forms=forms,
         equation="+ normal * rate^power while a tip goes in (power 2 where it is not named), - sideways * u * abs(u) "

@@ -107,7 +107,7 @@ def _form(
 
 CANDIDATE = fit.Candidate(
     meaning="the surface does not spring back all the way",
-    confirm="press one spike in, lift it and measure the mark",
+    confirm="press {one} in, lift it and measure the mark",
     tumble=fit.Tumble(
         rank=80, forms=forms,
         equation="on the way back the law's force at (z - share * z_m) / (1 - share), times (that over z_m)^a, "

@@ -36,7 +36,7 @@ TERM = Term(
 
 CANDIDATE = Candidate(
     meaning="the ground ahead of a spike resists by more than friction",
-    confirm="drag one spike sideways at two depths: at twice the depth the force beyond friction is about four times "
+    confirm="drag {one} sideways at two depths: at twice the depth the force beyond friction is about four times "
             "as large",
     tumble=Tumble(
         forms=lambda t: (

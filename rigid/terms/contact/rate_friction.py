@@ -26,7 +26,7 @@ TERM = Term(
 
 CANDIDATE = Candidate(
     meaning="friction depends on the sliding speed",
-    confirm="drag one spike over the surface at two speeds a factor of ten apart",
+    confirm="drag {one} over the surface at two speeds a factor of ten apart",
     tumble=Tumble(
         rank=100,
         forms=lambda t: (

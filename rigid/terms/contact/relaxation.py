@@ -71,7 +71,7 @@ def forms(t: fit.Typical) -> tuple[fit.Form, ...]:
 
 CANDIDATE = fit.Candidate(
     meaning="the ground's force falls with time while the tip rests in it",
-    confirm="push one spike in, hold it for a minute and read the force: it should fall by equal steps for equal "
+    confirm="push {one} in, hold it for a minute and read the force: it should fall by equal steps for equal "
             "factors of time",
     tumble=fit.Tumble(
         forms=forms,

@@ -33,8 +33,8 @@ def _form(name: str, slot: str, how: str, starts: Starts, equation: str, *more: 
 
 CANDIDATE = Candidate(
     meaning="something resists the spike's motion in either direction",
-    confirm="move the spike's guide up and down without a bed: a guide's resistance is there too, that of a shaft or "
-            "an edge in the bed is not; for that, push a spike with a rougher side",
+    confirm="move the {body}'s guide up and down without a bed: a guide's resistance is there too, that of a shaft or "
+            "an edge in the bed is not; for that, push a {body} with a rougher side",
     push=Push(
         rank=60, law={"force": push_force}, lengths={"shaft_speed": 1e-2, "shaft_reach": 1e-3},
         turning=("shaft_held", "shaft_reach"),

@@ -33,7 +33,7 @@ TERM = Term(
 
 CANDIDATE = Candidate(
     meaning="the ground gives way under a tip that slides",
-    confirm="load one spike with a weight, drag it sideways, and read its depth over the distance",
+    confirm="load {one} with a weight, drag it sideways, and read its depth over the distance",
     tumble=Tumble(
         forms=lambda t: (
             Form("by distance", (free("share", "1", 0.1, 0.0, 0.93), logarithm("way", WAY)),

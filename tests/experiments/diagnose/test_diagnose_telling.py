@@ -26,6 +26,7 @@ from experiments.diagnose.report.sentences import (
     worse_sentences,
 )
 from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
+from rigid.terms import CANDIDATES
 from vis.diagnose.figures import _kind
 
 
@@ -193,6 +194,14 @@ def test_how_sure_a_name_is_stands_in_words_with_its_nearest_rival():
     for words in ("268 nats", "153 to 0.97", "com-offset", "209 nats", "9 degrees"):
         assert words in sure
     golden("diagnose/telling_sure", [what, sure, confirmation("umbilical", "tumble")])
+
+
+def test_the_confirming_measurement_names_a_tip_in_pushes_and_a_spike_in_tumbles():
+    for effect in CANDIDATES:
+        pushed, tumbled = confirmation(effect, "penetration"), confirmation(effect, "tumble")
+        assert "spike" not in pushed and "{" not in pushed + tumbled
+        assert ("one spike" in tumbled) == (re.search("(push|drop|lift|press|load|drag) the tip", pushed) is not None)
+    assert "the tip's guide" in confirmation("shaft-friction", "penetration")
 
 
 def unknown(**changes):

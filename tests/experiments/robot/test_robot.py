@@ -145,8 +145,9 @@ def test_k_of_sand_goes_with_gravity_and_c_with_its_root_unless_that_is_refused_
     given = plan_robot(RobotSettings(**low, stiffness=2.0))
     assert given.numbers["stiffness"].value == 2.0 and given.numbers["damping"] == scaled.numbers["damping"]
     assert not [said for said in given.warnings if "K = " in said]
-    sticky = plan_robot(RobotSettings(**low, surface="jsc1a"))
-    assert [said for said in sticky.warnings if "cohesion of jsc1a" in said]
+    for surface, asked in (("jsc1a-heights", None), ("jsc1a", False)):  # without a map, and without its use
+        sticky = plan_robot(RobotSettings(**low, surface=surface, scale_with_gravity=asked))
+        assert [said for said in sticky.warnings if f"cohesion of {surface}:" in said]
     for surface in ("jsc1a", "brick"):
         with pytest.raises(ValueError, match=f"scale_with_gravity.*{surface}"):
             plan_robot(RobotSettings(**low, surface=surface, scale_with_gravity=True))

@@ -1,0 +1,73 @@
+"""How long a robot flies: from the speed of its first launch, and from where it is when a run ends.
+
+In flight the centre of mass has the acceleration of gravity alone, whatever the joints do. A launch with the speed v
+upwards therefore rises by v^2 / 2 g and is back at its height after 2 v / g.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling.robot import MujocoRobot, RobotRun
+
+from . import say
+from .settings import RobotSettings
+
+__all__ = ["fall_warning", "launched", "to_landing"]
+
+Array = NDArray[np.float64]
+
+
+def launched(run: RobotRun, begin: int) -> list[str]:
+    """What the speed at a launch, row `begin`, means in this gravity, in a sentence; none without gravity or speed."""
+    gravity, speed = run.robot.gravity, float(_upwards(run)[begin])
+    if gravity <= 0 or speed <= 0:
+        return []
+    time = float(run.columns["time"][begin])
+    rise, flight = speed**2 / (2 * gravity), 2 * speed / gravity
+    return [say("launched", time=time, speed=speed, gravity=gravity, rise=1e3 * rise, flight=flight)]
+
+
+def to_landing(run: RobotRun, heights: Array) -> str:
+    """How much longer a run must be that ends in the air, in a sentence.
+
+    ``heights``: of the lowest point of each foot at every row [m], shape (row, foot), as of
+    `experiments.robot.feet.heights_of`. The feet are taken to keep their place below the centre of mass.
+    """
+    gravity, height, speed = run.robot.gravity, max(0.0, float(heights[-1].min())), float(_upwards(run)[-1])
+    if run.robot.hangs or (gravity <= 0 and speed >= 0):
+        return say("no_landing")
+    end = float(run.columns["time"][-1])
+    fall = _fall(height, speed, gravity) if gravity > 0 else -height / speed
+    return say("landing", fall=fall, height=1e3 * height, wanted=_above(end + fall))
+
+
+def fall_warning(settings: RobotSettings, robot: MujocoRobot) -> list[str]:
+    """Before a run: the warning that a robot at rest is still in free fall when it ends; none if it is not."""
+    height, gravity = robot.clearance, robot.gravity
+    if height <= 0 or gravity <= 0 or robot.hangs or np.any(robot.data.qvel):
+        return []
+    fall = _fall(height, 0.0, gravity)
+    if fall < settings.duration:
+        return []
+    return [say("still_falls", s=settings, height=1e3 * height, fall=fall, gravity=gravity, wanted=_above(fall))]
+
+
+def _fall(height: float, speed: float, gravity: float) -> float:
+    """Time until a body `height` [m] up with this speed upwards [m/s] is down [s]."""
+    return (speed + math.sqrt(speed**2 + 2 * gravity * height)) / gravity
+
+
+def _upwards(run: RobotRun) -> Array:
+    """Speed of the centre of mass upwards at every row [m/s]; in a flight without an error, as it is a parabola."""
+    z, time = run.columns["z"], run.columns["time"]
+    if len(time) < 3:
+        return np.zeros(len(time))
+    return np.asarray(np.gradient(z, time, edge_order=2))
+
+
+def _above(seconds: float) -> float:
+    """A duration above this one, in two figures [s]."""
+    step = 10.0 ** (math.floor(math.log10(seconds)) - 1) if seconds > 0 else 0.1
+    return step * math.ceil(1.02 * seconds / step)

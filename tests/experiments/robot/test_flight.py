@@ -1,0 +1,87 @@
+"""What a robot's run states of its flights: the apex after the first touch, and how long a flight lasts."""
+
+import re
+
+import numpy as np
+import pytest
+
+from experiments.cli.main import main
+from experiments.robot.flight import fall_warning
+from experiments.robot.on_grains import RobotFollowed
+from experiments.robot.plan import plan_robot
+from experiments.robot.result import conclude
+from experiments.robot.settings import RobotSettings
+
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+
+LANDER = """<mujoco model="lander"><worldbody><body name="body" pos="0 0 0.2"><freejoint/>
+  <geom name="tip" type="cylinder" size="0.03 0.01" mass="1.5"/></body></worldbody></mujoco>"""
+BOUNCE = {"surface": "brick", "stiffness": 15e3, "damping": 0.0, "height": 0.02}
+"""A fall of 20 mm at 9.81 m/s2 takes 64 ms, half a swing of 1.5 kg on 15 kN/m 31 ms, the flight after it 128 ms."""
+
+
+@pytest.fixture
+def lander(tmp_path):
+    """Name of the file of a plate of 60 mm with 1.5 kg."""
+    (tmp_path / "lander.xml").write_text(LANDER, encoding="utf-8")
+    return str(tmp_path / "lander.xml")
+
+
+def concluded(lander, folder, **given):
+    """The run, its result."""
+    settings = RobotSettings(model=lander, feet=("tip",), **given)
+    plan = plan_robot(settings)
+    run = RobotFollowed(settings, plan).run_on_law()
+    run.run()
+    return run, conclude(settings, plan, run, folder)
+
+
+def test_the_apex_is_that_after_the_first_touch_so_that_a_drop_is_no_rise(lander, tmp_path):
+    """On sand the plate falls by 20 mm and stays down; on undamped brick it comes back to where it began."""
+    _, sunk = concluded(lander, tmp_path, surface="sand", height=0.02, duration=0.2)
+    step = 0.63 * sunk["macro_step"]  # at sqrt(2 g h) in one exchange of forces
+    assert sunk.quantities["highest"].value == pytest.approx(-0.02, abs=step)
+    (below,) = [said for said in sunk["departures"]["sentences"] if "below its start" in said]
+    assert float(re.findall(r"stayed ([0-9.]+) mm", below)[0]) == pytest.approx(20, abs=1e3 * step)
+    _, back = concluded(lander, tmp_path, **BOUNCE, duration=0.2)
+    assert back.quantities["highest"].value == pytest.approx(0.0, abs=5e-4)
+
+
+def test_a_run_that_ends_in_the_air_says_when_it_lands_and_what_a_launch_means(lander, tmp_path):
+    """Flight 2 v / g and rise v^2 / 2 g: those that a longer run has, within an exchange of forces or the rounding."""
+    _, short = concluded(lander, tmp_path, **BOUNCE, duration=0.15)
+    longer, whole = concluded(lander, tmp_path, **BOUNCE, duration=0.24)
+    free = longer.columns["touching"] == 0
+    lands = [float(longer.columns["time"][row]) for row in np.flatnonzero(np.diff(free.astype(int)) == -1) + 1][-1]
+    (said,) = [said for said in short.warnings if "cut off" in said]
+    assert 0.15 + float(re.findall(r"after ([0-9.]+) s", said)[0]) == pytest.approx(lands, abs=2e-3)
+    assert lands < float(re.findall(r"--duration ([0-9.]+)", said)[0]) < 1.2 * lands
+    (launch,) = [said for said in whole["departures"]["sentences"] if "first leaves" in said]
+    assert float(re.findall(r"after ([0-9.]+) s", launch)[0]) == pytest.approx(
+        whole.quantities["longest_flight"].value, rel=0.02
+    )
+    assert float(re.findall(r"by ([0-9.]+) mm", launch)[0]) == pytest.approx(20.0, rel=0.02)
+    assert not [said for said in whole.warnings if "cut off" in said]
+
+
+def test_a_robot_that_is_still_falling_at_the_end_is_told_of_it_before_and_a_run_of_that_length_touches(
+    lander, tmp_path
+):
+    """At 0.1 m/s2 a fall of 20 mm takes sqrt(2 h / g) = 0.632 s."""
+    given = {"model": lander, "feet": ("tip",), "gravity": 0.1, "height": 0.02}
+    short = RobotSettings(**given, duration=0.3)
+    (said,) = fall_warning(short, plan_robot(short).robot())
+    assert "0.632 s" in said
+    wanted = float(re.findall(r"--duration ([0-9.]+)", said)[0])
+    enough = RobotSettings(**given, duration=wanted)
+    assert fall_warning(enough, plan_robot(enough).robot()) == []
+    _, none = concluded(lander, tmp_path, gravity=0.1, height=0.02, duration=0.3)
+    assert any("0.332 s more" in said for said in none["departures"]["sentences"])
+    _, result = concluded(lander, tmp_path, gravity=0.1, height=0.02, duration=wanted)
+    assert result.quantities["first_touch"].value == pytest.approx(0.632, abs=1e-3)
+
+
+def test_the_command_warns_of_a_fall_that_it_does_not_finish(lander, tmp_path, capsys):
+    given = ["--feet", "tip", "--height", "0.02", "--gravity", "0.1", "--duration", "0.01", "--frame-count", "0"]
+    assert main(["mujoco", lander, *given, "--out", str(tmp_path / "run")]) == 0
+    assert "0.632 s" in capsys.readouterr().err
