@@ -72,7 +72,7 @@ class RobotSettings(GrainsSettings):
     scale_with_gravity: bool | None = None
     """Whether K and C of the surface, which are those of 1 g, follow gravity: K in proportion, C with its square root,
     as in grains without cohesion. If not given: on sand, where the map of hedgebed ground covers gravity (1e-6 g to
-    1 g) and feet (1 to 100 mm)."""
+    1 g) and feet (1 to 100 mm). On jsc1a, K and C of each foot are those of its map unless this is off."""
     mu_s: NotNegative | None = Field(None, description="Static friction [1]; the surface's if not given (sand: 0.6).")
     mu_d: NotNegative | None = None
     """Sliding friction [1]; the surface's if not given (sand: 0.3), half of mu_s where that is."""

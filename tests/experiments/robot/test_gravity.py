@@ -39,7 +39,7 @@ def test_each_foot_on_jsc1a_has_k_and_c_of_the_map_at_its_size_and_gravity(gravi
     small = read_map("jsc-1a-loose-cut").answer(gravity=gravity, diameter=0.012, grain=None, packing=None, load=None)
     assert f"K = {small.stiffness.value:.3g} ± {small.stiffness.std:.2g} N/m" in said and "jsc1a" in said
     ratio = under["large"]["stiffness"] / small.stiffness.value
-    assert f"{ratio:.3g} times under a foot" in plan.numbers["stiffness"].origin
+    assert f"{ratio:.3g} times under" in plan.numbers["stiffness"].origin
     if gravity < 1e-4:
         assert ratio == pytest.approx(5.0, rel=1e-2)
 
