@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ __all__ = ["answer_tiles", "write_beds_report"]
 
 Columns = Mapping[str, Array]
 LABELS = {
-    "highest": ("Highest", "of the centre of mass over its start"),
+    "highest": ("Highest", "of the centre of mass after the first touch, over its start"),
     "longest_flight": ("Longest flight", "no foot touches"),
     "clearance_largest": ("Clearance", "lowest point of the highest foot, over the undisturbed surface"),
     "sinkage_largest": ("Deepest", "of any foot"),
@@ -69,10 +69,10 @@ def write_beds_report(report: Report) -> Path:
     return report.write(sections, lead=["mujoco", f"{result['duration']:g} s"], tiles=answer_tiles(result))
 
 
-def _draw_beds(runs: list[Columns], beside: Columns, law: str) -> Figure:
+def _draw_beds(runs: Sequence[Columns], beside: Columns, law: str) -> Figure:
     """Rise and deepest foot over time: one line for each bed, and the law."""
     drawing, height, depth = pair("rise of the centre of mass [mm]", "depth of the deepest foot [mm]")
-    styles = [*({"color": BED, "lw": 0.8} for _ in runs), {"color": MODEL, "ls": DASHED}]
+    styles: list[Mapping[str, Any]] = [*({"color": BED, "lw": 0.8} for _ in runs), {"color": MODEL, "ls": DASHED}]
     for columns, style in zip([*runs, beside], styles, strict=True):
         height.plot(columns["t_s"], 1e3 * (columns["z_m"] - columns["z_m"][0]), **style)
         depth.plot(columns["t_s"], 1e3 * columns["sinkage_m"], **style)
