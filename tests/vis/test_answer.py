@@ -1,11 +1,14 @@
 """A report begins with its answer: six numbers at most, their errors, a picture, three findings; the rest is folded."""
 
 import re
+import shutil
+from pathlib import Path
 
 import pytest
 
 from vis.page.answer import MOST_ROWS, answer, write_page
 from vis.page.page import Page, Section, Tile, listing, text
+from vis.report import write_report
 
 ON_GRAINS = {"experiment": "penetrate", "ground": "bed"}
 
@@ -42,3 +45,12 @@ def test_three_findings_are_open_and_the_rest_is_folded(tmp_path):
     opened, folded = html.split("<details", 1)
     assert re.findall(r"finding \d", opened) == findings[:3]
     assert re.findall(r"finding \d", folded) == findings[3:] and "all of them" in folded
+
+
+def test_the_error_of_a_law_in_other_beds_is_a_share_in_per_cent(tmp_path):
+    """calibrate-sand-1mm: 0.1075 of the rms force, with a scatter of 0.0027 between the beds."""
+    kept = Path(__file__).parents[2] / "docs" / "results" / "calibrate-sand-1mm"
+    folder = tmp_path / "run"
+    shutil.copytree(kept, folder)
+    page = write_report(folder).read_text(encoding="utf-8")
+    assert "<td>10.7 %</td>" in page.replace("\N{NO-BREAK SPACE}", " ")

@@ -38,12 +38,12 @@ def write_lawfit_report(report: Report) -> Path:
         report.again("hedgebed calibrate run.toml", "numbers"),
     ]
     tiles, numbers = [], result["quantities"]
-    for name, key, factor, unit in (("K", "stiffness", 1, None), ("C", "damping", 1, None),
-                                    ("Force in other beds", "held_out_error", 100, "%")):  # fmt: skip
+    for name, key, unit in (("K", "stiffness", None), ("C", "damping", None),
+                            ("Error of the force, other beds", "held_out_error", "%")):  # fmt: skip
         own = numbers[key] if key in numbers else numbers[f"{key}@{cells[0]['name']}"]
         words = "one standard deviation" if unit is None else "rms of the spring-damper, std over beds"
         words += f", {cells[0]['name']}" if len(cells) > 1 else ""
-        shown = quote(factor * own["value"], factor * own["std"], unit or own["unit"])
+        shown = quote(own["value"], own["std"], unit or own["unit"])
         tiles.append(Tile(name, shown, words))
     runs = [one for cell in cells for one in cell["contributions"]]
     counted = f"{len(runs)} runs in beds of {len({one['bed'] for one in runs})} seeds"
