@@ -24,7 +24,7 @@ from .effect_texts import confirmation
 from .matters import undecided
 from .next_steps import after_unknown
 from .renoised import scatter_of, wander_of
-from .rivals import LEAD, Predicted, Rival
+from .rivals import LEAD, Predicted, Rival, marked
 from .scatter_gap import ScatterGap, gap_with_scatter, weighed_residuals
 from .search import Choice
 
@@ -298,6 +298,8 @@ def finish(
     """The diagnosis that a choice makes. `alone`: the base model's fit with rows weighted as it has them itself, where
     they are weighted otherwise now. `last`, `held`: the gate on the best model, and on trials held out. `sure`: effects
     that are certain beside something unknown. A name that does not lead its rivals by enough is one of several."""
+    if choice is not None:
+        choice = replace(choice, rivals=marked(choice.rivals, choice.best))
     if choice is not None and verdict == "named" and (rivals := undecided(choice)):
         choice, verdict = replace(choice, alternatives=rivals), "ambiguous"
     base, held_out = settled(base), known.held_out

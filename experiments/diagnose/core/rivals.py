@@ -16,17 +16,18 @@ drop that is sensitive to a number that the others determine badly tells nothing
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from inspect import signature as arguments_of
 
 import numpy as np
 
-from experiments.diagnose.fit.evidence import Hypothesis, held_out_fit, inflation, slow_count, tempered
+from experiments.diagnose.fit.evidence import SMALL, Hypothesis, held_out_fit, inflation, slow_count, tempered
 from experiments.diagnose.fit.fitting import Fit, Linear, fit
 from experiments.diagnose.fit.gate import column_basis
 from experiments.diagnose.fit.problem import Array, Model, TrialInfo, Values
 from experiments.diagnose.noise.replicates import groups_of
 
-__all__ = ["CLOSE", "LEAD", "Predicted", "Rival", "compare", "folds_of", "predict"]
+__all__ = ["CLOSE", "LEAD", "Predicted", "Rival", "compare", "folds_of", "marked", "predict"]
 
 CLOSE = 4.0  # nats within which two effects cannot be separated
 LEAD = 10.0  # nats by which a name must lead every rival
@@ -64,6 +65,8 @@ class Rival:
     expected: float  # evidence that these trials can be expected to give between the two [nats]
     predicted: Predicted | None = None  # its cross-validation; None where there was none
     behind_left_out: float | None = None  # score of the best's cross-validation over this one's [nats]
+    is_the_same: bool = False
+    """Whether the best's form is this effect at its fitted numbers (`Form.becomes`), which explains the trials, too."""
 
     @property
     def close(self) -> bool:
@@ -88,8 +91,9 @@ class Rival:
 
     @property
     def lead(self) -> float:
-        """Nats by which the best leads this one, by the evidence or by prediction: both say much the same twice."""
-        return max(self.behind, self.behind_left_out or 0.0)
+        """Nats by which the best leads this one, by the evidence or by prediction: both say much the same twice. None
+        where the names mean the same: then forms are compared, and neither is nature's."""
+        return 0.0 if self.is_the_same else max(self.behind, self.behind_left_out or 0.0)
 
 
 def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Rival:
@@ -117,6 +121,29 @@ def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Riva
         angle=math.degrees(math.acos(float(np.clip(cosine, -1.0, 1.0)))), distance=distance,
         expected=0.5 * distance**2 / inflation(best.fit) ** 2,
     )  # fmt: skip
+
+
+def marked(rivals: Sequence[Rival], best: Hypothesis) -> tuple[Rival, ...]:
+    """With those marked that mean the same as the best, as it is fitted at last, and leave too little to matter."""
+    names = _becomes(best) if best.effects else set()
+    fits = [rival.hypothesis.fit for rival in rivals]
+    return tuple(
+        replace(rival, is_the_same=rival.effect in names and own.chi_square <= SMALL * own.count)
+        for rival, own in zip(rivals, fits, strict=True)
+    )
+
+
+def _becomes(best: Hypothesis) -> set[str]:
+    """Effects that each form of the first one is at its fitted numbers."""
+    found = best.fit
+    own = [form for form in best.forms if form.effect == best.effects[0]]
+    names = [
+        {other for other, asked in form.becomes if asked(*(
+            found.model.problem.reported(found.values, form)[name][0] for name in arguments_of(asked).parameters
+        ))}
+        for form in own
+    ]  # fmt: skip
+    return set.intersection(*names) if names else set()
 
 
 def folds_of(trials: Sequence[TrialInfo]) -> list[tuple[str, ...]]:

@@ -90,6 +90,8 @@ class Form:
     numbers: tuple[Number, ...] = ()  # of the term (tumbles) or of the law (pushes), as the effect's file declares them
     bends: tuple[Bend, ...] = ()  # what may bend it
     form_std: float = 0.0  # of the amplitude, relative: how far nature's law lets it be another number than the form's
+    becomes: tuple[tuple[str, Callable[..., bool]], ...] = ()
+    """Another effect, and whether the form is that one at these numbers (as `Problem.reported` has them, by name)."""
 
     @property
     def id(self) -> str:

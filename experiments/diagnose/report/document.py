@@ -124,7 +124,7 @@ def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:
         form = next(f for f in rival.hypothesis.forms if f.effect == rival.effect)
         rows.append({
             "effect": rival.effect, "told_apart": _told_apart(rival) and rival.effect not in found.alternatives,
-            "evidence_behind": rival.behind, "lead": rival.lead,
+            "evidence_behind": rival.behind, "lead": rival.lead, "same_meaning": rival.is_the_same,
             "left_out_behind": rival.behind_left_out,
             "left_out": None if rival.predicted is None else rival.predicted.per_sample,
             "angle_deg": rival.angle, "distance": rival.distance, "expected": rival.expected,

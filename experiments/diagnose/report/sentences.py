@@ -65,6 +65,8 @@ def sure_sentences(diagnosis: Row) -> list[str]:
     if rivals := diagnosis["equivalence"][1:]:
         near = min(rivals, key=lambda row: row.get("lead", row["evidence_behind"]))
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
+        if near.get("same_meaning"):
+            apart = "at the fitted numbers both names mean the same"
         if sure:
             sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)}, "
         sure += f"and its change of the data is {near['angle_deg']:.0f} degrees away (0: the same): {apart}"

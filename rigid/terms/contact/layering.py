@@ -21,10 +21,17 @@ def push_loading(grown, depth, layer_depth, layer_width, layer_slope, layer_step
     return force
 
 
+def reaches_surface(layer_depth, layer_width):
+    """Whether the bed changes from the surface on: a tenth of the change or more stands there. The width of an edge is
+    counted from a tenth to nine tenths, as a rise time is; a layer has undisturbed ground above its edge."""
+    return layer_depth < log(9.0) * layer_width
+
+
 def _form(name: str, slot: str, how: str, std: float, lowest: float, highest: float, starts: Starts, equation: str,
           edge: Number, width: Number) -> Form:  # fmt: skip
     first = amplitude(slot, how, std, lowest, highest)
-    return Form(name, (first, edge, width), starts, equation, redefines=("stiffness",))
+    becomes = () if name == "crust" else (("depth-hardening", reaches_surface),)
+    return Form(name, (first, edge, width), starts, equation, redefines=("stiffness",), becomes=becomes)
 
 
 def _starts(sizes: tuple[float, ...], depths: tuple[float, ...], width: float) -> Starts:

@@ -9,7 +9,7 @@ from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.core.matters import undecided
-from experiments.diagnose.core.rivals import CLOSE, compare, folds_of, predict
+from experiments.diagnose.core.rivals import CLOSE, compare, folds_of, marked, predict
 from experiments.diagnose.core.search import Choice, Search
 from experiments.diagnose.fit import gate
 from experiments.diagnose.fit.evidence import Hypothesis, excess, score, slow_count, tempered
@@ -98,6 +98,24 @@ def test_a_name_that_does_not_lead_by_ten_nats_is_one_of_several():
     for behind, left_out, sure in ((6.0, None, False), (6.0, 9.0, False), (12.0, None, True), (6.0, 11.0, True)):
         near = replace(choice, rivals=(replace(rival, behind=behind, behind_left_out=left_out),))
         assert (undecided(near) == ()) == sure
+
+
+@pytest.mark.parametrize(("depth", "width", "same"), [(0.2, 0.1, True), (0.2, 0.08, False), (0.8, 0.1, False)])
+def test_a_layer_that_begins_at_the_surface_is_hardening_however_far_it_leads(depth, width, same):
+    """A tenth of the change at the surface or more: edges nearer than ln 9 widths, in units of D."""
+    problem = make_problem(campaign_of([("0", "driven", 0.03, driven_trial(constant, speed=0.03, seed=1))]))
+    base = fit(Model(problem, Whitener.white(problem), ("0",)))
+    layer, bent = (next(form for form in problem.forms if form.id == name)
+                   for name in ("layering:slope", "depth-hardening:cubic"))  # fmt: skip
+    one, other = fit(base.model.with_forms([layer]), base.values), fit(base.model.with_forms([bent]), base.values)
+    edge = {"layering.layer_depth": math.log(depth), "layering.layer_width": math.log(width)}
+    best = Hypothesis(replace(one, values={**one.values, **edge}), score(one))
+    rival = replace(compare("depth-hardening", Hypothesis(one, score(one)), Hypothesis.of(other), base), behind=30.0)
+    little, much = replace(other, chi_square=1.1 * other.count), replace(other, chi_square=1.3 * other.count)
+    for left, is_one_of_several in ((little, same), (much, False)):
+        near = marked([replace(rival, hypothesis=replace(rival.hypothesis, fit=left))], best)
+        choice = Choice(Hypothesis.of(base), best, (), (), open_gate(base)[1], near)
+        assert bool(undecided(choice)) == is_one_of_several
 
 
 def test_each_condition_is_left_out_once_and_replicates_together():
