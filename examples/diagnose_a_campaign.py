@@ -1,4 +1,4 @@
-"""Diagnose measured pushes of a plate into sand: where the spring-damper fails, and what it lacks."""
+"""Diagnose measured pushes of a plate into sand: where the spring-damper fails, and what it omits."""
 
 import json
 import sys
@@ -14,8 +14,9 @@ diagnose.run(diagnose.Settings(campaign=str(campaign)), out)
 diagnosis = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
 print(f"verdict: {diagnosis['verdict']}")
 for effect in diagnosis["effects"]:
-    print(f"  lacks {effect['id']}, probability {effect['probability']:.2f}")
-print(f"the whole story: {out / 'report.html'}")
+    sizes = ", ".join(f"{name} = {number['value']:.3g}" for name, number in effect["parameters"].items())
+    print(f"  {effect['id']}: {sizes}")
+print(f"report: {out / 'report.html'}")
 
-assert diagnosis["verdict"] in ("none", "named", "unknown"), "one of the three verdicts"
+assert diagnosis["verdict"] in ("none", "named", "ambiguous", "unknown"), "one of the four verdicts"
 assert (out / "report.html").is_file(), "a report was written"
