@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from coupling.lammps import LammpsBed
 from dem import Bed
 from experiments.runs.progress import Progress, as_expected
 
@@ -13,9 +14,13 @@ _DOWN = 0.82  # Share of the fall at which the grains are down: what lies is 1 /
 _CALM, _REST = 4, 14  # Updates of a bed until it is cut level, and while it rests without drag: 2 to 30 were seen
 
 
-def show_bed(progress: Progress, bed: Bed) -> None:
-    """Show the number of grains, of grains awake, and of grain-steps done."""
-    progress.show_grains(grain_count=bed.grain_count, awake_count=bed.awake_count, grain_steps=bed.grain_steps)
+def show_bed(progress: Progress, bed: Bed | LammpsBed) -> None:
+    """Show the number of grains, of grains awake and slow, and of grain-steps done."""
+    sleeper = bed.sleeper if isinstance(bed, Bed) else None
+    progress.show_grains(
+        grain_count=bed.grain_count, awake_count=bed.awake_count, grain_steps=bed.grain_steps,
+        slow_count=0 if sleeper is None else sleeper.awake - sleeper.fast,
+    )  # fmt: skip
 
 
 class Stages:

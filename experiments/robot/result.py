@@ -187,6 +187,9 @@ def conclude(
             "origin": [float(number) for number in run.ground.origin],
             "beside": quantities_of(beside, heights_of(beside)), "beside_law": settings.default_law,
         }  # fmt: skip
+        if settings.sleep:
+            done, awake = (result["grains"][key] for key in ("grain_steps", "grain_steps_all_awake"))
+            sentences.append(say("slept", share=done / awake))
         warnings += [
             grains.reversal_warning(run.dissipation_reversal),
             grains.overlap_warning(bed, softening, settings.max_overlap),

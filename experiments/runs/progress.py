@@ -118,7 +118,7 @@ class Progress(AbstractContextManager["Progress"]):
         self.stage_name = ""
         self._total: float | None = None
         self._done = 0.0
-        self._bed: tuple[int, int] | None = None  # grains, those awake
+        self._bed: tuple[int, int, int] | None = None  # grains, those awake, those of them that are slow
         self._worked: deque[tuple[float, float]] = deque()  # when [s], and grain-steps until then
         self._start_reckoning({}, {}, None)
         self._pace = self._opened
@@ -176,8 +176,10 @@ class Progress(AbstractContextManager["Progress"]):
         if self._opened is not self._pace and self._opened.first is None:
             self._opened.report(now, 0.0)  # something is done within it
 
-    def show_grains(self, *, grain_count: int, awake_count: int, grain_steps: int) -> None:
+    def show_grains(self, *, grain_count: int, awake_count: int, grain_steps: int, slow_count: int = 0) -> None:
         """Say of the stage's bed how many grains it has, how many are awake, how many grain-steps it has done in all.
+
+        ``slow_count``: how many of those awake are computed once in several steps.
 
         Before `update`, which shows it; the end of the stage ends it.
         """
@@ -186,16 +188,17 @@ class Progress(AbstractContextManager["Progress"]):
             self._worked.clear()
         while len(self._worked) > 1 and now - self._worked[1][0] >= _RECENT:
             self._worked.popleft()
-        self._bed = (grain_count, awake_count)
+        self._bed = (grain_count, awake_count, slow_count)
         self._worked.append((now, float(grain_steps)))
 
     @property
     def bed_words(self) -> list[str]:
-        """The bed of the stage as it is shown: grains, the share awake, grain-steps a second; empty without one."""
+        """The bed of the stage as it is shown: grains, shares awake and slow, grain-steps a second; empty without."""
         if self._bed is None:
             return []
-        grains, awake = self._bed
+        grains, awake, slow = self._bed
         words = [f"{grains:,} grains", f"{_percent(awake / max(1, grains))} awake"]
+        words += [f"{_percent(slow / grains)} slow"] if slow else []
         (began, first), (now, last) = self._worked[0], self._worked[-1]
         if now > began:
             words.append(f"{(last - first) / (now - began) / 1e6:.3g} million grain-steps/s")

@@ -8,6 +8,7 @@ from scipy import stats
 from spatial_runs import EXAMPLES, grain_bed
 
 from experiments.compare.robots import read_moved
+from experiments.grains.bed_progress import show_bed
 from experiments.platform.law_spread import moved
 from experiments.robot import experiment as robot
 from experiments.robot.feet import heights_of
@@ -17,6 +18,7 @@ from experiments.robot.result import quantities_of, write_series_of
 from experiments.robot.settings import RobotSettings
 from experiments.robot.sure import ANSWER
 from experiments.runs.folder import RunFolder, write_series
+from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
@@ -127,6 +129,22 @@ def test_two_beds_of_grains_have_an_interval_that_holds_both(tmp_path, monkeypat
     assert forces[0] != forces[1] and min(forces) > 1.0
     assert sure["low"] <= min(forces) and max(forces) <= sure["high"]
     assert not [said for said in result.warnings if "one bed" in said]
+
+
+def test_slow_grains_of_a_bed_that_sleeps_are_shown_beside_those_awake():
+    bed, progress = grain_bed(), Progress()
+    bed.let_sleep()
+    bed.sleeper.fast = 384  # half of the 768 grains, as after a check that made the others slow
+    progress.stage("robot", total=1.0)
+    show_bed(progress, bed)
+    assert progress.bed_words == ["768 grains", "100 % awake", "50 % slow"]
+
+
+def test_a_preparation_is_expected_to_last_longer_in_less_gravity_and_a_robot_is_not_set_down():
+    """Times of similar motions of dry grains go with 1 / sqrt(g)."""
+    runs = [RobotSettings(**ON_BED, gravity=g) for g in (9.81, 0.0981)]
+    costs = [RobotOnBed(settings, plan_robot(settings)).costs for settings in runs]
+    assert costs[1]["bed"] == pytest.approx(10 * costs[0]["bed"]) and costs[0]["robot"] == costs[1]["robot"] == 0.2
 
 
 def surely(path, **given):

@@ -287,6 +287,8 @@ def test_a_bed_is_shown_by_its_grains_the_share_awake_and_its_rate(clock):
     assert progress.bed_words == ["20,789 grains", "33 % awake", "4 million grain-steps/s"]
     progress.show_grains(grain_count=10, awake_count=10, grain_steps=0)  # another bed has no rate yet
     assert progress.bed_words == ["10 grains", "100 % awake"]
+    progress.show_grains(grain_count=10, awake_count=9, grain_steps=0, slow_count=4)
+    assert progress.bed_words == ["10 grains", "90 % awake", "40 % slow"]
     progress.stage("report")
     assert progress.bed_words == []
 
