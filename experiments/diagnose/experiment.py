@@ -17,12 +17,13 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
-from vis.diagnose.usable import has_numbers_to_use
+from vis.diagnose.usable import has_numbers_to_use, secant_depth
 
 from .core.diagnosis import diagnose
 from .core.outcome import Diagnosis
 from .fit.bounds import is_strained
 from .fit.forms import OwnEffect, load_own
+from .fit.gaps import numeral
 from .fit.problem import Problem
 from .noise.colour import together
 from .report.document import write_diagnosis
@@ -101,11 +102,12 @@ run, resume = computed_run("diagnose", DiagnoseSettings, _compute, check=lambda 
 
 def _quantity(entry: Json, *, at_end: bool) -> Json:
     """A fitted number with its standard error; at the end of its range, or where it is not determined, it has none."""
-    number = {key: value for key, value in entry.items() if key != "determined"}
+    number = {key: value for key, value in entry.items() if key not in ("determined", "at_most")}
     if at_end:
         return {**number, "std": None, "note": "at the end of its range: no standard error"}
     if entry["std"] is None or not entry.get("determined", True):
-        return {**number, "std": None, "note": "these trials do not determine it: no standard error"}
+        bound = f"; at most {numeral(entry['at_most'], 2)} (95 % bound)" if "at_most" in entry else ""
+        return {**number, "std": None, "note": f"these trials do not determine it: no standard error{bound}"}
     return {**number, "note": "standard error of the fit, right if the model is and the noise is as it was found"}
 
 
@@ -136,6 +138,10 @@ def _result(found: Diagnosis, diagnosis: Json) -> Result:
         f"{effect['id']}.{name}": _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
         for effect in diagnosis["effects"] for name, entry in effect["parameters"].items()
     }  # fmt: skip
+    if (depth := secant_depth(diagnosis)) is not None:
+        for name, number in base["after"].items():
+            if name.startswith("stiffness"):
+                number["note"] = f"F / z at the depth D = {1e3 * depth:.3g} mm; {number['note']}"
     if has_numbers_to_use(diagnosis):  # these first
         quantities = base["after"] | effects | quantities | base["before"]
     else:

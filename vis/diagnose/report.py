@@ -16,7 +16,7 @@ from vis.diagnose.figures import (
     trials_of,
     worst,
 )
-from vis.diagnose.usable import has_numbers_to_use
+from vis.diagnose.usable import has_numbers_to_use, secant_depth
 from vis.page.numbers import beside, plain, short
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.report import Report, Result, again, report_of, unit_text
@@ -122,7 +122,7 @@ def _gap_table(diagnosis: Result) -> Block:
         for one in (gap, weighed) if weighed is not None else (gap,):
             cells += [_DASH if one[stage][part] is None else _number(one[stage][part]) for stage in ("before", "after")]
             error = one.get("after_std", {}).get(part)
-            cells[-1] += "" if error is None else f" ± {short(error, 1)}"
+            cells[-1] += "" if error is None else f" ± {short(error, 2)}"
         rows.append(cells)
     head: tuple[str, ...] = ("", "base model", "best model")
     title = "The gap, chi-square per sample (1: the sensors' noise)"
@@ -279,7 +279,8 @@ def _error(diagnosis: Result, entry: Result, name: str, stage: str) -> str:
     if any(bound["parameter"] == name and bound["at_bound"] for bound in diagnosis.get("at_bounds", {}).get(stage, [])):
         return "at its end"
     lost = entry["std"] is None or not entry.get("determined", True)
-    return "not determined" if lost else short(entry["std"], 2)
+    bound = f", at most {short(entry['at_most'], 2)}" if "at_most" in entry else ""
+    return f"not determined{bound}" if lost else short(entry["std"], 2)
 
 
 def _effects(diagnosis: Result) -> list[tuple[str, str, str, str, str]]:
@@ -295,8 +296,11 @@ def _to_use(diagnosis: Result) -> list[Block]:
     """The numbers of the best model in one table, where there is a K to use."""
     if not has_numbers_to_use(diagnosis):
         return []
+    depth = secant_depth(diagnosis)
+    secant = "" if depth is None else f", F / z at {1e3 * depth:.3g} mm"
     rows = [
-        (name, _value(entry), _error(diagnosis, entry, name, "after"), unit_text(entry["unit"]))
+        (name + (secant if name.startswith("stiffness") else ""), _value(entry),
+         _error(diagnosis, entry, name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["after"].items()
     ] + [(f"{effect} {name}", *numbers) for effect, name, *numbers in _effects(diagnosis)]  # fmt: skip
     return table_of(("number to use", "value", "standard error (random)", "unit"), rows, title=say("to_use"))

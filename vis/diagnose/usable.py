@@ -1,9 +1,11 @@
-"""Whether a diagnosis has a K to use, which report and sentences put first."""
+"""Whether a diagnosis has a K to use, which report and sentences put first, and to which depth that K belongs."""
 
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["has_numbers_to_use"]
+__all__ = ["has_numbers_to_use", "secant_depth"]
+
+_OF_POWER = "K * z * (z / D)^"  # how an equation begins in which K is F / z at z = D alone
 
 
 def has_numbers_to_use(diagnosis: Mapping[str, Any]) -> bool:
@@ -11,3 +13,11 @@ def has_numbers_to_use(diagnosis: Mapping[str, Any]) -> bool:
     number of the base model went far from what was stated."""
     far = any(bound["sigmas"] is not None for bound in diagnosis.get("at_bounds", {}).get("after", []))
     return diagnosis.get("kind") == "penetration" and diagnosis["verdict"] != "unknown" and not far
+
+
+def secant_depth(diagnosis: Mapping[str, Any]) -> float | None:
+    """The depth D [m] to which K is a secant, K = F / z at z = D; None where K is the same at every depth or the slope
+    at the surface."""
+    powers = any(row["equation"].startswith(_OF_POWER) for row in diagnosis.get("equations", []))
+    depth: float | None = diagnosis.get("typical_depth_m")
+    return depth if powers else None

@@ -9,7 +9,7 @@ from typing import Any, TypedDict
 import numpy as np
 
 from experiments.diagnose.fit.bounds import Bound, bounds_met
-from experiments.diagnose.fit.evidence import SMALL, held_out_fit, inflation
+from experiments.diagnose.fit.evidence import SMALL, Hypothesis, held_out_fit, inflation
 from experiments.diagnose.fit.fitting import Fit, fit, settled
 from experiments.diagnose.fit.gate import Verdict
 from experiments.diagnose.fit.localise import Place, depends_on, latent_table, places
@@ -192,9 +192,35 @@ class Diagnosis(Known):
         if self.choice is None:
             return None
         if self.verdict == "ambiguous":
-            return self.problem.planned(self.best, smallest(self.choice)[0].fit)
+            other = smallest(self.choice)[0].fit
+            return self.problem.planned(self.best, other, inflation=_inflations(self.best, other))
+        near = self._nearest_model
+        return (
+            None
+            if near is None
+            else self.problem.planned(self.best, near.fit, inflation=_inflations(self.best, near.fit))
+        )
+
+    def ordered(self, other: Hypothesis) -> tuple[str, ...]:
+        """The effects of another answer, those it has in common with this one first."""
+        return tuple(sorted(other.effects, key=lambda name: name not in self.effects))
+
+    @property
+    def _nearest_model(self) -> Hypothesis | None:
+        """The nearest rival of the whole answer, of a verdict that names something."""
         near = self._nearest
-        return None if near is None else self.problem.planned(self.best, near.hypothesis.fit)
+        return self.nearest_answer or (None if near is None else near.hypothesis)
+
+    @cached_property
+    def nearest_answer(self) -> Hypothesis | None:
+        """Where several effects are named, the likeliest other set of effects: one that has another effect than these,
+        and is not these with a further one. None of other verdicts, and where no such set was fitted."""
+        own = set(self.effects)
+        if self.choice is None or self.verdict != "named" or len(own) < 2:
+            return None
+        fitted = (*self.choice.table, *(rival.hypothesis for rival in self.choice.rivals))
+        others = [one for one in fitted if not set(one.effects) <= own and not set(one.effects) > own]
+        return max(others, key=lambda one: one.score, default=None)
 
     @property
     def _nearest(self) -> Rival | None:
@@ -228,7 +254,9 @@ class Diagnosis(Known):
         if self.choice is None:  # unknown for the readings' noise alone
             return say("measure_noise")
         if self.verdict == "named":
-            return confirmation(self.choice.best.effects[0], self.problem.kind) + self._expected
+            near = self.nearest_answer
+            doubted = [name for name in self.effects if near is not None and name not in near.effects]
+            return confirmation((*doubted, *self.choice.best.effects)[0], self.problem.kind) + self._expected
         if self.verdict == "ambiguous":
             told = self.problem.next_experiment(self.forms[0], self.rivals[0], self.best.values)
             if (plan := self.planned) is None:
@@ -244,15 +272,16 @@ class Diagnosis(Known):
     @property
     def _expected(self) -> str:
         """The best further push for a named effect, and what it and its nearest rival predict there; empty without."""
-        near, plan = self._nearest, self.planned
+        near, plan = self._nearest_model, self.planned
         if near is None or plan is None or plan.apart is None:
             return ""
-        first, apart = self.effects[0], plan.apart
+        several = len(self.effects) > 1 or len(near.effects) > 1
+        first, apart = " + ".join(self.effects) if several else self.effects[0], plan.apart
         ways = {-1.0: "on the way back", 0.0: "in the hold", 1.0: "on the way in"}
         way = ways[float(np.sign(apart["speed_m_s"]))]
-        errors = {key: f"{apart[f'{key}_N']:.3g} ± {apart[f'{key}_std_N']:.1g} N" for key in ("one", "other")}
-        return " " + say("confirming", plan=plan, first=first, rival=near.effect, depth_mm=1e3 * apart["depth_m"],
-                         way=way, **errors)  # fmt: skip
+        errors = {key: _with_error(apart[f"{key}_N"], apart[f"{key}_std_N"]) for key in ("one", "other")}
+        rival, depth_mm = " + ".join(self.ordered(near)), 1e3 * apart["depth_m"]
+        return " " + say("confirming", plan=plan, first=first, rival=rival, depth_mm=depth_mm, way=way, **errors)
 
     def base_parameters(self, one: Fit) -> dict[str, Estimated]:
         """The base model's shared numbers in one of the fits: name -> value, std (standard error; None where data and
@@ -283,6 +312,16 @@ class Diagnosis(Known):
                 std = _error(self.best, covariance, slopes[name], loose.get(name, 0.0) * value)
                 found[name] = {"value": float(value), "std": std, "unit": unit}
         return found
+
+
+def _inflations(one: Fit, other: Fit) -> tuple[float, float]:
+    """Factors on the errors of two models for what each leaves beyond noise."""
+    return inflation(one), inflation(other)
+
+
+def _with_error(force: float, std: float) -> str:
+    """0.112 ± 0.008 N; a force that the model gives exactly has no error."""
+    return f"{force:.3g} ± {std:.2g} N" if std > 0 else f"{force:.3g} N"
 
 
 def _error(found: Fit, covariance: Array, slope: Array, more: float = 0.0) -> float | None:

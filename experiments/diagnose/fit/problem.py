@@ -155,8 +155,8 @@ class Estimate(Protocol):
     def free(self) -> NDArray[np.bool_]:
         """Which of them no bound holds, shape [p]."""
 
-    def covariance(self) -> Array:
-        """Of the numbers, in their units, shape [p, p]."""
+    def covariance(self, *, inflation: float = 1.0) -> Array:
+        """Of the numbers, in their units, shape [p, p]; `inflation`: by how much the data are noisier than stated."""
 
 
 @dataclass(frozen=True)
@@ -295,6 +295,14 @@ class Problem(Protocol):
         """What `trials` show of the base model's numbers, a sentence each; `is_open`: whether one is undetermined."""
         return ()
 
+    def typical_depth(self) -> float | None:
+        """D of the equations of pushes and drops [m]; None of tumbles."""
+        return None
+
+    def at_most(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> Mapping[str, float]:
+        """Upper bounds of base parameters that trials leave open: name -> bound, in its unit."""
+        return {}
+
     def undetermined(
         self, values: Values, forms: Sequence[Form], trials: Sequence[str], errors: Mapping[str, float | None]
     ) -> Sequence[str]:
@@ -315,8 +323,9 @@ class Problem(Protocol):
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """One sentence: the trial or bench measurement that would distinguish the two."""
 
-    def planned(self, one: Estimate, other: Estimate) -> Planned | None:
-        """The further trial that would separate two fitted models best; None where none is searched."""
+    def planned(self, one: Estimate, other: Estimate, *, inflation: tuple[float, float] = (1.0, 1.0)) -> Planned | None:
+        """The further trial that would separate two fitted models best; None where none is searched. `inflation`:
+        factors on the standard errors of each, for what it leaves beyond noise."""
         return None
 
 

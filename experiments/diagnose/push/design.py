@@ -25,8 +25,8 @@ _ROWS = 200  # of a planned push
 
 
 def best_push(
-    one: Estimate, other: Estimate, predict: Predict, *, diameters: Sequence[float], speeds: Sequence[float],
-    depth: float, std: float, rows: int,
+    one: Estimate, other: Estimate, predict: Predict, *, inflation: tuple[float, float], diameters: Sequence[float],
+    speeds: Sequence[float], depth: float, std: float, rows: int,
 ) -> Planned:  # fmt: skip
     """The push that separates two fitted models best.
 
@@ -34,6 +34,7 @@ def best_push(
         one: a fitted model.
         other: the other one.
         predict: forces of pushes.
+        inflation: factors on the standard errors of each model, for what it leaves of the campaign beyond noise.
         diameters: those of the campaign [m].
         speeds: those of the campaign [m/s].
         depth: its deepest [m].
@@ -47,8 +48,8 @@ def best_push(
         time, z, v = _path(speed, part * depth, hold, returns)
         d, noise = np.zeros(len(time)), np.eye(len(time))
         forces: list[tuple[Array, Array]] = []
-        for sign, fit in ((1.0, one), (-1.0, other)):
-            force, errors = _predicted(fit, predict, diameter, time, z, v)
+        for sign, fit, factor in ((1.0, one, inflation[0]), (-1.0, other, inflation[1])):
+            force, errors = _predicted(fit, predict, factor, diameter, time, z, v)
             forces.append((force, np.linalg.norm(errors, axis=1)))
             weight = np.sqrt(rows / _ROWS) / std
             d += sign * weight * force
@@ -94,7 +95,7 @@ def _path(speed: float, depth: float, hold: float, returns: bool) -> tuple[Array
 
 
 def _predicted(
-    fit: Estimate, predict: Predict, diameter: float, time: Array, z: Array, v: Array
+    fit: Estimate, predict: Predict, inflation: float, diameter: float, time: Array, z: Array, v: Array
 ) -> tuple[Array, Array]:
     """Forces [N] and a factor of the covariance of their errors, shape [n, p]."""
     model = fit.model
@@ -107,6 +108,6 @@ def _predicted(
         points.append(({**fit.values, p.name: fit.values[p.name] + steps[-1]}, model.forms))
     forces = predict(points, diameter, time, z, v)
     slopes = (forces[1:] - forces[0]).T / np.array(steps)
-    covariance = fit.covariance()[np.ix_(shared, shared)]
+    covariance = fit.covariance(inflation=inflation)[np.ix_(shared, shared)]
     size, axes = np.linalg.eigh(covariance)
     return forces[0], slopes @ (axes * np.sqrt(np.maximum(size, 0.0)))

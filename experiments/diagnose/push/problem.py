@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, write_model
 from experiments.diagnose.core.effect_texts import push_advice
 from experiments.diagnose.fit.forms import PENETRATION_HOOKS, OwnEffect, shapes_of
+from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.localise import acceleration
 from experiments.diagnose.fit.problem import (
     Array,
@@ -42,7 +43,7 @@ from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
 from .model_file import Pairs, model_of
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, scatter_parameters, speeds_of
-from .remarks import SURE, Push, contradict, facts
+from .remarks import SURE, Push, contradict, facts, highest_damping
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
@@ -74,7 +75,6 @@ class PenetrationProblem(Problem):
     lone_scatter = (("bed", "depth zero"), ("bed", "bed damping"), ("force zero",))  # K may differ, and not C
     own_base = "diameter_m"
     special_scatter = ("depth zero", "force zero")
-    how_to_determine = "To determine C: drop the tip, or push at a tenth and at ten times the speed."
 
     def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> None:
         tables = campaign.tables
@@ -109,6 +109,12 @@ class PenetrationProblem(Problem):
         parts += [(t.info.condition, len(t.time), round(float(t.time[-1]), 3)) for t in prepared]
         self.design = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
         speeds = np.array([s for trial in prepared for s in speeds_of(trial)])
+        if pushed := [max(float(speeds_of(trial)[1]), 1e-6) for trial in prepared if trial.driven]:
+            slow, fast = numeral(100 * min(pushed), 2), numeral(1e4 * max(pushed), 2)
+            self.how_to_determine = (
+                f"To determine C: drop the tip, or push at {slow} and at {fast} mm/s "
+                "(a tenth of the slowest and ten times the fastest speed)."
+            )
         differ = speeds.max() > 1.05 * max(speeds.min(), 1e-12)
         self.forms = push_forms(
             retreats=comes_back(prepared), speeds_differ=bool(differ), drops=bool(self.rough), own=own
@@ -436,6 +442,17 @@ class PenetrationProblem(Problem):
         added = tuple(dict.fromkeys(form.effect for form in forms))
         return facts(self._pushes(values, forms, trials), added, is_open=is_open)
 
+    def typical_depth(self) -> float:
+        """See `Problem`."""
+        return self._scales.depth
+
+    def at_most(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> dict[str, float]:
+        """See `Problem`: C of each diameter, by its fastest pushes (`highest_damping`)."""
+        pushes = self._pushes(values, forms, trials)
+        sizes = {diameter: [push for push in pushes if push.diameter == diameter] for diameter in self._diameters}
+        return {named("damping", diameter, self._diameters): bound for diameter, own in sizes.items()
+                if (bound := highest_damping(own)) is not None}  # fmt: skip
+
     def undetermined(
         self, values: Values, forms: Sequence[Form], trials: Sequence[str], errors: Mapping[str, float | None]
     ) -> tuple[str, ...]:
@@ -465,7 +482,7 @@ class PenetrationProblem(Problem):
         """See `Problem`."""
         return push_advice(first.effect, second.effect)
 
-    def planned(self, one: Estimate, other: Estimate) -> Planned | None:
+    def planned(self, one: Estimate, other: Estimate, *, inflation: tuple[float, float] = (1.0, 1.0)) -> Planned | None:
         """See `Problem`; None where no push was driven."""
         driven = [trial for trial in self._trials.values() if trial.driven]
         if not driven:
@@ -479,7 +496,7 @@ class PenetrationProblem(Problem):
             return self._run_each(points, [replace(like, time=time, smooth=SmoothDepth(z, v, none, none))])[0]
 
         return best_push(
-            one, other, predict, diameters=sorted({trial.diameter for trial in driven}),
+            one, other, predict, inflation=inflation, diameters=sorted({trial.diameter for trial in driven}),
             speeds=[max(float(speeds_of(trial)[1]), 1e-6) for trial in driven], std=stds(self.tables, True)[1],
             depth=max(float(trial.path.depth.max()) for trial in driven),
             rows=int(np.median([trial.has_other.sum() for trial in driven])),

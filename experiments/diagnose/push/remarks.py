@@ -1,15 +1,18 @@
 """Facts of driven trials: K and its spread, how it depends on the diameter, whether C can be determined."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array
 
-__all__ = ["Push", "SURE", "contradict", "facts"]
+__all__ = ["Push", "SURE", "contradict", "facts", "highest_damping"]
 
+_FAST = 0.8  # of the largest speed from which on a push is one of the fastest
 SURE = 2.0  # standard errors from which on a C is sure
 
 
@@ -47,6 +50,22 @@ def contradict(pushes: Sequence[Push], added: Sequence[str]) -> bool:
     negative in another. A straight spring in the place of a bent one would give C what the bend does."""
     straight, bent = _each(pushes, added)
     return len({c > 0 for _, c, s in bent or straight if abs(c) >= SURE * s}) > 1
+
+
+def highest_damping(pushes: Sequence[Push]) -> float | None:
+    """Upper bound of C [N s/m], one-sided 95 %, by the fastest pushes: C of each with the best model's spring, whose
+    factor is free, is one measurement (Student's t of their mean). Of a single push its standard error counts. None
+    where no push moves in."""
+    fast = [float(np.percentile(np.maximum(push.speed, 0.0), 90)) for push in pushes]
+    if not fast or max(fast) <= 0:
+        return None
+    own = [_two(push, lambda p: p.spring) for push, pace in zip(pushes, fast, strict=True) if pace > _FAST * max(fast)]
+    found = np.array([c for _, c, _ in own])
+    error, times = own[0][2], float(student.ppf(0.95, np.inf))
+    if len(own) > 1:
+        error = max(float(np.std(found, ddof=1)), *(s for _, _, s in own)) / math.sqrt(len(own))
+        times = float(student.ppf(0.95, len(own) - 1))
+    return max(float(found.mean()) + times * error, 0.0)
 
 
 _Fitted = list[tuple[float, float, float]]

@@ -70,7 +70,13 @@ def document(found: Diagnosis) -> dict[str, Any]:
         }
     diagnosis["kind"] = found.problem.kind
     if count := COUNTS.get(found.problem.counted_as):
-        diagnosis["counted"] = {"of": found.problem.counted_as, **count}
+        pairs = COUNTS["pairs"][found.problem.counted_as]
+        diagnosis["counted"] = {"of": found.problem.counted_as, "seed": COUNTS["seed"], **count, "pairs": pairs}
+    if (depth := found.problem.typical_depth()) is not None:
+        diagnosis["typical_depth_m"] = depth
+    if (near_answer := found.nearest_answer) is not None and found.choice is not None:
+        behind = found.choice.best.score - near_answer.score
+        diagnosis["nearest_answer"] = {"effects": list(found.ordered(near_answer)), "evidence_behind": behind}
     diagnosis["base"] = {"before": _base(found, found.base), "after": _base(found, found.best)}
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
     diagnosis["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
@@ -109,8 +115,16 @@ def _numbers(found: Mapping[str, Estimated]) -> dict[str, Any]:
 
 def _base(found: Diagnosis, one: Fit) -> dict[str, Any]:
     """The base model's numbers in one of the fits; what the trials leave open has no standard error."""
-    return {name: {**told, "std": None} if name in found.undetermined else dict(told)
-            for name, told in found.base_parameters(one).items()}  # fmt: skip
+    numbers: dict[str, Any] = {
+        name: {**told, "std": None} if name in found.undetermined else dict(told)
+        for name, told in found.base_parameters(one).items()
+    }
+    if one is found.best and found.undetermined:
+        bounds = found.problem.at_most(found.best.values, found.forms, (*found.fitted, *found.held_out))
+        for name in found.undetermined:
+            if name in numbers and name in bounds:
+                numbers[name]["at_most"] = bounds[name]
+    return numbers
 
 
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:

@@ -62,7 +62,11 @@ def sure_sentences(diagnosis: Row) -> list[str]:
         parts.append(f"on held-out trials it changes the gap from {numeral(before)} to {numeral(after)} "
                      "(1 is noise)")  # fmt: skip
     sure = f"Confidence: {'; '.join(parts)}" if parts else ""
-    if rivals := diagnosis["equivalence"][1:]:
+    if answer := diagnosis.get("nearest_answer"):
+        sure += say(
+            "nearest_answer", names=" + ".join(answer["effects"]), behind=answer["evidence_behind"], needed=LEAD
+        )
+    elif rivals := diagnosis["equivalence"][1:]:
         near = min(rivals, key=lambda row: row.get("lead", row["evidence_behind"]))
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         if near.get("same_meaning"):
@@ -80,8 +84,17 @@ def _how_often(diagnosis: Row) -> list[str]:
     if diagnosis["verdict"] != "named" or counted is None:
         return []
     named, right = counted["named"], counted["right"]
-    least = 100 * float(beta.ppf(1 - _BOUND, right, named - right + 1))
-    return [say("how_often", of=say(f"of_{counted['of']}"), named=named, right=right, least=least)]
+    of = say(f"of_{counted['of']}")
+    if len(diagnosis["effects"]) > 1:
+        pairs = counted.get("pairs")
+        return [] if pairs is None else [say("how_often_pairs", of=of, pairs=pairs, least=_least(pairs))]
+    return [say("how_often", of=of, named=named, right=right, least=_least(counted))]
+
+
+def _least(counted: Row) -> float:
+    """The lower bound of a rate [%] of which `right` of `named` were counted."""
+    right, named = counted["right"], counted["named"]
+    return 100 * float(beta.ppf(1 - _BOUND, right, named - right + 1))
 
 
 _SPREAD_UNITS = {

@@ -169,7 +169,7 @@ def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -
 
     def written(key: str) -> str:
         error = errors.get(key)
-        return numeral(gap[key] or 0.0) if error is None else f"{gap[key]:.2f} ± {error:.1g}"
+        return numeral(gap[key] or 0.0) if error is None else f"{gap[key]:.2f} ± {error:.2g}"
 
     out = "" if gap["held_out"] is None else f" ({written('held_out')} held out)"
     return f"{written('fit')} fitted{out}"

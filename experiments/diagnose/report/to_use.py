@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from vis.diagnose.usable import has_numbers_to_use
+from experiments.diagnose.fit.gaps import numeral
+from vis.diagnose.usable import has_numbers_to_use, secant_depth
 
 from .sentences import say
 
@@ -26,13 +27,24 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     beside = f", together with {names} as in model.toml" if names else ""
     each = say("one_k_each") if len(stiffnesses) > 1 else ""
     is_open = [name for name, entry in after.items() if name.startswith("damping") and entry["std"] is None]
-    return [say("use", numbers=", ".join(shown), beside=beside, each=each) + (say("c_is_open") if is_open else "")]
+    depth = secant_depth(diagnosis)
+    secant, of_depth = ("", "") if depth is None else (say("secant", depth_mm=1e3 * depth), say("of_depth"))
+    sentence = say("use", numbers=", ".join(shown), secant=secant, beside=beside, each=each, of_depth=of_depth)
+    bounds = "".join(_bound(name, after[name]["at_most"]) for name in is_open[:_SHOWN] if "at_most" in after[name])
+    return [sentence + (say("c_is_open", bounds=bounds) if is_open else "")]
+
+
+def _bound(name: str, bound: float) -> str:
+    """; it is at most 1.2 N s/m at 60 mm"""
+    return say("c_at_most", at_most=numeral(bound, 2), at=_at(name))
 
 
 def _words(name: str, entry: Mapping[str, Any]) -> str:
     """K = 5932 ± 7.2 N/m at 60 mm"""
-    _, _, diameter = name.partition("@")
     error = "" if entry["std"] is None else f" ± {entry['std']:.2g}"
-    return f"K = {entry['value']:.4g}{error} {entry['unit']}" + (
-        f" at {1e3 * float(diameter):g} mm" if diameter else ""
-    )
+    return f"K = {entry['value']:.4g}{error} {entry['unit']}{_at(name)}"
+
+
+def _at(name: str) -> str:
+    _, _, diameter = name.partition("@")
+    return f" at {1e3 * float(diameter):g} mm" if diameter else ""

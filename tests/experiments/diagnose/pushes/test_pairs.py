@@ -3,14 +3,18 @@
 from types import SimpleNamespace
 
 import pytest
+from golden import golden
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
 
 from experiments.diagnose.core import matters
 from experiments.diagnose.core.deciding import Gap
+from experiments.diagnose.core.outcome import Diagnosis
 from experiments.diagnose.core.search import Search
 from experiments.diagnose.fit.evidence import excess
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
 from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.report.document import COUNTS
+from experiments.diagnose.report.sentences import sure_sentences
 
 
 def layer_and_crater(z, v, top):
@@ -55,3 +59,29 @@ def test_a_second_name_stands_where_what_it_explains_matters_and_it_leads(monkey
     other = SimpleNamespace(effects=("bearing-drag", "com-offset"), fit="other", score=rival)
     choice = SimpleNamespace(best=best, table=(first, best, other))
     assert matters._calls_for_both(choice, first, ("004",), {}) is calls
+
+
+def test_the_nearest_answer_to_a_pair_has_another_name_in_it_and_is_no_longer_set():
+    def one(score, *effects):
+        return SimpleNamespace(effects=effects, score=score)
+
+    own = ("plastic-sinkage", "depth-hardening")
+    near = one(34.0, "layering", "plastic-sinkage")
+    table = (one(54.0, *own), one(53.0, *own, "adhesion"), one(50.0, "plastic-sinkage"), near, one(18.0, "adhesion"))
+    found = SimpleNamespace(effects=own, verdict="named", choice=SimpleNamespace(table=table, rivals=()))
+    assert Diagnosis.nearest_answer.func(found) is near
+    assert Diagnosis.ordered(found, near) == ("plastic-sinkage", "layering")
+    one_name = SimpleNamespace(effects=own[:1], verdict="named", choice=found.choice)
+    assert Diagnosis.nearest_answer.func(one_name) is None
+
+
+def test_a_pair_is_said_with_the_count_of_pairs_and_the_nearest_whole_answer():
+    gap = {"held_out": 1.1}
+    said = {
+        "verdict": "named", "effects": [{"id": "plastic-sinkage"}, {"id": "depth-hardening"}], "equivalence": [],
+        "evidence": [{"effects": ["plastic-sinkage", "depth-hardening"], "score": 54.0}], "sizes": [],
+        "gap": {"before": {"held_out": 1200.0}, "after": gap},
+        "nearest_answer": {"effects": ["plastic-sinkage", "layering"], "evidence_behind": 20.1},
+        "counted": {"of": "pushes", "seed": 981, "named": 15, "right": 15, "pairs": COUNTS["pairs"]["pushes"]},
+    }  # fmt: skip
+    golden("diagnose/sure_of_a_pair", sure_sentences(said)[2:])

@@ -14,7 +14,7 @@ from experiments.campaign import Recording, read_campaign
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose.experiment import diagnose_campaign, run
-from experiments.diagnose.push.remarks import Push, contradict
+from experiments.diagnose.push.remarks import Push, contradict, highest_damping
 from experiments.diagnose.report.document import COUNTS, document
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
@@ -235,3 +235,40 @@ def test_how_often_a_name_is_right_is_what_the_kept_count_has(name, of):
     right = [row for row in named if row["outside"] is None and set(row["effects"]) == set(row["truth"])]
     assert COUNTS[of] == {"named": len(named), "right": len(right)}
     assert {row["case"]["seed"] // 1000 for row in rows} == {COUNTS["seed"]}
+
+
+@pytest.mark.parametrize(("kind", "of"), [("push", "pushes"), ("rig", "rig"), ("tumble", "tumbles")])
+def test_how_often_two_names_are_right_is_what_the_kept_counts_have(kind, of):
+    counted, rows = COUNTS["pairs"][of], []
+    for seed in counted["seeds"]:
+        path = Path(__file__).parents[4] / "docs" / "results" / "diagnose-second" / f"{kind}-{seed}" / "cases.jsonl"
+        rows += [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    named = [row for row in rows if row["verdict"] == "named" and len(row["effects"]) > 1]
+    right = [row for row in named if row["outside"] is None and set(row["effects"]) == set(row["truth"])]
+    hidden = [row for row in rows if row["outside"] is None and len(row["truth"]) > 1]
+    found = {"named": len(named), "right": len(right), "hidden": len(hidden)}
+    assert counted == {"seeds": counted["seeds"]} | found
+
+
+def test_a_k_of_a_power_of_depth_is_said_with_the_depth_it_belongs_to(result):
+    _, said, folder = result
+    (sentence,) = use_sentences(said)
+    assert said["typical_depth_m"] == pytest.approx(0.0075, rel=0.01)
+    assert "= 7.5 mm" in sentence and "at 7.5 mm" in (folder / "report.html").read_text(encoding="utf-8")
+    straight = said | {"equations": []}
+    assert "secant" not in use_sentences(straight)[0]
+
+
+def test_the_highest_c_is_a_bound_that_holds_the_true_one_in_nine_of_ten_cases():
+    """F = k 900 z + C v with k scattered by 1.5 %: 95 % of bounds hold C."""
+    random, depth = np.random.default_rng(5), np.linspace(0.0, 0.02, 100)
+    bounds = []
+    for _ in range(100):
+        pushes = []
+        for speed in (0.005, 0.08, 0.08, 0.08):
+            spring, rate = 900.0 * depth, np.full(100, speed)
+            force = (1 + 0.015 * random.standard_normal()) * spring + 0.5 * rate + 0.03 * random.standard_normal(100)
+            pushes.append(Push(0.012, depth, rate, force, spring))
+        bounds.append(highest_damping(pushes))
+    assert np.mean(np.array(bounds) > 0.5) > 0.89 and np.median(bounds) < 1.0
+    assert highest_damping([]) is None
