@@ -220,8 +220,11 @@ class MujocoRobot:
 
     @property
     def twist(self) -> Twist:
-        """Of its feet, half a lag after the pose."""
-        return self._twist
+        """Of its feet, half a lag after the pose: by the ground's last force and by all its other forces."""
+        half = 0.5 * self._lag
+        return Twist(
+            self._twist.velocity + half * self._speeding.velocity, self._twist.spin + half * self._speeding.spin
+        )
 
     def twist_now(self, lag: float) -> Twist:
         """Of its feet at the time of the pose."""
@@ -237,6 +240,7 @@ class MujocoRobot:
             if not self._step:
                 self._mujoco.mj_forward(self.model, self.data)
                 self._own = np.array(self.data.qacc)
+                self._speeding = self._twist_of(self._own)
                 self.data.qvel[:] = self._rates - 0.5 * step * self._own
             self._step = step
 
@@ -315,7 +319,7 @@ class MujocoRobot:
         self._own = data.qacc - by_ground
         self._read_works()
         self._rates = data.qvel + 0.5 * self._step * data.qacc + 0.5 * self._lag * by_ground
-        self._twist = self._twist_of(self._rates)
+        self._twist, self._speeding = self._twist_of(self._rates), self._twist_of(self._own)
 
     def response(self, rows: Vector) -> Vector:
         """M^-1 J^T of wrenches on the feet [N, N m], shape (foot, 6): accelerations [m/s2, rad/s2], shape (nv,)."""
@@ -343,7 +347,8 @@ class MujocoRobot:
 
     def _read_pose(self) -> None:
         self._pose = self._end = self._pose_now()
-        self._twist = self._twist_of(self._rates)
+        # With the ground's last force alone half a lag after the pose; and the acceleration by all other forces.
+        self._twist, self._speeding = self._twist_of(self._rates), self._twist_of(self._own)
 
     def _pose_now(self) -> Pose:
         return Pose(self.data.xipos[self._bodies].ravel(), self.data.xquat[self._bodies].ravel())

@@ -102,7 +102,10 @@ class Experiment:
         """Raise ValueError for settings that cannot be run, before any work."""
         check: Callable[[BaseModel], None] | None = getattr(import_module(self.module), "check", None)
         if check is not None:
-            check(settings)
+            try:
+                check(settings)
+            except RuntimeError as error:  # a short trial that fails
+                raise ValueError(f"with these settings a short trial fails: {error}") from error
 
 
 def _read() -> dict[str, Experiment]:

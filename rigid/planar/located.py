@@ -124,9 +124,7 @@ class _Motion:
         step = self._attempt(h)
         if not math.isfinite(step.error):
             if h < 1e-12:
-                raise RuntimeError(
-                    f"the motion is no longer finite at t = {self.time:.6g} s: {system.trial.describe()}"
-                )
+                raise RuntimeError(f"the motion is no longer finite at t = {self.time:.6g} s")
             self.h, went.rejected = 0.1 * h, went.rejected + 1
             return
         if step.error > 1 and h > _SHORTEST:

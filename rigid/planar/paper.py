@@ -60,7 +60,7 @@ def integrate_fixed(
         z[WORK] += time_step * (rate[WORK] / turning * mean if turning else system.s.torque * mean)
         z[LOST] += time_step * rate[LOST]
         if not all(map(math.isfinite, z)):
-            raise RuntimeError(f"the motion is no longer finite at t = {time:.6g} s: {trial.describe()}")
+            raise RuntimeError(f"the motion is no longer finite at t = {time:.6g} s")
         rate = _read_modes(system, time, z, modes, before, speeds)
         if modes.state != transitions[-1][1]:
             transitions.append((time, modes.state, z[THETA]))

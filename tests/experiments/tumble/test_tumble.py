@@ -514,6 +514,7 @@ def test_a_term_of_ones_own_runs_from_a_file_beside_the_model():
          ["time_step = 0.001 s", "'wire-compliance', stiffness = 1e+07", "'located'"]),
         (["--ground", "power", "--ground-parameters", "stiffness=1e12", "--method", "paper"],
          ["ground = 'power', stiffness = 1e+12"]),
+        (["--method", "paper", "--wheel-inertia", "1e-6", "--torque", "1e300"], ["short trial", "finite at t"]),
         (["--sample-interval", "0.01"], ["--sample-interval = 0.01", "[s]"]),
         (["--duration", "0"], ["--duration = 0"]),
         (["--spike-lenght", "0.2"], ["--spike-lenght", "--spike-length"]),
