@@ -151,6 +151,10 @@ def _result(found: Diagnosis, diagnosis: Json) -> Result:
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
     sentences += spread_sentences(found.model_std, granular=found.problem.granular)
     warnings = [finding.what for finding in said_once(found.findings)]
+    if not found.problem.covered.get("withdrawal", True):
+        warnings.append(
+            "no push was withdrawn: the model was fitted to the way in only, and knows nothing of the way out"
+        )
     beside = "beside the effects named it means another thing"
     if is_strained(found.best):
         unknown = found.verdict == "unknown"

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from coupling import Penetration
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.files import MODEL_COPY, keep_model
-from experiments.campaign.tables import BASE_NOTE, EffectTable
+from experiments.campaign.tables import BASE_NOTE, RANGE_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, given_way, push, slot_places, slot_table
@@ -48,6 +48,8 @@ _POWERS = {"area": 2, "drag": 2, "perimeter": 1, "viscous": 1}
 """With which power of the diameter a number goes, by how it enters the law."""
 _SPEED = 1.1
 """Factor beyond the speeds that a model was fitted to from which on it is extrapolated."""
+_DEEPER = 1.02
+"""Factor beyond the deepest depth of a fit, which is a reading with noise, from which on it is extrapolated."""
 _CREEP = 1e-4
 """Below this share of a set-down's lowering speed the direction of the motion is not certain."""
 
@@ -193,18 +195,35 @@ class AmendedLaw:
         drops = (*own.drop_speeds, *own.other_drop_speeds)
         if drops and spike.mass is not None and not math.isclose(spike.mass, own.mass, rel_tol=1e-3):
             said.append(say("other_mass", spike=spike, own=own))
+        said += self._beyond()
         driven, dropped, by_hand = self._speeds
         if by_hand or not (driven or dropped):
             return said
         # A drop has every speed below its own.
         least, most = 0.0 if dropped else min(driven), max(driven + dropped)
-        pushes = {*own.speeds, *own.other_speeds, *([own.retreat_speed] if own.speeds or own.other_speeds else [])}
-        far = sorted(v for v in pushes | {*drops} if not least / _SPEED <= v <= most * _SPEED)
-        if far:
+        pushes = {*own.speeds, *own.other_speeds}
+
+        def is_far(speed: float) -> bool:
+            return not least / _SPEED <= speed <= most * _SPEED
+
+        if far := sorted(v for v in pushes | {*drops} if is_far(v)):
             said.append(say("extrapolated", s=self, far=", ".join(f"{v:g}" for v in far)))
+        if pushes and is_far(own.retreat_speed):
+            said.append(say("extrapolated_retreat", s=self, speed=own.retreat_speed))
         if drops and not dropped:
             said.append("the model was fitted to pushes alone: its results for drops are extrapolated")
         return said
+
+    def _beyond(self) -> list[str]:
+        """That the pushes go deeper than those of the fit, or come out where none of these did."""
+        own, covered = self.settings, self.model.notes.get(RANGE_NOTE)
+        if not isinstance(covered, Mapping) or not (own.speeds or own.other_speeds):
+            return []
+        deepest = float(covered.get("depth_m", math.inf))
+        said = (
+            [say("deeper", deepest_mm=1e3 * deepest, own_mm=1e3 * own.depth)] if own.depth > _DEEPER * deepest else []
+        )
+        return said + ([] if covered.get("withdrawal", True) else [say("way_out_unseen")])
 
     @property
     def fitted_to(self) -> str:
@@ -366,16 +385,17 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             folder.write_series(f"{unit.id}.amended", runs[unit.id].columns())
             progress.update(done)
         (stiffness, damping), (plain_stiffness, plain_damping) = law.pair, law.pair_without_effects
+        under = f"of the set-down: depth at rest under the load of {settings.weight:.3g} N"
         beside = f"with {law.words}" if law.effects else "without effects"
         of_plain = "of the spring-damper fitted without effects" if law.has_base else say("no_base_fit")
-        found: dict[str, tuple[float | None, str, str]] = {
+        found: dict[str, tuple[float | None, str, str]] = _peaks(settings, units, plain, runs, law) | {
             "stiffness": (stiffness, "N/m", f"of the model {beside}"),
             "damping": (damping, "N s/m", f"of the model {beside}"),
             "stiffness_spring_damper": (plain_stiffness, "N/m", of_plain),
             "damping_spring_damper": (plain_damping, "N s/m", of_plain),
             "load": (settings.weight, "N", "on the spike, set down and dropped"),
-            "sinkage_spring_damper": (_rest(units, plain), "m", "depth at rest under the load"),
-            "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
+            "sinkage_spring_damper": (_rest(units, plain), "m", under),
+            "sinkage_amended": (_rest(units, runs), "m", f"{under}, with {law.words}"),
             "work_returned_spring_damper": (_returned(units, plain), "1", "work out over work in, driven"),
             "work_returned_amended": (_returned(units, runs), "1", f"the same with {law.words}"),
         }
@@ -419,6 +439,20 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
 def _amended(run: Penetration) -> Json:
     """The numbers of a run on the law, by their names in result.json."""
     return {f"amended_{name}": value for name, value in run.quantities().items()}
+
+
+def _peaks(
+    settings: PenetrateSettings, units: Sequence[Unit], plain: Runs, runs: Runs, law: AmendedLaw
+) -> dict[str, tuple[float | None, str, str]]:
+    """Peak forces [N] of the pushes on the spring-damper and on the law, for each speed where there are several."""
+    driven = [unit for unit in units if unit.kind == "driven"]
+    found: dict[str, tuple[float | None, str, str]] = {}
+    for unit in driven:
+        at = f"@{unit.speed:g}" if len(driven) > 1 else ""
+        path = f"push to {1e3 * settings.depth:.3g} mm at {1e3 * unit.speed:.3g} mm/s"
+        for name, whose, made in (("amended", f", with {law.words}", runs), ("spring_damper", "", plain)):
+            found[f"peak_force_{name}{at}"] = (made[unit.id].peak_force, "N", f"{path}{whose}")
+    return found
 
 
 def _rest(units: Sequence[Unit], runs: Runs) -> float | None:

@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,6 +205,9 @@ class Problem(Protocol):
     """Kinds that are asked for by themselves where the others do not explain what is left."""
     force_scatter: tuple[str, ...] = ()  # and after these; they count where they explain all
     how_to_determine: str = ""  # one sentence: the trial that would determine what is `undetermined`
+    typical_depth: float | None = None  # D of the equations of pushes and drops [m]; None of tumbles
+    covered: Mapping[str, Any] = MappingProxyType({})
+    """What pushes cover: greatest depth, speeds and whether one came out again; empty where there are none."""
     own_base: str = ""  # the setting each value of which has base parameters of its own
     lone_scatter: tuple[tuple[str, ...], ...] = ()
     """What is asked for, one after the other, where no trial repeats another (`lone_beds`)."""
@@ -294,10 +297,6 @@ class Problem(Protocol):
     def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str], *, is_open: bool) -> Sequence[str]:
         """What `trials` show of the base model's numbers, a sentence each; `is_open`: whether one is undetermined."""
         return ()
-
-    def typical_depth(self) -> float | None:
-        """D of the equations of pushes and drops [m]; None of tumbles."""
-        return None
 
     def at_most(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> Mapping[str, float]:
         """Upper bounds of base parameters that trials leave open: name -> bound, in its unit."""

@@ -22,7 +22,7 @@ from experiments.grains.spells import spells
 from .depth import SmoothDepth, smooth_depth
 from .drive import Holds, Weights
 
-__all__ = ["Prepared", "prepare", "stds", "tip_depth"]
+__all__ = ["Prepared", "of_drop", "prepare", "stds", "tip_depth"]
 
 _FEWEST = 12  # rows that a trial must have to be used
 _AROUND = 20  # rows on either side of a gap that show whether the clock has jumped
@@ -443,3 +443,9 @@ def tip_depth(spike: SpikeTable, diameter: float) -> float:
         assert spike.cone_angle is not None  # the tables see to it
         return 0.5 * diameter / math.tan(math.radians(spike.cone_angle) / 2)
     return 1e-4 * diameter
+
+
+def of_drop(trial: Prepared, depth: Array, acceleration: Array, tables: PenetrationCampaign) -> Array:
+    """Columns of all rows as samples, over the stated noise."""
+    std_depth, std_other = stds(tables, False)
+    return np.concatenate([depth[trial.has_depth] / std_depth, acceleration[trial.has_other] / std_other])

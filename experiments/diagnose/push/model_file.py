@@ -4,27 +4,46 @@ from collections.abc import Sequence
 from typing import Any
 
 from experiments.campaign import EffectTable, PenetrationCampaign, PenetrationModel
-from experiments.campaign.tables import BASE_NOTE
+from experiments.campaign.tables import BASE_NOTE, RANGE_NOTE
 
-__all__ = ["Pairs", "model_of"]
+from .data import Prepared
+from .parameters import comes_back, speeds_of
+
+__all__ = ["Pairs", "model_of", "range_of"]
 
 Pairs = dict[str, dict[str, float]]
 """Diameter [m] as text -> ``stiffness`` [N/m] and ``damping`` [N s/m]."""
 
 
 def model_of(
-    tables: PenetrationCampaign, middle: float, pairs: Pairs, plain: Pairs, effects: Sequence[EffectTable]
-) -> PenetrationModel:
+    tables: PenetrationCampaign, middle: float, pairs: Pairs, plain: Pairs, effects: Sequence[EffectTable],
+    trials: Sequence[Prepared],
+) -> PenetrationModel:  # fmt: skip
     """The tables of model.toml. `middle`: the diameter [m] whose K and C stand in [surface]; `pairs`: K and C beside
-    the effects; `plain`: those of the base model that was fitted without effects, empty where there are none."""
-    notes: dict[str, Any] = {name: note for name, note in tables.notes.items() if name != BASE_NOTE}
+    the effects; `plain`: those of the base model that was fitted without effects, empty where there are none;
+    `trials`: those of the campaign, whose range is noted."""
+    notes: dict[str, Any] = {name: note for name, note in tables.notes.items() if name not in (BASE_NOTE, RANGE_NOTE)}
     if plain:
         notes[BASE_NOTE] = plain
+    if covered := range_of(trials):
+        notes[RANGE_NOTE] = covered
     if len(pairs) > 1:
         notes["fitted_by_diameter"] = pairs
     same = {name: getattr(tables, name) for name in ("format", "kind", "name", "uncertainty", "sensors")}
-    surface, spike, trials = tables.surface.model_copy(update=pairs[f"{middle:g}"]), tables.spike, tables.trial
+    surface, spike, listed = tables.surface.model_copy(update=pairs[f"{middle:g}"]), tables.spike, tables.trial
     if spike.diameter != middle:
-        trials = tuple(trial.model_copy(update={"diameter": tables.diameter_of(trial)}) for trial in trials)
+        listed = tuple(trial.model_copy(update={"diameter": tables.diameter_of(trial)}) for trial in listed)
         spike = spike.model_copy(update={"diameter": middle})
-    return PenetrationModel(**same, spike=spike, surface=surface, notes=notes, trial=trials, effect=tuple(effects))
+    return PenetrationModel(**same, spike=spike, surface=surface, notes=notes, trial=listed, effect=tuple(effects))
+
+
+def range_of(trials: Sequence[Prepared]) -> dict[str, Any]:
+    """What the pushes among `trials` cover: greatest depth [m], slowest and fastest speed on the way in [m/s], and
+    whether one came out again; empty without pushes."""
+    pushes = [trial for trial in trials if trial.driven]
+    if not pushes:
+        return {}
+    speeds = [float(speeds_of(trial)[1]) for trial in pushes]
+    deepest = max(float(trial.path.depth.max()) for trial in pushes)
+    return {"depth_m": float(f"{deepest:.4g}"), "speed_m_s": [float(f"{v:.4g}") for v in (min(speeds), max(speeds))],
+            "withdrawal": comes_back(pushes)}  # fmt: skip

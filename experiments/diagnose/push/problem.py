@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, write_model
 from experiments.diagnose.core.effect_texts import push_advice
 from experiments.diagnose.fit.forms import PENETRATION_HOOKS, OwnEffect, shapes_of
-from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.localise import acceleration
 from experiments.diagnose.fit.problem import (
     Array,
@@ -35,15 +34,15 @@ from experiments.diagnose.fit.problem import (
 )
 from experiments.diagnose.noise.jitter import Shaken
 
-from .data import Prepared, prepare, stds, tip_depth
+from .data import Prepared, of_drop, prepare, stds, tip_depth
 from .depth import SmoothDepth
 from .design import best_push
 from .doubt import off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
-from .model_file import Pairs, model_of
+from .model_file import Pairs, model_of, range_of
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, scatter_parameters, speeds_of
-from .remarks import SURE, Push, contradict, facts, highest_damping
+from .remarks import SURE, Push, contradict, facts, highest_dampings, how_to_determine
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
@@ -109,12 +108,8 @@ class PenetrationProblem(Problem):
         parts += [(t.info.condition, len(t.time), round(float(t.time[-1]), 3)) for t in prepared]
         self.design = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
         speeds = np.array([s for trial in prepared for s in speeds_of(trial)])
-        if pushed := [max(float(speeds_of(trial)[1]), 1e-6) for trial in prepared if trial.driven]:
-            slow, fast = numeral(100 * min(pushed), 2), numeral(1e4 * max(pushed), 2)
-            self.how_to_determine = (
-                f"To determine C: drop the tip, or push at {slow} and at {fast} mm/s "
-                "(a tenth of the slowest and ten times the fastest speed)."
-            )
+        self.covered, self.typical_depth = range_of(prepared), self._scales.depth
+        self.how_to_determine = how_to_determine(self.covered.get("speed_m_s", ()))
         differ = speeds.max() > 1.05 * max(speeds.min(), 1e-12)
         self.forms = push_forms(
             retreats=comes_back(prepared), speeds_differ=bool(differ), drops=bool(self.rough), own=own
@@ -236,7 +231,7 @@ class PenetrationProblem(Problem):
 
     def _missed(self, trial: Prepared, model: Array) -> Array:
         """Measured less modelled over the stated noise, of a drop."""
-        return _bounded(_of_drop(trial, trial.depth - model[:, 0], trial.other - model[:, 2], self.tables))
+        return _bounded(of_drop(trial, trial.depth - model[:, 0], trial.other - model[:, 2], self.tables))
 
     def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
         """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
@@ -246,7 +241,7 @@ class PenetrationProblem(Problem):
             chosen = [replace(t, time=t.time + late) if drops else t for t in moved if t.driven != drops]
             for trial, out in zip(chosen, self._run([values], forms, chosen) if chosen else (), strict=True):
                 if drops:
-                    found[trial.info.id] = _of_drop(trial, out[0][:, 0], out[0][:, 2], self.tables)
+                    found[trial.info.id] = of_drop(trial, out[0][:, 0], out[0][:, 2], self.tables)
                 else:  # along the path as it was smoothed
                     force = np.interp(trial.time[trial.has_other] + late, trial.time, out[0])
                     found[trial.info.id] = force / stds(self.tables, True)[1]
@@ -428,7 +423,9 @@ class PenetrationProblem(Problem):
             for form in forms
         )  # fmt: skip
         plain = self._pairs(base) if forms and base is not None else {}
-        write_model(Path(path), model_of(self.tables, self._middle, self._pairs(values), plain, effects))
+        write_model(Path(path), model_of(
+            self.tables, self._middle, self._pairs(values), plain, effects, tuple(self._trials.values())
+        ))  # fmt: skip
 
     def _pairs(self, values: Values) -> Pairs:
         """Diameter [m] as text -> K [N/m] and C [N s/m]."""
@@ -442,16 +439,10 @@ class PenetrationProblem(Problem):
         added = tuple(dict.fromkeys(form.effect for form in forms))
         return facts(self._pushes(values, forms, trials), added, is_open=is_open)
 
-    def typical_depth(self) -> float:
-        """See `Problem`."""
-        return self._scales.depth
-
     def at_most(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> dict[str, float]:
-        """See `Problem`: C of each diameter, by its fastest pushes (`highest_damping`)."""
-        pushes = self._pushes(values, forms, trials)
-        sizes = {diameter: [push for push in pushes if push.diameter == diameter] for diameter in self._diameters}
-        return {named("damping", diameter, self._diameters): bound for diameter, own in sizes.items()
-                if (bound := highest_damping(own)) is not None}  # fmt: skip
+        """See `Problem`: C of each diameter, by its fastest pushes."""
+        bounds = highest_dampings(self._pushes(values, forms, trials))
+        return {named("damping", diameter, self._diameters): bound for diameter, bound in bounds.items()}
 
     def undetermined(
         self, values: Values, forms: Sequence[Form], trials: Sequence[str], errors: Mapping[str, float | None]
@@ -501,12 +492,6 @@ class PenetrationProblem(Problem):
             depth=max(float(trial.path.depth.max()) for trial in driven),
             rows=int(np.median([trial.has_other.sum() for trial in driven])),
         )  # fmt: skip
-
-
-def _of_drop(trial: Prepared, depth: Array, acceleration: Array, tables: PenetrationCampaign) -> Array:
-    """Columns of all rows as samples, over the stated noise."""
-    std_depth, std_other = stds(tables, False)
-    return np.concatenate([depth[trial.has_depth] / std_depth, acceleration[trial.has_other] / std_other])
 
 
 def _bounded(rest: Array) -> Array:

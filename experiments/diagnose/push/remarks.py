@@ -10,7 +10,7 @@ from scipy.stats import t as student
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array
 
-__all__ = ["Push", "SURE", "contradict", "facts", "highest_damping"]
+__all__ = ["Push", "SURE", "contradict", "facts", "highest_damping", "highest_dampings", "how_to_determine"]
 
 _FAST = 0.8  # of the largest speed from which on a push is one of the fastest
 SURE = 2.0  # standard errors from which on a C is sure
@@ -66,6 +66,22 @@ def highest_damping(pushes: Sequence[Push]) -> float | None:
         error = max(float(np.std(found, ddof=1)), *(s for _, _, s in own)) / math.sqrt(len(own))
         times = float(student.ppf(0.95, len(own) - 1))
     return max(float(found.mean()) + times * error, 0.0)
+
+
+def highest_dampings(pushes: Sequence[Push]) -> dict[float, float]:
+    """`highest_damping` by diameter [m]."""
+    sizes = sorted({push.diameter for push in pushes})
+    found = {size: highest_damping([push for push in pushes if push.diameter == size]) for size in sizes}
+    return {size: bound for size, bound in found.items() if bound is not None}
+
+
+def how_to_determine(speeds: Sequence[float]) -> str:
+    """The trial that would determine C. `speeds`: slowest and fastest push of the campaign [m/s], none without one."""
+    ways = "To determine C: drop the tip"
+    if len(speeds) and min(speeds) > 0:
+        slow, fast = numeral(100 * min(speeds), 2), numeral(1e4 * max(speeds), 2)
+        ways += f", or push at {slow} and at {fast} mm/s (a tenth of the slowest and ten times the fastest speed)"
+    return f"{ways}."
 
 
 _Fitted = list[tuple[float, float, float]]

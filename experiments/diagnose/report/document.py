@@ -72,8 +72,10 @@ def document(found: Diagnosis) -> dict[str, Any]:
     if count := COUNTS.get(found.problem.counted_as):
         pairs = COUNTS["pairs"][found.problem.counted_as]
         diagnosis["counted"] = {"of": found.problem.counted_as, "seed": COUNTS["seed"], **count, "pairs": pairs}
-    if (depth := found.problem.typical_depth()) is not None:
+    if (depth := found.problem.typical_depth) is not None:
         diagnosis["typical_depth_m"] = depth
+    if covered := dict(found.problem.covered):
+        diagnosis["covered"] = covered
     if (near_answer := found.nearest_answer) is not None and found.choice is not None:
         behind = found.choice.best.score - near_answer.score
         diagnosis["nearest_answer"] = {"effects": list(found.ordered(near_answer)), "evidence_behind": behind}

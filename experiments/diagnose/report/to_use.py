@@ -31,7 +31,9 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     secant, of_depth = ("", "") if depth is None else (say("secant", depth_mm=1e3 * depth), say("of_depth"))
     sentence = say("use", numbers=", ".join(shown), secant=secant, beside=beside, each=each, of_depth=of_depth)
     bounds = "".join(_bound(name, after[name]["at_most"]) for name in is_open[:_SHOWN] if "at_most" in after[name])
-    return [sentence + (say("c_is_open", bounds=bounds) if is_open else "")]
+    covered = diagnosis.get("covered", {})
+    no_way_out = "" if covered.get("withdrawal", True) else f" {say('no_withdrawal')}"
+    return [sentence + (say("c_is_open", bounds=bounds) if is_open else "") + no_way_out]
 
 
 def _bound(name: str, bound: float) -> str:

@@ -123,6 +123,18 @@ def test_speeds_that_the_model_was_not_fitted_to_are_said_and_a_drops_mass_only_
     golden("penetrate/extrapolated", [said, far, alone])
 
 
+def test_a_deeper_push_a_faster_retreat_and_a_way_out_that_was_never_seen_are_warned_of(law):
+    covered = "[notes.fitted_range]\ndepth_m = 0.02\nspeed_m_s = [0.01, 0.05]\nwithdrawal = false\n"
+    push = '[[trial]]\nid = "p"\nmode = "driven"\nspeed = 0.05\ngravity = 9.81\ndata = "p.csv"\n'
+    still = {"drop_speeds": (), "other_drop_speeds": (), "other_speeds": (), "speeds": (0.05,)}
+    slow = still | {"retreat_speed": 0.05}
+    said = law(covered + push, depth=0.025, **(still | {"retreat_speed": 0.4})).warnings()
+    golden("penetrate/beyond_the_fit", said)
+    seen = covered.replace("false", "true") + push
+    assert len(said) == 3 and law(seen, depth=0.02, **slow).warnings() == []
+    assert len(law(seen, depth=0.025, **slow).warnings()) == 1
+
+
 def test_what_is_no_model_of_penetration_is_refused_by_name(law):
     with pytest.raises(ValueError, match="crater_shape = 0"):
         law(CRATER.replace("crater_share", "crater_shape"))
@@ -144,9 +156,9 @@ def test_without_a_bed_the_spike_the_mass_and_the_load_are_the_models_own(tmp_pa
     assert (typed.mass, typed.tip_diameter, typed.load) == (0.2, 0.02, None)
     beside = PenetrateSettings(model=str(path))  # beside a bed its spike is that of the bed's runs, and it is said
     assert (beside.tip, beside.mass) == ("sphere", 0.1)
-    size, tip, mass, speeds = read_law(path, beside).warnings()
+    size, tip, mass, speeds, retreat = read_law(path, beside).warnings()
     assert "--tip-diameter 0.003" in size and "--tip cone" in tip and "--mass 0.3" in mass
-    golden("penetrate/another_spike_than_the_models", [size, tip, mass, speeds])
+    golden("penetrate/another_spike_than_the_models", [size, tip, mass, speeds, retreat])
     path.write_text("nonsense")
     with pytest.raises(ValueError, match=r"model\.toml"):
         penetrate.check(PenetrateSettings(ground="spring-damper", model=str(path)))
@@ -161,6 +173,9 @@ def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
     numbers = {name: entry["value"] for name, entry in result["quantities"].items()}
     assert numbers["sinkage_amended"] == pytest.approx(0.1 / K, rel=0.01)
     assert numbers["work_returned_amended"] < 0.2 * numbers["work_returned_spring_damper"]
+    (run,) = (run for run in result["runs"] if run["kind"] == "driven")
+    assert numbers["peak_force_amended"] == run["quantities"]["amended_peak_force"]["value"] > 0
+    assert numbers["peak_force_spring_damper"] == run["quantities"]["model_peak_force"]["value"]
     assert "plastic-sinkage" in (tmp_path / "run" / "report.html").read_text()
 
 

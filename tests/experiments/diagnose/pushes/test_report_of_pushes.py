@@ -10,7 +10,7 @@ import pytest
 from golden import golden
 from penetration_campaigns import FORCE_STD, campaign_of, saved
 
-from experiments.campaign import Recording, read_campaign
+from experiments.campaign import Recording, read_campaign, read_model
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose.experiment import diagnose_campaign, run
@@ -257,6 +257,16 @@ def test_a_k_of_a_power_of_depth_is_said_with_the_depth_it_belongs_to(result):
     assert "= 7.5 mm" in sentence and "at 7.5 mm" in (folder / "report.html").read_text(encoding="utf-8")
     straight = said | {"equations": []}
     assert "secant" not in use_sentences(straight)[0]
+
+
+def test_a_model_of_pushes_states_their_range_and_that_none_came_out(result):
+    found, said, folder = result
+    model = read_model(folder / "model.toml")
+    covered = model.notes["fitted_range"]
+    assert covered["depth_m"] == pytest.approx(0.01, rel=0.01) and not covered["withdrawal"]
+    assert covered["speed_m_s"] == pytest.approx([0.005, 0.005], rel=0.02)
+    assert any("was withdrawn" in warning for warning in found["warnings"])
+    assert "No push was" in use_sentences(said)[0] and "No push was" not in use_sentences(said | {"covered": {}})[0]
 
 
 def test_the_highest_c_is_a_bound_that_holds_the_true_one_in_nine_of_ten_cases():
