@@ -6,12 +6,17 @@ from numpy.typing import NDArray
 from coupling.robot import LawFeet, RobotRun
 
 from . import say
+from .plan import RobotPlan
 
-__all__ = ["FEW", "feet_quantities", "feet_reached", "heights_of", "too_deep"]
+__all__ = ["FEW", "feet_quantities", "feet_reached", "heights_of", "too_deep", "too_fast"]
 
 FEW = 6  # Most feet whose numbers are quantities of their own
 NAMES = ("clearance_largest", "clearance_end", "sinkage_largest", "sinkage_end")
 """Of each foot [m]."""
+
+FASTEST = 2.6
+"""Speed of a foot in the ground over sqrt(g D) up to which laws of sand were compared with grains [1]
+(docs/results/mujoco-laws/flat-foot.json); D: diameter of the circle with the area of the foot from above."""
 
 Array = NDArray[np.float64]
 
@@ -40,7 +45,7 @@ def feet_reached(run: RobotRun, heights: Array) -> dict[str, dict[str, float]]:
     }  # fmt: skip
 
 
-def too_deep(run: RobotRun) -> list[str]:
+def too_deep(run: RobotRun, law: str = "spring-damper") -> list[str]:
     """A sentence where a part of a foot went deeper than its law holds, of the part that did so most."""
     limits, feet = run.ground.depths if isinstance(run.ground, LawFeet) else {}, run.feet
     found: list[tuple[float, str, float]] = []
@@ -51,7 +56,31 @@ def too_deep(run: RobotRun) -> list[str]:
                 depth = -float((feet[:, k, 2] + (part.vertices @ ups.T).min(axis=0)).min())
                 found.append((depth / limits[part.name], part.name, depth))
     most, name, depth = max(found, default=(0.0, "", 0.0))
-    return [say("too_deep", name=name, depth=1e3 * depth, limit=1e3 * limits[name])] if most > 1 else []
+    key = "too_deep" if law == "spring-damper" else "too_deep_for"
+    return [say(key, law=law, name=name, depth=1e3 * depth, limit=1e3 * limits[name])] if most > 1 else []
+
+
+def too_fast(plan: RobotPlan, run: RobotRun, heights: Array) -> list[str]:
+    """A sentence where a foot goes into sand faster than its law was compared with grains, of the fastest foot.
+
+    ``heights``: as of `heights_of`. At v above sqrt(g D) the inertia of the grains, rho v^2 D^2, exceeds their weight,
+    rho g D^3, which is the scale of the static force.
+    """
+    gravity, time = plan.numbers["gravity"].value, run.columns["time"]
+    if plan.fitted is not None or not plan.surface.granular or not gravity > 0 or len(time) < 2:
+        return []
+    downwards = np.where(heights[1:] < 0, -np.diff(heights, axis=0) / np.diff(time)[:, None], 0.0).max(axis=0)
+    found = []
+    for foot, speed in zip(run.robot.feet, downwards, strict=True):
+        diameter = max(plan.diameters[part.name] for part in foot.parts)
+        found.append((float(speed) / np.sqrt(gravity * diameter), foot.name, float(speed), diameter))
+    froude, name, speed, diameter = max(found)
+    if froude <= FASTEST:
+        return []
+    law = plan.law if plan.law == "rft" else "other"
+    inertia = plan.numbers["inertia"].value if "inertia" in plan.numbers else None
+    cause = say(f"inertia_of_{law}", law=plan.law, inertia=inertia)
+    return [say("too_fast", name=name, speed=speed, froude=froude, diameter=1e3 * diameter, most=FASTEST, cause=cause)]
 
 
 def feet_quantities(reached: dict[str, dict[str, float]]) -> dict[str, tuple[float, str, str]]:

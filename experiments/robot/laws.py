@@ -32,6 +32,9 @@ SHAPE_DEPTH = 0.2
 """Depth over the diameter of the foot at which its shape is compared with that of the tip [1]: that of a light foot."""
 LIKE_TIP = 1.1
 """Ratio of forces above which, and below whose inverse, a foot has another shape than the tip [1]."""
+DEEPEST = {"rft": 1.5}
+"""Depth over the diameter of a foot down to which a law of grains was compared with them [1]: pushes of a ball of 12 mm
+to 1 diameter (docs/results/calibrate-sand-1mm), drops of a ball to 1.7 (docs/results/katsuragi-durian)."""
 SAME_AREA = 0.02
 """Relative difference of two areas from above that is not stated [1]: a polygon of 32 sides has 0.6 % less than its
 circle."""
@@ -113,7 +116,9 @@ def law_of(
     found = find_law(settings.ground)
     parameters = found.values(found.in_gravity(numbers["gravity"].value, given_here))
     unsized = not surface.granular or bool(ill_sized(settings.ground, given_here))  # the second: accepted
-    return UnderFeet(law=settings.ground, parameters=parameters, of=None if unsized else SPIKE, given=tuple(given_here))
+    depth = DEEPEST[settings.ground] * SPIKE if settings.ground in DEEPEST and not unsized else None
+    of = None if unsized else SPIKE
+    return UnderFeet(law=settings.ground, parameters=parameters, of=of, given=tuple(given_here), depth=depth)
 
 
 def _depth_of_map(surface: Surface, tip: float) -> float | None:

@@ -61,6 +61,7 @@ class RobotPlan:
     surface: Surface
     numbers: Mapping[str, Number]
     scales: Mapping[str, float]  # Area of each part of a foot over that of the tip that the law is of [1]
+    diameters: Mapping[str, float]  # Of the circle with the area of each part from above [m]
     fitted: GroundFile | None  # The file that the law comes from
     rule: GravityRule  # How K and C of the surface follow gravity
     warnings: tuple[str, ...]
@@ -179,7 +180,8 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None, model: An
             soles[part.name] = sole_of(part, to_matrix(turn), of=tip or SPIKE)
     most = max(scales, key=lambda name: (scales[name], soles[name].area))
     largest = Largest(name=most, times=scales[most], sole=soles[most])
-    rule = gravity_rule(settings, surface, robot.gravity, {name: sole.diameter for name, sole in soles.items()})
+    diameters = {name: sole.diameter for name, sole in soles.items()}
+    rule = gravity_rule(settings, surface, robot.gravity, diameters)
     if fitted is not None:
         warnings += fitted_words(fitted, largest)
         warnings += _beyond_gravity(settings, fitted, robot.gravity)
@@ -194,7 +196,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None, model: An
     numbers["weight"] = Number(max(robot.mass * robot.gravity, 1e-9), "N", "mass times gravity")
     return RobotPlan(
         settings=settings, model=model, controller=_controller(settings, folder), surface=surface, numbers=numbers,
-        scales=scales, fitted=fitted, rule=rule, warnings=tuple(warnings),
+        scales=scales, diameters=diameters, fitted=fitted, rule=rule, warnings=tuple(warnings),
         notes=tuple(law_notes(settings, surface)),
     )  # fmt: skip
 

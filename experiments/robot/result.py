@@ -22,7 +22,7 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .energy import MOST_RESIDUAL, balance_warning
-from .feet import feet_quantities, feet_reached, heights_of, too_deep
+from .feet import feet_quantities, feet_reached, heights_of, too_deep, too_fast
 from .flight import launched, to_landing
 from .laws import of_sand
 from .plan import RobotPlan
@@ -160,7 +160,8 @@ def conclude(
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
         say("airborne", landing=to_landing(run, heights)) if _airborne(run, heights) else None,
-        *(too_deep(run) if plan.fitted is None else []),
+        *(too_deep(run, plan.law) if plan.fitted is None else []),
+        *([] if settings.on_grains else too_fast(plan, run, heights)),
     ]  # fmt: skip
     if plan.fitted is not None:
         warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]

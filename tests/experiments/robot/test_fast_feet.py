@@ -1,0 +1,64 @@
+"""What a run on a law of sand states of a foot that is faster or deeper than the law was compared with grains."""
+
+import re
+
+import numpy as np
+import pytest
+
+from experiments.robot.feet import FASTEST, heights_of, too_deep, too_fast
+from experiments.robot.on_grains import RobotFollowed
+from experiments.robot.plan import plan_robot
+from experiments.robot.settings import RobotSettings
+
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+
+BALL = """<mujoco><worldbody><body pos="0 0 0.02"><joint type="slide" axis="0 0 1"/>
+<geom name="foot" size="0.015" mass="0.3"/></body></worldbody></mujoco>"""
+
+
+@pytest.fixture
+def fallen(tmp_path):
+    """A ball of 30 mm that falls onto a law from `height`; the plan and the run."""
+    (tmp_path / "ball.xml").write_text(BALL, encoding="utf-8")
+
+    def fall(**given):
+        settings = RobotSettings(model=str(tmp_path / "ball.xml"), feet=("foot",), frame_count=0, **given)
+        plan = plan_robot(settings)
+        run = RobotFollowed(settings, plan).run_on_law()
+        run.run()
+        return plan, run
+
+    return fall
+
+
+@pytest.mark.parametrize("ground", ["rft", "spring-damper"])
+def test_a_foot_faster_than_the_pushes_of_grains_is_warned_of_with_the_speed_of_its_fall(fallen, ground):
+    """From a height h a ball has sqrt(2 h / D) times sqrt(g D) at the surface, in any gravity."""
+    for froude, gravity, duration in ((1.0, 9.80665, 0.1), (4.0, 9.80665, 0.25), (4.0, 0.0980665, 2.5)):
+        plan, run = fallen(ground=ground, gravity=gravity, height=0.5 * 0.03 * froude**2, duration=duration)
+        assert run.columns["sinkage"].max() > 0
+        told = too_fast(plan, run, heights_of(run))
+        assert bool(told) == (froude > FASTEST)
+        for said in told:
+            speed, times = re.findall(r"at ([0-9.]+) m/s, ([0-9.]+) times", said)[0]
+            assert float(times) == pytest.approx(froude, rel=0.05)
+            assert float(speed) == pytest.approx(froude * np.sqrt(gravity * 0.03), rel=0.05)
+            assert ("inertia = 1.1" in said) == (ground == "rft")
+
+
+def test_steel_and_a_slow_foot_have_no_inertia_of_grains(fallen):
+    plan, run = fallen(surface="steel", height=0.24, duration=0.25)
+    assert run.columns["sinkage"].max() > 0 and too_fast(plan, run, heights_of(run)) == []
+
+
+def test_a_foot_deeper_than_one_and_a_half_diameters_is_warned_of_on_rft(fallen):
+    """A ball of 0.3 kg after a fall of 1 m, with no inertia of the grains, and one that is set down."""
+    for height, deep in ((1.0, True), (0.001, False)):
+        plan, run = fallen(
+            height=height, duration=0.6 if deep else 0.05, ground_parameters=("inertia=0",), ground="rft"
+        )
+        depth = float(run.columns["sinkage"].max())
+        told = too_deep(run, plan.law)
+        assert (depth > 0.045) == deep and bool(told) == deep
+        limits = [float(found) for said in told for found in re.findall(r"to ([0-9.]+) mm", said)]
+        assert limits == pytest.approx([45.0] * deep, rel=0.01)
