@@ -103,10 +103,13 @@ def test_the_states_have_colours_apart_for_the_colour_blind_too_and_dark_enough_
     assert max(colour[0] for colour in seen.values()) <= 70
 
 
-def test_a_diagnosis_shows_states_in_the_colours_that_they_have_everywhere_and_pushes_in_the_same():
+@pytest.mark.parametrize("sight", SIGHT.values(), ids=SIGHT)
+def test_a_diagnosis_shows_states_in_their_colours_and_phases_of_pushes_apart_from_both_models(sight):
+    """CIE 1976 distances: 30 between phases, 20 from the lines of the models, for the colour-blind too."""
     assert all(_PHASES[name] == colour for name, colour in STATES.items())
-    pushed = [_PHASES[name] for name in ("free", "in", "rest", "out")]
-    assert sorted(pushed) == sorted(STATES.values())
+    pushed = [lab(_PHASES[name], np.array(sight)) for name in ("free", "in", "rest", "out")]
+    assert min(np.linalg.norm(one - other) for one, other in combinations(pushed, 2)) > 30
+    assert min(np.linalg.norm(pushed[3] - lab(line, np.array(sight))) for line in (MODEL, AMENDED)) > 20
 
 
 def test_a_film_keeps_the_colours_of_the_states_as_they_are_however_rare(tmp_path):

@@ -44,8 +44,10 @@ _QUANTITIES: dict[str, tuple[str, str]] = {
     "force": ("force", "N"),
     "accel": ("acceleration", "m/s²"),
 }
-_PHASES = STATES | {"free": STATES["hop"], "in": STATES["pivot"], "rest": STATES["stand"], "out": STATES["slip"]}
-"""Of a tumble the colours that its states have everywhere; of a push, never in one figure with those, the same four."""
+_REPLICATES = "#e6d08f"  # by what replicates differ: darker than the page and than the band of the sensor
+_PHASES = STATES | {"free": STATES["hop"], "in": STATES["pivot"], "rest": STATES["stand"], "out": "#503f00"}
+"""Of a tumble the colours that its states have everywhere. Of a push, never in one figure with those, three of them and
+a brown for `out`, which would have the colour of the base model."""
 _FACTORS = {"mm": 1e3, "degrees": 180 / math.pi}
 """What a number in SI is multiplied by to be in a unit."""
 _NARROW = 3.0
@@ -193,7 +195,7 @@ def draw_trajectories(
         step = max(1, len(time) // 80)
         if c.scatter is not None:
             wide = 2 * np.hypot(1.0, c.scatter / c.std_after)
-            right.fill_between(time, -wide, wide, color="#f1ead8", lw=0, zorder=0)
+            right.fill_between(time, -wide, wide, color=_REPLICATES, lw=0, zorder=0)
         right.axhspan(-2, 2, color="#e3e8ec", lw=0)
         for stage, colour, dash, _ in models:
             left.plot(place, factor * c.model(stage), color=colour, ls=dash, lw=1.4, zorder=3)
@@ -213,7 +215,7 @@ def draw_trajectories(
     handles += [handle(label, colour, ls=dash) for _, colour, dash, label in models]
     handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
     if any(c.scatter is not None for c in channels):
-        handles.append(Patch(color="#f1ead8", label="and of replicates"))
+        handles.append(Patch(color=_REPLICATES, label="and of replicates"))
     handles += _phase_handles(phase for c in channels for phase in c.phase)
     legend_above(drawing, handles, 4, fontsize=8)
     return drawing
