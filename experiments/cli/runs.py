@@ -22,7 +22,7 @@ from experiments.runs.registry import Headline
 from experiments.runs.result import Result
 from experiments.runs.streams import RefusedError, file_words, say, stdout_to_stderr
 from experiments.runs.whole_runs import draw_report, keeping_status
-from vis.page.numbers import beside
+from vis.page.numbers import beside, with_squares
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "redraw_old_report", "show_folder"]
 
@@ -112,7 +112,7 @@ def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> i
         return DONE
     result, report = folder.read_result(), folder.path / "report.html"
     console = Console(file=sys.stdout, highlight=False)
-    console.print(result.get("title", ""), markup=False, style="italic")
+    console.print(with_squares(result.get("title", "")), markup=False, style="italic")
     experiment = registry.EXPERIMENTS.get(folder.command)
     headline = experiment.headline_of(result) if experiment is not None and not verbose else None
     if headline is not None:
@@ -170,14 +170,16 @@ def _show_headline(headline: Headline, console: Console) -> None:
     console.print(table, markup=False)
     for mark, texts in (("warning: ", headline.warnings), ("- ", headline.sentences)):
         for text in texts:
-            folded = textwrap.wrap(text, console.width, initial_indent=mark, subsequent_indent=" " * len(mark))
+            folded = textwrap.wrap(
+                with_squares(text), console.width, initial_indent=mark, subsequent_indent=" " * len(mark)
+            )
             print("\n".join(folded))
 
 
 def _show_all(result: Mapping[str, Any], console: Console) -> None:
     """What it comes to, every quantity, the tables, findings and warnings."""
     for sentence in result.get("summary", []):
-        console.print(f"- {sentence}", markup=False)
+        console.print(with_squares(f"- {sentence}"), markup=False)
     table = Table(box=None, pad_edge=False)
     table.add_column("quantity")
     table.add_column("value", justify="right")
@@ -209,6 +211,6 @@ def _show_all(result: Mapping[str, Any], console: Console) -> None:
             shown.add_row(*(Text(str(cell)) for cell in row))
         console.print(shown, markup=False)
     for sentence in result.get("departures", {}).get("sentences", []):
-        console.print(f"- {sentence}", markup=False)
+        console.print(with_squares(f"- {sentence}"), markup=False)
     for warning in result.get("warnings", []):
-        console.print(f"warning: {warning}", markup=False)
+        console.print(with_squares(f"warning: {warning}"), markup=False)

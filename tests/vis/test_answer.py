@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from experiments.robot.headline import robot_headline
 from vis.page.answer import MOST_ROWS, answer, write_page
 from vis.page.page import Page, Section, Tile, listing, text
 from vis.report import write_report
+from vis.robot.answer import answer_tiles
 
 ON_GRAINS = {"experiment": "penetrate", "ground": "bed"}
 
@@ -54,3 +56,52 @@ def test_the_error_of_a_law_in_other_beds_is_a_share_in_per_cent(tmp_path):
     shutil.copytree(kept, folder)
     page = write_report(folder).read_text(encoding="utf-8")
     assert "<td>10.7 %</td>" in page.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def robot_result(**more):
+    """The numbers of a robot's result that its answer shows."""
+    values = {"highest": 0.01, "longest_flight": 0.2, "clearance_largest": 0.02, "sinkage_largest": 0.0142}
+    numbers = {name: {"value": value, "std": None, "unit": "m"} for name, value in values.items()}
+    numbers["longest_flight"]["unit"] = "s"
+    numbers["largest_force"] = {"value": 142.0, "std": None, "unit": "N"}
+    numbers["energy_residual"] = {"value": 1e-4, "std": None, "unit": "1"}
+    findings = [f"finding {k} at 0.0981 m/s2" for k in range(6)]
+    departures = {"sentences": findings}
+    return {"experiment": "mujoco", "quantities": numbers, "departures": departures, "warnings": ["w"], **more}
+
+
+@pytest.mark.parametrize(
+    ("more", "errors"),
+    [
+        ({"ground": "bed", "grains": {}}, ("14 mm", "one bed", "not known", "not known")),
+        (
+            {"ground": "bed", "beds": [], "sure": {"sinkage_largest": {"value": 0.0142, "high": 0.0165, "unit": "m"}}},
+            ("14 mm", "2 mm", "not known", "not known"),
+        ),
+        ({"ground": "rft"}, ("14 mm", "not known", "no grains", "not known")),
+        (
+            {"ground": "rft", "sure": {"sinkage_largest": {"low": 0.011, "high": 0.02, "unit": "m"}}},
+            ("14 mm", "11 to 20 mm", "no grains", "not known"),
+        ),
+    ],
+)
+def test_a_robot_states_each_error_of_its_answer_or_that_it_is_not_known(more, errors):
+    numbers, _ = answer(answer_tiles(robot_result(**more)), robot_result(**more))
+    sinkage = next(row for row in numbers.rows if row[0] == "Sinkage")
+    assert tuple(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in sinkage[1:5]) == errors
+    assert len(numbers.head) == 6
+
+
+def test_the_terminal_of_a_robot_has_the_rows_of_its_report():
+    result = robot_result(ground="rft")
+    shown, (numbers, _) = robot_headline(result), answer(answer_tiles(result), result)
+    assert len(shown.rows) == MOST_ROWS
+    assert [row[:2] for row in shown.rows] == [
+        tuple(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row[:2]) for row in numbers.rows
+    ]
+    assert (len(shown.sentences), shown.left, shown.warnings) == (3, 3, ("w",))
+
+
+def test_sentences_of_a_page_have_units_as_figures_have_them():
+    block = listing(["at 9.81 m/s2", "gravity [m/s2]", "runs/m/s2"])
+    assert block.entries == ("at 9.81 m/s²", "gravity [m/s2]", "runs/m/s2")

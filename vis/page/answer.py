@@ -35,7 +35,8 @@ class Top:
 def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     """The table of the numbers that a reader wants first, and what its empty cells mean.
 
-    A spread in a tile's value goes into the column of chance. Raises ValueError for more than `MOST_ROWS` tiles.
+    A spread in a tile's value goes into the column of chance, where the tile does not state that error itself.
+    Raises ValueError for more than `MOST_ROWS` tiles.
     """
     if not tiles:
         return []
@@ -46,21 +47,26 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     errors = (say("of_the_law"), *_ERRORS[1:]) if "ground_file" in result else _ERRORS
     if errors is _ERRORS and (result.get("experiment") == "penetrate" or "beds" in result):
         errors = (say("of_95"), *errors[1:])
-    elif "sure" in result and not on_grains:
-        errors = (say("left_open"), *errors[1:])
+    elif errors is _ERRORS and not on_grains and ("sure" in result or result.get("experiment") == "mujoco"):
+        errors = (say("left_open"), errors[1], say("form_of_law"))
     shown = [k for k in range(3) if on_grains or any(row[2 + k] for row in rows)]
     head = ("", "value", *(errors[k] for k in shown), "")
     cells = [(*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), row[5]) for row in rows]
-    note = [text(say("empty_cells"), small=True)] if on_grains and any("\N{EN DASH}" in row for row in cells) else []
-    return [table(head, cells, words=True), *note]
+    notes = []
+    if result.get("experiment") == "mujoco":
+        first = [] if "beds" in result else [say("one_bed" if on_grains else "range_of_law")]
+        notes = [text(" ".join([*first, say("no_error")]), small=True)]
+    elif on_grains and any("\N{EN DASH}" in row for row in cells):
+        notes = [text(say("empty_cells"), small=True)]
+    return [table(head, cells, words=True), *notes]
 
 
 def _row(tile: Tile) -> tuple[str, ...]:
     found = _SPREAD.match(tile.value)
-    if any(tile.errors) or not found:
+    if tile.errors[0] or not found:
         return (tile.label, tile.value, *tile.errors, tile.note)
     unit = found["unit"] or ""
-    return (tile.label, found["mean"] + unit, found["error"] + unit, "", "", tile.note)
+    return (tile.label, found["mean"] + unit, found["error"] + unit, *tile.errors[1:], tile.note)
 
 
 def write_page(path: Path, page: Page, result: Mapping[str, Any]) -> Path:

@@ -26,6 +26,7 @@ __all__ = [
     "quote",
     "short",
     "typeset",
+    "with_squares",
 ]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -135,6 +136,11 @@ def typeset(words: str) -> str:
     """Words of a title or an axis as a picture has them: typeset("F / (rho g D^3) at 9.81 m/s2") has ρ, D³ and m/s²."""
     raised = _POWER.sub(lambda found: (found[1] or "") + (found[2] or found[3]).translate(_RAISED), words)
     return re.sub(r"\brho\b", "ρ", raised)
+
+
+def with_squares(words: str) -> str:
+    """A sentence with the units m/s² and kg/m³ of its numbers as figures have them, in place of m/s2 and kg/m3."""
+    return re.sub(r"(?<=\d[ \N{NO-BREAK SPACE}])(m/s2|kg/m3)\b", lambda found: _AS_THEY_ARE[found[1]][1], words)
 
 
 def quantity(entry: Any, *, unit: str | None = None, significant: int | None = None) -> str:

@@ -18,6 +18,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from PIL import Image
 
 from rigid.series import replacing
+from vis.page.numbers import with_squares
 
 __all__ = [
     "Block", "Columns", "Page", "Section", "Tile", "code", "columns", "figure", "listing", "scene_block", "table",
@@ -79,7 +80,7 @@ class Page:
 
 def text(words: str, *, small: bool = False) -> Block:
     """A paragraph."""
-    return Block(kind="text", text=words, small=small)
+    return Block(kind="text", text=with_squares(words), small=small)
 
 
 def code(words: str) -> Block:
@@ -89,7 +90,7 @@ def code(words: str) -> Block:
 
 def listing(items: Sequence[str]) -> Block:
     """A list of sentences."""
-    return Block(kind="list", entries=tuple(items))
+    return Block(kind="list", entries=tuple(map(with_squares, items)))
 
 
 def figure(

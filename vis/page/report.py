@@ -13,7 +13,7 @@ from rigid.result import read_result
 from vis.page.answer import write_page
 from vis.page.folder import read_columns
 from vis.page.limits import limits_words
-from vis.page.numbers import typeset
+from vis.page.numbers import typeset, with_squares
 from vis.page.page import Block, Page, Section, Tile, code, figure, table, text
 from vis.page.plots import Array, styled, title_above
 from vis.page.sentences import Sentences
@@ -112,6 +112,7 @@ class Report:
         """
         result = self.result
         warned = [capital(str(warning)) for warning in result["warnings"]] if warnings is None else warnings
+        warned = list(map(with_squares, warned))
         top = [f"hedgebed {result['version']}", *lead] if version else lead
         words = str(result["title"]) if title is None else title
         page = Page(typeset(words), top, sections, tiles, warned, missing, limits_words(result))

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import stats
 
 from vis.page.folder import PYTHON_RUNS, Run, RunFolder, Setting
-from vis.page.numbers import column, plain, quantity, quote, short
+from vis.page.numbers import column, plain, quantity, quote, short, with_squares
 from vis.page.sentences import Sentences
 
 __all__ = [
@@ -207,7 +207,7 @@ def joined(words: list[str]) -> str:
 
 def sentence(text: str) -> str:
     """`text` with a capital at its start and a full stop at its end."""
-    text = text.strip()
+    text = with_squares(text.strip())
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".") if text else ""
 
 

@@ -1,4 +1,4 @@
-"""The answer of a robot's run with its errors, and the report of a robot on several beds."""
+"""The report of a robot on several beds."""
 
 from __future__ import annotations
 
@@ -8,47 +8,17 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from vis.page.numbers import between, quantity, quote
-from vis.page.page import Section, Tile, listing, text
+from vis.page.page import Section, listing, text
 from vis.page.plots import BED, DASHED, MODEL, Array, legend_above
 from vis.page.report import Report, given, tables
 from vis.spatial.report import pair
 
-__all__ = ["answer_tiles", "write_beds_report"]
+from .answer import answer_tiles
+
+__all__ = ["write_beds_report"]
 
 Columns = Mapping[str, Array]
-LABELS = {
-    "highest": ("Highest", "of the centre of mass after the first touch, over its start"),
-    "longest_flight": ("Longest flight", "no foot touches"),
-    "clearance_largest": ("Clearance", "lowest point of the highest foot, over the undisturbed surface"),
-    "sinkage_largest": ("Deepest", "of any foot"),
-    "largest_force": ("Largest force", "of the ground"),
-}
-"""Number of the answer -> its label and note."""
 OWN = "Pictures, film and figures of each bed are in the report of its folder: {folders}."
-
-
-def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
-    """Rows of the table at the top of a report: what the robot did, with the errors that are known."""
-    quantities, sure, several = result["quantities"], result.get("sure") or {}, "beds" in result
-    reached = (result.get("feet_reached") or {}).values()
-    found = dict(quantities)
-    if "clearance_largest" not in quantities and reached:  # of several feet each has its own
-        highest = max(foot["clearance_largest"] for foot in reached)
-        found["clearance_largest"] = {"value": highest, "std": None, "unit": "m"}
-    rows = []
-    for name, (label, note) in LABELS.items():
-        if name not in found:  # a folder of an older hedgebed
-            continue
-        one = sure.get(name)
-        if one is None:
-            rows.append(Tile(label, quantity(found[name]), note))
-        elif several:
-            rows.append(Tile(label, quote(one["value"], one["high"] - one["value"], one["unit"]), note))
-        else:
-            ends = between(one["low"], one["high"], one["unit"])
-            rows.append(Tile(label, quantity(found[name]), note, errors=(ends, "", "")))
-    return [*rows, Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was")]
 
 
 def write_beds_report(report: Report) -> Path:

@@ -19,19 +19,20 @@ from vis.spatial.report import draw_energy, pair, say_grains
 from vis.view.curves import MOST_LINES, joint_columns, law_beside
 from vis.view.page import report_scene
 
-from .beds import answer_tiles, write_beds_report
+from .answer import answer_tiles
+from .beds import write_beds_report
 
 __all__ = ["write_robot_report"]
 
 Columns = Mapping[str, Array]
 REACHED = {
-    "clearance_largest": "highest [mm]", "clearance_end": "height at the end [mm]", "sinkage_largest": "deepest [mm]",
-    "sinkage_end": "depth at the end [mm]",
+    "clearance_largest": "clearance [mm]", "clearance_end": "height at the end [mm]", "sinkage_largest": "sinkage [mm]",
+    "sinkage_end": "sinkage at the end [mm]",
 }  # fmt: skip
 """Number of a foot in result.json -> head of its column."""
 HEIGHTS = (
-    "Height and depth of the lowest point of each foot, from the undisturbed surface. The highest is that after the "
-    "first touch of any foot."
+    "Largest height and depth of the lowest point of each foot, from the undisturbed surface. The clearance is that "
+    "after the first touch of any foot."
 )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vis.page.folder import read_folder
+from vis.page.numbers import with_squares
 from vis.page.page import Block, scene_block, text, write_template
 from vis.page.report import Progress
 from vis.page.sentences import Sentences
@@ -112,7 +113,7 @@ def _title(home: Path) -> tuple[str, list[str]]:
     run = read_folder(home)
     result = run.result
     settings = {setting.key: setting.value.strip("\"'") for setting in run.settings}
-    title = str(result.get("title") or f"Run in {home.resolve().name}")
+    title = with_squares(str(result.get("title") or f"Run in {home.resolve().name}"))
     lead = [f"hedgebed {result['version']}"] if "version" in result else []
     surface = result.get("surface") or settings.get("material") or settings.get("surface")
     lead += [str(result.get("experiment") or "no result yet"), *([f"surface: {surface}"] if surface else [])]
