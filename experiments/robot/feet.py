@@ -1,16 +1,25 @@
 """How high and how deep each foot of a robot goes: its lowest point over the undisturbed surface."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from coupling.robot import LawFeet, RobotRun
+from experiments.grains.spells import spells
 
 from . import say
 from .plan import RobotPlan
 
-__all__ = ["FEW", "feet_quantities", "feet_reached", "heights_of", "too_deep", "too_fast"]
+__all__ = [
+    "FEW", "bounce_warning", "bounce_words", "crater_losses", "feet_quantities", "feet_reached", "heights_of",
+    "too_deep", "too_fast",
+]  # fmt: skip
 
 FEW = 6  # Most feet whose numbers are quantities of their own
+FEW_LOSSES = 3
+"""Losses of contact in a crater up to which a law is not suspected [1]: a leg that pushes off has one to three."""
+DAMPED = "power-irreversible"  # The law with memory whose damping stops a foot in its crater
 NAMES = ("clearance_largest", "clearance_end", "sinkage_largest", "sinkage_end")
 """Of each foot [m]."""
 
@@ -43,6 +52,50 @@ def feet_reached(run: RobotRun, heights: Array) -> dict[str, dict[str, float]]:
         }
         for k, foot in enumerate(run.robot.feet)
     }  # fmt: skip
+
+
+def crater_losses(run: RobotRun, heights: Array, *, apart: float) -> dict[str, list[float]]:
+    """Name of a foot -> rise [m] in each time that it loses and regains contact below the undisturbed surface.
+
+    ``heights``: as of `heights_of`; times shorter than ``apart`` [s] do not count. Feet without any are left out. A law
+    with inertia of the grains has a force again where a foot begins to fall back, so such a time may be half a bounce.
+    """
+    pushed = np.abs(run.feet[:, :, 7:10]).max(axis=2) > 0
+    found = {}
+    for k, foot in enumerate(run.robot.feet):
+        first = int(np.argmax(pushed[:, k])) if pushed[:, k].any() else len(pushed)
+        free = [(first + low, first + high) for low, high in spells(~pushed[first:, k])]
+        lasting = [(low, high) for low, high in free if high < len(pushed) and (high - low) * run.macro_step >= apart]
+        rises = [
+            float(heights[low - 1 : high + 1, k].max() - heights[low - 1, k])
+            for low, high in lasting
+            if heights[low:high, k].max() < 0
+        ]
+        if rises:
+            found[foot.name] = rises
+    return found
+
+
+def bounce_words(losses: dict[str, list[float]]) -> list[str]:
+    """How often the foot with most of `crater_losses` lost contact, in a sentence; none without any."""
+    return [say("lost_below", **_most(losses))] if losses else []
+
+
+def bounce_warning(run: RobotRun, losses: dict[str, list[float]], law: str) -> list[str]:
+    """The warning that a foot may bounce in its crater on a law with memory; none up to `FEW_LOSSES` of its losses."""
+    if not (isinstance(run.ground, LawFeet) and run.ground.has_memory and losses):
+        return []
+    most = _most(losses)
+    if most["count"] <= FEW_LOSSES:
+        return []
+    remedy = say("bounces_bed" if law == DAMPED else "bounces_damped", law=DAMPED)
+    return [say("bounces", law=law, remedy=remedy, **most)]
+
+
+def _most(losses: dict[str, list[float]]) -> dict[str, Any]:
+    """Name, count and largest rise [mm] of the foot with most losses, the first of equals."""
+    name = max(losses, key=lambda one: len(losses[one]))
+    return {"name": name, "count": len(losses[name]), "rise": 1e3 * max(losses[name])}
 
 
 def too_deep(run: RobotRun, law: str = "spring-damper") -> list[str]:

@@ -22,7 +22,16 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .energy import MOST_RESIDUAL, balance_warning
-from .feet import feet_quantities, feet_reached, heights_of, too_deep, too_fast
+from .feet import (
+    bounce_warning,
+    bounce_words,
+    crater_losses,
+    feet_quantities,
+    feet_reached,
+    heights_of,
+    too_deep,
+    too_fast,
+)
 from .flight import launched, to_landing
 from .laws import of_sand
 from .plan import RobotPlan
@@ -160,6 +169,7 @@ def conclude(
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
         say("airborne", landing=to_landing(run, heights)) if _airborne(run, heights) else None,
+        *bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law),
         *(too_deep(run, plan.law) if plan.fitted is None else []),
         *([] if settings.on_grains else too_fast(plan, run, heights)),
     ]  # fmt: skip
@@ -303,5 +313,6 @@ def _sentences(run: RobotRun, heights: Array) -> list[str]:
     longest = 1e3 * run.macro_step * max((end - begin for begin, end in flights), default=0)
     told.append(say("flew", count=len(flights), apart=1e3 * APART, longest=longest) if flights else say("stayed"))
     told += launched(run, flights[0][0]) if flights else []
+    told += bounce_words(crater_losses(run, heights, apart=APART))
     told.append(say("sank", depth=1e3 * float(rows["sinkage"].max()), end=1e3 * float(rows["sinkage"][-1])))
     return told

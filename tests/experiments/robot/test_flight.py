@@ -85,3 +85,23 @@ def test_the_command_warns_of_a_fall_that_it_does_not_finish(lander, tmp_path, c
     given = ["--feet", "tip", "--height", "0.02", "--gravity", "0.1", "--duration", "0.01", "--frame-count", "0"]
     assert main(["mujoco", lander, *given, "--out", str(tmp_path / "run")]) == 0
     assert "0.632 s" in capsys.readouterr().err
+
+
+def test_a_foot_that_bounces_in_its_crater_is_counted_and_the_run_warns_of_it_on_a_law_without_loss(lander, tmp_path):
+    """On rft the plate leaves the bottom of its crater with v and rises by v^2 / 2 g. Damping stops it there."""
+    given = {"surface": "sand", "height": 0.04, "duration": 0.4}
+    run, result = concluded(lander, tmp_path, **given)
+    free = (run.columns["touching"] == 0).astype(int)
+    leaves, meets = (np.flatnonzero(np.diff(free) == sign) + 1 for sign in (1, -1))
+    leaves = leaves[: len(meets) - 1]  # the first to meet is the landing, and the last to leave may not be back
+    speeds = np.gradient(run.columns["z"], run.columns["time"])[leaves] + 9.81 * run.macro_step
+    (words,) = [said for said in result["departures"]["sentences"] if "below the surface:" in said]
+    count, rise = re.findall(r": ([0-9]+); in the highest it rises by ([0-9.]+) mm", words)[0]
+    assert int(count) == len(leaves) > 3
+    assert float(rise) == pytest.approx(1e3 * speeds.max() ** 2 / 2 / 9.81, rel=0.05)
+    (warned,) = [said for said in result.warnings if "in its crater" in said]
+    assert f"contact {count} times" in warned and "'power-irreversible'" in warned
+    _, damped = concluded(lander, tmp_path, **given, ground="power-irreversible")
+    assert not [said for said in damped.warnings if "in its crater" in said]
+    _, flies = concluded(lander, tmp_path, **BOUNCE, duration=0.4)
+    assert not [said for said in flies["departures"]["sentences"] if "below the surface:" in said]
