@@ -16,7 +16,7 @@ KILLED ?= killed.jsonl
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(firstword $(MAKEFILE_LIST)) | sed -E 's/^([a-z]+):.*## */  make \1\t/' | expand -t 18
 
-run: $(VENV)/.installed  ## a first answer: a spike in sand, into a fresh folder under runs/ (ARGS="--option value ...")
+run: $(VENV)/.installed  ## a first answer in 2 to 3 minutes: a spike in sand, into a fresh folder under runs/ (ARGS="--option value ...")
 	$(BIN)/hedgebed penetrate penetrate-first $(ARGS)
 
 flagship: $(VENV)/.installed  ## the same spike extrapolated to real grains, with three errors; some 3 hours of one core

@@ -53,7 +53,7 @@ def inertial_number(settings: PenetrateSettings, speed: float) -> float:
 
 SIZES_TELL = 4.0
 """What grain size tells, over what width, depth, overlap or speed does [1]: from three to ten grains across, K of the
-shipped spike fell by 40 %; with the width by nothing that beds did not differ by (docs/results/README.md)."""
+shipped spike fell by 40 %; with the width by nothing that beds did not differ by (docs/notes/results.md)."""
 
 
 @dataclass(frozen=True)

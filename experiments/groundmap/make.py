@@ -1,7 +1,7 @@
 """Makes maps.toml from kept results: `python -m experiments.groundmap.make` from the root of a checkout.
 
 Of sand it reads docs/results/converge-flagship (numbers over grain size) and docs/results/ground-map (packing, and two
-runs that check the scaling); of JSC-1A docs/results/penetrate-jsc-1a-push. docs/results/README.md has their commands.
+runs that check the scaling); of JSC-1A docs/results/penetrate-jsc-1a-push. docs/notes/results.md describes both.
 """
 
 import json

@@ -324,7 +324,7 @@ def test_the_shipped_cases_are_settings():
     # (docs/results), and sand bears 1.65 to 1.77 times as much (docs/materials.md).
     kept = json.loads((cases.parents[1] / "docs/results/penetrate-full/result.json").read_text())["quantities"]
     assert 1.65 < full.young / kept["young"]["value"] < 1.77 and kept["max_overlap"]["value"] < full.max_overlap
-    # Four tips wide: what that alone does is in docs/results/README.md, by the shipped grains in a bed of this size.
+    # Four tips wide: what that alone does is in docs/notes/results.md, by the shipped grains in a bed of this size.
     assert min(full.bed_size[:2]) > 4 * full.tip_diameter and full.bed_size[2] > full.depth + 1.8 * full.tip_diameter
     assert {name for name, value in full if value != getattr(short, name)} == finer
     assert len(full.seeds) >= 3 and full.other_speeds == full.speeds and full.other_drop_speeds == full.drop_speeds

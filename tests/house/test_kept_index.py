@@ -1,0 +1,48 @@
+"""The list of kept runs is the one that docs/results/index.py makes, and the folders have short pages."""
+
+import runpy
+import shutil
+
+import pytest
+from import_graph import ROOT
+
+FOLDER = ROOT / "docs" / "results"
+MODULE = runpy.run_path(str(FOLDER / "index.py"))
+
+
+def test_the_list_of_kept_runs_is_made_from_the_folders_of_today():
+    made = MODULE["index_of"](FOLDER)
+    assert (FOLDER / "README.md").read_text(encoding="utf-8") == made, "python docs/results/index.py"
+    assert made.count("\n| [") == sum(path.is_dir() and path.name[0] not in "._" for path in FOLDER.iterdir())
+
+
+def test_a_page_of_a_kept_folder_has_at_most_200_words():
+    long = {path for path in FOLDER.rglob("*/README.md") if len(path.read_text(encoding="utf-8").split()) > 200}
+    assert long == set(), "prose belongs to docs/notes"
+
+
+def test_a_line_follows_the_files_of_a_folder(tmp_path):
+    shutil.copytree(FOLDER / "converge-flagship", tmp_path / "run")
+    assert "`hedgebed converge` | 2026-11-26 |" in MODULE["index_of"](tmp_path)
+    result = tmp_path / "run/result.json"
+    result.write_text(result.read_text(encoding="utf-8").replace("A 12 mm spike", "A spike of 12 mm", 1))
+    assert "| A spike of 12 mm in sand, with its errors; `stiffness` 38.9 ± 40 N/m |" in MODULE["index_of"](tmp_path)
+    (tmp_path / "run/README.md").write_text("# Two pushes\n\nCommand: `make a|b`\n\nDate: 2026-11-27\n")
+    assert "| [run](run/README.md) | `make a\\|b` | 2026-11-27 | Two pushes |" in MODULE["index_of"](tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("README.md", "# Two pushes\n", "README.md: a line is missing, expected a line `Command: ...` and"),
+        ("run.toml", "x = 1\n", "run.toml: the key 'command' was not found"),
+        ("run.toml", "x =", "run.toml: cannot be read"),
+        ("other.csv", "", "run.toml: cannot be read"),
+    ],
+)
+def test_a_folder_that_states_no_command_is_named(tmp_path, capsys, name, text, said):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / name).write_text(text)
+    assert MODULE["main"](tmp_path) == 1
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "README.md").exists()
