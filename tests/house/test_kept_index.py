@@ -18,24 +18,28 @@ def test_the_list_of_kept_runs_is_made_from_the_folders_of_today():
 
 def test_a_page_of_a_kept_folder_has_at_most_200_words():
     long = {path for path in FOLDER.rglob("*/README.md") if len(path.read_text(encoding="utf-8").split()) > 200}
-    assert long == set(), "prose belongs to docs/notes"
+    assert long == set()
 
 
 def test_a_line_follows_the_files_of_a_folder(tmp_path):
+    def cells():
+        return MODULE["index_of"](tmp_path).splitlines()[-1].strip("| ").split(" | ")
+
     shutil.copytree(FOLDER / "converge-flagship", tmp_path / "run")
-    assert "`hedgebed converge` | 2026-11-26 |" in MODULE["index_of"](tmp_path)
+    assert cells()[:3] == ["[run](run)", "`hedgebed converge`", "2026-11-26"]
     result = tmp_path / "run/result.json"
     result.write_text(result.read_text(encoding="utf-8").replace("A 12 mm spike", "A spike of 12 mm", 1))
-    assert "| A spike of 12 mm in sand, with its errors; `stiffness` 38.9 ± 40 N/m |" in MODULE["index_of"](tmp_path)
+    shown = "A spike of 12 mm in sand, with its errors; `stiffness` 38.9 ± 40 N/m"
+    assert cells()[3] == shown
     (tmp_path / "run/README.md").write_text("# Two pushes\n\nCommand: `make a|b`\n\nDate: 2026-11-27\n")
-    assert "| [run](run/README.md) | `make a\\|b` | 2026-11-27 | Two pushes |" in MODULE["index_of"](tmp_path)
+    assert cells() == ["[run](run/README.md)", "`make a\\|b`", "2026-11-27", "Two pushes"]
 
 
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("README.md", "# Two pushes\n", "README.md: a line is missing, expected a line `Command: ...` and"),
-        ("run.toml", "x = 1\n", "run.toml: the key 'command' was not found"),
+        ("README.md", "# Two pushes\n", "README.md: a line"),
+        ("run.toml", "x = 1\n", "run.toml: the key"),
         ("run.toml", "x =", "run.toml: cannot be read"),
         ("other.csv", "", "run.toml: cannot be read"),
     ],

@@ -36,5 +36,5 @@ def test_the_script_of_the_readme_prints_what_it_states_and_keeps_its_run(tmp_pa
     # The size of the bed, its gravity and the 2 of m/s2 are printed as they are given.
     within = [grains, 0, 0, 0, packing, 0, 0, time, float(force), float(work), float(work)]
     assert [abs(a - b) <= by for a, b, by in zip(printed, written, within, strict=True)] == [True] * 11, done.stdout
-    assert printed[-1] < 0.02 * printed[-2], "sand returns almost none"
+    assert printed[-1] < 0.02 * printed[-2]
     assert {"run.toml", "result.json"} <= {path.name for path in (tmp_path / "runs/first").iterdir()}
