@@ -31,6 +31,8 @@ DATA = Path(__file__).with_name("maps.toml")
 NAMES = ("stiffness", "damping", "sinkage")
 POWERS = {"stiffness": (1.0, 2.0), "damping": (0.5, 2.5), "sinkage": (0.0, 1.0)}
 """Powers of gravity and of the tip's diameter of each number. A speed has 0.5 and 0.5 (Froude number)."""
+ON_EARTH = 9.7
+"""Gravity from which on sand is poured and tested in laboratories as grains that do not stick [m/s2]."""
 TO_STD = 1.96  # of a 95 % half-width
 
 
@@ -111,7 +113,7 @@ class GroundMap:
 
     def words(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:
         """What a person must know of this map besides its numbers; gravity [m/s2] and diameter [m] change nothing."""
-        told = [say("of_real_grains")]
+        told = [say("of_real_grains")] if gravity < ON_EARTH else []
         if answer.packing != self.packing:
             told.append(say("of_packing", answer=answer, measured=self.packed[0]))
         return told

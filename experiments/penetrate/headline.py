@@ -16,6 +16,10 @@ from .sure import in_words
 
 __all__ = ["penetrate_headline"]
 
+NOT_INCLUDED = "  (without bed size, softness, speed)"
+"""Below an interval: what is not in it."""
+BY_FORMULA = "by Terzaghi, cohesion \N{PLUS-MINUS SIGN} 1 std"
+"""Depth that a formula gives where grains that stick are too large to show it."""
 _SAID, _OF_FINDINGS = 4, 2
 """Sentences shown, warnings first; but all warnings, and at least so many findings."""
 
@@ -30,6 +34,9 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     if "depth_to_rest" in numbers:
         rows[0] = (f"would rest{load} at about", _quoted(numbers["depth_to_rest"]), rows[0][2])
     rows += _with_errors(result.get("sure", {}))
+    if result.get("rest", {}).get("comes_to_rest"):
+        low, high = result["rest"]["depth_range"]
+        rows.append((BY_FORMULA, in_words(low, high, "m") if high else "0", ""))
     rows += _drag(result.get("departures", {}).get("table", []))
     rows += _fastest_drop(result.get("runs", []))
     given, back = (numbers.get(f"work_returned_{side}") for side in ("dem", "spring_damper"))
@@ -70,7 +77,8 @@ def _with_errors(sure: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         if name in sure:
             low, high = sure[name]["low"], sure[name]["high"]
             known = "not known" if low is None else f"at least {quote(low, None, 'm', significant=2)}"
-            return [(words, known if high is None else in_words(low, high, "m"), "")]
+            shown = [(words, known if high is None else in_words(low, high, "m"), "")]
+            return [*shown, (NOT_INCLUDED, "", "")] if low is not None else shown
     return []
 
 

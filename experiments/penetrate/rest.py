@@ -40,12 +40,14 @@ def made_units(settings: PenetrateSettings, units: Sequence[Unit]) -> list[Unit]
 def answer(findings: Findings, material: Any) -> Json | None:
     """The entry "rest" of result.json: how deep the load would rest, and what cohesion would change.
 
-    None where a set-down came to rest, or ended otherwise than at the floor.
+    Where a set-down came to rest: what Terzaghi's formula gives for a flat foot in grains that stick (`_stuck`), else
+    None. None too where a set-down ended otherwise than at rest or at the floor.
     """
     settings = findings.settings
     stood = findings.of("set_down")
     if stood and not all(run.ended == "max_depth" for run in stood):
-        return None
+        rests = any(depth is not None for depth in findings.sinkages(findings.beds))
+        return _stuck(settings, material) if rests and settings.tip == "flat" else None
     load, area = settings.weight, math.pi * settings.tip_diameter**2 / 4
     expected = beds.expected_bearing(settings)
     stiffness = findings.fit.stiffness if findings.fit.stiffness > 0 else expected.stiffness
@@ -70,8 +72,8 @@ def answer(findings: Findings, material: Any) -> Json | None:
     sentences += [say("with_cohesion", **told)] + ([] if beside is None else [beside.pop("sentence")])
     return {
         "comes_to_rest": False, "at_any_depth_of_the_foot": not never, "load": load, "foot": settings.foot,
-        "depth": depths[0], "depth_range": [low, high], "stiffness": stiffness,
-        "stiffness_plate": plate,
+        "depth": depths[0], "depth_range": [low, high], "depth_expected": expected.depth(load),
+        "stiffness": stiffness, "stiffness_plate": plate,
         "friction_angle": angle, "cohesion_enough": enough, "cohesions": rows, "sentences": sentences,
         "source": say("terzaghi"), **({} if beside is None else {"beside": beside}),
     }  # fmt: skip
@@ -83,27 +85,54 @@ def _beside(settings: PenetrateSettings, material: Any, stiffness: float) -> Jso
     Its friction angle is its own, not that of these grains: N_c grows from 32 at 31 degrees to 55 at 37. K is the one
     of this bed times the expected ratio of the two materials.
     """
-    other = MATERIALS[_BESIDE]
-    recipe, area = recipe_of(other), math.pi * settings.tip_diameter**2 / 4
-    assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
-    load, angle = settings.weight, friction_angle(other)
-    needs = [load / (bearing_capacity(1.0, phi) * area) for phi in (angle, recipe.circle)]
+    other, area = MATERIALS[_BESIDE], math.pi * settings.tip_diameter**2 / 4
     facts = {"grain": settings.grain, "gravity": settings.gravity, "area": area}
     of_it = stiffness * bearing_of(other, **facts).stiffness / bearing_of(material, **facts).stiffness
+    found, told = _by_terzaghi(settings, other, of_it)
+    verdict = say(f"beside_{told.pop('verdict')}", **told)
+    return found | {"sentence": say("try_cohesive", **told, verdict=verdict)}
+
+
+def _stuck(settings: PenetrateSettings, material: Any) -> Json | None:
+    """The entry "rest" of a flat foot that rests on grains that stick, larger than real ones; None where the cohesion
+    has no known error. K is the one expected of the material (`bearing_of`).
+    """
+    recipe = recipe_of(material)
+    if recipe.cohesion is None or recipe.cohesion_std is None or recipe.circle is None:
+        return None
+    area = math.pi * settings.tip_diameter**2 / 4
+    bears = bearing_of(material, grain=settings.grain, gravity=settings.gravity, area=area)
+    found, told = _by_terzaghi(settings, material, bears.stiffness)
+    verdict = say(f"sticky_{told.pop('verdict')}", **told)
+    return {
+        "comes_to_rest": True, "load": settings.weight, "stiffness": bears.stiffness, **found,
+        "sentences": [say("on_sticky", **told, mm=1e3 * settings.grain, verdict=verdict)], "source": say("terzaghi"),
+    }  # fmt: skip
+
+
+def _by_terzaghi(settings: PenetrateSettings, material: Any, stiffness: float) -> tuple[Json, Json]:
+    """The cohesion that a material has and needs, and the depths [m] where K = ``stiffness`` [N/m] carries the rest.
+
+    The ends are those of the cohesion plus and minus one standard deviation. Returns the numbers, and what the
+    sentences on them take, with "verdict": holds, sinks or open.
+    """
+    recipe, area = recipe_of(material), math.pi * settings.tip_diameter**2 / 4
+    assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
+    load, angle = settings.weight, friction_angle(material)
+    needs = [load / (bearing_capacity(1.0, phi) * area) for phi in (angle, recipe.circle)]
     least, most = max(0.0, recipe.cohesion - recipe.cohesion_std), recipe.cohesion + recipe.cohesion_std
     shares = [max(0.0, 1.0 - most / min(needs)), max(0.0, 1.0 - least / max(needs))]
-    low, high = (load * share / of_it for share in shares)
-    verdict = "beside_holds" if high == 0 else "beside_sinks" if low > 0 else "beside_open"
-    sentence = say(
-        "try_cohesive", beside=_BESIDE, cohesion=recipe.cohesion, std=recipe.cohesion_std, angle=angle,
-        circle=recipe.circle, large=f"{needs[0]:.2g}", peak=f"{needs[1]:.2g}",
-        verdict=say(verdict, low=_length(low), high=_length(high)),
-    )  # fmt: skip
-    return {
-        "material": _BESIDE, "cohesion": recipe.cohesion, "cohesion_std": recipe.cohesion_std,
+    low, high = (load * share / stiffness for share in shares)
+    found: Json = {
+        "material": material.name, "cohesion": recipe.cohesion, "cohesion_std": recipe.cohesion_std,
         "friction_angles": [angle, recipe.circle], "cohesions_enough": needs, "depth_range": [low, high],
-        "sentence": sentence,
     }  # fmt: skip
+    told: Json = {
+        "name": material.name, "beside": material.name, "cohesion": recipe.cohesion, "std": recipe.cohesion_std,
+        "angle": angle, "circle": recipe.circle, "large": f"{needs[0]:.2g}", "peak": f"{needs[1]:.2g}",
+        "low": _length(low), "high": _length(high), "verdict": "holds" if high == 0 else "sinks" if low > 0 else "open",
+    }  # fmt: skip
+    return found, told
 
 
 def sinkage_interval(findings: Findings, material: Any) -> Interval | None:
@@ -132,7 +161,7 @@ def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
         for name, interval, unit in (("sinkage_dem", sunk, "m"), ("stiffness", stiffness, "N/m"))
         if interval is not None
     }
-    if rest is None:
+    if rest is None or rest["comes_to_rest"]:
         return found
     force = max(float(run.force.max()) for run in findings.of("driven"))
     ends = None if stiffness is None else interval_of_rest(settings.weight, stiffness, rest["depth_range"][1])
@@ -142,15 +171,19 @@ def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
     if low is None:
         known = say("rest_unknown", why=_why_unknown(findings, stiffness, cohesive=material.cohesion != "none"))
     else:
-        known = (
-            say("rest_beyond", low=_length(low)) if high is None else say("rest_within", ends=in_words(low, high, "m"))
-        )
+        known = say("rest_beyond", low=_length(low)) if high is None else _within(low, high, rest["depth_expected"])
     if low is not None and not findings.beds_separate:
         known = f"{known}. {say('rest_as_of_one_bed')}"
     said = f"{times}{known}"
     rest["sentences"] = [rest["sentences"][0], said, *rest["sentences"][1:]]
     depth = {"unit": "m", "value": rest["depth"], "low": low, "high": high, "times_beyond": beyond, "sentence": said}
     return found | {"depth_to_rest": depth}
+
+
+def _within(low: float, high: float, expected: float) -> str:
+    """The interval of the depth to rest, and whether the depth expected before the run is inside."""
+    inside = say("expected_inside" if low <= expected <= high else "expected_outside", expected=_length(expected))
+    return say("rest_within", ends=in_words(low, high, "m"), inside=inside)
 
 
 def _why_unknown(findings: Findings, stiffness: Interval | None, *, cohesive: bool) -> str:

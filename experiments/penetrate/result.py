@@ -111,7 +111,7 @@ def _made(stiffened: list[Json]) -> dict[int, float]:
 
 def _depth_needed(rest: Json | None) -> Json:
     """The quantity "depth_to_rest" where the foot does not come to rest."""
-    if rest is None:
+    if rest is None or rest["comes_to_rest"]:
         return {}
     low, high = rest["depth_range"]
     note = f"where the load would rest, reckoned from the driven runs: {low:.2g} to {high:.2g} m"
@@ -147,8 +147,6 @@ def _compare(settings: PenetrateSettings, result: Json) -> None:
 
 LEAST_CONDITIONS = 3
 """Kinds and speeds that a fit of two numbers needs."""
-LEAST_ACROSS = 5.0
-"""Grains across a tip below which a result warns."""
 
 
 def departures_in_words(findings: Findings) -> Json:
@@ -189,7 +187,7 @@ def warnings_of(findings: Findings) -> Iterator[str]:
         several = sum(value is not None for value in findings.sinkages(findings.beds)) > 1
         so = "its spread between seeds is part of the answer" if several else "another seed will give another"
         if sunk["value"] < 0:
-            yield say("on_top", shown=_words(sunk | {"value": -sunk["value"]}), so=so)
+            yield say("on_top", shown=_words(sunk | {"value": -sunk["value"]}), mm=1e3 * grain, so=so)
         else:
             yield say("shallow", shown=_words(sunk), grains=sunk["value"] / grain, so=so)
     bound = overdamped_below(settings.weight, settings.lowering_speed) / pace_of(settings)
@@ -205,7 +203,6 @@ def warnings_of(findings: Findings) -> Iterator[str]:
         yield say("traded", least=min(own))
     yield from resolution_advice(
         tip=settings.tip_diameter, grain=settings.grain, size=settings.bed_size, depth=settings.depth,
-        across=LEAST_ACROSS,
     )  # fmt: skip
     if fit.damping == 0:
         yield say("damping_zero")
@@ -247,7 +244,8 @@ def overlap_warning(overlap: float | None, settings: PenetrateSettings, softenin
     if overlap is None or overlap <= 0.9 * most:
         return None
     stiffer = softening.stiffer(overlap, 0.8 * most)
-    return say("overlap_near", percent=100 * overlap, most=100 * most, stiffer=stiffer, softening=softening)
+    return say("overlap_near", percent=100 * overlap, most=100 * most, stiffer=stiffer, softening=softening,
+               beside="above" if overlap > most else "near")  # fmt: skip
 
 
 def _which_stiffness(findings: Findings) -> str | None:

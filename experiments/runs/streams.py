@@ -10,12 +10,16 @@ from pathlib import Path
 from types import FrameType
 
 from cyclopts import CoercionError, MissingArgumentError
-from cyclopts.exceptions import UnusedCliTokensError
+from cyclopts.exceptions import UnknownOptionError, UnusedCliTokensError
 
 __all__ = [
     "RefusedError", "fault_words", "file_words", "is_number", "naming", "refusing", "say", "stdout_to_stderr",
     "terminate_like_ctrl_c",
 ]  # fmt: skip
+
+
+PRINTING = ("bed foot", "bed list", "bed show")
+"""Commands that print what they found and keep nothing."""
 
 
 class RefusedError(ValueError):
@@ -39,6 +43,11 @@ def fault_words(error: Exception) -> str:
             return f"{error.argument.name} = {typed} will not do: it takes {count} values, not {got}{about}"
     if isinstance(error, UnusedCliTokensError):
         return f"{' '.join(error.unused_tokens or [])} belongs to no option and to no argument; --help lists them"
+    if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
+        command = " ".join(error.command_chain or ())
+        if error.token and error.token.keyword == "--out" and command in PRINTING:
+            return f"{text} `{command}` prints its numbers and writes no folder; `> FILE` keeps them (--json: as JSON)"
+        return f"{text} `{f'hedgebed {command}'.rstrip()} --help` lists the options"
     if isinstance(error, CoercionError) and error.target_type is float and error.token and error.argument:
         unit = re.findall(r"\[([^\[\]]+)\]", error.argument.parameter.help or "")[-1:]
         if unit and unit[0] != "1":

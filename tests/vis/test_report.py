@@ -271,14 +271,14 @@ def test_what_the_ground_gives_back_is_read_from_the_data(tmp_path, make_run):
 
     run = edit_result(make_run(tmp_path, frames=0), elastic)
     assert "bed 50\N{NO-BREAK SPACE}%" in plot_called("work", run).caption
-    answer = next(item["answer"] for item in summarise(run)["answers"] if "force of the sand" in item["question"])
+    answer = next(item["answer"] for item in summarise(run)["answers"] if "How large is the force" in item["question"])
     assert "withdrawal, 50\N{NO-BREAK SPACE}%" in answer
 
     def costly(result):
         result["quantities"]["work_returned_dem"] = {"value": -0.006, "std": None, "unit": "1"}
 
     run = edit_result(run.path, costly)
-    taken = next(item["answer"] for item in summarise(run)["answers"] if "force of the sand" in item["question"])
+    taken = next(item["answer"] for item in summarise(run)["answers"] if "How large is the force" in item["question"])
     assert "another 0.60" in taken
     golden.golden("report/gives_back", {"half of it": answer, "less than nothing": taken})
 

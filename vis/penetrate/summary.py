@@ -108,7 +108,7 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
         stood = {"sinkage_dem": _in_95(quantities["sinkage_dem"], beds)}
         tiles.append(("Sinks to rest at", _rests_at(stood), note))
     if push := _push(run):
-        tiles.append(("Largest force of the sand", *_largest_push(run), push[1]))
+        tiles.append((f"Largest force of {_grains(run)}", *_largest_push(run), push[1]))
     if words.value_of(quantities, "drag_gap") is not None:
         note = "rms difference over rms force, loading, all pushes"
         tiles.append(("Error of the spring-damper", quantity(_in_95(quantities["drag_gap"], beds), unit="%"), note))
@@ -259,7 +259,7 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
             text += f" In drops the force peaks at {words.joined(peaks)}."
         if words.value_of(quantities, "work_returned_dem") is not None:
             text += " " + _returned(quantities)
-        answers["How large is the force of the sand?"] = text
+        answers[f"How large is the force of {_grains(run)}?"] = text
     if words.value_of(quantities, "drag_gap") is not None:
         text = (
             f"With K = {words.fitted(quantities, 'stiffness')} and C = {words.fitted(quantities, 'damping')} its "
@@ -283,9 +283,10 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
     if sunk is not None:
         load = f" of {quantity(quantities['load'])}" if words.value_of(quantities, "load") is not None else ""
         text = f"Set down under its load{load}, the spike comes to rest {_rests_at(quantities)}"
-        text += " deep." if sunk >= 0 else ": it stands on grains that extend above the mean surface."
+        text += " deep." if sunk >= 0 else say("on_uppermost", size=_size_of_grains(run))
         sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("sinkage_dem")).get("sentence")
         text += f" {words.sentence(str(sure))}" if sure else ""
+        text += "".join(f" {words.sentence(said)}" for said in _by_cohesion(run.result))
         if law is not None:
             text += model + (f", {_deeper(law / sunk)}." if sunk > 0 else ".")
         return text + more
@@ -295,6 +296,24 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
         return ""
     text = "Not known: set down under its load, the spike did not come to rest in the simulated time."
     return text + (f"{model}." if law is not None else "") + more
+
+
+def _grains(run: RunFolder) -> str:
+    """What pushes back: the name of the material, where it is known."""
+    name = str(words.mapping_of(run.result.get("bed")).get("material") or "bed")
+    return name if name.startswith("jsc-") else f"the {name}"
+
+
+def _size_of_grains(run: RunFolder) -> str:
+    """The mean diameter of the grains in brackets, where it is known."""
+    grain = words.plain_value(words.mapping_of(run.result.get("bed")).get("grain"))
+    return "" if grain is None else f" ({quote(grain, 0.0, 'm')})"
+
+
+def _by_cohesion(result: Mapping[str, Any]) -> list[str]:
+    """What a formula gives for a foot that rests on grains that stick."""
+    rest = words.mapping_of(result.get("rest"))
+    return [str(text) for text in words.list_of(rest.get("sentences"))] if rest.get("comes_to_rest") is True else []
 
 
 def _rests_at(quantities: Mapping[str, Any]) -> str:

@@ -130,6 +130,8 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
         (["cone", "--depth", "0.01", "--size", "0.002"], "grain"),
         (["cone", "--depth", "0.01", "--size", "20"], "large"),
         (["cone", "--depth", "1"], "deep"), (["cone", "--depth", "15s"], "depth"),
+        (["cone", "--depth", "0.01", "--out", "x"], "`> FILE`"),
+        (["cone", "--depth", "0.01", "--zzz", "1"], "bed foot --help"),
     ):  # fmt: skip
         assert main(["bed", "foot", str(path), *wrong]) == BAD_INPUT
         assert named in capsys.readouterr().err

@@ -186,6 +186,7 @@ def test_a_load_that_was_not_given_is_set_beside_the_weight_of_a_platform(tmp_pa
     """At 1 g and 12 mm it is that of the Hedgehog in the rig; elsewhere the warning has the weight there, m g / 4."""
     low = ground.run(ground.Settings(gravity=0.0085 * 9.80665), tmp_path / "low")
     assert low["quantities"]["load"]["value"] == pytest.approx(0.219 * 0.0085)
+    assert any("grains stick" in text for text in low["warnings"])  # where their weight is small
     assert "0.11 N" in low["warnings"][0] and "12 mm" in low["warnings"][0]
     small = ground.run(ground.Settings(tip_diameter=0.01, grain=0.001), tmp_path / "small")
     assert "0.219 N" in small["warnings"][0] and " ± " in small["warnings"][0]
@@ -201,6 +202,7 @@ def test_c_is_called_not_identified_where_its_interval_contains_zero_and_only_th
         told = any("not identified" in text for text in result["warnings"])
         assert told == (c["value"] <= 1.645 * c["std"])
     assert any("not identified" in text for text in shipped["warnings"])
+    assert not any("grains stick" in text for text in shipped["warnings"])  # at 1 g
 
 
 def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_the_tip_is_a_ball(tmp_path, capsys):

@@ -19,6 +19,7 @@ from experiments.grains.staged import check_bed_stages
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.following import SPEEDS, TIMES
+from experiments.penetrate.headline import penetrate_headline
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.similarity import fast_for_gravity, similarity_of
 from experiments.penetrate.units import make_run, plan_units
@@ -298,6 +299,27 @@ def test_a_foot_that_grains_above_the_surface_carry_rests_above_it(fake, tmp_pat
     on_top = [text for text in [*result["departures"]["sentences"], *result["warnings"]] if "extend above the" in text]
     answer = said["answers"][0]["answer"].split(" A set-down")[0]
     golden("penetrate/rests_on_top", [said["tiles"][0]["value"], answer, *on_top, result["departures"]["drop"]])
+
+
+@pytest.mark.parametrize(("load", "verdict"), [(0.5, "open"), (0.05, "should support"), (3.15, "should not")])
+def test_a_foot_on_coarse_grains_that_stick_is_held_against_terzaghi(fake, tmp_path, monkeypatch, load, verdict):
+    """24 ± 20 Pa against the load over 1.3 c N_c A: 0.5 N is open although the coarse bed carries it on top."""
+    law, _ = fake
+    law |= {"hardness": 1e3 * load / 0.5, "rate": 0.001, "proud": 2e-3}
+    sticky = MATERIALS["jsc-1a-loose-cut"]
+    monkeypatch.setattr(beds, "find_material", lambda name: sticky)
+    monkeypatch.setattr(beds, "sinks_away", lambda settings: False)
+    own = FOOT | {"load": load, "gravity": "1e-3g", "seeds": (1,), "frame_count": 0, "drop_speeds": ()}
+    result = penetrate.run(PenetrateSettings(**own), tmp_path / "run")
+    assert result["quantities"]["sinkage_dem"]["value"] < 0
+    rest, area = result["rest"], math.pi * 0.008**2
+    low, high = rest["depth_range"]
+    least = load * max(0.0, 1.0 - 4.0 * 1.3 * 54.57 * area / load) / rest["stiffness"]
+    assert (low > 0, high) == (load > 1, pytest.approx(least, rel=1e-3))
+    assert verdict in rest["sentences"][0]
+    shown = penetrate_headline(result)
+    assert any(verdict in text for text in shown.sentences)
+    assert verdict in summarise(read_folder(tmp_path / "run"))["answers"][0]["answer"]
 
 
 def test_a_law_that_creeps_in_its_damper_is_not_at_rest(fake, tmp_path):
