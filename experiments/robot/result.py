@@ -311,8 +311,10 @@ def _sentences(run: RobotRun, heights: Array) -> list[str]:
     rose = say("rose", rise=rise) if rise >= 0 else say("stayed_below", rise=-rise)
     told = [say("went", way=1e3 * way, rose=rose)]
     longest = 1e3 * run.macro_step * max((end - begin for begin, end in flights), default=0)
-    told.append(say("flew", count=len(flights), apart=1e3 * APART, longest=longest) if flights else say("stayed"))
+    lost = bounce_words(crater_losses(run, heights, apart=APART))
+    stayed = say("stayed_in_crater" if lost else "stayed")
+    flew = say("flew", count=len(flights), apart=1e3 * APART, longest=longest) if flights else stayed
+    told.append(" ".join([flew, *lost]))
     told += launched(run, flights[0][0]) if flights else []
-    told += bounce_words(crater_losses(run, heights, apart=APART))
     told.append(say("sank", depth=1e3 * float(rows["sinkage"].max()), end=1e3 * float(rows["sinkage"][-1])))
     return told
