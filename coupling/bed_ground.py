@@ -214,7 +214,7 @@ class BedGround:
         if overlap > 0:
             raise ValueError(
                 f"the body, its centre at a height of {pose.position[2]:.6g} m, starts in overlap with a grain: "
-                f"{_called(row)} by {overlap:.3g} m; {self.clear_height(pose):.6g} m higher would do"
+                f"{_called(row)} by {overlap:.3g} m; start it {self.clear_height(pose):.6g} m higher"
             )
 
     def _deepest_overlap(self, grains: Grains, pose: Pose, lift: float = 0.0) -> tuple[float, int]:

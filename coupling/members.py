@@ -94,7 +94,7 @@ def platform_members(
         )
     slots = slots_of(count)
     if slots < FEWEST_SLOTS:
-        raise ValueError(f"spike_count = {count}: rows that share a body must be far apart; 6, 8 or 16 would do")
+        raise ValueError(f"spike_count = {count}: rows that share a body must be far apart: expected 6, 8 or 16")
     inner = row_tips(spike_length - radius, count)
     shaft = max(clear, spike_length - hull_radius + radius) if hull_radius > 0 else clear
     members = []

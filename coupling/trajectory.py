@@ -41,7 +41,7 @@ class Penetration:
     """Why it ended.
 
     "done": a driven run came to the end of its way. "rest": a drop or set-down came to rest. "stopped": a drop was
-    still bobbing `after_stop` after its first stop. "max_depth": it went as deep as it was allowed. "max_time": its
+    still bobbing `after_stop` after its first stop. "max_depth": it reached the largest depth allowed. "max_time": its
     time was over. "unfinished": these are the rows of a run under way.
     """
     settings: dict[str, Any] = field(default_factory=dict)
@@ -183,7 +183,7 @@ class Penetration:
 
 REMARKS = {
     "max_time": "its time was over before it had come to rest",
-    "max_depth": "it went as deep as it was allowed and was ended there",
+    "max_depth": "it reached the largest depth allowed and was ended there",
     "stopped": "it was still bobbing when it was ended",
     "unfinished": "these are the rows of a run under way",
 }

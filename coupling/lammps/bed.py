@@ -277,7 +277,7 @@ class LammpsBed:
                 raise BedFailure(
                     f"a body at {'xy'[axis]} = {body.position[axis]:.4g} m, from {low[axis]:.4g} to "
                     f"{high[axis]:.4g} m, reaches with a grain's radius across the end of the bed in LAMMPS, from "
-                    f"{begin:.4g} to {begin + self.size[axis]:.4g} m: a longer or wider bed would do"
+                    f"{begin:.4g} to {begin + self.size[axis]:.4g} m: use a longer or wider bed"
                 )
 
     def reactions(self) -> Vector:

@@ -35,7 +35,7 @@ class LammpsGround(BedGround):
     def checkpoint(self) -> Any:
         """Raises ValueError: steps in LAMMPS are not repeated."""
         raise ValueError(
-            "iterations is above 1: a bed in LAMMPS takes explicit coupling alone, iterations = 1 would do"
+            "iterations is above 1: a bed in LAMMPS takes explicit coupling alone: expected iterations = 1"
         )
 
     def energies(self) -> dict[str, float]:

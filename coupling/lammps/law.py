@@ -90,7 +90,7 @@ def dashpot_input(factor: float, *, setups: int = 1) -> float:
     if not low <= factor <= high:
         raise ValueError(
             f"the normal dashpot has the factor {factor:.4g}: LAMMPS' `damping tsuji` gives {max(low, 0.0):.3g} to "
-            f"{high:.4g}; a larger restitution would do"
+            f"{high:.4g}; use a larger restitution"
         )
     return float(brentq(lambda e: np.polyval(_TSUJI, e) - factor, _LEAST, _MOST, xtol=1e-15))
 
@@ -145,6 +145,6 @@ def spring_energy(row: Row, cohesion: str, overlap: np.ndarray, radius: np.ndarr
     """
     two_e, pi_w = float(row[0]), float(row[-1])
     if cohesion == "jkr":
-        raise ValueError("cohesion is 'jkr': LAMMPS does not tell which stretched contacts still hold")
+        raise ValueError("cohesion is 'jkr': LAMMPS does not report which stretched contacts still hold")
     pressed = 4 / 15 * two_e * float((np.sqrt(radius) * overlap**2.5).sum())
     return pressed - 2 * pi_w * float((radius * overlap).sum()) if cohesion == "dmt" else pressed

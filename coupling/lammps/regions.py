@@ -33,8 +33,8 @@ MOST_PIECES = 30  # Of all bodies: each takes one of LAMMPS' 32 groups
 _ARM = 0.1  # Over which a larger change of angle than JUMP is no motion [m]
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 _NO_POINT = (
-    "LAMMPS gives no right force on a cone where it is thinner than a grain; a Ball as tip, a wider end, or the ground "
-    "`bed` would do"
+    "LAMMPS gives no right force on a cone where it is thinner than a grain: use a Ball as tip, a wider end, or the "
+    "ground `bed`"
 )
 
 
@@ -73,7 +73,7 @@ def check_count(pieces: Sequence[Piece]) -> None:
     if len(pieces) <= MOST_PIECES:
         return
     flat = sum(not isinstance(piece, Primitive) for piece in pieces)
-    of_faces = f", {flat} of them faces and edges of polyhedra: fewer corners, or parallelograms as faces, would do"
+    of_faces = f", {flat} of them faces and edges of polyhedra: use fewer corners, or parallelograms as faces"
     raise ValueError(
         f"the bodies have {len(pieces)} pieces{of_faces if flat else ''}; a bed in LAMMPS takes at most {MOST_PIECES}"
     )
@@ -151,7 +151,7 @@ def _seam(below: Shape, above: Shape) -> float:
             return float(height)
     raise ValueError(
         f"{below} below {above}: in LAMMPS a body of several pieces is a cylinder as thick as the ball or the cone "
-        f"below it; a shaft as thick as the tip would do"
+        f"below it: use a shaft as thick as the tip"
     )
 
 

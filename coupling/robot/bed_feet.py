@@ -20,7 +20,7 @@ __all__ = ["BedFeet"]
 
 Surface = Callable[[Vector], tuple[Vector, Vector, Vector]]
 """Points in the bed [m] -> distance [m], outward normal and curvature [1/m] (`distances`)."""
-MOST_LIFT = 0.5  # A start deeper than this in the bed is refused without the height that would do [m]
+MOST_LIFT = 0.5  # A start deeper than this in the bed is refused without a sufficient height [m]
 
 
 class BedFeet(BedGround):
@@ -149,15 +149,15 @@ class BedFeet(BedGround):
         if overlap > 0:
             low, high = 0.0, MOST_LIFT
             if self._overlap(pose, high)[0] > 0:
-                would = f"more than {high:g} m higher"
+                above = f"more than {high:g} m higher"
             else:
                 for _ in range(40):
                     middle = 0.5 * (low + high)
                     low, high = (middle, high) if self._overlap(pose, middle)[0] > 0 else (low, middle)
-                would = f"{1e3 * (high + 0.005 * self._grain):.4g} mm higher"
+                above = f"{1e3 * (high + 0.005 * self._grain):.4g} mm higher"
             raise ValueError(
                 f"feet: {worst.name!r} starts in the sand, {1e3 * overlap:.3g} mm into a grain: raise the robot "
-                f"(height), {would} would do"
+                f"(height) to start {above}"
             )
 
     def clear_height(self, pose: Pose, *, most: float = MOST_LIFT) -> float:

@@ -223,8 +223,8 @@ def _geom(model: Any, data: Any, k: int, name: str) -> Part:
         spreads = np.zeros((len(points), 3, 3))
     else:
         raise ValueError(
-            f"feet: {name!r} is a {kind}, which no foot can be: sphere, capsule, cylinder, box, ellipsoid or mesh "
-            f"would do"
+            f"feet: {name!r} is a {kind}, which no foot can be: expected sphere, capsule, cylinder, box, "
+            f"ellipsoid or mesh"
         )
     return Part(name, kind, vertices, faces, (shape,), points, spreads, share, note)
 
@@ -300,7 +300,7 @@ def _closed(name: str, vertices: Vector, faces: Faces) -> tuple[Vector, Faces, s
             made = made.convex_hull
         except Exception as error:
             raise ValueError(
-                f"feet: the mesh of {name!r} encloses no volume ({error}): a closed one would do"
+                f"feet: the mesh of {name!r} encloses no volume ({error}): expected a closed one"
             ) from None
         note = f"the mesh of {name!r} is not closed: its convex hull is used, as MuJoCo does for contacts"
     if made.volume < 0:

@@ -147,7 +147,7 @@ class FootForces(AbstractContextManager["FootForces"]):
             check_exchange(robot, self._make_ground(time_step=step), substeps=1)
         except ValueError as error:
             raise ValueError(
-                f"model.opt.timestep = {step:g} s is too long for this law: a shorter one or a softer law would do. "
+                f"model.opt.timestep = {step:g} s is too long for this law: use a shorter one or a softer law. "
                 f"In words of the check of runs: {error}"
             ) from None
 

@@ -27,7 +27,7 @@ def load_model(path: str | Path) -> Any:
     """The MuJoCo model in an MJCF or URDF file. Raises ValueError for a file that is not there or no model."""
     mujoco, path = refuse_missing(), Path(path)
     if not path.is_file():
-        raise ValueError(f"model = {str(path)!r}: there is no such file; an MJCF or URDF file would do")
+        raise ValueError(f"model = {str(path)!r}: there is no such file; expected an MJCF or URDF file")
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
@@ -41,11 +41,11 @@ def check_model(model: Any) -> None:
     """Raise ValueError for an integrator that cannot be stepped in halves and for gravity that is not straight down."""
     if int(model.opt.integrator) == int(refuse_missing().mjtIntegrator.mjINT_RK4):
         raise ValueError(
-            "the model's integrator is RK4, which cannot be stepped in halves: implicitfast or Euler would do"
+            "the model's integrator is RK4, which cannot be stepped in halves: expected implicitfast or Euler"
         )
     gravity = np.asarray(model.opt.gravity)
     if gravity[0] or gravity[1] or gravity[2] > 0:
-        raise ValueError(f"the model's gravity is {gravity.tolist()} m/s2: only straight down (0, 0, -g) would do")
+        raise ValueError(f"the model's gravity is {gravity.tolist()} m/s2: expected straight down (0, 0, -g)")
 
 
 def keyframe_of(model: Any, name: str) -> int:

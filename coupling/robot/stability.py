@@ -198,6 +198,6 @@ def check_exchange(robot: Any, ground: LawFeet | BedFeet | ExpectedBed, *, subst
             f"of {worst.stiffness:.3g} N/m and {worst.damping:.3g} N s/m is unstable with substeps = {substeps}, an "
             f"exchange every {1e6 * step:.4g} us ({found:.3g} times what is stable"
             f"{'' if iterations == 1 else ' explicitly'}); "
-            f"{', or '.join(remedies)} would do"
+            f"use {', or '.join(remedies)}"
         )
     return found

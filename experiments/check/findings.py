@@ -222,7 +222,7 @@ def missing_sensors(campaign: Campaign) -> list[Finding]:
     for sensor in ("pose", "imu", "wheel"):
         without = [trial.id for trial in tables.trial if sensor not in trial.files]
         if len(without) == len(tables.trial):
-            what = f"no trial has a recording of {sensor}: what only it tells stays unknown"
+            what = f"no trial has a recording of {sensor}: what only it measures stays unknown"
             found.append(Finding(trial="", what=what))
         else:
             found += [Finding(trial=id, what=f"trial {id} has no recording of {sensor}, others have") for id in without]

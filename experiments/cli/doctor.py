@@ -107,7 +107,7 @@ def _cache() -> Finding:
     detail = f"{folder}: {len(beds)} files, {size / 2**20:.1f} MiB; {free / GIB:.1f} GiB free"
     if not writable:
         detail += "; cannot be written"
-    return Finding("cache of beds", writable and free >= GIB // 4, detail, "set HEDGEBED_CACHE to a folder with room")
+    return Finding("cache of beds", writable and free >= GIB // 4, detail, "set HEDGEBED_CACHE to an emptier disk")
 
 
 def _opengl(answer: Answer) -> Finding:

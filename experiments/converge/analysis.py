@@ -26,7 +26,7 @@ __all__ = ["QUANTITIES", "REST", "Finding", "findings_of", "numbers_of", "two_fi
 
 REST = ("width", "depth", "overlap", "speed")
 BANDS = 4
-"""Bands of depth in which `penetrate` tells the mean force."""
+"""Bands of depth in which `penetrate` states the mean force."""
 WANTED = 0.05
 """By how much the two finest grains may differ to agree [1]."""
 

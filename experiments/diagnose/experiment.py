@@ -108,7 +108,7 @@ def _quantity(entry: Json, *, at_end: bool) -> Json:
     if entry["std"] is None or not entry.get("determined", True):
         bound = f"; at most {numeral(entry['at_most'], 2)} (95 % bound)" if "at_most" in entry else ""
         return {**number, "std": None, "note": f"these trials do not determine it: no standard error{bound}"}
-    return {**number, "note": "standard error of the fit, right if the model is and the noise is as it was found"}
+    return {**number, "note": "standard error of the fit, right if the model is and the noise has the size found"}
 
 
 def _result(found: Diagnosis, diagnosis: Json) -> Result:
@@ -152,15 +152,13 @@ def _result(found: Diagnosis, diagnosis: Json) -> Result:
     sentences += spread_sentences(found.model_std, granular=found.problem.granular)
     warnings = [finding.what for finding in said_once(found.findings)]
     if not found.problem.covered.get("withdrawal", True):
-        warnings.append(
-            "no push was withdrawn: the model was fitted to the way in only, and knows nothing of the way out"
-        )
+        warnings.append("no push was withdrawn: the model was fitted to loading only, and states nothing of withdrawal")
     beside = "beside the effects named it means another thing"
     if is_strained(found.best):
         unknown = found.verdict == "unknown"
         beside = "it does not explain the data" if unknown else "it absorbs a difference in structure"
     for model, bounds, meaning in (
-        ("the base model", found.bounds_before, "it bends them because it lacks something"),
+        ("the base model", found.bounds_before, "it bends them because something is missing"),
         ("the best model", found.bounds_after if found.forms else (), beside),
     ):
         strained = [bound.words for bound in bounds if bound.strains]

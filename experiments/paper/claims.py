@@ -28,7 +28,7 @@ __all__ = [
 AGREEMENT = 5.0
 """Degrees within which the paper calls transition angles in agreement."""
 ALONG = 0.5
-"""Degrees below 0 up to which a platform is said to move along the surface: no angle is read more finely."""
+"""Degrees below 0 up to which a platform counts as moving along the surface: no angle is read more finely."""
 STATED_ANGLE = 22.5
 """The initial trajectory angle by which the paper knows its low-torque experiments [degrees]."""
 LASTING = 0.1

@@ -102,7 +102,7 @@ def settings_of_bed(given: Json) -> Json:
 def settings_of_gravity(given: Json, fields: Mapping[str, FieldInfo]) -> Json:
     """`given` with the speeds, times and rig that follow its ``gravity``, where it has none; ``fields``: of the class.
 
-    What will not do is refused later.
+    What is not accepted is refused later.
     """
     defaults = {name: field.default for name, field in fields.items()}
     numbers = {}

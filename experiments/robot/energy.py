@@ -12,8 +12,9 @@ from .settings import RobotSettings
 __all__ = ["MOST_RESIDUAL", "balance_warning", "growth_warning"]
 
 MOST_RESIDUAL = 0.05
-"""`energy_residual` above which the numbers of a run are not to be used. How high a robot rises goes with its energy,
-so it would be off by as much. The hopping leg that ships has 0.0001 on its law and 0.004 on grains."""
+"""`energy_residual` above which the numbers of a run are not to be used. The height of a hop is in
+proportion to its energy, so it would be off by as much. The hopping leg that ships has 0.0001 on its law and 0.004 on
+grains."""
 MOST_GROWTH = 1.3
 """Growth of a swing above which a run is warned of before it starts. It is an upper bound, since a foot that bounces is
 in the ground for a part of the time: at 1.5 in 1 s a robot of 2.6 kg that falls by 20 mm gains 5 % of its energy."""

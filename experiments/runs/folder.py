@@ -71,7 +71,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 
 
 _TOLD: set[str] = set()
-"""Damage that was told: a folder is looked at more than once."""
+"""Damage that was reported: a folder is read more than once."""
 
 
 def settings_toml(command: str, settings: BaseModel, version: str, code: str = "") -> str:

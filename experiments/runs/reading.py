@@ -88,7 +88,7 @@ def settings_from(settings_class: type[Settings], layers: Iterable[Layer]) -> Se
 
     A number may be text with a unit (`experiments.runs.units`). Raises ValueError, one sentence a line, for a name
     there is not (with the nearest there is) and for a value that
-    will not do (with what would). TOML has no null: "none" unsets a setting that need not be set.
+    is not accepted (with what is). TOML has no null: "none" unsets a setting that need not be set.
     """
     names = list(settings_class.model_fields)
     faults = []
@@ -146,5 +146,5 @@ def _sentence(settings_class: type[BaseModel], detail: ErrorDetails, origin: Map
     elif detail["type"] == "too_short" and not detail["input"]:
         said = f"{called} is empty: give at least one"
     else:
-        said = f"{called}{inside} = {detail['input']!r} will not do: {message[:1].lower() + message[1:]}"
+        said = f"{called}{inside} = {detail['input']!r} is not accepted: {message[:1].lower() + message[1:]}"
     return f"{said} ({described.strip().rstrip('.')})" if described else said

@@ -40,7 +40,7 @@ def fault_words(error: Exception) -> str:
         if count > 1:
             typed = " ".join(error.tokens_so_far) or "nothing"
             about = f" ({error.argument.parameter.help.rstrip('.')})" if error.argument.parameter.help else ""
-            return f"{error.argument.name} = {typed} will not do: it takes {count} values, not {got}{about}"
+            return f"{error.argument.name} = {typed}: expected {count} values, got {got}{about}"
     if isinstance(error, UnusedCliTokensError):
         return f"{' '.join(error.unused_tokens or [])} belongs to no option and to no argument; --help lists them"
     if isinstance(error, UnknownOptionError) and "Did you mean" not in text:

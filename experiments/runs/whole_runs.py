@@ -175,7 +175,7 @@ def whole_run(
     def run(settings: Settings, folder: str | Path, *, progress: Progress | None = None) -> Result:
         """Carry it out into `folder` and return the result, as result.json has it.
 
-        Raises ValueError for settings that will not do, before any work; RuntimeError where it cannot go on.
+        Raises ValueError for settings that are not accepted, before any work; RuntimeError where it cannot go on.
         """
         check(settings)
         return renewed(settings, RunFolder.ensure(Path(folder), name, settings, code=code()), progress or Progress())

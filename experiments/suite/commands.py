@@ -160,7 +160,7 @@ def _sinking(names: _Names = (), /, *, results: _Results = RESULTS) -> int:
             depths = " ".join(f"{1e3 * fall.deepest:.1f}{'' if fall.counts else '*'}" for fall in falls)
             print(f"{name}: {depths} mm")
         found = sinking_over(list(beds.values()))
-        print(f"{group}: {found.verdict if found else 'too few rows came down to tell'}")
+        print(f"{group}: {found.verdict if found else 'too few rows came down for a verdict'}")
     if not groups:
         say(f"no case of several tumbles has a result in {results}: `hedgebed experiments run grains3` makes them")
         return 1

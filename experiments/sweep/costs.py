@@ -34,7 +34,7 @@ def cost_words(command: str, points: Sequence[Point], cores: int) -> tuple[list[
     known = [core_seconds(command, point.settings) for point in points]
     costs = [1.0 if cost is None else cost for cost in known]
     if None in known:
-        return costs, f"what a run of {command} costs is not reckoned: the first ones tell"
+        return costs, f"what a run of {command} costs has no estimate: the first ones will show it"
     whole = sum(costs)
     shared = f", {duration(whole / cores)} on {cores} cores" if cores > 1 else ""
     return costs, f"about {duration(whole)} of one core by the estimate{shared}"

@@ -74,7 +74,7 @@ class Design:
 def design_of(settings: SweepSettings, *, check: bool = False) -> Design:
     """The runs of a sweep, with the settings of each read; if `check`, the experiment checks them too.
 
-    Raises ValueError, naming run, key and value, for what will not do.
+    Raises ValueError, naming run, key and value, for what is not accepted.
     """
     experiment = find_experiment(settings.experiment)
     settings_class = experiment.settings_class()

@@ -216,7 +216,7 @@ def _sensitivities(
     if settings.samples < FEWEST_SAMPLES:
         warnings.append(
             f"samples = {settings.samples} are few for Sobol' indices, which may lie outside 0 to 1: "
-            f"{FEWEST_SAMPLES} or more would do"
+            f"use {FEWEST_SAMPLES} or more"
         )
     for column in columns:
         means = column.values.reshape(len(design.shares), -1).mean(axis=1)

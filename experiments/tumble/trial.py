@@ -246,7 +246,7 @@ def _given_effects(texts: tuple[str, ...]) -> tuple[Effect, ...]:
         name, dot, parameter = head.partition(".")
         values = found.setdefault(name.strip(), {})
         if bool(dot) != bool(equals):
-            raise ValueError(f"effects = {text!r} will not do: id, or id.parameter=value such as pendulum.length=2.2")
+            raise ValueError(f"effects = {text!r}: expected id, or id.parameter=value such as pendulum.length=2.2")
         if dot:
             values[parameter.strip()] = _assignment("effects", text)[1]
     try:

@@ -136,7 +136,7 @@ def simulate_batch(
 
 def _many(trials: Sequence[Trial], vary: Any) -> tuple[Trial, Array]:
     if vary is not None:
-        raise ValueError("vary goes with one trial, not with a sequence of them")
+        raise ValueError("vary is given with a sequence of trials: expected one trial")
     if not trials:
         raise ValueError("trials is empty: at least one is needed")
     first = trials[0]

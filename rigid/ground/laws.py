@@ -42,7 +42,7 @@ NEAR_1_G = 0.1
 Numbers = Any  # A law's numbers: anything that p[0], p[1] ... can be read from.
 
 MEMORY = (
-    "ours: a bed of sand computed with this package gives back nothing that can be measured (work_returned_dem of "
+    "ours: a bed of sand computed with this package returns nothing that can be measured (work_returned_dem of "
     "docs/results/penetrate is below 0.01), and a twentieth is about the stiffest unloading that a 1 ms step follows"
 )
 
@@ -243,7 +243,7 @@ _LAWS = (
     ),
     _law(
         "power-irreversible", "power", "spring_damper",
-        summary="K z^n + C dz/dt while going in, and nearly nothing given back: a power law of grains",
+        summary="K z^n + C dz/dt while going in, and nearly nothing returned: a power law of grains",
         source="as power, with the unloading that grains have here",
         parameters=(
             _number("stiffness", "N/m^n", 1146.0, "K", above_lowest=True,

@@ -150,7 +150,7 @@ def _sentence(path: Path, detail: Any) -> str:
         return f"{path}: {key} = {detail['input']!r} is no key of a platform; {nearest(str(detail['loc'][-1]), names)}"
     message = detail["msg"].removeprefix("Value error, ")
     found = detail["input"] if not isinstance(detail["input"], dict) else sorted(detail["input"])
-    return f"{path}: {key} = {found!r} will not do: {message[:1].lower()}{message[1:]}"
+    return f"{path}: {key} = {found!r} is not accepted: {message[:1].lower()}{message[1:]}"
 
 
 def _keys_beside(place: tuple[Any, ...]) -> list[str]:

@@ -255,11 +255,11 @@ def test_a_start_in_overlap_is_refused_with_the_height_that_would_do():
     bed = layer()
     kept = bed.state()
     with pytest.raises(
-        ValueError, match=r"height of 0.036 m, starts in overlap with a grain: spike [07] by .* higher would do"
+        ValueError, match=r"height of 0.036 m, starts in overlap with a grain: spike [07] by .* m higher"
     ) as refused:
         small(bed, height=0.036)
     bed.restore(kept)  # without the bodies of the one that was refused
-    small(bed, height=0.036 + float(str(refused.value).split("; ")[1].split(" m ")[0]))
+    small(bed, height=0.036 + float(str(refused.value).split("start it ")[1].split(" m ")[0]))
 
 
 def test_a_platform_that_comes_down_beyond_the_bed_says_so():

@@ -24,7 +24,7 @@ PHASES = ("free", "in", "rest", "out")
 #: Experiment of a run that a script has saved -> the function of `coupling` that made it.
 PYTHON_RUNS = {"driven": "drive", "drop": "drop", "set_down": "set_down"}
 _VALUE = re.compile(r"""((?:"[^"]*"?|'[^']*'?|[^"'#])*)(?:#(.*))?""")
-"""A value of a TOML file as it is written, and the comment behind it."""
+"""A value of a TOML file in its written form, and the comment behind it."""
 _COLUMNS = ("t_s", "depth_m", "velocity_m_s", "force_N", "phase")
 
 

@@ -12,5 +12,5 @@ def insert(text: str, table: str, marks: tuple[str, str], *, page: str = "the pa
     head, first, rest = text.partition(begin)
     _, second, tail = rest.partition(end)
     if not first or not second:
-        raise ValueError(f"{page} lacks the marks {begin} and {end}")
+        raise ValueError(f"{page}: the marks {begin} and {end} are missing")
     return f"{head}{begin}\n{table}{end}{tail}"

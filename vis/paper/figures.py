@@ -26,7 +26,7 @@ _HARD = ("steel", "brick")
 _SOILS = {"sand": "sand", "jsc1a": "JSC-1A"}
 """Surfaces of grains: the soil of the paper. Legends name the materials that we compute."""
 VARIANTS = ("low", "nominal", "high", "paper")
-"""Of a case: friction at the lower end of its band, as it is, at the upper end; the paper's fixed step."""
+"""Of a case: friction at the lower end of its band, its value, at the upper end; the paper's fixed step."""
 _DASHED, _DOTTED = (0, (5, 3)), (0, (1, 1.6))
 _SURFACE_LINES, _RIG_MARKS = {"steel": "-", "brick": (0, (4, 2))}, "os^D"
 _SHOWN = 0.045

@@ -205,7 +205,7 @@ def work_plot(run: RunFolder) -> Plot | None:
     figure, axes = new_panels(2, height=2.7, sharey=True)
     law = any(value_of(r.quantities, "model_work_in") is not None for r in driven)
     sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
-    titles = {"work_in": "Work done on the way in", "work_out": "Work recovered on the way out"}
+    titles = {"work_in": "Work done in loading", "work_out": "Work recovered on withdrawal"}
     for axis, (key, title) in zip(axes, titles.items(), strict=True):
         for shift, prefix, colour in sides:
             mean, spread = by_speed(driven, speeds, prefix + key, 1e3)

@@ -102,7 +102,7 @@ def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str,
     """
     shares: dict[str, float] = {}
     if not len(table["trial"]):
-        return "nothing that can be told: no sensor that was recorded tells a force", shares
+        return "nothing: no sensor that was recorded measures a force", shares
     latents = [name for name in table if name.startswith("latent_")]
     ids, which = np.unique(np.asarray(table["trial"]), return_inverse=True)
     others = [name for name in table if name != "trial" and name not in latents and not _labels(table[name], which)]

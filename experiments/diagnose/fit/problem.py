@@ -335,7 +335,7 @@ class Whitener:
     blocks: Mapping[str, tuple[NDArray[np.intp], ...]]  # rows of each channel in each trial, in the order of time
     weights: Mapping[str, Array]  # one over the noise of each mode, in the order of the blocks, shape [sample_count]
     kept: Mapping[str, Array] = field(default_factory=dict)
-    """Of trials that are looked at in part only: factors 0 or 1 on the residuals, shape [sample_count]."""
+    """Of trials that are fitted in part only: factors 0 or 1 on the residuals, shape [sample_count]."""
 
     @staticmethod
     def white(problem: Problem) -> Whitener:

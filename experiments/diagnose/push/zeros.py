@@ -59,7 +59,7 @@ def find_force_zeros(trials: Sequence[Prepared], noise: float) -> ForceZeros | N
     std = likeliest_scatter([np.column_stack([means, errors])])
     what = (
         f"the zero of the force differs by {std:.2g} N from push to push, {std / noise:.2g} times its noise, as rows "
-        f"above the surface tell ({means.min():.2g} to {means.max():.2g} N in {len(means)} pushes): taken into account "
+        f"above the surface show ({means.min():.2g} to {means.max():.2g} N in {len(means)} pushes): taken into account "
         f"as a zero of each push's own"
     )
     zeros = {id: float(mean) for id, mean in zip(read, means, strict=True)}

@@ -63,7 +63,7 @@ def title_words(diagnosis: Mapping[str, Any]) -> str:
     if diagnosis["verdict"] == "ambiguous":
         return f"Missing: {names}, or {' or '.join(diagnosis['alternatives'])}: these trials cannot distinguish them"
     if worsens_held_out(diagnosis):
-        return "Unknown: something is missing; no effect of the library, as it was fitted here, explains it"
+        return "Unknown: something is missing; no effect of the library explains it with the values fitted here"
     if names:
         return f"Unknown: {names} with confidence, and something else that no effect of the library explains"
     likeliest = _likeliest(diagnosis)

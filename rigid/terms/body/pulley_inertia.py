@@ -19,7 +19,7 @@ TERM = Term(
 
 CANDIDATE = Candidate(
     meaning="the rig's pulleys have to be turned, which acts as mass in y",
-    confirm="let the balanced rig run under a small known weight: its acceleration tells the mass",
+    confirm="let the balanced rig run under a small known weight: its acceleration gives the mass",
     tumble=Tumble(
         rank=170,
         forms=lambda t: (Form("added mass", (free("mass", "kg", 0.05, 0.0, 20.0),), ((0.1,), (1.0,))),),

@@ -59,11 +59,11 @@ TERM = Term(
                   "v_0: where it is not 0 the pull acts on the way out only, at the speed v times 1 - exp(-v / v_0), "
                   "and friction loses it all", lowest=0.0),
         Parameter("grip", "1", 0.0,
-                  "share of the pull that friction does not lose: at 0 its bound goes with the net normal force, at 1 "
-                  "with what the ground presses alone", lowest=0.0, highest=1.0, visible=(0.0, 1.0)),
+                  "share of the pull that friction does not lose: at 0 its bound follows the net normal force, at 1 "
+                  "what the ground presses alone", lowest=0.0, highest=1.0, visible=(0.0, 1.0)),
     ),
     source="pull-off force of cohesive ground; mobilised over a distance so that rest is well defined; friction "
-           "of what sticks together goes with the load and the adhesion (Derjaguin 1934, Z. Phys. 88:661)",
+           "of what sticks together is in proportion to load and adhesion (Derjaguin 1934, Z. Phys. 88:661)",
     limits="breaks where the tip leaves the surface",
     hooks={"hold": held_back, "rate_pull": pulled_out, "grip": gripping},
 )  # fmt: skip

@@ -25,7 +25,7 @@ TERM = Term(
         Parameter("reference", "m", 0.01, "h_0: the depth at which the power changes nothing", lowest=0.0,
                   above_lowest=True),
     ),
-    source="passive earth pressure on a narrow blade goes with the depth squared (Hegedus 1960, A simplified method "
+    source="passive earth pressure on a narrow blade follows the depth squared (Hegedus 1960, A simplified method "
            "for the determination of bulldozing resistance; McKyes 1985, Soil Cutting and Tillage). A short pile "
            "carries 1.5 K_p rho g d h^2 sideways (Broms 1964, J. Soil Mech. Found. Div. 90(SM3):123): 670 N/m2 for "
            "K_p = 2.46, 1540 kg/m3, d = 12 mm, twice that for a row of two spikes",

@@ -35,7 +35,7 @@ TERM = Term(
            "and Alava 2013, Phys. Rev. E 88:032207); a rate process whose speed falls exponentially with what it has "
            "released gives that law",
     limits="one rate for all loads; what has given way never comes back, so that after a hold the force stays below "
-           "that of a push without one; a slow push has time to relax: its force goes with the logarithm of the speed",
+           "that of a push without one; a slow push has time to relax: its force follows the logarithm of the speed",
     hooks={"settle": creeping, "settled": stood_still},
 )  # fmt: skip
 

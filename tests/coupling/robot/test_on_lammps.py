@@ -144,7 +144,7 @@ def test_a_foot_that_turns_out_of_the_plane_ends_the_run(grounds):
 
 def test_a_foot_that_starts_in_the_sand_is_refused_with_the_height_that_would_do(grounds):
     robot = MujocoRobot(ball("box", "0.015 0.015 0.015", mass=0.1, height=0.014), "foot")
-    with pytest.raises(ValueError, match=r"feet: 'foot' starts in the sand, .* mm higher would do"):
+    with pytest.raises(ValueError, match=r"feet: 'foot' starts in the sand, .* mm higher"):
         RobotRun(robot, grounds(robot, ranks=1), duration=0.01)
 
 

@@ -98,7 +98,7 @@ def test_none_unsets_what_need_not_be_set(dig):
         (["--spike-diameter", "thin"], ["--spike-diameter", "thin", "float"]),
         (["--spike-diameter", "0.2"], ["spike_diameter = 0.2", "at most 0.1"]),
         (["--grain", "snow"], ["--grain", "snow", "sand"]),
-        (["--size", "1"], ["--size = 1 will not do: it takes 3 values, not 1 (Size of the bed [m])"]),
+        (["--size", "1"], ["--size = 1: expected 3 values, got 1 (Size of the bed [m])"]),
         (["--seeds", "1.5"], ["--seeds[0] = 1.5", "fractional part"]),
         (["--steps", "10.7"], ["--steps = 10.7", "fractional part"]),
         (["--seeds"], ["--seeds is empty: give at least one (Seeds [1])"]),
