@@ -14,7 +14,7 @@ from coupling.robot import MujocoRobot, RobotRun
 from . import say
 from .settings import RobotSettings
 
-__all__ = ["fall_warning", "launched", "to_landing"]
+__all__ = ["fall_warning", "launched", "to_landing", "touch_words"]
 
 Array = NDArray[np.float64]
 
@@ -45,13 +45,30 @@ def to_landing(run: RobotRun, heights: Array) -> str:
 
 def fall_warning(settings: RobotSettings, robot: MujocoRobot) -> list[str]:
     """Before a run: the warning that a robot at rest is still in free fall when it ends; none if it is not."""
-    height, gravity = robot.clearance, robot.gravity
-    if height <= 0 or gravity <= 0 or robot.hangs or np.any(robot.data.qvel):
-        return []
-    fall = _fall(height, 0.0, gravity)
-    if fall < settings.duration:
+    height, gravity, fall = robot.clearance, robot.gravity, _to_touch(robot)
+    if fall is None or fall < settings.duration:
         return []
     return [say("still_falls", s=settings, height=1e3 * height, fall=fall, gravity=gravity, wanted=_above(fall))]
+
+
+def touch_words(settings: RobotSettings, robot: MujocoRobot) -> list[str]:
+    """Before a run: when a robot that starts at rest first touches, in a sentence; none if it starts on the ground.
+
+    Grains stick out of the surface: on a bed also the time to half a grain above it.
+    """
+    height, gravity, fall = robot.clearance, robot.gravity, _to_touch(robot)
+    if fall is None or fall >= settings.duration:
+        return []
+    early = _fall(max(0.0, height - 0.5 * settings.grain), 0.0, gravity)
+    grains = say("grains_earlier", early=early) if settings.on_grains else ""
+    return [say("touches_after", height=1e3 * height, gravity=gravity, fall=fall, grains=grains)]
+
+
+def _to_touch(robot: MujocoRobot) -> float | None:
+    """Time of free fall of a robot at rest until its lowest foot is at the surface [s]; None where it does not fall."""
+    if robot.clearance <= 0 or robot.gravity <= 0 or robot.hangs or np.any(robot.data.qvel):
+        return None
+    return _fall(robot.clearance, 0.0, robot.gravity)
 
 
 def _fall(height: float, speed: float, gravity: float) -> float:

@@ -31,7 +31,7 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .feet import feet_reached, heights_of
-from .flight import fall_warning
+from .flight import fall_warning, touch_words
 from .plan import RobotPlan, width_of
 from .result import RobotFrames, conclude, deepest_at_start, quantities_of, write_series_of
 from .settings import RobotSettings
@@ -42,6 +42,9 @@ __all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed"]
 SEEN = 200  # Moments of the forecast at which the extent of the feet is taken
 WIDE = 4.0
 """Width of a bed over that of the widest foot below which a run starts with a warning [1]: of `hedgebed penetrate`."""
+PACE = 3.0
+"""Grain-steps in a second of processor time [1e6]: the leg for 1 s on 3,921 grains, 1.2e8 grain-steps, took 62 s with
+its bed on one core (docs/notes/mujoco.md). Sleep makes it less."""
 FEWEST_ACROSS = 5.0  # Grains across the widest part of a foot, below which it is refused [1]
 
 
@@ -70,8 +73,10 @@ class RobotFollowed(Followed[RobotRun]):
 
     def _announce(self, plan: RobotPlan, progress: Progress) -> None:
         """What `plan` announces, and that the robot is still in free fall at the end, if it is."""
-        falls = fall_warning(self.settings, plan.robot())
-        for sentence in [*plan.announcement(), *(f"warning: {warning}" for warning in falls)]:
+        robot = plan.robot()
+        falls = fall_warning(self.settings, robot)
+        touch = touch_words(self.settings, robot)
+        for sentence in [*plan.announcement(), *touch, *(f"warning: {warning}" for warning in falls)]:
             progress.message(sentence)
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
@@ -208,8 +213,20 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
     def announce(self, progress: Progress) -> None:
         self.progress = progress
         _ = self.beside  # before the bed is made: a failure loses no work on grains
-        for sentence in self.told.announcement():
-            progress.message(sentence)
+        self._announce(self.told, progress)
+        if self.settings.ground != "lammps":
+            progress.message(self._work())
+
+    def _work(self) -> str:
+        """Grains, steps and processor time of the run without bed and pictures, in a sentence."""
+        count, steps = self.grain_count(), self.duration / self._time_step()
+        return say("work", count=count, steps=steps, minutes=count * steps / (60e6 * PACE), pace=PACE)
+
+    def _time_step(self) -> float:
+        """Of the grains [s]."""
+        s = self.settings
+        grains = self.material.softened(self.softening().young)
+        return time_step_for(grains, diameter=s.grain * (1 - s.spread), max_overlap=s.max_overlap)
 
     def check_exchange(self) -> float:
         """The load of the exchange at the start over what is stable [1], on the bed as it is expected.
@@ -218,7 +235,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         """
         s, robot = self.settings, self.plan.robot()
         grains = self.material.softened(self.softening().young)
-        step = time_step_for(grains, diameter=s.grain * (1 - s.spread), max_overlap=s.max_overlap)
+        step = self._time_step()
         robot.start()
         bed = ExpectedBed(0.5 * s.grain, run_limit(s.max_overlap), grains, step, repeatable=s.ground != "lammps")
         return check_exchange(robot, bed, substeps=s.substeps, iterations=s.iterations)
@@ -251,18 +268,22 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         self.check_exchange()
 
     def check_extent(self) -> None:
-        s, forecast = self.settings, self.forecast
-        least = forecast.deepest + 2 * self.spike_diameter
-        if s.bed_size[2] < least:
-            wanted = math.ceil(1e3 * least) / 1e3
-            raise ValueError(say("too_shallow", s=s, f=forecast, width=self.spike_diameter, least=wanted))
+        s, forecast, faults = self.settings, self.forecast, []
+        sizes = list(s.bed_size)
+        wide = WIDE * max(width for width, _ in self._standing)
         for axis, (name, low, high) in enumerate(zip("xy", forecast.low, forecast.high, strict=True)):
             need = high - low + 2 * s.grain
             if s.bed_size[axis] < need:
-                wanted = math.ceil(100 * need) / 100
-                raise ValueError(
-                    say("too_short", s=s, size=s.bed_size[axis], name=name, low=low, high=high, wanted=wanted)
-                )
+                words = {"size": s.bed_size[axis], "low": low, "high": high, "wanted": math.ceil(100 * need) / 100}
+                faults.append(say("too_short", s=s, name=name, **words))
+            sizes[axis] = max(s.bed_size[axis], math.ceil(100 * max(need, wide) - 1e-6) / 100)
+        least = forecast.deepest + 2 * self.spike_diameter
+        if s.bed_size[2] < least:
+            sizes[2] = math.ceil(1e3 * least) / 1e3
+            faults.insert(0, say("too_shallow", s=s, f=forecast, width=self.spike_diameter, least=sizes[2]))
+        if faults:
+            told = " ".join(f"{size:g}" for size in sizes)
+            raise ValueError(say("all_sides", faults=". ".join(faults), sizes=told))
 
     @property
     def pressure(self) -> float:

@@ -19,6 +19,7 @@ from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number, refuse_other_grains
 from experiments.platform.surfaces import Surface, find_surface, surface_of_grains
 from experiments.runs.given import keep_given, kept_copy
+from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
 from rigid.platform.rig import STANDARD_GRAVITY
 from rigid.spatial.quaternions import to_matrix
@@ -45,6 +46,8 @@ __all__ = [
 
 LAW_STEP = 4e-5  # Of a surface law [s], ten of which make an exchange by default
 DEFAULT_SURFACE = "sand"
+OF_LAW = ("stiffness", "damping", "mu_s", "mu_d")
+"""Numbers of a surface law that grains do not have: there they are those of the forecast of the bed's size."""
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MODEL, CONTROLLER = "model.mjb", "controller.py"  # Copies in the run folder
 
@@ -108,11 +111,16 @@ class RobotPlan:
     def announcement(self) -> list[str]:
         """What was not given, then the warnings."""
         chosen = [] if "ground" in self.settings.model_fields_set else [say("default_law", law=self.law)]
-        told = [
-            f"{name} = {number.value:.6g}{'' if number.unit == '1' else f' {number.unit}'} ({number.origin})"
-            for name, number in self.numbers.items()
-            if number.origin != "given"
-        ]
+        means = {parameter.name: parameter.summary for parameter in find_law(self.law).parameters}
+        means |= {name: say(f"{name}_means") for name in OF_LAW if name.startswith("mu_")}
+        told = []
+        for name, number in self.numbers.items():
+            if number.origin == "given":
+                continue
+            of_law = self.settings.on_grains and name in OF_LAW
+            words = "; ".join(part for part in (means.get(name), number.origin) if part)
+            unit = "" if number.unit == "1" else f" {number.unit}"
+            told.append(f"{name} = {number.value:.6g}{unit} ({words}{say('of_forecast') if of_law else ''})")
         return [*chosen, *told, *self.notes, *(f"warning: {warning}" for warning in self.warnings)]
 
 

@@ -316,5 +316,10 @@ def _sentences(run: RobotRun, heights: Array) -> list[str]:
     flew = say("flew", count=len(flights), apart=1e3 * APART, longest=longest) if flights else stayed
     told.append(" ".join([flew, *lost]))
     told += launched(run, flights[0][0]) if flights else []
-    told.append(say("sank", depth=1e3 * float(rows["sinkage"].max()), end=1e3 * float(rows["sinkage"][-1])))
+    sinkage, time = rows["sinkage"], rows["time"]
+    deepest = int(sinkage.argmax())
+    told.append(say("sank", depth=1e3 * sinkage[deepest], time=time[deepest], end=1e3 * sinkage[-1]))
+    if flights and deepest > flights[0][0]:
+        begin = flights[0][0]
+        told.append(say("sank_in_push", depth=1e3 * sinkage[:begin].max(), launch=time[begin]))
     return told

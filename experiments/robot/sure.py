@@ -55,14 +55,14 @@ def sure_of_law(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Ans
     try:
         return _of_file(plan, best, follow) if plan.fitted is not None else _of_stiffness(plan, best, follow)
     except RuntimeError as error:
-        return {}, say("not_known", why=say("end_fails", error=error))
+        return _not_known(plan, say("end_fails", error=error))
 
 
 def _of_file(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Answer]) -> tuple[Json, str]:
     """One standard deviation of the parameters of a ground file."""
     assert plan.fitted is not None
     if not moved(plan.fitted):
-        return {}, say("not_known", why=say("no_range_of_law", law=plan.law))
+        return _not_known(plan, say("no_range_of_law", law=plan.law))
     stds = spread_of_law(plan.fitted, lambda file: follow(replace(plan, fitted=file)), best)
     spreads = {name: std or 0.0 for name, std in stds.items()}
     sure = {name: entry(name, best[name], best[name] - std, best[name] + std) for name, std in spreads.items()}
@@ -73,9 +73,9 @@ def _of_stiffness(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], A
     """K of the surface at the ends of what is known of it."""
     surface, known = plan.surface, plan.rule.answer
     if plan.law != "spring-damper":
-        return {}, say("not_known", why=say("no_range_of_law", law=plan.law))
+        return _not_known(plan, say("no_range_of_law", law=plan.law))
     if plan.settings.stiffness is not None:
-        return {}, say("not_known", why=say("k_given"))
+        return _not_known(plan, say("k_given"))
     share = known.stiffness.std / known.stiffness.value if known is not None else 1.0
     if share < 1.0:
         factors, how = (1 - share, 1 + share), {"key": "k_of_map", "share": share}
@@ -84,7 +84,7 @@ def _of_stiffness(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], A
         factors = (low / surface.stiffness, high / surface.stiffness)
         how = {"key": "k_in_range", "factor": math.sqrt(high / low)}
     else:
-        return {}, say("not_known", why=say("no_range_of_k", surface=surface.name))
+        return _not_known(plan, say("no_range_of_k", surface=surface.name))
     found = [best, *(follow(_times(plan, factor)) for factor in factors)]
     sure = {
         name: entry(name, best[name], min(one[name] for one in found), max(one[name] for one in found))
@@ -92,6 +92,11 @@ def _of_stiffness(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], A
     }
     key = str(how.pop("key"))
     return sure, say(key, surface=surface.name, words=in_words(sure, half=False), **how)
+
+
+def _not_known(plan: RobotPlan, why: str) -> tuple[Json, str]:
+    """No entries, why, and what would state them: beds of the grains of the surface, another K of hard ground."""
+    return {}, say("not_known" if plan.surface.granular else "not_known_hard", why=why)
 
 
 def _times(plan: RobotPlan, factor: float) -> RobotPlan:
