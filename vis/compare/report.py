@@ -138,9 +138,9 @@ def _drives(report: Report, labels: Labels) -> list[Block]:
 def _tiles(result: Result) -> list[Tile]:
     wanted = (
         ("trajectory_angle", "Trajectory angle"), ("max_speed", "Largest speed"), ("largest_turn", "Largest turn"),
-        ("highest", "Highest"), ("sinkage_largest", "Deepest"), ("sinkage", "Sinkage"), ("stiffness", "Stiffness"),
+        ("highest", "Rise"), ("sinkage_largest", "Sinkage"), ("sinkage", "Sinkage"), ("stiffness", "Stiffness"),
         ("largest_force", "Largest force"),
-        ("energy_residual", "Energy residual"),
+        ("energy_residual", "Energy left over"),
     )  # fmt: skip
     rows = {row["name"]: row for row in result["compared"]}
     end = result.get("compared_over")

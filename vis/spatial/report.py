@@ -82,7 +82,7 @@ def write_spatial_report(
     tiles = [
         Tile("Largest speed", quantity(quantities["max_speed"]), "of the centre of mass"),
         Tile("Largest angular velocity", quantity(quantities["max_angular_velocity"]), ""),
-        Tile("Deepest", quantity(quantities["sinkage_largest"]), "of any spike"),
+        Tile("Sinkage", quantity(quantities["sinkage_largest"]), "largest of any spike"),
         Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was"),
     ]
     lead = ["tumble spatial", f"{result['duration']:g} s", f"{len(path['t_s'])} rows"]
