@@ -18,6 +18,8 @@ __all__ = ["penetrate_headline"]
 
 NOT_INCLUDED = "  (without bed size, softness, speed)"
 """Below an interval: what is not in it."""
+ON_TOP = "  (negative: on the uppermost grains)"
+"""Below a sinkage above depth 0."""
 BY_FORMULA = "by Terzaghi, cohesion \N{PLUS-MINUS SIGN} 1 std"
 """Depth that a formula gives where grains that stick are too large to show it."""
 _SAID, _OF_FINDINGS = 4, 2
@@ -33,6 +35,8 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     rows = [(f"sinkage at rest{load}", *(_quoted(numbers[f"sinkage_{side}"]) for side in ("dem", "spring_damper")))]
     if "depth_to_rest" in numbers:
         rows[0] = (f"would rest{load} at about", _quoted(numbers["depth_to_rest"]), rows[0][2])
+    if (numbers["sinkage_dem"]["value"] or 0.0) < 0:
+        rows.append((ON_TOP, "", ""))
     rows += _with_errors(result.get("sure", {}))
     if result.get("rest", {}).get("comes_to_rest"):
         low, high = result["rest"]["depth_range"]

@@ -89,7 +89,7 @@ def _beside(settings: PenetrateSettings, material: Any, stiffness: float) -> Jso
     facts = {"grain": settings.grain, "gravity": settings.gravity, "area": area}
     of_it = stiffness * bearing_of(other, **facts).stiffness / bearing_of(material, **facts).stiffness
     found, told = _by_terzaghi(settings, other, of_it)
-    verdict = say(f"beside_{told.pop('verdict')}", **told)
+    verdict = say(f"beside_{told.pop('verdict')}", **told, ratio=_two_digits(of_it / stiffness))
     return found | {"sentence": say("try_cohesive", **told, verdict=verdict)}
 
 
