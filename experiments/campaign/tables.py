@@ -44,10 +44,10 @@ __all__ = [
 FORMAT = "hedgehog-campaign/1"
 
 BASE_NOTE = "fitted_without_effects"
+"""Note of model.toml: K and C by diameter of the spring-damper that was fitted without the effects."""
 RANGE_NOTE = "fitted_range"
 """A note of model.toml: what the trials that it was fitted to cover, `depth_m` and `speed_m_s` (slowest and fastest, on
 the way in) of the pushes, and `withdrawal`, whether one of them came out again."""
-"""Note of model.toml: K and C by diameter of the spring-damper that was fitted without the effects."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

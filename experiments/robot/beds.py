@@ -91,7 +91,8 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
         sure[name] = entry(name, found.mean, found.mean - found.half, found.mean + found.half)
     invalid = [result["title"] for result in results if result["departures"]["sentences"][0] == say("invalid")]
     sentences = [say("over_beds", count=count, words=in_words(sure, half=True)), say("chance_alone")]
-    notes = [said for said in first["departures"]["sentences"] if _in_all(results, said)]
+    shared = [said for said in first["departures"]["sentences"] if _in_all(results, said)]
+    notes = [said for said in shared if said != say("invalid")]
     return Result.make(
         "mujoco",
         title=say("title_beds", title=(invalid or [first["title"]])[0], count=count),

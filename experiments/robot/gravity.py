@@ -73,6 +73,14 @@ class GravityRule:
         """K and C of the map of grains that stick for a part of a foot; empty where it is not used."""
         return {name: getattr(self.feet[part], name).value for name in SYMBOLS} if part in self.feet else {}
 
+    def stiffer(self, factor: float) -> "GravityRule":
+        """The rule with K of each part of the feet times a factor [1]."""
+        feet = {
+            part: replace(found, stiffness=replace(found.stiffness, value=factor * found.stiffness.value))
+            for part, found in self.feet.items()
+        }
+        return replace(self, feet=feet)
+
     def warning(self, surface: Surface, stiffness: float) -> list[str]:
         """That K and C are those of 1 g, where gravity is far from it; ``stiffness``: of one foot at 1 g [N/m]."""
         if self.follows or self.feet or NEAR[0] <= self.share <= NEAR[1]:

@@ -174,7 +174,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             return self.forecast.run
         plan = self.plan.on_law(law)
         robot = plan.robot()
-        run = RobotRun(robot, plan.law_feet(robot), duration=self.duration)
+        run = RobotRun(robot, plan.law_feet(robot), duration=self.duration, **_stepping(self.settings))
         run.run()
         return run
 

@@ -20,7 +20,8 @@ __all__ = ["ANSWER", "Answer", "answer_of", "entry", "in_words", "sure_of_law"]
 ANSWER = {
     "highest": "m", "longest_flight": "s", "clearance_largest": "m", "sinkage_largest": "m", "largest_force": "N",
 }  # fmt: skip
-"""Numbers that answer how well a robot hops, with their units; all are at least 0. The clearance is of any foot."""
+"""Numbers that answer how well a robot hops, with their units. The clearance is of any foot."""
+_SIGNED = ("highest",)  # May be below 0: the centre of mass stays below its start
 
 Answer = Mapping[str, float]
 
@@ -32,8 +33,12 @@ def answer_of(quantities: Mapping[str, Json], reached: Mapping[str, Mapping[str,
 
 
 def entry(name: str, value: float, low: float, high: float) -> Json:
-    """An entry of ``sure`` in result.json: a number of `ANSWER` with the ends of its interval, none below 0."""
-    return {"unit": ANSWER[name], "value": value, "low": max(0.0, low), "high": max(0.0, high)}
+    """An entry of ``sure`` in result.json: a number of `ANSWER` with the ends of its interval.
+
+    None is below 0 but that of the rise.
+    """
+    least = -math.inf if name in _SIGNED else 0.0
+    return {"unit": ANSWER[name], "value": value, "low": max(least, low), "high": max(least, high)}
 
 
 def in_words(sure: Mapping[str, Json], *, half: bool) -> str:
@@ -54,7 +59,7 @@ def sure_of_law(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Ans
     """
     try:
         return _of_file(plan, best, follow) if plan.fitted is not None else _of_stiffness(plan, best, follow)
-    except RuntimeError as error:
+    except (RuntimeError, ValueError) as error:  # lost, or an exchange that would be unstable
         return _not_known(plan, say("end_fails", error=error))
 
 
@@ -100,6 +105,7 @@ def _not_known(plan: RobotPlan, why: str) -> tuple[Json, str]:
 
 
 def _times(plan: RobotPlan, factor: float) -> RobotPlan:
-    """The plan with K of the surface times a factor."""
+    """The plan with K of the surface, or of each foot where a map has it, times a factor."""
     stiffness = plan.numbers["stiffness"]
-    return replace(plan, numbers={**plan.numbers, "stiffness": replace(stiffness, value=factor * stiffness.value)})
+    numbers = {**plan.numbers, "stiffness": replace(stiffness, value=factor * stiffness.value)}
+    return replace(plan, numbers=numbers, rule=plan.rule.stiffer(factor))

@@ -104,7 +104,9 @@ class Experiment:
         if check is not None:
             try:
                 check(settings)
-            except RuntimeError as error:  # a short trial that fails
+            except RuntimeError as error:  # a short trial that fails; a kind of it is something else
+                if type(error) is not RuntimeError:
+                    raise
                 raise ValueError(f"with these settings a short trial fails: {error}") from error
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from rigid.checks import (
     Coulomb,
@@ -242,9 +242,3 @@ class Trial(Coulomb):
 
         numbers = [value for effect in self.effects if not effect.term.sensor for value in effect.values.values()]
         return dict(zip(parameter_names(self.terms), (*numbers, self.surface.rebound), strict=True))
-
-    def describe(self) -> dict[str, Any]:
-        """What it is, in plain numbers."""
-        plain = {key: value for key, value in vars(self).items() if key not in ("mu_d", "effects", "ground")}
-        plain |= {"mu_d": self.sliding_friction, "ground": self.surface.name}
-        return plain | {"effects": [{"id": effect.id, "parameters": effect.values} for effect in self.effects]}

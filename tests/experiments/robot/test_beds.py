@@ -16,7 +16,7 @@ from experiments.robot.on_grains import RobotFollowed, RobotOnBed
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import quantities_of, write_series_of
 from experiments.robot.settings import RobotSettings
-from experiments.robot.sure import ANSWER
+from experiments.robot.sure import ANSWER, sure_of_law
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -178,6 +178,24 @@ def test_a_hop_on_a_law_has_the_range_that_k_of_the_surface_leaves_open(tmp_path
     tile = next(tile for tile in answer_tiles(result) if tile.label == "Sinkage")
     assert " to " in tile.errors[0]
     assert "sure" not in ends[0] and [said for said in ends[0].departures.sentences if "is not known" in said]
+
+
+def test_the_range_of_k_reaches_each_foot_where_the_map_of_sticking_grains_has_it():
+    plan = plan_robot(RobotSettings(**HOPPER, surface="jsc1a", gravity=0.0981))
+    tried: list[float] = []
+
+    def follow(other):
+        tried.append(other.feet_options(other.robot())["under"]["foot"]["stiffness"])
+        return dict.fromkeys(ANSWER, -0.001 * len(tried))
+
+    follow(plan)
+    sure, _ = sure_of_law(plan, dict.fromkeys(ANSWER, -0.002), follow)
+    known = plan.rule.answer.stiffness
+    assert tried[1] / tried[0] == pytest.approx(1 - known.std / known.value)
+    assert tried[2] / tried[0] == pytest.approx(1 + known.std / known.value)
+    # A rise may be below 0, a depth not.
+    assert (sure["highest"]["low"], sure["highest"]["high"]) == (-0.003, -0.002)
+    assert (sure["sinkage_largest"]["low"], sure["sinkage_largest"]["high"]) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("given", [{}, {"surface": "brick"}, {"ground": "katsuragi-durian"}])
