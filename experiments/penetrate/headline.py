@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from statistics import fmean, stdev
 from typing import Any
 
-from experiments.runs.registry import Headline
+from experiments.runs.registry import Headline, findings_shown
 from vis.page.numbers import foldable, quote
 from vis.penetrate.summary_parts import as_foot
 
@@ -22,8 +22,6 @@ ON_TOP = "  (negative: on the uppermost grains)"
 """Below a sinkage above depth 0."""
 BY_FORMULA = "by Terzaghi, cohesion \N{PLUS-MINUS SIGN} 1 std"
 """Depth that a formula gives where grains that stick are too large to show it."""
-_SAID, _OF_FINDINGS = 4, 2
-"""Sentences shown, warnings first; but all warnings, and at least so many findings."""
 
 
 def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
@@ -61,7 +59,7 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     moved = [f"Against the reference, {', '.join(parts)}."] if parts else []
     # Of a finding that goes on, as to how far beds differ, the first sentence.
     own = [re.split(r"(?<=\.)\s+(?=[A-Z])", text)[0] for text in said if not text.startswith("Against the reference")]
-    shown = [*own[: max(_OF_FINDINGS, _SAID - len(warnings)) - len(moved)], *moved]
+    shown = [*own[: findings_shown(warnings) - len(moved)], *moved]
     left = len(said) - len(shown)
     shown = [*rest, *shown]
     if result.get("spike", {}).get("tip") == "flat":

@@ -6,15 +6,12 @@ Everything else is in the report and in result.json, and with ``--verbose`` on t
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.runs.registry import Headline
+from experiments.runs.registry import Headline, findings_shown
 from vis.page.answer import answer
 from vis.page.numbers import foldable
 from vis.robot.answer import answer_tiles
 
 __all__ = ["robot_headline"]
-
-_SAID, _OF_FINDINGS = 4, 2
-"""Sentences shown, warnings first; but all warnings, and at least so many findings."""
 
 
 def robot_headline(result: Mapping[str, Any]) -> Headline | None:
@@ -24,7 +21,7 @@ def robot_headline(result: Mapping[str, Any]) -> Headline | None:
     table = answer(answer_tiles(result), result)[0]
     rows = [tuple(foldable(cell) for cell in row[:-1]) for row in table.rows]
     warnings, said = result.get("warnings", []), result.get("departures", {}).get("sentences", [])
-    shown = said[: max(_OF_FINDINGS, _SAID - len(warnings))]
+    shown = said[: findings_shown(warnings)]
     return Headline(
         tuple(table.head[:-1]), tuple(rows), tuple(map(foldable, warnings)), tuple(map(foldable, shown)),
         len(said) - len(shown),

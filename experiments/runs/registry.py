@@ -10,7 +10,7 @@ Both names are text here so that help does not wait for Taichi.
 """
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from experiments.runs.progress import Progress
     from experiments.runs.result import Result
 
-__all__ = ["EXPERIMENTS", "Experiment", "Headline", "Preset", "face", "find_experiment"]
+__all__ = ["EXPERIMENTS", "Experiment", "Headline", "Preset", "face", "find_experiment", "findings_shown"]
 
 CASES = Path(__file__).parents[1] / "cases"
 S = TypeVar("S", bound=BaseModel)
@@ -39,6 +39,15 @@ class Resume(Protocol):
     """The `resume` of an experiment."""
 
     def __call__(self, folder: str | Path, *, progress: "Progress | None" = None) -> "Result": ...
+
+
+_SAID, _OF_FINDINGS = 4, 2
+"""Sentences that a headline shows, warnings first; but all warnings, and at least so many findings."""
+
+
+def findings_shown(warnings: Sequence[str]) -> int:
+    """How many findings a headline with these warnings shows at most [1]."""
+    return max(_OF_FINDINGS, _SAID - len(warnings))
 
 
 @dataclass(frozen=True)

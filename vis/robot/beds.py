@@ -15,7 +15,7 @@ from vis.spatial.report import pair
 
 from .answer import answer_tiles
 
-__all__ = ["write_beds_report"]
+__all__ = ["draw_beside", "write_beds_report"]
 
 Columns = Mapping[str, Array]
 OWN = "Pictures, film and figures of each bed are in the report of its folder: {folders}."
@@ -27,7 +27,7 @@ def write_beds_report(report: Report) -> Path:
     folders = [bed["folder"] for bed in result["beds"]]
     runs = [report.columns(f"{folder}/series/motion.csv") for folder in folders]
     beside = report.columns(f"{folders[0]}/series/{law}.csv")
-    drawn = report.draw("beds", _draw_beds(runs, beside, law), law=law)
+    drawn = report.draw("beds", draw_beside(runs, beside, law, called="each bed"), law=law)
     sections = [
         Section("", [listing(result["departures"]["sentences"])]),
         Section("Over time", [drawn]),
@@ -39,14 +39,15 @@ def write_beds_report(report: Report) -> Path:
     return report.write(sections, lead=["mujoco", f"{result['duration']:g} s"], tiles=answer_tiles(result))
 
 
-def _draw_beds(runs: Sequence[Columns], beside: Columns, law: str) -> Figure:
-    """Rise and deepest foot over time: one line for each bed, and the law."""
+def draw_beside(runs: Sequence[Columns], beside: Columns, law: str, *, called: str) -> Figure:
+    """Rise and deepest foot over time: a line for each run on grains, `called` so in the legend, and the law."""
     drawing, height, depth = pair("rise of the centre of mass [mm]", "depth of the deepest foot [mm]")
-    styles: list[Mapping[str, Any]] = [*({"color": BED, "lw": 0.8} for _ in runs), {"color": MODEL, "ls": DASHED}]
+    own: Mapping[str, Any] = {"color": BED, "lw": 0.8} if len(runs) > 1 else {"color": BED}
+    styles: list[Mapping[str, Any]] = [*(own for _ in runs), {"color": MODEL, "ls": DASHED}]
     for columns, style in zip([*runs, beside], styles, strict=True):
         height.plot(columns["t_s"], 1e3 * (columns["z_m"] - columns["z_m"][0]), **style)
         depth.plot(columns["t_s"], 1e3 * columns["sinkage_m"], **style)
-    height.lines[0].set_label("each bed")
+    height.lines[0].set_label(called)
     height.lines[-1].set_label(law)
     depth.invert_yaxis()
     legend_above(drawing, [height.lines[0], height.lines[-1]], 2)

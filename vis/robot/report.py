@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from vis.film.film import ARROWS_OF_FEET, draw_runs, shown
 from vis.film.reel import SpaceReel
 from vis.page.page import Section, listing, table_of, text
-from vis.page.plots import AXES, AXIS_LINES, BED, DASHED, INK, MODEL, Array, legend_above, line_styles, mean_over
+from vis.page.plots import AXES, AXIS_LINES, INK, Array, legend_above, line_styles, mean_over
 from vis.page.report import Report, given, report_of
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frames_of
@@ -20,7 +20,7 @@ from vis.view.curves import MOST_LINES, joint_columns, law_beside
 from vis.view.page import report_scene
 
 from .answer import answer_tiles
-from .beds import write_beds_report
+from .beds import draw_beside, write_beds_report
 
 __all__ = ["write_robot_report"]
 
@@ -54,7 +54,8 @@ def write_robot_report(
     motion, feet, joints = (report.columns(f"series/{name}.csv") for name in ("motion", "feet", "joints"))
     drawn = [report.draw("path", _draw_path(motion)), report.draw("ground", _draw_ground(motion, feet, result["feet"]))]
     if (law := law_beside(home)) is not None:
-        drawn.append(report.draw("beside", _draw_beside(motion, report.columns(f"series/{law}.csv"), law), law=law))
+        beside = draw_beside([motion], report.columns(f"series/{law}.csv"), law, called="grains")
+        drawn.append(report.draw("beside", beside, law=law))
     drawn += [report.draw("joints", _draw_joints(joints)), report.draw("energy", draw_energy(motion, "the robot"))]
     seen = []
     if pictures and frames_of(home):
@@ -101,17 +102,6 @@ def _draw_ground(motion: Columns, feet: Columns, names: list[str]) -> Figure:
     depth.invert_yaxis()
     depth.legend(loc="best")
     legend_above(drawing, force.lines, 3)
-    return drawing
-
-
-def _draw_beside(motion: Columns, other: Columns, law: str) -> Figure:
-    drawing, height, depth = pair("rise of the centre of mass [mm]", "depth of the deepest foot [mm]")
-    for columns, style in ((motion, {"color": BED, "label": "grains"}), (other, {"color": MODEL, "ls": DASHED})):
-        height.plot(columns["t_s"], 1e3 * (columns["z_m"] - columns["z_m"][0]), **style)
-        depth.plot(columns["t_s"], 1e3 * columns["sinkage_m"], **style)
-    height.lines[-1].set_label(law)
-    depth.invert_yaxis()
-    legend_above(drawing, height.lines, 2)
     return drawing
 
 
