@@ -26,6 +26,7 @@ from experiments.runs.given import keep_given, kept_copy
 from rigid.checks import nearest
 from rigid.digests import check_as_written
 
+from .digests import changed_files, write_digests
 from .recording import Recording, read_recording, write_recording
 from .tables import (
     PenetrationCampaign,
@@ -76,7 +77,8 @@ class Campaign:
 
 def read_campaign(folder: str | Path) -> Campaign:
     """Read the campaign in `folder`. Raises ValueError, one sentence a line, naming the file, the line or key, what was
-    found and what was expected, for all that is wrong, in the tables and in every file that can be found, at once."""
+    found and what was expected, for all that is wrong, in the tables and in every file that can be found, at once; and
+    each file that differs from its digest, where the folder has digests."""
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"{str(folder)!r} is no folder: one with campaign.toml was expected")
@@ -100,23 +102,27 @@ def read_campaign(folder: str | Path) -> Campaign:
                 recordings[trial.id, sensor] = read_recording(folder / name, trial.columns(sensor))
             except ValueError as error:
                 faults += str(error).splitlines()
+    named = [name for _, trial in trials for name in trial.files.values()]
+    faults += changed_files(folder, ["campaign.toml", *named])
     if faults or tables is None:
         raise ValueError("\n".join(dict.fromkeys(faults)))
     return Campaign(tables, recordings, folder)
 
 
 def write_campaign(folder: str | Path, campaign: Campaign) -> Path:
-    """Write a campaign into `folder`, which must be new or empty, and return it. Raises ValueError where the folder is
-    in use or a file that a trial names has no recording."""
+    """Write a campaign with its digests into `folder`, which must be new or empty, and return it. Raises ValueError
+    where the folder is in use or a file that a trial names has no recording."""
     folder = Path(folder)
     _refuse_used(folder)
+    names = [name for trial in campaign.tables.trial for name in trial.files.values()]
     for trial in campaign.tables.trial:
         for sensor, name in trial.files.items():
             recording = campaign.recordings.get((trial.id, sensor))
             if recording is None:
                 raise ValueError(f"trial {trial.id!r} names {sensor} = {name!r}, but there is no recording of it")
             write_recording(folder / name, recording)
-    write_text(folder / "campaign.toml", _tables_toml(campaign.tables))  # last: without it there is no campaign
+    write_text(folder / "campaign.toml", _tables_toml(campaign.tables))  # without it there is no campaign
+    write_digests(folder, ["campaign.toml", *names])
     return folder
 
 

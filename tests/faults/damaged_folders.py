@@ -133,6 +133,9 @@ def diagnosed() -> None:
     done("diagnose campaign --out run")
 
 
+CAMPAIGN = "--duration 0.1 --lead 0.05 --camera-rate 60 --imu-rate 50 --wheel-rate 100 --brake-torques 6.0 --rig 0.0085"
+
+
 def bed(*, stopped: bool) -> Callable[[], None]:
     """A bed that is made, with a name; `stopped`: after its first stage."""
 
@@ -197,6 +200,10 @@ KINDS = {
     "copies": Kind(
         copies, ("resume tumbled", "resume run"), ("*/result.json", "*/*.csv", "*/series/*.csv"),
         ("tumbled/*", "run/*"), fake=True,
+    ),
+    "campaign, written": Kind(
+        of(f"campaign {CAMPAIGN}"), ("campaign check run/campaign --out out",), ("out/result.json", "out/series/*.csv"),
+        ("run/campaign/*",),
     ),
     "diagnose, model": Kind(
         diagnosed, ("penetrate --ground spring-damper --model run/model.toml --out out", "resume run --json"),

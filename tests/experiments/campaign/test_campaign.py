@@ -1,6 +1,8 @@
 """Campaigns read, written and read back; what is wrong with one is said by file, line or key."""
 
+import json
 import math
+import random
 import re
 
 import numpy as np
@@ -15,6 +17,8 @@ from experiments.campaign import (
     write_campaign,
     write_model,
 )
+from experiments.campaign.digests import DIGESTS
+from experiments.campaign.files import TEMPLATES
 
 
 def same_bits(one, other):
@@ -142,6 +146,54 @@ def test_a_campaign_written_and_read_back_is_the_same_to_the_bit(tmp_path, make)
     write_campaign(tmp_path / "third", again)
     for path in (tmp_path / "again").rglob("*.*"):
         assert path.read_bytes() == (tmp_path / "third" / path.relative_to(tmp_path / "again")).read_bytes()
+
+
+def one_digit_other(path, chance):
+    """Change one digit of a file: the number is as good as another."""
+    content = bytearray(path.read_bytes())
+    at = chance.choice([at for at, byte in enumerate(content) if byte in b"0123456789"])
+    content[at] = chance.choice([byte for byte in b"0123456789" if byte != content[at]])
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("make", [tumble_folder, penetration_folder])
+def test_every_changed_digit_of_a_written_campaign_is_found_and_may_be_intended(tmp_path, make):
+    """Without the digests, as they are in a campaign that a person makes, the file is taken as it is."""
+    folder = write_campaign(tmp_path / "written", read_campaign(make(tmp_path / "c")))
+    chance = random.Random(make.__name__)
+    files = sorted(path for path in folder.rglob("*.*") if path.name != DIGESTS)
+    for path in files * 5:
+        whole = path.read_bytes()
+        one_digit_other(path, chance)
+        with pytest.raises(ValueError, match="has changed since hedgebed wrote it") as refused:
+            read_campaign(folder)
+        assert f"{path}: " in str(refused.value) and f"delete {folder / DIGESTS}" in str(refused.value)
+        path.write_bytes(whole)
+    read_campaign(folder)
+    other = folder / "campaign.toml"
+    other.write_text(other.read_text().replace("stiffness = ", "stiffness = 1"))
+    (folder / DIGESTS).unlink()
+    assert str(read_campaign(folder).tables.surface.stiffness).startswith("1")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"digests": 1}', "\x00"])
+def test_damaged_digests_of_a_campaign_are_named(tmp_path, text):
+    folder = write_campaign(tmp_path / "written", read_campaign(tumble_folder(tmp_path / "c")))
+    (folder / DIGESTS).write_text(text)
+    with pytest.raises(ValueError, match=f"{DIGESTS}: is damaged"):
+        read_campaign(folder)
+
+
+def test_shipped_recordings_have_digests_and_templates_to_fill_in_have_none():
+    """The recordings of others are as they were put here; a template is there to be changed."""
+    with_digests = {path.parent.name for path in TEMPLATES.glob(f"*/{DIGESTS}")}
+    assert with_digests == {path.parent.name for path in TEMPLATES.glob("cmu-*/campaign.toml")}
+    for name in with_digests:
+        named = json.loads((TEMPLATES / name / DIGESTS).read_text())["digests"]
+        assert set(named) == {path.name for path in (TEMPLATES / name).glob("c*.toml")} | {
+            path.name for path in (TEMPLATES / name).glob("*.csv")
+        }
+        read_campaign(TEMPLATES / name)
 
 
 def test_a_campaign_is_not_written_over_another(tmp_path):

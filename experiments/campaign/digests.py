@@ -1,0 +1,44 @@
+"""Digests of a campaign that hedgebed wrote: whether its files are as they were written.
+
+In recordings and tables a changed digit is a number as good as another, which nothing else can tell. A folder without
+digests.json, as a person makes one, is taken as it is.
+"""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from experiments.runs.folder import write_json
+from rigid.digests import digest_of
+
+__all__ = ["DIGESTS", "changed_files", "write_digests"]
+
+DIGESTS = "digests.json"
+"""Name of the file below a campaign: {"digests": {name of a file: its SHA-256}}."""
+
+
+def write_digests(folder: Path, names: Iterable[str]) -> None:
+    """Write the digests of these files of a campaign into its folder."""
+    write_json(folder / DIGESTS, {"digests": {name: digest_of(folder / name) for name in sorted(set(names))}})
+
+
+def changed_files(folder: Path, names: Iterable[str]) -> list[str]:
+    """Which of these files of a campaign differ from their digests, a sentence each; none without digests.json.
+
+    A file that is not there, or has no digest, is not looked at.
+    """
+    keeper = folder / DIGESTS
+    if not keeper.exists():
+        return []
+    way = f"if the change is intended, delete {keeper}"
+    try:
+        kept = json.loads(keeper.read_text(encoding="utf-8"))["digests"]
+        digests = {str(name): str(digest) for name, digest in kept.items()}
+    except (OSError, ValueError, RecursionError, LookupError, TypeError, AttributeError):
+        return [f"{keeper}: is damaged; a table of digests was expected; {way}"]
+    there = ((folder / name, digests[name]) for name in names if name in digests)
+    return [
+        f"{path}: has changed since hedgebed wrote it (its digest differs from that in {keeper}): restore it, or {way}"
+        for path, digest in there
+        if path.is_file() and digest_of(path) != digest
+    ]
