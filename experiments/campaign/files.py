@@ -102,8 +102,8 @@ def read_campaign(folder: str | Path) -> Campaign:
                 recordings[trial.id, sensor] = read_recording(folder / name, trial.columns(sensor))
             except ValueError as error:
                 faults += str(error).splitlines()
-    named = [name for _, trial in trials for name in trial.files.values()]
-    faults += changed_files(folder, ["campaign.toml", *named])
+    recorded = [name for _, trial in trials for name in trial.files.values()]
+    faults += changed_files(folder, ["campaign.toml", *recorded])
     if faults or tables is None:
         raise ValueError("\n".join(dict.fromkeys(faults)))
     return Campaign(tables, recordings, folder)
