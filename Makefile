@@ -22,8 +22,9 @@ run: $(VENV)/.installed  ## a first answer in 2 to 3 minutes: a spike in sand, i
 flagship: $(VENV)/.installed  ## the same spike extrapolated to real grains, with three errors; some 3 hours of one core
 	$(BIN)/hedgebed converge docs/results/converge-flagship/run.toml $(ARGS)
 
-# A file of tests stays with one worker: its fixtures and kernels are made once. WORKERS=0 tests in one process.
-PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+# A file of tests stays with one worker: its fixtures and kernels are made once; tests/conftest.py has the longest files
+# begin. WORKERS=0 tests in one process.
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test: $(VENV)/.installed-test  ## ruff, mypy and the tests, these in WORKERS=2 processes
 	$(BIN)/ruff check .

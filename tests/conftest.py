@@ -1,8 +1,10 @@
-"""Same examples in every run; one thread; which files of tests are quick enough for `make fast`."""
+"""Same examples in every run; one thread; which files of tests are quick enough for `make fast`, and which begin."""
 
+import math
 import os
 import tomllib
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 import engine_pool
@@ -54,12 +56,25 @@ def pytest_configure(config):
     config.pluginmanager.register(_Stopwatch(config))
 
 
-def pytest_collection_modifyitems(items):
-    heavy = heavy_files(tomllib.loads(DURATIONS.read_text(encoding="utf-8")))
+def longest_first(names: Iterable[str], durations: dict[str, float]) -> list[str]:
+    """The files in the order in which workers take them, so that none is left with a long file at the end.
+
+    A file that has no measured duration may be long: it comes first.
+    """
+    return sorted(names, key=lambda name: (-durations.get(name, math.inf), name))
+
+
+def pytest_collection_modifyitems(config, items):
+    durations = tomllib.loads(DURATIONS.read_text(encoding="utf-8"))
+    heavy = heavy_files(durations)
+    names = {item: item.path.relative_to(ROOT).as_posix() for item in items}
+    if hasattr(config, "workerinput"):
+        place = {name: number for number, name in enumerate(longest_first(set(names.values()), durations))}
+        items.sort(key=lambda item: place[names[item]])
     for item in items:
         if engine_pool.ARCH != "cpu" and (mark := item.get_closest_marker("cpu_only")):
             item.add_marker(pytest.mark.skip(reason=f"{mark.args[0]}: on a CPU only"))
-        if item.path.relative_to(ROOT).as_posix() in heavy:
+        if names[item] in heavy:
             item.add_marker("heavy")
 
 

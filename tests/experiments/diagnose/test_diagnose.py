@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from functools import cache
 from importlib.resources import files
 
 import jsonschema
@@ -53,6 +54,12 @@ def diagnosed(trials, **more):
     return diagnose(make_problem(campaign_of(trials, **more)))
 
 
+@cache
+def found_in_pushes(force):
+    """The diagnosis of six pushes, which tests only read."""
+    return diagnosed(pushes(force))
+
+
 def test_a_quarter_of_the_trials_is_held_out_and_no_condition_loses_all_its_trials_before_it_must():
     trials = [TrialInfo(id=str(k), condition=(k % 4,), settings={"speed_m_s": float(k % 4)}) for k in range(9)]
     fitted, held_out = split_trials(trials)
@@ -98,8 +105,9 @@ def test_a_number_that_neither_data_nor_prior_determine_has_no_standard_error():
         assert any("not determined" in str(block) for block in numbers_of(said))
 
 
+@pytest.mark.long
 def test_an_effects_number_that_nothing_determines_keeps_the_contract_and_says_so(monkeypatch):
-    found = diagnosed(pushes(rubbed))
+    found = found_in_pushes(rubbed)
     lost = {"shaft": {"value": -0.6, "std": None, "unit": "N"}, "growth": {"value": 1.0, "std": 0.1, "unit": "1"}}
     monkeypatch.setattr(type(found), "parameters", lambda self, effect: lost)
     said = document(found)
@@ -110,9 +118,10 @@ def test_an_effects_number_that_nothing_determines_keeps_the_contract_and_says_s
     assert sum("not determined" in str(block) for block in numbers_of(said)) == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("force", "name"), [(crater, "plastic-sinkage"), (rubbed, "shaft-friction")])
 def test_a_hidden_effect_of_another_form_than_the_librarys_is_named_and_the_gap_closes(force, name):
-    found = diagnosed(pushes(force))
+    found = found_in_pushes(force)
     assert (found.verdict, found.effects) == ("named", (name,))
     assert found.before.held_out > 5 and found.after.held_out < 0.2 * found.before.held_out
     assert found.model_std == {}  # two replicates of each speed, which differ by the sensors alone
@@ -133,6 +142,7 @@ def test_a_constant_force_at_one_speed_is_drag_or_friction_and_both_are_named():
     assert "speed" in said["next_experiment"]
 
 
+@pytest.mark.long
 def test_a_vibration_is_unknown_and_goes_with_time():
     def shaken(recording):
         wave = 1.5 * np.sin(2 * np.pi * 2.0 * np.arange(400) / 400 + 1.0)

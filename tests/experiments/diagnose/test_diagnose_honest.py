@@ -147,6 +147,7 @@ def test_a_trial_that_was_held_out_and_is_fitted_is_exchanged_for_its_replicate(
     assert set(fitted) == {"a1", "a2", "b2", "b3"}
 
 
+@pytest.mark.long
 def test_what_shows_in_a_held_out_trial_alone_is_not_passed_over():
     # Replicates at two speeds, and one of those held out in a bed a quarter stiffer: nothing is left of the others.
     trials = pushed(base, (0.01, 0.03, 0.1, 0.02, 0.05))
@@ -166,6 +167,7 @@ def test_trials_that_go_another_way_are_no_replicates():
     assert [sorted(ids) for ids in groups_of(told).values()] == [["a", "c"], ["b"], ["d"]]
 
 
+@pytest.mark.long
 def test_a_stiffness_that_was_stated_wrong_is_not_passed_over():
     trials = pushed(base, (0.01, 0.03, 0.1, 0.02))
     found = diagnose(make_problem(campaign_of(trials, stiffness=0.7 * STIFFNESS, doubt=(0.05, 0.1))))

@@ -95,7 +95,11 @@ def stated(campaign, share):
 SPEEDS = (0.01, 0.01, 0.05, 0.05, 0.01, 0.05)
 
 
-@pytest.mark.parametrize(("share", "times"), [(0.97, None), (1 / 1.4, 1.4), (0.03, 33), (1e-3, 1e3)])
+@pytest.mark.parametrize(
+    ("share", "times"),
+    [(0.97, None), *(pytest.param(share, times, marks=pytest.mark.long)
+                     for share, times in ((1 / 1.4, 1.4), (0.03, 33), (1e-3, 1e3)))],
+)  # fmt: skip
 def test_readings_noisier_than_stated_are_no_proof_that_nothing_is_missing(share, times):
     """The gap takes the stated noise: 1 / share^2, and `none` asks for 1.2 at most."""
     found = diagnose(make_problem(stated(pushes(base, SPEEDS), share)))
@@ -115,6 +119,7 @@ def test_readings_noisier_than_stated_are_no_proof_that_nothing_is_missing(share
     assert f"std = {row['found']:.2g} N" in words and f"stated {row['stated']:.2g}" in " ".join(summary_sentences(told))
 
 
+@pytest.mark.long
 def test_beds_that_differ_excuse_a_gap_and_do_not_excuse_a_noisier_sensor():
     """K of each bed is off by some percent: replicates show that, and it counts as noise; a sensor's noise does not."""
     factors = (1.0, 1.04, 0.97, 1.01, 0.96, 1.03)

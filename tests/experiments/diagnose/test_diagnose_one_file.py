@@ -32,6 +32,7 @@ def muddy(z, v, top=0.0):
     return STIFFNESS * z + DAMPING * rate + FORCE * (1 - math.exp(-rate / SPEED))
 
 
+@pytest.mark.long
 def test_an_effect_from_a_file_is_found_where_it_is_hidden_with_its_words_and_its_equation(tmp_path):
     trials = [
         (f"{k}", "driven", v, driven_trial(muddy, speed=v, seed=k)) for k, v in enumerate((0.01, 0.1, 0.03, 0.01))

@@ -83,6 +83,7 @@ def test_a_hold_leaves_one_number_of_the_force_in_doubt_and_not_how_it_changes_w
     assert not doubt.any() and held.shape == (80, 0)
 
 
+@pytest.mark.long
 def test_a_plain_crater_with_its_own_weights_leaves_replicates_alike():
     # Weighed as the bent base model has it, the steep way back read as beds that differ by a quarter of C.
     found = diagnose(make_problem(pushes(crater)))

@@ -176,6 +176,7 @@ def coloured(random, count, persistence):
     return noise
 
 
+@pytest.mark.long
 def test_the_error_of_a_depth_whose_noise_is_coloured_is_as_large_as_it_says():
     """A correlation a from row to row leaves a mean with (1 + a) / (1 - a) times the variance that white noise does."""
     time, std = np.linspace(0.0, 1.0, 600), 1e-4
@@ -189,6 +190,7 @@ def test_the_error_of_a_depth_whose_noise_is_coloured_is_as_large_as_it_says():
     assert np.mean(told[0.6]) < 1.5 < np.mean(told[0.0])
 
 
+@pytest.mark.long
 def test_a_louder_depth_sensor_makes_no_speeds_that_the_machine_never_had():
     """225 rows of a push at 0.095 m/s and back at 0.099, noise 1.3 times as loud as stated and coloured.
 

@@ -100,6 +100,7 @@ def setting_in(size):
     return force
 
 
+@pytest.mark.long
 def test_friction_that_sets_in_over_a_millimetre_is_named_over_two_diameters():
     trials = []
     for k, (size, speed) in enumerate((s, v) for s in (1.0, 2.0) for v in (0.01, 0.03, 0.06)):
@@ -189,6 +190,7 @@ def lets_go(z, v, top=0.0):
     return STIFFNESS * z + DAMPING * max(v, 0.0) - pull
 
 
+@pytest.mark.long
 def test_a_pull_that_is_there_at_once_and_lets_go_over_millimetres_is_adhesion():
     trials = []
     for k, speed in enumerate((0.01, 0.03, 0.06) * 2):
@@ -202,6 +204,7 @@ def locking(z, v, top=0.0):
     return STIFFNESS * z / (1 - z / 0.035) + DAMPING * max(v, 0.0)
 
 
+@pytest.mark.long
 def test_a_bed_that_locks_is_hardening_and_no_layer():
     trials = [(f"{k:02d}", "driven", speed, driven_trial(locking, speed=speed, seed=70 + k))
               for k, speed in enumerate((0.01, 0.03, 0.06) * 2)]  # fmt: skip

@@ -30,7 +30,10 @@ def pieces(random, *, amplitude=0.0, frequency=14.0, persistence=0.0, drift=0.0)
     return found
 
 
-@pytest.mark.parametrize(("persistence", "drift"), [(0.0, 0.0), (0.6, 0.0), (0.6, 5.0)])
+@pytest.mark.parametrize(
+    ("persistence", "drift"),
+    [*(pytest.param(persistence, 0.0, marks=pytest.mark.long) for persistence in (0.0, 0.6)), (0.6, 5.0)],
+)
 def test_coloured_noise_and_a_misfit_that_wanders_and_parts_have_no_line(persistence, drift):
     random = np.random.default_rng(5)
     assert [spectral_lines(pieces(random, persistence=persistence, drift=drift)) for _ in range(4)] == [[]] * 4

@@ -79,6 +79,7 @@ def test_a_prediction_counts_the_errors_of_what_was_learned_as_noise():
     )
 
 
+@pytest.mark.long
 def test_the_further_push_that_separates_two_effects_is_made_at_another_speed():
     # f sign(v) and b v^2 are one number f at v_0 = 0.05 m/s. At v they differ by f ((v / v_0)^2 - 1) = 8 N on the way
     # in. C is stated to 5 %, and C v_0 + f is known: an error c of C changes the predictions by c (v - v_0) and

@@ -187,6 +187,7 @@ def test_fits_that_are_carried_out_together_end_where_each_ends_alone():
         np.testing.assert_array_equal(one.modes, alone.modes)
 
 
+@pytest.mark.long
 def test_a_pendulum_is_found_with_its_length_and_beats_a_slope():
     length = 1.5
     found = make_problem(campaign(effects=(Effect(id="pendulum", parameters={"length": length}),), seed=4, off=0.5))
@@ -208,6 +209,7 @@ def test_a_pendulum_is_found_with_its_length_and_beats_a_slope():
     assert reported["length"][0] == pytest.approx(1 / curvature)
 
 
+@pytest.mark.long
 def test_a_plain_effect_is_found_where_the_base_model_ends_on_branches_of_its_own():
     """A centre of mass 0.58 mm off the shaft, half of what cancels the whole restoring moment at 0.0085 g."""
     truth = {"x": -5e-4, "y": 3e-4}
@@ -226,6 +228,7 @@ def test_a_plain_effect_is_found_where_the_base_model_ends_on_branches_of_its_ow
         assert values[f"com-offset.{name}"] == pytest.approx(value, abs=3e-5)
 
 
+@pytest.mark.long
 def test_a_trial_on_a_branch_that_was_not_measured_does_not_keep_the_base_model_away_from_the_others():
     """From the stated numbers the fit ends with mu_s 4.7 sigma off, where trials stick that slipped."""
     nominal = {"mass": 5.177, "inertia": 0.05967, "stiffness": 4455.0, "damping": 16.42, "mu_s": 0.4725, "mu_d": 0.2786}

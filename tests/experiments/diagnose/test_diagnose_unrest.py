@@ -60,6 +60,7 @@ def test_a_replicate_with_half_as_many_rows_does_not_seem_to_wander():
     assert find_wander(found, found.values, ids).model_std.get("force", 0.0) < 0.1
 
 
+@pytest.mark.long
 def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by():
     """The verdict stays `unknown`: beside this wander 1.29 is left of held-out pushes, 1.2 at most would be named.
 
@@ -86,6 +87,7 @@ def test_a_name_is_certain_where_all_that_is_left_is_what_replicates_differ_by()
     assert found.next_experiment.startswith(words)
 
 
+@pytest.mark.long
 def test_what_differs_between_replicates_alone_gets_no_name_and_is_not_called_nothing():
     found = diagnose(wandering(0.8))
     assert found.verdict == "unknown" and found.effects == ()

@@ -63,11 +63,13 @@ def test_a_zero_that_differs_by_one_noise_is_nothing_missing_and_is_said():
     assert 1.5 < found.after.fit < 3.0
 
 
+@pytest.mark.long
 def test_a_zero_that_differs_hides_no_effect():
     found = diagnose(problem_of(bent, zeros=FORCE_STD * OFF))
     assert found.verdict == "named" and found.effects == ("depth-hardening",)
 
 
+@pytest.mark.long
 def test_a_depth_counted_from_another_height_in_each_push_is_nothing_missing():
     found = diagnose(problem_of(straight, deeper=DEPTH_STD * OFF))
     assert found.verdict == "none" and found.model_std == {"depth zero": pytest.approx(DEPTH_STD, rel=0.4)}
@@ -77,12 +79,14 @@ ALONE = (0.01, 0.014, 0.02, 0.028, 0.04, 0.056, 0.08, 0.11)
 BEDS = 0.05 * np.array([0.4, -1.3, 1.2, 0.2, -1.1, 1.4, -0.9, 0.1])
 
 
+@pytest.mark.long
 def test_beds_that_differ_where_no_push_repeats_another_are_scatter_and_said():
     found = diagnose(problem_of(straight, ALONE, beds=BEDS))
     assert found.verdict == "none" and found.model_std == {"bed": pytest.approx(0.05, rel=0.3)}
     assert any("no replicates" in finding.what for finding in found.findings)
 
 
+@pytest.mark.long
 def test_a_force_zero_of_each_push_in_noise_that_is_correlated_is_nothing_missing_though_none_repeats_another():
     """The colour shows once the zeros are out of the way, and with it nothing is left."""
     found = diagnose(make_problem(campaign_of(on_the_surface(ALONE, BEDS / 0.05, 0.7), depth_std=2e-5)))
@@ -90,6 +94,7 @@ def test_a_force_zero_of_each_push_in_noise_that_is_correlated_is_nothing_missin
     assert any("a zero that" in finding.what for finding in found.findings)
 
 
+@pytest.mark.long
 def test_a_stiffness_that_goes_with_the_speed_is_no_scatter():
     found = diagnose(problem_of(straight, ALONE, beds=np.sort(BEDS)))
     assert found.verdict != "none"
@@ -104,6 +109,7 @@ def test_pushes_and_drops_that_differ_are_no_scatter():
     assert _explained(dict(zip(kinds, BEDS, strict=True)), kinds, [list(kinds)]) < 0.5
 
 
+@pytest.mark.long
 def test_one_bed_that_is_another_is_no_scatter():
     found = diagnose(problem_of(straight, ALONE, beds=np.where(np.arange(8) == 3, 0.2, 0.0)))
     assert found.verdict != "none"
@@ -127,6 +133,7 @@ def on_the_surface(speeds, offs, persistence=0.0):
     return trials
 
 
+@pytest.mark.long
 def test_a_force_zero_of_pushes_that_begin_at_the_surface_is_nothing_missing():
     # At rest on the surface no row reads the zero for certain; a depth's zero takes up most of it, but not there.
     found = diagnose(make_problem(campaign_of(on_the_surface(SPEEDS, OFF), depth_std=2e-5)))

@@ -13,7 +13,8 @@ from penetration_campaigns import FORCE_STD, campaign_of, saved
 from experiments.campaign import Recording, read_campaign, read_model
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
-from experiments.diagnose.experiment import diagnose_campaign, run
+from experiments.diagnose import experiment
+from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.push.remarks import Push, contradict, highest_damping
 from experiments.diagnose.report.document import COUNTS, document
 from experiments.diagnose.report.gaps import Gaps
@@ -49,12 +50,27 @@ def plates(**changes):
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory):
-    """The result and diagnosis.json of the plates, n2 being off by `OFF`."""
+def diagnosed(tmp_path_factory):
+    """The run folder of the plates, n2 being off by `OFF`, its result and the diagnosis behind it."""
     folder = tmp_path_factory.mktemp("plates")
     campaign = saved(folder / "campaign", plates(n2={"zero": OFF}))
-    found = run(DiagnoseSettings(campaign=str(campaign)), folder / "run")
-    return found, json.loads((folder / "run" / "diagnosis.json").read_text()), folder / "run"
+    kept = []
+
+    def keep(*campaign, **options):
+        kept.append(diagnose_campaign(*campaign, **options))
+        return kept[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(experiment, "diagnose_campaign", keep)
+        found = experiment.run(DiagnoseSettings(campaign=str(campaign)), folder / "run")
+    return folder / "run", found, kept[0]
+
+
+@pytest.fixture(scope="module")
+def result(diagnosed):
+    """The result and diagnosis.json of the plates, and their run folder."""
+    folder, found, _ = diagnosed
+    return found, json.loads((folder / "diagnosis.json").read_text()), folder
 
 
 def test_a_depth_zero_of_one_push_is_found_from_its_replicates():
@@ -186,9 +202,12 @@ def test_stated_values_that_are_far_off_are_said_first_with_what_to_do():
     golden("diagnose/stated_far", [summary_sentences(said)[0], summary_sentences(tumble)[0]])
 
 
-def test_a_rival_is_distinguished_where_evidence_or_prediction_leads_by_ten_nats_and_both_are_said(tmp_path):
-    found = diagnose_campaign(saved(tmp_path / "c", plates()))
+def test_a_rival_is_distinguished_where_evidence_or_prediction_leads_by_ten_nats_and_both_are_said(
+    diagnosed, monkeypatch
+):
+    *_, found = diagnosed
     assert found.choice is not None
+    monkeypatch.setattr(type(found), "planned", None)  # the plan of a next push takes seconds, and is none of this
     rival = found.choice.rivals[0]
     for evidence, left_out, apart in ((5.9, 10.4, True), (5.9, 7.0, False), (12.0, None, True), (9.0, None, False)):
         other = replace(rival, behind=evidence, behind_left_out=left_out)
