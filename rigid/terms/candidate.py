@@ -139,6 +139,9 @@ class Push:
     """Slots that are never 0, and what they are where the effect is off."""
     turning: tuple[str, str] | None = None
     """Slots of a friction that takes a distance to turn round: its bound and that distance."""
+    steep: tuple[tuple[str, ...], str] | None = None
+    """Slots of a friction that rises with speed: its parts, of which the sum bounds it [N], and the speed [m/s] over
+    which it rises, 0 where it does not."""
     apart: Mapping[str, str] = field(default_factory=dict)  # Another effect -> the experiment that separates the two
 
 

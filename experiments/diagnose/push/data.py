@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from experiments.diagnose.noise.stuck import clipped, cut_rows, stuck_rows
 from experiments.grains.spells import spells
 
 from .depth import SmoothDepth, smooth_depth
-from .drive import Holds, Weights
+from .drive import Drive, Holds, Weights
 
 __all__ = ["Prepared", "of_drop", "prepare", "stds", "tip_depth"]
 
@@ -91,10 +91,13 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
         columns["force_N"][rows] = np.nan
         recordings[id] = replace(recordings[id], columns=columns)
 
-    def again(trial: Prepared, colours: Mapping[str, Colour], alike: Holds = ()) -> Prepared:
+    def again(
+        trial: Prepared, colours: Mapping[str, Colour], alike: Holds = (), begun: Drive | None = None
+    ) -> Prepared:
         """The same, smoothed with what is known now."""
         id = trial.info.id
-        return _one(tables, trial.table, recordings[id], alike=alike, colour=colours.get(id))[0] or trial
+        found = _one(tables, trial.table, recordings[id], alike=alike, begun=begun, colour=colours.get(id))[0]
+        return found or trial
 
     trials, colours = _recoloured(
         trials, noisier, stds(tables, True)[0] if any(t.driven for t in trials) else 0.0, again
@@ -178,14 +181,29 @@ def _recoloured(
 
 
 def _alike(trials: list[Prepared], colours: Mapping[str, Colour], again: Callable[..., Prepared]) -> list[Prepared]:
-    """Smoothed once more where the holds of a push are not those of most: one machine makes all of them."""
+    """Smoothed once more where the holds of a push are not those of most: one machine makes all of them.
+
+    The fit begins also with the motion of that push of the others whose record is as long, or nearest to it: a search
+    that adds one ramp after another may end beside the motion that the machine makes.
+    """
     holds = Counter(trial.smooth.holds for trial in trials if trial.smooth is not None and trial.smooth.holds)
     if not holds:
         return trials
     usual, count = holds.most_common(1)[0]
     if count < 2:
         return trials
-    return [again(t, colours, usual) if t.smooth and t.smooth.holds not in ((), usual) else t for t in trials]
+    like = [t for t in trials if t.smooth is not None and t.smooth.holds == usual]
+    return [
+        again(t, colours, usual, _motion_of(like, t)) if t.smooth and t.smooth.holds not in ((), usual) else t
+        for t in trials
+    ]
+
+
+def _motion_of(others: Sequence[Prepared], trial: Prepared) -> Drive | None:
+    """The motion of that of `others` which lasts most nearly as long as `trial`, stretched to its length."""
+    span = float(np.ptp(trial.time))
+    near = min(others, key=lambda other: abs(math.log(float(np.ptp(other.time)) / span)))
+    return None if near.path.drive is None else near.path.drive.stretched(float(np.ptp(near.time)), span)
 
 
 def _path(trial: Prepared) -> tuple[float, ...]:
@@ -214,7 +232,7 @@ def stds(tables: PenetrationCampaign, driven: bool) -> tuple[float, float]:
 
 def _one(
     tables: PenetrationCampaign, table: PenetrationTrial, recording: Recording, *, alike: Holds = (),
-    colour: Colour | None = None, cut: NDArray[np.int64] | None = None,
+    begun: Drive | None = None, colour: Colour | None = None, cut: NDArray[np.int64] | None = None,
 ) -> tuple[Prepared | None, list[Finding]]:  # fmt: skip
     driven = table.mode == "driven"
     channel, key = ("force", "force_N") if driven else ("accel", "accel_m_s2")
@@ -269,7 +287,7 @@ def _one(
             report(f"the force is held: {int((~held).sum())} of {len(other)} readings repeat the one before; only "
                    f"fresh ones are used", where="force")  # fmt: skip
             other[~held] = np.nan
-        return _driven(tables, table, time, depth, other, std_depth, findings, alike, colour)
+        return _driven(tables, table, time, depth, other, std_depth, findings, alike, begun, colour)
     has_depth, has_other = np.isfinite(depth), np.isfinite(other)
     has_other &= np.abs(time) > 1e-9  # the force jumps at the touch: neither side is wrong
     if has_depth.sum() + has_other.sum() < _FEWEST:
@@ -323,7 +341,7 @@ def _drop_jumps(time: Array, depth: Array, std: float, report: Callable[..., Non
 
 def _driven(
     tables: PenetrationCampaign, table: PenetrationTrial, time: Array, depth: Array, other: Array, std: float,
-    findings: list[Finding], alike: Holds, colour: Colour | None,
+    findings: list[Finding], alike: Holds, begun: Drive | None, colour: Colour | None,
 ) -> tuple[Prepared | None, list[Finding]]:  # fmt: skip
     known = np.isfinite(depth)
     if known.sum() < _FEWEST or (known & np.isfinite(other)).sum() < _FEWEST:
@@ -331,7 +349,7 @@ def _driven(
         findings.append(Finding(trial=table.id, what=what, set_aside=True))
         return None, findings
     noisier, persistence = (max(colour.std, 1.0), colour.persistence) if colour is not None else (1.0, 0.0)
-    smooth = smooth_depth(time[known], depth[known], noisier * std, alike=alike, persistence=persistence)
+    smooth = smooth_depth(time[known], depth[known], noisier * std, alike=alike, begun=begun, persistence=persistence)
     smooth = replace(smooth, inflation=noisier * float(np.sqrt((1 + persistence) / (1 - persistence))))
     speed = float(table.speed) if table.speed else float(np.percentile(np.abs(smooth.speed), 80))
     time, depth, other = time[known], depth[known], other[known]

@@ -39,9 +39,14 @@ class SmoothDepth:
     speed: Array  # its slope [m/s], shape [n]
     depth_error: Array  # factor of the depth's error: the error is this times standard normal numbers [m], shape [n, p]
     speed_error: Array  # of the slope's, the same numbers [m/s], shape [n, p]
-    holds: Holds = ()  # which of its levels of speed are 0; () where it is no motion of levels
+    drive: Drive | None = None  # its levels of speed and ramps; None where it is no such motion
     inflation: float = 1.0
     """By how much its standard error is larger than with white noise of the stated size, as the gap has it."""
+
+    @property
+    def holds(self) -> Holds:
+        """Which of its levels of speed are 0; () where it is no motion of levels."""
+        return () if self.drive is None else self.drive.resting
 
     @property
     def depth_std(self) -> Array:
@@ -54,11 +59,13 @@ class SmoothDepth:
         return np.sqrt((self.speed_error**2).sum(axis=1))
 
 
-def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = (), persistence: float = 0.0) -> SmoothDepth:
+def smooth_depth(
+    time: Array, depth: Array, std: float, *, alike: Holds = (), begun: Drive | None = None, persistence: float = 0.0
+) -> SmoothDepth:
     """Smooth a depth column [m] at times [s], both of shape [n], with noise of standard deviation `std` [m].
 
-    `alike`: the holds of most of the machine's other pushes. `persistence`: correlation of the noise of a row with
-    that of the next.
+    `alike`: the holds of most of the machine's other pushes. `begun`: their motion in a record as long as this one,
+    from which a fit begins, too. `persistence`: correlation of the noise of a row with that of the next.
 
     Raises ValueError for fewer than two rows.
     """
@@ -69,7 +76,7 @@ def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = (), pe
     noise = max(std, 1e-9 * max(float(np.ptp(depth)), 1e-9))
     weigh = Weights(np.ones(len(u)), persistence)
     driven = len(u) >= _DRIVEN
-    drive = find_drive(u, depth / noise, alike=alike, persistence=persistence) if driven else None
+    drive = find_drive(u, depth / noise, alike=alike, begun=begun, persistence=persistence) if driven else None
     curve, change, ways, hidden, intervals = _curve(u, depth / noise, drive, weigh)
     rest = depth - noise * curve
     chosen: tuple[float, Array, Array, int] | None = None
@@ -86,8 +93,7 @@ def smooth_depth(time: Array, depth: Array, std: float, *, alike: Holds = (), pe
         root = _shrunk(basis, fixed, rest / noise, noise, weigh)[2]
         errors = basis @ root, slopes @ root
     span = span if span > 0 else 1.0
-    holds = drive.resting if drive is not None and hidden is not ways else ()
-    return SmoothDepth(best, speed / span, errors[0], errors[1] / span, holds)
+    return SmoothDepth(best, speed / span, errors[0], errors[1] / span, drive if hidden is not ways else None)
 
 
 _Columns = tuple[Array, Array]

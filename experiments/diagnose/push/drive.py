@@ -133,6 +133,23 @@ class Drive:
             widths = widths * np.minimum(1.0, np.minimum(np.append(room, 1.0), np.insert(room, 0, 1.0)))
         return replace(self, start=self.start + float(step[0]), levels=levels, middles=middles, widths=widths)
 
+    def stretched(self, span: float, other: float) -> Drive | None:
+        """This motion, of a record that lasts `span` [s], as a machine makes it in one that lasts `other` [s]: holds
+        last as long as here, all else is longer or shorter in proportion. None where no time is left for that.
+
+        Levels of speed stay as they are: a fit begins with the best ones for its ramps.
+        """
+        lasts = span * np.diff(np.concatenate([[0.0], self.middles, [1.0]]))
+        rests = np.array(self.resting)
+        moving = float(lasts[~rests].sum())
+        factor = (other - float(lasts[rests].sum())) / moving if moving > 0 else 0.0
+        if factor <= 0:
+            return None
+        lasts[~rests] *= factor
+        widths = self.widths * span * factor / other
+        return replace(self, middles=np.cumsum(lasts)[:-1] / other, widths=widths, round=False, even=False,
+                       chi_square=np.inf)  # fmt: skip
+
     @property
     def _shares(self) -> Array:
         """The ramps' widths over their mean."""
@@ -149,10 +166,13 @@ class Drive:
         return np.column_stack(on), np.column_stack(gone)
 
 
-def find_drive(u: Array, measured: Array, *, alike: Holds = (), persistence: float = 0.0) -> Drive:
+def find_drive(
+    u: Array, measured: Array, *, alike: Holds = (), begun: Drive | None = None, persistence: float = 0.0
+) -> Drive:
     """The motion behind depths `measured` (over their noise) at times `u` from 0 to 1, shapes [n].
 
-    `alike`: which levels are at rest in most of the machine's other pushes. `persistence`: of the noise (`Weights`).
+    `alike`: which levels are at rest in most of the machine's other pushes. `begun`: a motion from which a fit begins
+    beside those that the search finds (`Drive.stretched`). `persistence`: of the noise (`Weights`).
     """
     n = len(u)
     block = max(1, -(-n // _BLOCKS))
@@ -183,6 +203,8 @@ def find_drive(u: Array, measured: Array, *, alike: Holds = (), persistence: flo
         else:
             tried.append(drive)
             idle += 1
+    if begun is not None:
+        tried.append(_fitted(begun, t, y, weigh))
     plain = min((_pared(one, t, y, weigh, n, alike) for one in tried), key=lambda one: one.criterion(n, alike))
     found = [plain]
     if len(plain.middles):  # a raised cosine is as steep as a straight ramp of two thirds of its width

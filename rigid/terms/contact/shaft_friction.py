@@ -37,7 +37,7 @@ CANDIDATE = Candidate(
             "an edge in the bed is not; for that, push a {body} with a rougher side",
     push=Push(
         rank=60, law={"force": push_force}, lengths={"shaft_speed": 1e-2, "shaft_reach": 1e-3},
-        turning=("shaft_held", "shaft_reach"),
+        turning=("shaft_held", "shaft_reach"), steep=(("shaft", "shaft_deep", "shaft_power"), "shaft_rise"),
         forms=(
             _form("constant", "shaft", "perimeter", ((0.05,),), "+ shaft * sign(v)"),
             _form("growing with depth", "shaft_deep", "perimeter", ((0.05,),), "+ shaft_deep * z / D * sign(v)"),
