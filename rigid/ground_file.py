@@ -21,7 +21,7 @@ from .ground.grounds import SurfaceGround
 from .ground.laws import SurfaceLaw, find_law
 from .result import toml_value, write_text
 
-__all__ = ["GROUND_FORMAT", "RANGES", "Estimate", "Foot", "GroundFile", "is_ground_file", "read_ground"]
+__all__ = ["GROUND_FORMAT", "OPTIONAL", "RANGES", "Estimate", "Foot", "GroundFile", "is_ground_file", "read_ground"]
 
 GROUND_FORMAT = "hedgebed-ground/1"
 RANGES = {
@@ -32,6 +32,8 @@ RANGES = {
     "diameter": ("m", "diameter of the tip"),
 }
 """What the range of validity is stated over: name -> unit, meaning."""
+OPTIONAL = ("loss", "loss_speed")
+"""Parameters that a file need not have: the law's defaults, as in files made before these parameters existed."""
 SLACK = 1e-6
 """Relative excess over a limit that counts as round-off [1]."""
 
@@ -83,7 +85,7 @@ class GroundFile(_Table):
     @model_validator(mode="after")
     def _fits_the_law(self) -> Self:
         names = [parameter.name for parameter in self.surface_law.parameters]
-        if missing := [name for name in names if name not in self.parameters]:
+        if missing := [name for name in names if name not in self.parameters and name not in OPTIONAL]:
             raise ValueError(f"parameters.{missing[0]} is missing: {self.law} has {', '.join(names)}")
         self.surface_law.values(self.values)
         if wrong := [name for name in (*RANGES, *self.range) if name not in RANGES or name not in self.range]:

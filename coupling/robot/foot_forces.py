@@ -18,7 +18,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rigid.checks import check_above_zero
-from rigid.ground.laws import find_law
+from rigid.ground.laws import SurfaceLaw, find_law
 from rigid.ground.soles import of_one_foot
 from rigid.ground.specialised import Specialised, specialised
 
@@ -56,7 +56,7 @@ class FootForces(AbstractContextManager["FootForces"]):
     ----------
     model, data : of MuJoCo. Calls with any other model do nothing; the stability is checked where `data` is.
     feet : as `find_feet` gives them.
-    law, parameters, scales, under : as `LawFeet` has them; all parts must spring back the same share. With neither
+    law, parameters, scales, under : as `LawFeet` has them; rebound and loss are the same in all parts. With neither
         `scales` nor `under`, a law of grains takes what `parameters` does not have from its defaults for sand, in the
         gravity of `model` and with shape and size of each foot in the posture of `data`, as `hedgebed mujoco` does.
     depths : name of a part -> depth to which its parameters hold [m]; the first part that goes deeper warns, once.
@@ -98,10 +98,7 @@ class FootForces(AbstractContextManager["FootForces"]):
         self.model, self._data, self.feet, self.points, self._law = model, data, list(feet), 0, found
         self._make_ground = partial(LawFeet, self.feet, law=law, parameters=given, scales=scales, under=under)
         self._mu_d, self._slip = float(mu_d), float(slip_speed)
-        rebounds = {found.rebound(under.get(part.name, given)) or 1.0 for foot in feet for part in foot.parts}
-        if len(rebounds) > 1:
-            raise ValueError(f"under has several values of rebound, {sorted(rebounds)}: all feet must have the same")
-        self._rebound = rebounds.pop() if rebounds else 1.0
+        self._rebound, self._loss = _springback_of(found, [under.get(p.name, given) for f in feet for p in f.parts])
         self._kind = int(mujoco.mjtObj.mjOBJ_BODY)  # an int takes 0.1 us less than the enumeration
         self._rates, self._force, self._torque = np.zeros(6), np.zeros(3), np.zeros(3)
         self._depths: WeakKeyDictionary[Any, _Depths] = WeakKeyDictionary()
@@ -189,6 +186,7 @@ class FootForces(AbstractContextManager["FootForces"]):
     def _push(self, data: Any, body: int, height: float, m: list[float], groups: Any, depths: _Depths) -> bool:
         """Force and torque of a foot about its origin into `_force` and `_torque`; whether there are any."""
         mu_d, slow, remembers, rebound = self._mu_d, self._slip, self._law.has_memory, self._rebound
+        loss, loss_speed = self._loss
         before, now, sqrt = depths.before, depths.now, math.sqrt
         m0, m1, m2, m3, m4, m5, m6, m7, m8 = m
         fx = fy = fz = tx = ty = tz = 0.0
@@ -225,10 +223,14 @@ class FootForces(AbstractContextManager["FootForces"]):
                 elif depth < (top := before[place]):  # `SurfaceLaw.force`, written out as it takes most of the time
                     now[place] = top
                     share = 1.0 - (top - depth) / (rebound * top)
+                    if rate < 0.0:
+                        share *= 1.0 - loss * rate / (rate - loss_speed)
                     load = (law.loading(top) * share if share > 0.0 else 0.0) + law.rate_force(depth, rate)
                 else:
                     now[place] = depth
                     load = new_depth(depth, rate)
+                    if rate < 0.0:
+                        load -= law.loading(depth) * loss * rate / (rate - loss_speed)
                 if load <= 0.0:
                     continue
                 az = -height - depth
@@ -248,6 +250,15 @@ class FootForces(AbstractContextManager["FootForces"]):
         force[0], force[1], force[2] = fx, fy, fz
         torque[0], torque[1], torque[2] = tx, ty, tz
         return fz > 0.0
+
+
+def _springback_of(law: SurfaceLaw, parts: Sequence[Mapping[str, float]]) -> tuple[float, tuple[float, float]]:
+    """`rebound` and `loss` of `law`, which all parts must share. Raises ValueError, naming the parameter, if not."""
+    for name in ("rebound", "loss", "loss_speed") if law.has_memory else ():
+        if len(several := {law.values(own)[name] for own in parts}) > 1:
+            raise ValueError(f"under has several values of {name}, {sorted(several)}: all feet must have the same")
+    own = parts[0] if parts else {}
+    return law.rebound(own) or 1.0, law.loss(own)
 
 
 _Group = tuple[

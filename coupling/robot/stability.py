@@ -165,7 +165,8 @@ def _of_law(law: Any, load: float) -> tuple[float, float]:
         depth *= 1.5
     step, rate = 1e-4 * depth, 1e-4 * SPEED
     stiffness = float(law.force(depth + step, 0.0) - law.force(depth, 0.0)) / step
-    return stiffness, float(law.force(depth, SPEED + rate) - law.force(depth, SPEED)) / rate
+    damping = float(law.force(depth, SPEED + rate) - law.force(depth, SPEED)) / rate
+    return stiffness, max(damping, law.retreat_damping * float(law.force(depth, 0.0)))
 
 
 def _of_grain(bed: ExpectedBed) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.runs.progress import Progress
 from experiments.runs.types import Json
-from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
+from rigid.ground_file import GROUND_FORMAT, OPTIONAL, Estimate, Foot, GroundFile
 
 from .data import Data
 from .fit import Estimated, LawFit, fit_law, fit_usable, interval, mean_of
@@ -180,6 +180,8 @@ def ground_file(fitted: Fitted, data: Data, unidentified: Sequence[str]) -> Grou
     parameters, estimates = {}, _fitted_parameters(fitted)
     for name, parameter in known.items():
         if name not in estimates:
+            if name in OPTIONAL:  # loading alone was fitted: the law's default
+                continue
             own = candidate.fixed[name]
             parameters[name] = (
                 _rebound(data, own) if name == "rebound" else Estimate(value=own, std=0.0, note=say("fixed"))

@@ -168,7 +168,7 @@ def _rows(trial: Trial, given: Mapping[str, Array]) -> Array:
         get("wheel_speed_0"), get("mu_s"), _sliding(trial, given),
         *(trial.surface.numbers if trial.ground else (get("stiffness"), get("damping"))),
         *(given.get(f"{effect.id}.{name}", value) for effect in moving for name, value in effect.values.items()),
-        trial.surface.rebound,
+        *trial.surface.memory,
     ]  # fmt: skip
     return np.stack(np.broadcast_arrays(*row), axis=-1) if given else np.array([row], dtype=float)
 

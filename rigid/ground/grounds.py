@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rigid.checks import Coulomb, check_above_zero, check_friction
 
-from .laws import SurfaceLaw, find_law
+from .laws import SurfaceLaw, find_law, retreat_share
 from .reaction import Contact, Facts, Reaction, State, Turned
 
 __all__ = ["SpringDamper", "SurfaceGround"]
@@ -43,6 +43,7 @@ class _LawGround(Coulomb):
     _law: SurfaceLaw = field(init=False, repr=False, compare=False)
     _numbers: tuple[float, ...] = field(init=False, repr=False, compare=False)
     _rebound: float = field(init=False, repr=False, compare=False)
+    _loss: tuple[float, float] = field(init=False, repr=False, compare=False)
     _deepest: list[float] = field(init=False, repr=False, compare=False)
     _depth: list[float] = field(init=False, repr=False, compare=False)
 
@@ -54,6 +55,7 @@ class _LawGround(Coulomb):
         check_above_zero("1", count=self.count)
         numbers = law.numbers(parameters, count=self.count)
         values = {"_law": law, "_numbers": numbers, "_rebound": law.rebound(parameters) or 1.0}
+        values["_loss"] = law.loss(parameters)
         for key, value in (values | {"_deepest": [0.0], "_depth": [0.0], "name": self.name or law.name}).items():
             object.__setattr__(self, key, value)
 
@@ -70,6 +72,11 @@ class _LawGround(Coulomb):
     def deepest(self) -> float:
         """How deep the body has been since it last left the surface [m]; 0 for a law without memory."""
         return self._deepest[0]
+
+    @property
+    def retreat_damping(self) -> float:
+        """Damping on retreat over the springback's force, from rest: loss / loss_speed [s/m]."""
+        return self._loss[0] / self._loss[1]
 
     def describe(self) -> Facts:
         """What it is, in plain numbers, for run.toml."""
@@ -138,7 +145,7 @@ class _LawGround(Coulomb):
             return 0.0
         deepest = max(self._deepest[0], start) if law.has_memory else 0.0
         if start == end:
-            return law.force(start, rate, p, top=deepest, rebound=self._rebound)
+            return law.force(start, rate, p, top=deepest, rebound=self._rebound, loss=self._loss)
         impulse = self._integral(lambda z: law.rate_force(z, rate, p), lambda z: law.rate_work(z, rate, p), low, high)
         turn = min(max(low, deepest), high)  # below it the depths are new
         impulse += self._integral(lambda z: law.loading(z, p), lambda z: law.loading_work(z, p), turn, high)
@@ -146,7 +153,8 @@ class _LawGround(Coulomb):
             ends = sorted({low, turn, min(max(low, deepest * (1.0 - self._rebound)), turn)})
             forces = [law.force(z, 0.0, p, top=deepest, rebound=self._rebound) for z in ends]
             pieces = pairwise(zip(ends, forces, strict=True))  # straight lines: the trapezium is exact
-            impulse += sum(0.5 * (b - a) * (force_a + force_b) for (a, force_a), (b, force_b) in pieces)
+            whole = sum(0.5 * (b - a) * (force_a + force_b) for (a, force_a), (b, force_b) in pieces)
+            impulse += whole * retreat_share(rate, *self._loss)
         return max(0.0, impulse / abs(end - start))
 
     def _integral(self, force: Callable[..., Any], work: Callable[..., Any], low: float, high: float) -> float:

@@ -6,7 +6,7 @@ together from them, is in `rigid.ground.laws`; p holds a law's numbers.
 """
 
 __all__ = [
-    "springback", "springback_energy", "spring_damper_loading", "spring_damper_loading_work",
+    "springback", "springback_energy", "retreat_share", "spring_damper_loading", "spring_damper_loading_work",
     "spring_damper_rate_force", "spring_damper_rate_work", "power_loading", "power_loading_work",
     "hunt_crossley_rate_force", "hunt_crossley_rate_work", "inertial_rate_force", "inertial_rate_work",
     "bekker_loading", "bekker_loading_work", "no_rate_force", "no_rate_work", "rft_loading", "rft_loading_work",
@@ -32,6 +32,14 @@ def springback_energy(depth, top, rebound, force_at_top):
             share = max(0.0, 1.0 - (top - depth) / (rebound * top))
         energy = 0.5 * rebound * top * force_at_top * share * share
     return energy
+
+
+def retreat_share(rate, loss, loss_speed):
+    """Share of the springback's force that is left while it retreats: 1 - loss u / (u + loss_speed), u = -rate [1]."""
+    share = 1.0
+    if rate < 0.0:
+        share = 1.0 - loss * rate / (rate - loss_speed)
+    return share
 
 
 def spring_damper_loading(depth, p):

@@ -5,12 +5,14 @@ compiled by whoever wants it (`ti.func`), on thousands of trials at once. Depth 
 surface, rate is dz/dt. With `p` the law's numbers (a tuple, or a vector, in the order of `SurfaceLaw.slots`), the
 force, never negative, is
 
-    force = loading(top, p) * springback(z, top, rebound) + rate_force(z, rate, p)
+    force = loading(top, p) * springback(z, top, rebound) * retreat_share(rate, *loss) + rate_force(z, rate, p)
 
 - `loading` is the force of loading, at new depths, and `loading_work` its integral from 0.
 - A law without memory springs back whole: there top = z, and springback(z, z, .) = 1. Grains do not: for them top is
   the deepest depth that this spike has reached here (top >= z; 0 again once it has left the surface), and the force
-  falls in a straight line to 0 while the share `rebound` of that depth is undone.
+  falls in a straight line to 0 while the share `rebound` of that depth is undone. On retreat it is smaller by the
+  factor 1 - loss u / (u + loss_speed), u the speed of retreat, so that a cycle of unloading and loading again at u
+  loses that share of its work. It is continuous at u = 0; `loss` = 0 is a springback without loss.
 - `rate_force` is what depends on the rate (it may be negative, never below -loading). `rate_work` is its integral over
   depth at a constant rate.
 
@@ -27,24 +29,27 @@ from typing import Any
 from rigid.checks import Parameter, check_parameters
 
 from . import law_functions as fn
-from .law_functions import springback, springback_energy
+from .law_functions import retreat_share, springback, springback_energy
 from .rft import ball_profile, stress_gradient
 from .rft_foot import foot_profile
 
 __all__ = [
-    "FOOT_LAWS", "GROUNDS", "Parameter", "SurfaceLaw", "find_law", "katsuragi_durian", "springback",
-    "springback_energy",
+    "FOOT_LAWS", "GROUNDS", "NO_LOSS", "Parameter", "SurfaceLaw", "find_law", "katsuragi_durian", "retreat_share",
+    "springback", "springback_energy",
 ]  # fmt: skip
 
 EARTH_GRAVITY = 9.80665  # Standard gravity, that of the defaults [m/s2]
 NEAR_1_G = 0.1
 """Relative difference from 1 g up to which defaults without a rule are used [1]: tables of moduli scatter by more."""
+NO_LOSS = (0.0, 1.0)  # `loss` and `loss_speed` of a law that loses nothing on retreat
 Numbers = Any  # A law's numbers: anything that p[0], p[1] ... can be read from.
 
 MEMORY = (
     "ours: a bed of sand computed with this package returns nothing that can be measured (work_returned_dem of "
     "docs/results/penetrate is below 0.01), and a twentieth is about the stiffest unloading that a 1 ms step follows"
 )
+
+LOSS = "ours: 0 is a springback without loss"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,15 +113,30 @@ class SurfaceLaw:
         """Share of the deepest depth that springs back [1], above 0; None for a law without memory."""
         return self.values(given)["rebound"] if self.has_memory else None
 
-    def force(self, depth: float, rate: float, p: Numbers, *, top: float | None = None, rebound: float = 1.0) -> float:
+    def loss(self, given: Mapping[str, float]) -> tuple[float, float]:
+        """`loss` [1] and `loss_speed` [m/s] of `retreat_share`; `NO_LOSS` for a law without memory."""
+        values = self.values(given)
+        return (values["loss"], values["loss_speed"]) if self.has_memory else NO_LOSS
+
+    def force(
+        self,
+        depth: float,
+        rate: float,
+        p: Numbers,
+        *,
+        top: float | None = None,
+        rebound: float = 1.0,
+        loss: tuple[float, float] = NO_LOSS,
+    ) -> float:
         """Force [N] at `depth` [m] and `rate` [m/s], both positive downwards; `top` is the deepest depth so far [m].
 
-        Without `top`, `depth` is the deepest.
+        Without `top`, `depth` is the deepest. `loss`: as the method of that name returns it.
         """
         if depth <= 0.0:
             return 0.0
         top = depth if top is None or not self.has_memory else max(top, depth)
-        return float(self.loading(top, p) * springback(depth, top, rebound) + self.rate_force(depth, rate, p))
+        elastic = self.loading(top, p) * springback(depth, top, rebound) * retreat_share(rate, *loss)
+        return float(elastic + self.rate_force(depth, rate, p))
 
     def stored(self, depth: float, p: Numbers, *, top: float | None = None, rebound: float = 1.0) -> float:
         """Energy stored in the surface [J]."""
@@ -185,6 +205,13 @@ def _law(name: str, loading: str, rate: str, **others: Any) -> SurfaceLaw:
 _number = partial(Parameter, lowest=0.0)  # a parameter that is never negative
 _REBOUND = _number("rebound", "1", 0.05, "share of the deepest depth that springs back", lowest=1e-3, highest=0.5,
                    source=MEMORY)  # fmt: skip
+_MEMORY = (
+    _REBOUND,
+    _number("loss", "1", 0.0, "share of the springback's work that a fast cycle of unloading and loading loses",
+            highest=1.0, source=LOSS),
+    _number("loss_speed", "m/s", 0.1, "speed of retreat at which half of that share is lost", lowest=1e-6, source=LOSS),
+)  # fmt: skip
+"""Of all laws that remember the deepest depth."""
 _RADIUS = _number("radius", "m", 0.006, "radius of the spike's ball and shaft", highest=1.0, above_lowest=True,
                   source="ours : 12 mm across")  # fmt: skip
 _SAND = katsuragi_durian(
@@ -250,7 +277,7 @@ _LAWS = (
                     source="ours: 81 N/m times 5 mm at 5 mm, a 12 mm spike in sand (docs/results/penetrate-sand)"),
             _number("damping", "N s/m", 0.63, "C, going in only", source="as stiffness"),
             _number("exponent", "1", 1.5, "n", lowest=0.3, highest=4.0, source="as power"),
-            _REBOUND,
+            *_MEMORY,
         ),
         slots=("stiffness", "damping", "exponent"), extensive=(0, 1),
         gravity_powers={"stiffness": 1.0, "damping": 0.5},
@@ -263,7 +290,7 @@ _LAWS = (
             _number("stiffness", "N/m", _SAND["stiffness"], "k: friction that grows with depth", above_lowest=True,
                     source="`katsuragi_durian`: a 12 mm steel ball in sand of 1500 kg/m3 and friction 0.6 at 1 g"),
             _number("drag", "kg/m", _SAND["drag"], "b = m / d_1: inertia of the grains", source="as stiffness"),
-            _REBOUND,
+            *_MEMORY,
         ),
         slots=("stiffness", "drag"), extensive=(0, 1), gravity_powers={"stiffness": 1.0},
     ),
@@ -281,7 +308,7 @@ _LAWS = (
             _number("frictional_modulus", "N/m^(n+2)", 1.52843e6, "k_phi", above_lowest=True,
                     source="as cohesive_modulus"),
             _number("exponent", "1", 1.1, "n", lowest=0.1, highest=2.0, source="as cohesive_modulus"),
-            _REBOUND,
+            *_MEMORY,
         ),
         slots=("pressure times section", "exponent", "tip_height"), extensive=(0,), bends=(2,), make=_make_bekker,
         of_one_g=("cohesive_modulus", "frictional_modulus"),
@@ -293,7 +320,7 @@ _LAWS = (
         parameters=(
             _RADIUS,
             *_RFT,
-            _REBOUND,
+            *_MEMORY,
         ),
         slots=("2 pi R^3 xi_n", "pi R^2 lambda rho / 2", "radius", *(f"shape {k}" for k in range(8)), "slope", "wall"),
         extensive=(0, 1), bends=(2,), make=_make_rft,
@@ -314,7 +341,7 @@ _FOOT_LAWS = (
                     source="geometry"),
             _number("perimeter", "m", 0.0, "of upright walls above the underside", source="geometry"),
             *_RFT,
-            _REBOUND,
+            *_MEMORY,
         ),
         slots=("A h xi_n", "A lambda rho", "height", "exponent", *(f"shape {k}" for k in range(8)), "slope", "wall",
                *(f"inertia {k}" for k in range(4))),

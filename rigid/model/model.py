@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigid.ground.laws import SurfaceLaw, find_law, springback, springback_energy
+from rigid.ground.laws import SurfaceLaw, find_law, retreat_share, springback, springback_energy
 from rigid.terms import BASE, STATE_FIELDS, Term
 
 __all__ = [
@@ -103,9 +103,9 @@ class Model:
 
 
 def parameter_names(terms: Sequence[Term]) -> tuple[str, ...]:
-    """The fields of `p`, in order: every parameter of every effect, then `rebound` of the ground's law."""
+    """The fields of `p`, in order: every parameter of every effect, then those of the springback."""
     own = [f"{_name(term)}_{parameter.name}" for term in terms if not term.sensor for parameter in term.parameters]
-    return (*own, "rebound")
+    return (*own, "rebound", "loss", "loss_speed")
 
 
 def _name(term: Term) -> str:
@@ -220,6 +220,7 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
     if law.has_memory:
         out += ["    stored = law_springback_energy(z, top, p.rebound, elastic)"]
         out += ["    elastic = elastic * law_springback(z, top, p.rebound)"]
+        out += ["    retreat = elastic * (law_retreat_share(rate, p.loss, p.loss_speed) - 1.0)"]
     if _calls(every, "unload", "") and not law.has_memory:
         out += _bent_energy(every)
         out += [f"    elastic = {call}" for call in _calls(every, "unload", "z, top, elastic")]
@@ -227,7 +228,7 @@ def model_source(terms: Sequence[Term], law: SurfaceLaw) -> str:
         out += ["    stored = left * stored"]
     for call in _calls(every, "hold", "s, depth, held"):
         out += [f"    pull, work = {call}", "    elastic = elastic - pull", "    stored = stored + work"]
-    out += ["    lost = law_rate_force(damped, rate, q)"]
+    out += ["    lost = law_rate_force(damped, rate, q)" + (" + retreat" if law.has_memory else "")]
     out += [f"    lost = lost + {call}" for call in _calls(every, "rate_force", "s, whole, rate")]
     out += [f"    lost = lost + {call}" for call in _calls(every, "rate_pull", "s, depth, rate, held")]
     out += ["    side = 0.0"]
@@ -249,6 +250,7 @@ def _hooks(terms: Sequence[Term], law: SurfaceLaw) -> dict[str, Callable[..., An
         "law_rate_force": law.rate_force,
         "law_springback": springback,
         "law_springback_energy": springback_energy,
+        "law_retreat_share": retreat_share,
         "contact_arms": contact_arms,
         "divide_mass": divide_mass,
     }

@@ -85,6 +85,11 @@ class Ground:
         """Share of the deepest depth that springs back [1]; 1 for a law without memory."""
         return self.law.rebound(self.parameters) or 1.0
 
+    @property
+    def memory(self) -> tuple[float, float, float]:
+        """`rebound`, and `loss` [1] and `loss_speed` [m/s] on retreat; 1 and no loss for a law without memory."""
+        return (self.rebound, *self.law.loss(self.parameters))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Trial(Coulomb):
@@ -241,4 +246,4 @@ class Trial(Coulomb):
         from .model import parameter_names
 
         numbers = [value for effect in self.effects if not effect.term.sensor for value in effect.values.values()]
-        return dict(zip(parameter_names(self.terms), (*numbers, self.surface.rebound), strict=True))
+        return dict(zip(parameter_names(self.terms), (*numbers, *self.surface.memory), strict=True))

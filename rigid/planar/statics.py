@@ -198,7 +198,8 @@ def stiffness_at_rest(system: System) -> tuple[float, float]:
     loading = (force(1.01 * depth, 0.0, 0.0) - force(0.99 * depth, 0.0, 0.0)) / (0.02 * depth)
     unloading = (force(depth, 0.0, depth) - force(0.99 * depth, 0.0, depth)) / (0.01 * depth)
     speed = 0.1
-    return max(loading, unloading), max(0.0, (force(depth, speed, 0.0) - force(depth, 0.0, 0.0)) / speed)
+    retreat = p.loss / p.loss_speed * force(depth, 0.0, 0.0)
+    return max(loading, unloading), max(retreat, (force(depth, speed, 0.0) - force(depth, 0.0, 0.0)) / speed)
 
 
 def inner_slopes(system: System) -> tuple[float, float, float]:

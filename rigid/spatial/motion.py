@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid.ground.laws import SurfaceLaw, springback
+from rigid.ground.laws import SurfaceLaw, retreat_share, springback
 from rigid.platform.platform import Platform
 
 from .quaternions import rate as quaternion_rate
@@ -74,12 +74,14 @@ class Motion:
         law: SurfaceLaw,
         numbers: tuple[float, ...],
         rebound: float,
+        loss: tuple[float, float],
         mu_s: float,
         mu_d: float,
         weight: Array,
         counterweight: float,
     ) -> None:
         self.platform, self.law, self.numbers, self.rebound = platform, law, numbers, rebound
+        self.loss = loss
         self.mu_s, self.mu_d, self.weight = mu_s, mu_d, weight
         self.masses = np.array([platform.mass, platform.mass, platform.mass + counterweight])
         self.tips = platform.tips - platform.centre_of_mass
@@ -119,6 +121,7 @@ class Motion:
         depth = max(depth, 0.0)
         top = max(top, depth) if self.law.has_memory else depth
         force = self.law.loading(top, self.numbers) * springback(depth, top, self.rebound)
+        force *= retreat_share(rate, *self.loss)
         # A tip that moves out may be above the surface by the error of a step: nothing acts there.
         return max(0.0, float(force + self.law.rate_force(depth, rate, self.numbers)))
 

@@ -95,7 +95,8 @@ class SpatialTrial(Coulomb):
         law, given = find_law(self.ground), self.ground_parameters
         return Motion(
             self.platform, law=law, numbers=law.numbers(given), rebound=law.rebound(given) or 1.0,
-            mu_s=self.mu_s, mu_d=self.sliding_friction, weight=self.weight, counterweight=self.counterweight,
+            loss=law.loss(given), mu_s=self.mu_s, mu_d=self.sliding_friction, weight=self.weight,
+            counterweight=self.counterweight,
         )  # fmt: skip
 
 

@@ -263,7 +263,8 @@ def test_any_fall_keeps_its_books_and_ends(seed):
     speed = math.sqrt(0.2 * gravity)
     fallen = simulate(
         SpatialTrial(
-            platform=platform, gravity=gravity, ground=str(random.choice(list(GROUNDS))),
+            platform=platform, gravity=gravity, ground=(name := str(random.choice(list(GROUNDS)))),
+            ground_parameters={"loss": 0.9, "loss_speed": 0.05} if GROUNDS[name].has_memory else {},
             mu_s=float(random.choice([0.0, 0.2, 0.5, 2.0])), torques=torques,
         ),
         duration=0.3, sample_interval=0.01, position=(0, 0, platform.reach),

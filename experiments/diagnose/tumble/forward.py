@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from experiments.diagnose.fit.forms import OwnEffect
 from experiments.diagnose.fit.problem import Array
 from experiments.diagnose.fit.together import each
+from rigid.ground.laws import NO_LOSS
 from rigid.model.model import parameter_names
 from rigid.terms import EFFECTS, Term, sensor_terms
 
@@ -246,7 +247,7 @@ class Forward:
         names = [f"{term.id}.{p.name}" for term in terms for p in term.parameters]
         for k, name in enumerate(names):
             numbers[:, len(fixed) + k] = columns[name][sets]
-        numbers[:, -1] = 1.0  # the spring-damper gives all back
+        numbers[:, -3:] = 1.0, *NO_LOSS  # the spring-damper gives all back
 
 
 def _pieces(lanes: Sequence[tuple[int, int, int]], rows: slice) -> Iterator[tuple[int, int, int, int, int]]:

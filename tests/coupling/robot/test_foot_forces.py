@@ -153,6 +153,27 @@ def test_sand_pushes_less_below_the_deepest_depth_and_a_reset_makes_it_new():
     assert pushed(forces, model, data, 1e-3) == fresh
 
 
+@pytest.mark.parametrize("law", ["power-irreversible", "rft"])
+@pytest.mark.parametrize("rise", [0.0, 2e-4])
+def test_on_retreat_in_its_crater_a_foot_has_the_force_of_the_law_with_its_loss(law, rise):
+    model, found, depth, speed = ball(), find_law(law), 0.01, 0.3
+    values = found.values({"loss": 0.7, "loss_speed": 0.1})
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    forces = FootForces(model, data, find_feet(model, data, ["foot"]), law=law, parameters=values)
+    pushed(forces, model, data, depth)
+    data.time += model.opt.timestep
+    data.qpos[2], data.qvel[2], data.qfrc_passive[:] = 0.05 - depth + rise, speed, 0.0
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comVel(model, data)
+    forces(model, data)
+    kept = {"top": depth, "rebound": values["rebound"], "loss": found.loss(values)}
+    expected = found.force(depth - rise, -speed, found.numbers(values), **kept)
+    whole = found.force(depth - rise, 0.0, found.numbers(values), top=depth, rebound=values["rebound"])
+    assert data.qfrc_passive[2] == pytest.approx(expected, rel=1e-9)
+    assert expected == pytest.approx(whole * (1 - 0.7 * 0.75), rel=1e-9)
+
+
 def test_a_second_look_at_the_same_time_leaves_no_trace():
     model = ball()
     data, forces = sand_and(model)

@@ -64,18 +64,22 @@ def test_work_is_the_integral_of_force(law, depth):
 
 @ALL
 @settings(max_examples=60, deadline=None)
-@given(depth=st.floats(1e-6, 0.03), more=st.floats(0, 0.01), rate=st.floats(-2, 2), rebound=st.floats(0.01, 0.5))
-def test_force_never_pulls_and_never_gives_more_than_was_stored(law, depth, more, rate, rebound):
+@given(
+    depth=st.floats(1e-6, 0.03), more=st.floats(0, 0.01), rate=st.floats(-2, 2), rebound=st.floats(0.01, 0.5),
+    loss=st.floats(0, 1), loss_speed=st.floats(1e-6, 1),
+)  # fmt: skip
+def test_force_never_pulls_and_never_gives_more_than_was_stored(law, depth, more, rate, rebound, loss, loss_speed):
     """F >= 0, and F dz/dt >= d(stored)/dt, whatever the history."""
     p, top = law.numbers({}), depth + more
-    force = law.force(depth, rate, p, top=top, rebound=rebound)
+    lost = {"loss": (loss, loss_speed)} if law.has_memory else {}
+    force = law.force(depth, rate, p, top=top, rebound=rebound, **lost)
     assert force >= 0.0
     step = 1e-7 * depth
     if law.has_memory and rate > 0 and depth >= top - step:  # the deepest depth goes along
         change = law.stored(depth + step, p, rebound=rebound) - law.stored(depth - step, p, rebound=rebound)
     else:
         kept = {"top": top + step, "rebound": rebound}
-        force = law.force(depth, rate, p, **kept)
+        force = law.force(depth, rate, p, **kept, **lost)
         change = law.stored(depth + step, p, **kept) - law.stored(depth - step, p, **kept)
     # By the sign of the rate alone: products with a rate of 1e-308 m/s say nothing about the law.
     way, scale = math.copysign(1.0, rate) if rate else 0.0, max(force, law.loading(top, p) / rebound)
@@ -99,6 +103,18 @@ def test_grains_give_back_the_share_that_rebounds():
     assert out == pytest.approx(rebound * 0.5 * 100 * top**2, rel=1e-9)
     assert law.stored(top, p, rebound=rebound) == pytest.approx(out, rel=1e-9)
     assert law.force(top * (1 - rebound), -0.1, p, top=top, rebound=rebound) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("law", [law for law in [*GROUNDS.values(), *FOOT_LAWS.values()] if law.has_memory],
+                         ids=lambda law: law.name)  # fmt: skip
+def test_without_loss_a_law_has_the_same_bits_and_with_it_retreats_with_less_force(law):
+    """F (1 - loss u / (u + loss_speed)) at the speed of retreat u; loading and rest are as without."""
+    p, kept = law.numbers({}), {"top": 0.01, "rebound": 0.05}
+    for rate in (-0.7, -1e-3, 0.0, 0.4):
+        plain = law.force(0.0097, rate, p, **kept)
+        assert law.force(0.0097, rate, p, **kept, loss=(0.0, 0.1)) == plain > 0.0
+        left = 1 - 0.8 * max(-rate, 0.0) / (max(-rate, 0.0) + 0.1)
+        assert law.force(0.0097, rate, p, **kept, loss=(0.8, 0.1)) == pytest.approx(left * plain, rel=1e-12)
 
 
 def test_hunt_crossley_restitution_falls_as_one_less_alpha_v():

@@ -106,6 +106,20 @@ def test_the_batch_agrees_on_the_other_grounds(name):
     assert compare(trials, time_step=2.5e-4).share("within") == 1
 
 
+@pytest.mark.parametrize("name", ["power-irreversible", "rft"])
+def test_the_batch_agrees_where_the_springback_loses_energy(name):
+    """With and without loss, which changes the motion; the accurate integrator's energy balance holds with it."""
+    angles = []
+    for loss in (0.0, 0.9):
+        ground = Ground(name=name, parameters={"loss": loss, "loss_speed": 0.02}, spikes_per_row=2)
+        trials = [in_rig(torque, mu_s=0.5, ground=ground) for torque in (0.1, 0.3)]
+        assert compare(trials, time_step=2.5e-4).share("within") == 1
+        run = simulate(trials[1], duration=1.0)
+        assert run.energy_residual < 1e-6
+        angles.append(run.theta[-1])
+    assert abs(angles[1] - angles[0]) > 1e-4
+
+
 def test_the_summary_is_that_of_the_accurate_integrator():
     braked = in_rig(6.0, mu_s=0.25, actuator="brake", wheel_speed_0=300)
     trials = [in_rig(0.22, mu_s=0.5), in_rig(0.125, mu_s=0.5), braked]
