@@ -68,6 +68,7 @@ class Run(Stepper):
         self.expected_time = self.max_time  # How long it may well take [s], for those who show progress
         self._rows: list[tuple[float, float, float, float]] = []
         self._phases: list[int] = []
+        self._table, self._copied = np.empty((0, 4)), 0  # The rows as an array, and how many of them it has
 
     def __repr__(self) -> str:
         where = f"{1e3 * self.depth:.3g} mm deep at {self.time:.4g} s"
@@ -123,6 +124,7 @@ class Run(Stepper):
         elif self.lets_go_at_touch and force > 0 and steps_left > 0:
             sooner = steps_left * self.macro_step
             self._rows = [(when + sooner, depth, rate, push) for when, depth, rate, push in self._rows]
+            self._copied = 0
             self._approach = self.count
             self._after(held, force)
         if not self.done and self.time >= self.max_time - 0.5 * self.macro_step:
@@ -176,6 +178,7 @@ class Run(Stepper):
         self._recall(memory)
         self.ended = str(own["ended"])
         self._rows = [tuple(row) for row in np.asarray(own["rows"]).tolist()]
+        self._copied = 0
         self._phases = [int(code) for code in own["phases"]]
         self.ground.restore(part_of(state, "ground"))
 
@@ -194,11 +197,17 @@ class Run(Stepper):
         pass
 
     def _last(self, seconds: float) -> np.ndarray | None:
-        """Rows of the last `seconds` [s], shape [n, 4]; None while fewer have passed since the surface."""
+        """Rows of the last `seconds` [s], shape [n, 4], to be read; None while fewer have passed since the surface."""
         count = max(2, round(seconds / self.macro_step))
         if self.count - self._approach < count:
             return None
-        return np.array(self._rows[-count:])
+        end = len(self._rows)
+        if end > len(self._table):
+            self._table, self._copied = np.empty((2 * end, 4)), 0
+        if end > self._copied:
+            self._table[self._copied : end] = self._rows[self._copied :]
+            self._copied = end
+        return self._table[end - count : end]
 
 
 class Drive(Run):

@@ -59,7 +59,9 @@ def carry_out(
             say(f"failed: {error}")
             say(f"what was finished is kept in {folder.path}; {again}")
             return FAILED
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
+            if isinstance(error, OverflowError):
+                error = ValueError(f"with these settings {registry.TOO_LARGE}").with_traceback(error.__traceback__)
             if fresh and not folder.has_work:  # refused before any work: leave nothing behind
                 if {item.name for item in folder.path.iterdir()} <= {"run.toml", "status.json", "lock"}:
                     shutil.rmtree(folder.path)

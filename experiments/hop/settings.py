@@ -26,7 +26,7 @@ class _Question(StrictSettings):
     given."""
     wheel_speed_0: Positive | None = None
     """Speed of the wheel before braking [rad/s], instead of a distance; the distance is computed."""
-    body_radius: Positive | None = None
+    body_radius: float | None = Field(None, gt=0, le=1e9)
     """Radius of the asteroid [m]; if not given, the ground is flat and escape is not examined."""
     actuator: Literal["brake", "motor"] = "brake"
     """Source of the torque: a brake on a spinning wheel, or a motor that starts at rest."""

@@ -1,6 +1,7 @@
 """Settings of a penetrate run that this machine or the grains' material cannot serve, refused before any work."""
 
 import math
+from collections.abc import Mapping
 
 from dem.engine.values import refuse_sleep
 from experiments.campaign.files import check_target
@@ -10,13 +11,15 @@ from experiments.grains.softening import check_young, drop_depth
 from experiments.grains.staged import check_bed_stages
 from experiments.grains.where import check_memory, check_where
 from experiments.platform.ground_file import fitted_ground
+from rigid.ground_file import GroundFile
 
 from . import beds
 from .amended import read_law
+from .on_law import law_step
 from .reference import read_reference
 from .rest import made_units
 from .settings import PenetrateSettings, say
-from .units import deepest, expected_time, plan_units
+from .units import Unit, deepest, expected_time, plan_units
 
 __all__ = ["check"]
 
@@ -24,6 +27,9 @@ MOST_GRAINS = 2**26
 """More are refused."""
 MOST_STEPS = 1e9
 """Of the grains, in all runs; more are refused."""
+MOST_STEPS_ON_LAW = 2e6
+"""Of the spike on a law, in all runs: some minutes, and 200 MB of rows; more are refused."""
+_HALVINGS = 60  # Of an interval of depths, to the last digit
 
 
 def check(settings: PenetrateSettings) -> None:
@@ -33,7 +39,7 @@ def check(settings: PenetrateSettings) -> None:
     if settings.campaign is not None:
         check_target(settings.campaign)
     if not settings.on_grains:
-        fitted_ground(settings.ground)
+        _check_steps_on_law(settings, fitted_ground(settings.ground))
         return
     check_lammps(settings)
     stuff = beds.find_material(settings)
@@ -96,9 +102,42 @@ def _check_step_count(settings: PenetrateSettings, step: float) -> None:
     stiffness, held = beds.expected_stiffness(settings), beds.expected_bearing(settings).held
     units = made_units(settings, plan_units(settings))
     times = {unit: expected_time(settings, unit, stiffness, held=held) for unit in units}
+    if sum(times.values()) / step > MOST_STEPS:
+        raise ValueError(_too_long(settings, times, step, "steps", most=MOST_STEPS))
+
+
+def _check_steps_on_law(settings: PenetrateSettings, fitted: GroundFile | None) -> None:
+    """Refuse runs on a law that last too long in any case; `fitted` is the law in a file, None for one of a model."""
+    step = law_step(settings) * settings.substeps
+    times = {}
+    for unit in plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]})):
+        if unit.kind == "driven":
+            times[unit] = settings.depth / unit.speed + settings.hold + settings.depth / settings.retreat_speed
+        elif unit.kind == "drop":
+            times[unit] = min(settings.drop_time, settings.rest_time, settings.after_stop)
+        else:
+            times[unit] = _least_sinkage(settings, fitted) / unit.speed + settings.rest_time
+    if sum(times.values()) / step > MOST_STEPS_ON_LAW:
+        how = {"fastest": max(*settings.speeds, *settings.drop_speeds, settings.retreat_speed)}
+        raise ValueError(_too_long(settings, times, step, "steps_on_law", most=MOST_STEPS_ON_LAW, **how))
+
+
+def _least_sinkage(settings: PenetrateSettings, fitted: GroundFile | None) -> float:
+    """Depth at which the law bears the load [m], at most where a set-down is stopped; 0 for the law of a model."""
+    if fitted is None:
+        return 0.0
+    ground, low, high = fitted.ground(), 0.0, deepest(settings)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if ground.force(middle, 0.0) >= settings.weight else (middle, high)
+    return high
+
+
+def _too_long(
+    settings: PenetrateSettings, times: Mapping[Unit, float], step: float, sentence: str, **numbers: float
+) -> str:
+    """What to say of runs that last `times` [s], in steps of `step` [s]: the setting that the longest is owed to."""
     count = sum(times.values()) / step
-    if count <= MOST_STEPS:
-        return
     unit = max(times, key=lambda unit: times[unit])
     if unit.kind == "driven":
         parts = {
@@ -113,5 +152,4 @@ def _check_step_count(settings: PenetrateSettings, step: float) -> None:
         parts = {f"lowering_speed = {unit.speed:g} m/s": sinking}
         parts[f"rest_time = {settings.rest_time:g} s"] = settings.rest_time
     key = max(parts, key=lambda part: parts[part])
-    numbers = {"own": times[unit] / step, "step": step, "count": count, "most": MOST_STEPS}
-    raise ValueError(say("steps", key=key, by=key.split()[0], **numbers))
+    return say(sentence, key=key, by=key.split()[0], own=times[unit] / step, step=step, count=count, **numbers)

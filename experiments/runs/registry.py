@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from experiments.runs.progress import Progress
     from experiments.runs.result import Result
 
-__all__ = ["EXPERIMENTS", "Experiment", "Headline", "Preset", "face", "find_experiment", "findings_shown"]
+__all__ = ["EXPERIMENTS", "Experiment", "Headline", "Preset", "TOO_LARGE", "face", "find_experiment", "findings_shown"]
 
+TOO_LARGE = "a number becomes larger than any that can be computed: a setting is far too large or too small"
+"""What an OverflowError means to a user."""
 CASES = Path(__file__).parents[1] / "cases"
 S = TypeVar("S", bound=BaseModel)
 S_contra = TypeVar("S_contra", bound=BaseModel, contravariant=True)
@@ -117,6 +119,8 @@ class Experiment:
                 if type(error) is not RuntimeError:
                     raise
                 raise ValueError(f"with these settings a short trial fails: {error}") from error
+            except OverflowError as error:
+                raise ValueError(f"with these settings {TOO_LARGE}") from error
 
 
 def _read() -> dict[str, Experiment]:

@@ -56,7 +56,12 @@ class SpatialFollowed(Followed[SpatialRun]):
         ground = LawGround.of_spatial(self.trial)
         ground.grounds = [replace(ground, time_step=STEP) for ground in ground.grounds]
         # Heavier on softer ground is set down faster.
-        slow = self.weight / (self.feet_count * self.plan.numbers["stiffness"].value * LAW_REST)
+        stiffness = self.plan.numbers["stiffness"].value
+        sinks = self.weight / (self.feet_count * stiffness)
+        if settings.placed and sinks > self.platform.reach:
+            least = self.weight / (self.feet_count * self.platform.reach)
+            raise ValueError(say("sinks_away", value=stiffness, sinks=sinks, reach=self.platform.reach, least=least))
+        slow = self.weight / (self.feet_count * stiffness * LAW_REST)
         lowering = settings.lowering_speed or max(LAW_LOWERING, slow)
         return SpatialRun(
             self.trial, ground, duration=settings.duration, lowering_speed=lowering if settings.placed else None,

@@ -12,6 +12,8 @@ __all__ = ["CampaignSettings"]
 
 Relative = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 SeedNumber = Annotated[int, Field(ge=0, lt=2**31)]
+MOST_ROWS = 1e6
+"""Of one recording; more are refused."""
 Triple = tuple[NotNegative, NotNegative, NotNegative]
 
 
@@ -70,6 +72,9 @@ class CampaignSettings(TrialSettings):
             raise ValueError(say("counterweight_of_a_rig", s=self))
         if self.ground != "spring-damper":
             raise ValueError(say("ground_of_a_campaign", s=self))
+        for key in ("camera_rate", "imu_rate", "wheel_rate"):
+            if (rows := getattr(self, key) * (self.lead + self.duration)) > MOST_ROWS:
+                raise ValueError(say("rows", key=key, rows=rows, most=MOST_ROWS, s=self, rate=getattr(self, key)))
         for key in ("rig", "gravity", "motor_torques", "brake_torques"):
             values = getattr(self, key)
             if len(set(values)) < len(values):

@@ -108,6 +108,7 @@ class Implicit:
         self._from: tuple[object, ...] = ()
         self._slopes = np.zeros((len(scale), len(scale)))
 
+    @np.errstate(over="ignore", invalid="ignore")  # of a step that is far too long: its error is infinite
     def attempt(self, time: float, z: list[float], modes: Modes, first: list[float], h: float) -> Step:
         """A step of `h` [s] from `z` at `time` [s], where dz/dt is `first`."""
         system, count = self.system, len(z)

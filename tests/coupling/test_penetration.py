@@ -57,6 +57,22 @@ def test_free_fall_is_exact():
     assert run.max_depth > 0
 
 
+def test_the_last_rows_of_a_run_are_its_rows_also_after_a_touch_above_the_surface_and_a_restart():
+    """They are kept as an array, so that a long time at rest is not read anew at each step."""
+    options = {"load": 1.0, "lowering_speed": 0.05, "rest_time": 0.01}
+    run, steps = SetDown(SPIKE, proud(FakeBed()), **options), 0
+    while not run.done:
+        run.advance()
+        steps += 1
+        last = run._last(0.01)
+        assert last is None or np.array_equal(last, np.array(run._rows[-len(last) :]))
+        if steps == 300:
+            kept = run.state()
+            run = SetDown(SPIKE, proud(FakeBed()), **options)
+            run.restore(kept)
+    assert steps > 400 and last is not None
+
+
 def _drop_error(step):
     """A drop on a spring: z = v/w sin wt + W/K (1 - cos wt); error at a fixed time, and of the energy."""
     stiffness, mass, load, speed = 500.0, 0.5, 2.0, 0.3

@@ -6,34 +6,29 @@ passes adds a line; parts that it has are not done again.
 """
 
 import json
-import os
 import random
 import shutil
 import subprocess
-from collections import Counter
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from functools import cache
-from io import StringIO
 from pathlib import Path
 from typing import get_args
 
 import pytest
+from faults import fuzzing
+from faults.fuzzing import ALL, CASES, in_words, kept, outcome
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
 from experiments.campaign.files import new_campaign
-from experiments.cli.main import build_app, main
+from experiments.cli.main import build_app
 from experiments.runs import registry
 from experiments.runs.registry import EXPERIMENTS
 from rigid.result import toml_value
 
-CASES = int(os.environ.get("HEDGEBED_FUZZ", "300"))
-KEPT = Path(os.environ["HEDGEBED_FUZZ_KEPT"]).resolve() if "HEDGEBED_FUZZ_KEPT" in os.environ else None
 ROOT = Path(__file__).resolve().parents[2]
 PART, CAMPAIGNS = 250, 25
 """Cases of settings and campaigns of a part, at most."""
 PARTS = range(-(-CASES // PART))
-ALL = CASES > 300
 
 numbers = st.one_of(
     st.sampled_from([0, 1, -1, 2, 3, 0.5, 1e-3, 1e-6, 1e6, 1e300, -1e-300, 2**31, float("nan"), float("inf")]),
@@ -66,19 +61,6 @@ def cases(draw):
     return experiment.name, given
 
 
-def outcome(*tokens):
-    """Exit status and the lines on stderr."""
-    said = StringIO()
-    with redirect_stderr(said), redirect_stdout(StringIO()):
-        status = main(list(map(str, tokens)))
-    return status, said.getvalue()
-
-
-def in_words(said):
-    """Whether each line is one of ours, and short enough to be read."""
-    return "Traceback" not in said and all(len(line) < 900 for line in said.splitlines())
-
-
 @pytest.fixture
 def no_work(monkeypatch, tmp_path):
     """Every experiment is over as soon as its settings are accepted."""
@@ -95,20 +77,6 @@ def no_work(monkeypatch, tmp_path):
     monkeypatch.setattr("experiments.cli.main.build_app", cache(build_app))
 
 
-@contextmanager
-def kept(name):
-    """Skips a part that the file has already; a part that passes adds its line, with how often each status came."""
-    lines = KEPT.read_text(encoding="utf-8").splitlines() if KEPT is not None and KEPT.exists() else []
-    if any(json.loads(line)["part"] == name for line in lines):
-        pytest.skip(f"{KEPT} has {name}")
-    counts = Counter()
-    yield counts
-    if KEPT is not None:
-        line = {"part": name} | {f"exit {status}": count for status, count in sorted(counts.items())}
-        with KEPT.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
-
-
 @pytest.mark.parametrize(("target", "variable"), [("fuzz", "FUZZED"), ("torture", "KILLED")])
 def test_make_names_the_file_of_what_is_done_by_its_whole_path(target, variable):
     """The tests work in folders of their own."""
@@ -119,7 +87,7 @@ def test_make_names_the_file_of_what_is_done_by_its_whole_path(target, variable)
 
 
 def test_a_part_that_the_file_has_is_not_done_again(tmp_path, monkeypatch):
-    monkeypatch.setitem(globals(), "KEPT", tmp_path / "parts.jsonl")
+    monkeypatch.setattr(fuzzing, "KEPT", tmp_path / "parts.jsonl")
     for part in ("settings 0", "settings 1"):
         with kept(part) as counts:
             counts[2] += 3
