@@ -31,6 +31,7 @@ def test_what_is_hidden_comes_out_as_strong_as_it_was_asked_for(kind):
     assert told.signature == pytest.approx(6.0, rel=0.25)
 
 
+@pytest.mark.long
 def test_a_null_holds_nothing_and_what_wanders_is_recorded_as_it_was_drawn():
     told = [make_rig(seed, kind="null", trials=8)[1] for seed in range(60)]
     assert all(one.effects == () and one.outside is None and one.signature == 0.0 for one in told)
@@ -45,6 +46,7 @@ def test_a_null_holds_nothing_and_what_wanders_is_recorded_as_it_was_drawn():
         assert (max(one.extra["louder"].values()) > 1) == (wandering["loud"] > 0)
 
 
+@pytest.mark.long
 def test_what_the_truth_leaves_is_the_noise_as_stated_and_what_comes_beside_it():
     """1 a reading where nothing is wrong; 1.3^2 where all sensors are so much louder; a force zero adds its square."""
     seen = set()

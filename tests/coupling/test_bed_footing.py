@@ -207,6 +207,7 @@ def test_a_platform_set_down_on_grains_carries_its_weight_and_stays():
     assert found.energy_residual < 1e-6
 
 
+@pytest.mark.long
 def test_a_tumble_on_grains_closes_its_books_and_goes_on_from_a_checkpoint_to_the_same_bits(tmp_path):
     """A torque well above the least that tips (W l sin(pi / 8)); the grains' momentum and the body's to round-off."""
     torque = 4 * 0.58 * 0.3 * 0.04 * math.sin(math.pi / 8)
@@ -237,6 +238,7 @@ def test_a_tumble_on_grains_closes_its_books_and_goes_on_from_a_checkpoint_to_th
     assert np.array_equal(run.losses["friction"], other.losses["friction"])
 
 
+@pytest.mark.long
 def test_the_residual_of_the_exchange_with_grains_falls_as_the_square_of_the_macro_step():
     """A tumble over the layer, from where the hand lets go: 16 of the bed's steps in one against 4."""
     torque = 4 * 0.58 * 0.3 * 0.04 * math.sin(math.pi / 8)

@@ -99,6 +99,7 @@ def test_a_landing_on_one_corner_out_of_the_plane_is_that_of_the_located_events_
     assert abs(master.exchange.given - master.exchange.taken) < 1e-3 * energy
 
 
+@pytest.mark.long
 def test_sliding_on_several_tips_comes_to_rest_where_the_located_events_have_it():
     """Level, with a sideways speed and a turn about the vertical: four tips slide, each its own way, and stick."""
     trial = SpatialTrial(platform=HEDGEHOG, gravity=0.0834, mu_s=0.3, ground_parameters=STIFF)
@@ -256,6 +257,7 @@ def test_a_platform_let_fall_askew_on_grains_closes_its_books_and_goes_on_from_i
     assert (np.array(again._rows) == np.array(run._rows)).all()
 
 
+@pytest.mark.long
 def test_a_ball_that_rolls_into_grains_keeps_the_angular_momentum_of_all_to_round_off():
     """On a floor, under gravity, through the periodic side: weight, floor and side told apart
     (`dem.engine.dissipation`); n = 1."""

@@ -248,6 +248,7 @@ def stored(bed, law):
     return float((0.4 * k * d**2.5 - 4 * math.pi * GAMMA * RADIUS / 2 * d).sum())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", LAWS)
 def test_momentum_and_angular_momentum_close_with_cohesion(law):
     """To round-off, with friction, rolling resistance and damping; and energy only falls."""
@@ -273,6 +274,7 @@ def test_momentum_and_angular_momentum_close_with_cohesion(law):
     assert energy[-1] < 0.5 * energy[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", LAWS)
 def test_energy_of_elastic_cohesive_grains_is_conserved(law):
     """Frictionless, restitution 1: kinetic energy and the integral of the law; separation has no history, no loss."""

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -251,9 +252,16 @@ def falling(folder, name, kind, seed, speed, load):
 
 
 @pytest.fixture(scope="session")
-def make_run():
-    """`synthetic_run(folder, frames=6)`."""
-    return synthetic_run
+def make_run(tmp_path_factory):
+    """`synthetic_run(folder, frames=6)`: made once for each number of frames, and copied into the folder."""
+    made = {}
+
+    def copied(folder, frames=6):
+        if frames not in made:
+            made[frames] = synthetic_run(tmp_path_factory.mktemp("made"), frames)
+        return Path(shutil.copytree(made[frames], folder, dirs_exist_ok=True))
+
+    return copied
 
 
 @pytest.fixture(scope="session")

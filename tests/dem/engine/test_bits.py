@@ -72,6 +72,7 @@ def test_one_thread_in_another_process_gives_the_same_bits(one_thread, two_threa
     assert finish(one_thread[0]) == two_threads[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cohesion", ["dmt", "jkr"])
 def test_cohesive_grains_keep_their_bits_too(cohesion, tmp_path):
     """One thread elsewhere, two here; and from a file of the middle."""
@@ -173,6 +174,7 @@ def test_the_bits_do_not_depend_on_how_a_run_is_cut(two_threads):
     assert falling_bed.digest(bed) == digests[400]
 
 
+@pytest.mark.long
 def test_kill_9_and_resume_gives_the_bits_of_a_run_without(two_threads, tmp_path):
     """Killed in mid-run, at whatever it does after its third save; what it left is resumed elsewhere."""
     _, digests, _, middle = two_threads

@@ -110,6 +110,7 @@ def test_a_packing_that_taps_cannot_bring_is_refused_before_the_last_of_them(bed
         work_on(bed, "compact:0.64")
 
 
+@pytest.mark.long
 def test_a_slope_too_steep_is_refused_with_the_steepest_that_held(bed):
     """Steeper than any sand's friction angle; gravity turns and keeps its strength."""
     with pytest.raises(

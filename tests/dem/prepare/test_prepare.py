@@ -268,6 +268,7 @@ def test_a_preparation_that_was_stopped_goes_on_to_the_same_bits(made, monkeypat
     assert not list((tmp_path / "unfinished").iterdir())
 
 
+@pytest.mark.long
 def test_a_preparation_is_kept_every_minute(made, monkeypatch, tmp_path):
     monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
     monkeypatch.setattr(dem.prepare.laboratory, "_KEEP_INTERVAL", 0.0)
