@@ -68,6 +68,7 @@ def simulate_batch(
     times: ArrayLike | None = None,
     sample_every: int | None = None,
     threads: int | None = None,
+    start_depth: float = 1.0,
 ) -> BatchTrajectory:
     """Integrate many trials from static equilibrium to `duration`.
 
@@ -80,6 +81,8 @@ def simulate_batch(
         times: sample times [s] within 0 to `duration`, rising, shape [sample_count] or [trial_count, sample_count].
         sample_every: record every so many steps instead. Without `times` and `sample_every` only the summary is kept.
         threads: CPU threads where Taichi is not running yet.
+        start_depth: depth of the tips at t = 0 over that in equilibrium [1]; other than 1 needs level ground and
+            pointed tips (no `slope`, `com-offset`, `tip-radius`).
 
     Raises ValueError: trials that do not go together, a number that cannot be, a time step too long for a ground.
     RuntimeError: a trial's motion is no longer finite; Taichi runs in single precision in this process.
@@ -99,6 +102,9 @@ def simulate_batch(
     stand, advance = batch_kernel(first.terms, first.surface.name, first.spike_count)
     poses = np.zeros((count, 2))
     stand(numbers, poses)
+    if start_depth != 1:
+        _check_start(first, start_depth)
+        poses[:, 0] += (1 - start_depth) * (numbers[:, 3] - poses[:, 0])
     summary = np.full((count, len(SUMMARY)), np.nan)
     series = np.full((count, max(samples.shape[1], 1), len(CHANNELS)), np.nan)
     steps = math.ceil(duration / time_step * (1 - 1e-12))
@@ -132,6 +138,15 @@ def simulate_batch(
             f"trial {deep[0]} of the batch sinks so deep that four rows of spikes would touch: use `simulate` for it"
         )
     return batch
+
+
+def _check_start(first: Trial, start_depth: float) -> None:
+    """Raise ValueError for a share of the depth at rest that cannot be, or effects with which both rows differ."""
+    check_above_zero(start_depth=start_depth)
+    uneven = {"slope", "com-offset", "tip-radius"} & {effect.id for effect in first.effects}
+    if uneven:
+        name = min(uneven)
+        raise ValueError(f"start_depth = {start_depth:g} must be 1 with effect {name!r}: its rows do not stand level")
 
 
 def _many(trials: Sequence[Trial], vary: Any) -> tuple[Trial, Array]:

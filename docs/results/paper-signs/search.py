@@ -19,6 +19,7 @@ from coupling import CoupledTumble
 from dem import SAND, Bed, material
 from dem.prepare.prepare import prepare_as
 from experiments.grains.on_bed import STANDARD_GRAVITY
+from experiments.grains.recipes import recipe_of
 from experiments.tumble.on_grains import PlanarOnBed
 from experiments.tumble.settings import TumbleSettings
 
@@ -43,6 +44,12 @@ def powder(share: float) -> dict[str, Any]:
 
 RISES = {"motor": ("torque-rise.rise=0.25",), "brake": ()}  # A brake's torque lasts 0.06 s
 SURFACE = {"start": "surface", "actuators": ("brake",)}  # The brake let go before the platform has settled
+JSC = material("jsc-1a-loose-cut")
+JSC1A: dict[str, Any] = {  # Right cohesion and density, on the bed of jsc-packed-0.22 in ../tumble-sand
+    "material": JSC, "stages": recipe_of(JSC).stages, "grain": 0.004, "size": (0.38, 0.036, 0.056), "young": 3e7,
+}  # fmt: skip
+MIDDLE = sand(0.1) | {"spike": 0.016, "grain": 0.0052}
+WIDE = sand(0.1) | {"spike": 0.024, "grain": 0.0075, "depth": 0.06}  # In the region that ../paper-region finds
 LEVERS: dict[str, dict[str, Any]] = {
     "weak sand": sand(0.1),
     "calibrated sand": sand(CALIBRATED),
@@ -63,6 +70,15 @@ LEVERS: dict[str, dict[str, Any]] = {
     "rough sand, motor from the surface": sand(1.2) | SURFACE | {"actuators": ("motor",)},
     "powder, 1/4, from the surface": powder(0.25) | SURFACE,
     "powder, from the surface": powder(1.0) | SURFACE,
+    "jsc1a": JSC1A,
+    "jsc1a, torque rise 0.25 s": JSC1A | {"effects": RISES, "actuators": ("motor",)},
+    "jsc1a, from the surface": JSC1A | SURFACE,
+    "weak sand, tip 24 mm": WIDE,
+    "weak sand, tip 24 mm, from the surface": WIDE | SURFACE,
+    "weak sand, tip 24 mm, torque rise 0.25 s": WIDE | {"effects": RISES, "actuators": ("motor",)},
+    "weak sand, tip 16 mm": MIDDLE,
+    "weak sand, tip 16 mm, from the surface": MIDDLE | SURFACE,
+    "weak sand, tip 16 mm, torque rise 0.25 s": MIDDLE | {"effects": RISES, "actuators": ("motor",)},
 }
 
 
@@ -76,16 +92,18 @@ class OnBed(PlanarOnBed):
             turn = {"torque": 6.0, "duration": 1.0, "actuator": "brake", "wheel_speed_0": 300.0}
         super().__init__(
             TumbleSettings(
-                surface="sand", ground="bed", rig=0.0085, grain=grain, spike_diameter=spike, seed=seed, young=1e7,
-                bed_size=(0.3, round(3 * spike, 6), lever.get("depth", 0.046)), max_overlap=0.1, threads=1,
-                frame_count=0,
+                surface="sand", ground="bed", rig=0.0085, grain=grain, spike_diameter=spike, seed=seed,
+                young=lever.get("young", 1e7), max_overlap=0.1, threads=1, frame_count=0,
+                bed_size=lever.get("size", (0.3, round(3 * spike, 6), lever.get("depth", 0.046))),
                 effects=lever.get("effects", {}).get(actuator, ()), **turn,
             )
         )  # fmt: skip
         self.lever, self.__dict__["material"] = lever, lever["material"]
 
-    def made(self) -> Bed:
-        """The bed, rained in and levelled, or by the lever's stages."""
+    def made(self, kept: Path | None) -> Bed:
+        """The bed, rained in and levelled, or by the lever's stages; or `kept`, a bed file."""
+        if kept is not None:
+            return self.laid_out(Bed.load(kept, threads=1))
         s, stuff, stages = self.settings, self.material, self.lever.get("stages")
         options: dict[str, Any] = {
             "size": s.bed_size, "grain": s.grain, "spread": s.spread, "gravity": STANDARD_GRAVITY, "seed": s.seed,
@@ -110,10 +128,10 @@ class OnBed(PlanarOnBed):
         return run
 
 
-def measured(lever: dict[str, Any], actuator: str, seed: int) -> dict[str, Any]:
+def measured(lever: dict[str, Any], actuator: str, seed: int, kept: Path | None) -> dict[str, Any]:
     """What came of one run."""
     on_bed, began = OnBed(lever, actuator, seed), time.process_time()
-    bed = on_bed.made()
+    bed = on_bed.made(kept)
     prepared = time.process_time() - began
     run = on_bed.stepper(bed)
     start = None
@@ -151,7 +169,7 @@ def measured(lever: dict[str, Any], actuator: str, seed: int) -> dict[str, Any]:
     return found | {"bed_s": round(prepared, 1), "run_s": round(time.process_time() - began - prepared, 1)}
 
 
-def main(chosen: list[str], seeds: list[int]) -> None:
+def main(chosen: list[str], seeds: list[int], kept: Path | None) -> None:
     """Every lever that is chosen, or all, seed by seed; what is there already is not done again."""
     done = [json.loads(line) for line in RUNS.read_text().splitlines()] if RUNS.exists() else []
     have = {(entry["lever"], entry["actuator"], entry["seed"]) for entry in done}
@@ -160,7 +178,8 @@ def main(chosen: list[str], seeds: list[int]) -> None:
             for actuator in LEVERS[name].get("actuators", ("motor", "brake")):
                 if (name, actuator, seed) in have:
                     continue
-                entry = {"lever": name, "actuator": actuator, "seed": seed} | measured(LEVERS[name], actuator, seed)
+                entry = {"lever": name, "actuator": actuator, "seed": seed}
+                entry |= measured(LEVERS[name], actuator, seed, kept)
                 with RUNS.open("a") as file:
                     file.write(json.dumps(entry) + "\n")
                 print(json.dumps(entry), flush=True)
@@ -170,5 +189,6 @@ if __name__ == "__main__":
     asked = argparse.ArgumentParser()
     asked.add_argument("levers", nargs="*")
     asked.add_argument("--seeds", type=int, nargs="*", default=[1, 2, 3])
+    asked.add_argument("--bed", type=Path, help="bed file in place of a bed that is prepared; with one lever and seed")
     given = asked.parse_args()
-    main(given.levers, given.seeds)
+    main(given.levers, given.seeds, given.bed)

@@ -49,6 +49,25 @@ def test_the_batch_keeps_its_published_tolerance_with_all_effects_on_at_once():
     assert_agreement([drawn(rng, tuple(RANGES)) for _ in range(1000)])
 
 
+def test_a_platform_let_go_above_its_rest_swings_as_far_below_it():
+    # Without torque and damping: y - y_rest = (1 - share) W / 2K cos(omega t), omega^2 = 2 K / (m + m_b).
+    trial = Trial(gravity_sim=0.0834, counterweight=5.21, stiffness=2000.0, damping=0.0)
+    omega = math.sqrt(2 * trial.stiffness / (trial.mass + trial.counterweight))
+    rest = trial.spike_length * math.cos(math.pi / 8) - trial.weight / (2 * trial.stiffness)
+    times = np.linspace(0, 2 * math.pi / omega, 9)
+    for share in (0.5, 1.5):
+        run = simulate_batch(trial, duration=0.5, times=times, start_depth=share)
+        swing = (1 - share) * trial.weight / (2 * trial.stiffness) * np.cos(omega * times)
+        assert run.channel("y")[0] - rest == pytest.approx(swing, abs=1e-3 * np.abs(swing).max())
+
+
+def test_a_start_off_the_depth_at_rest_is_refused_on_rows_that_do_not_stand_level():
+    with pytest.raises(ValueError, match="slope"):
+        simulate_batch(in_rig(effects=(effect("slope", angle=0.01),)), duration=0.1, start_depth=0.5)
+    with pytest.raises(ValueError, match="start_depth = 0"):
+        simulate_batch(in_rig(), duration=0.1, start_depth=0)
+
+
 def test_two_rows_whose_slip_ends_at_one_moment_slide_back_together():
     # Both rows slide towards +x at speeds 1e-7 m/s apart, and neither can be held where they come to rest.
     common = {"gravity_sim": 0.08336, "counterweight": 0.0}
