@@ -35,7 +35,7 @@ fast: $(VENV)/.installed-test  ## the inner loop: ruff, and the tests whose file
 	$(BIN)/ruff check .
 	$(PYTEST) -m "not heavy and not long and not slow" $(ARGS)
 
-long: $(VENV)/.installed-test  ## the tests of some 10 s and more, which CI runs after those of `make test`
+long: $(VENV)/.installed-test  ## whole diagnoses and the tests of some 5 s and more, which CI runs after those of `make test`
 	$(PYTEST) -m long $(ARGS)
 
 slow: $(VENV)/.installed-test  ## the tests that take minutes: physics against closed forms, kill and resume
@@ -48,7 +48,7 @@ torture: $(VENV)/.installed-test  ## files damaged, 4,000 in all, and experiment
 	HEDGEBED_DAMAGES=200 $(PYTEST) -m "long or slow or not long" tests/faults/test_damage.py tests/faults/test_damaged_folders.py $(ARGS)
 	HEDGEBED_KILLS=50 HEDGEBED_KILLED_KEPT=$(abspath $(KILLED)) $(PYTEST) -m "long or slow" tests/faults/test_killed.py $(ARGS)
 
-tiers: $(VENV)/.installed-test  ## measure again which files of tests `make fast` may take (tests/durations.toml)
+tiers: $(VENV)/.installed-test  ## measure again how long each file of tests takes (tests/durations.toml)
 	$(PYTEST) --write-durations $(ARGS)
 
 cover: $(VENV)/.installed-test  ## the tests of `make test`, counting the lines they reach: several times as long

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit  # of scipy.stats, which takes 0.5 s to import
 
 from experiments.grains.spells import spells
 from experiments.runs.result import quantity
@@ -88,6 +87,9 @@ def sinking_over(beds: Sequence[Sequence[Footfall]]) -> Sinking | None:
     free = sum(table.shape[1] for table in tables) - len(tables) - 1
     if free < 1:
         return None
+    # Here, since `hedgebed --help` imports this module; of scipy.stats, which takes longer still to import.
+    from scipy.special import stdtrit
+
     x = np.concatenate([number - number.mean() for number, _ in tables])
     y = np.concatenate([depth - depth.mean() for _, depth in tables])
     mean = float(np.concatenate([depth for _, depth in tables]).mean())

@@ -67,6 +67,7 @@ def test_what_the_truth_leaves_is_the_noise_as_stated_and_what_comes_beside_it()
     assert len(seen) > 2
 
 
+@pytest.mark.long
 def test_what_no_data_could_tell_is_not_hidden():
     pairs = [set(make_rig(seed, kind="pair", strength=5.0, trials=6)[1].effects) for seed in range(8)]
     assert {"depth-hardening", "layering"} not in pairs and all(len(pair) == 2 for pair in pairs)
@@ -74,7 +75,7 @@ def test_what_no_data_could_tell_is_not_hidden():
     assert all(told.extra["nuisances"]["bed"] == 0.0 and told.extra["design"]["drops"] >= 2 for told in masses)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 6))])
 def test_campaigns_are_read_and_checked(tmp_path, seed):
     """Units by suffix, gaps, an accelerometer that was not fitted: nothing is refused, and depths agree in metres."""
     campaign, told = make_rig(seed, trials=6)

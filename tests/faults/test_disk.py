@@ -46,7 +46,7 @@ def resumed(tokens, out):
     return ["resume", out, "--quiet"] if (out / "run.toml").exists() else [*tokens, out]
 
 
-@pytest.mark.parametrize("tokens", [TUMBLE, SWEEP], ids=["tumble", "sweep"])
+@pytest.mark.parametrize("tokens", [TUMBLE, pytest.param(SWEEP, marks=pytest.mark.long)], ids=["tumble", "sweep"])
 def test_each_file_that_cannot_be_written_is_named_and_the_run_goes_on_afterwards(
     tokens, tmp_path, monkeypatch, capsys
 ):

@@ -29,6 +29,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PART, CAMPAIGNS = 250, 25
 """Cases of settings and campaigns of a part, at most."""
 PARTS = range(-(-CASES // PART))
+MANY = pytest.mark.long
+"""Of a whole part of settings, where `make fuzz` does not ask for it: the few of the last part show the same."""
 
 numbers = st.one_of(
     st.sampled_from([0, 1, -1, 2, 3, 0.5, 1e-3, 1e-6, 1e6, 1e300, -1e-300, 2**31, float("nan"), float("inf")]),
@@ -97,7 +99,7 @@ def test_a_part_that_the_file_has_is_not_done_again(tmp_path, monkeypatch):
     assert lines == [{"part": f"settings {part}", "exit 2": 3} for part in (0, 1)]
 
 
-@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("part", [pytest.param(part, marks=MANY if part == 0 and not ALL else ()) for part in PARTS])
 def test_settings_of_any_kind_are_run_or_refused_in_words(part, no_work):
     with kept(f"settings {part}") as counts:
         count = min(CASES - part * PART, PART)
