@@ -48,6 +48,9 @@ BASE_NOTE = "fitted_without_effects"
 RANGE_NOTE = "fitted_range"
 """A note of model.toml: what the trials that it was fitted to cover, `depth_m` and `speed_m_s` (slowest and fastest, on
 the way in) of the pushes, and `withdrawal`, whether one of them came out again."""
+ERRORS_NOTE = "fitted_errors"
+"""A note of model.toml: `names` of the fitted numbers (``stiffness``, ``effect.parameter``), their standard errors
+`std` and `correlation`, rows in the order of `names`; `undetermined`: names of those without a standard error."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

@@ -23,7 +23,8 @@ _NOISY, _QUIET = 2.0, 0.1  # times the stated noise; coloured noise has less fro
 _NAMED = ("looks like", "would say so")  # words of a finding that names a unit
 _FOLLOWS = ("by a jump that no motion makes", "jumps so often", "what [sensors.", "its zero is to be taken off")
 """Words of findings that follow from such a unit."""
-_UNITS = ("is force_N in", "is depth_m in", "is t_s in", "looks like")  # words that ask for a unit
+_UNITS = ("is force_N in", "is depth_m in", "is t_s in", "is x_m in", "is y_m in", "looks like")
+"""Words that ask for a unit."""
 _ZERO_OFF, _SETS_IN = "subtract its zero", "the force sets in at"  # words of a zero that is off
 _OFF_SCALE = "in other units (N/mm, g)"  # words of a force that is out of all proportion
 _TOGETHER = (frozenset(("x", "y", "theta")), frozenset(("gyro", "ax", "ay")), frozenset(("wheel",)),

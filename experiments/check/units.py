@@ -13,14 +13,24 @@ from .words import say
 
 __all__ = ["noise_unit", "push_units"]
 
-_BY_NOISE: Mapping[str, tuple[float, str]] = {
-    "force_N": (1e3, "force_mN"),
-    "depth_m": (1e3, "depth_mm"),
-    "x_m": (1e3, "x_mm"),
-    "y_m": (1e3, "y_mm"),
-    "theta_rad": (180 / math.pi, "theta_deg"),
+_Units = tuple[tuple[float, str, str], ...]
+
+
+def _lengths(name: str) -> _Units:
+    """Units of a length whose column has this name."""
+    return ((1e3, "mm", f"{name}_mm would say so"), (100.0, "cm", "times 0.01 it is metres"),
+            (1 / 0.0254, "inches", "times 0.0254 it is metres"))  # fmt: skip
+
+
+_BY_NOISE: Mapping[str, _Units] = {
+    "force_N": ((1e3, "mN", "force_mN would say so"), (1e-3, "kN", "times 1,000 it is newtons")),
+    "depth_m": _lengths("depth"),
+    "x_m": _lengths("x"),
+    "y_m": _lengths("y"),
+    "theta_rad": ((180 / math.pi, "deg", "theta_deg would say so"),),
 }
-"""Column -> how many times too large it is in the unit that is usual beside the format's, and the heading for that."""
+"""Column -> other units: how many times too large a reading in it is, its name, and what to do. Pounds and kilograms of
+force are too near to newtons for a stated noise to show them."""
 _LIKE = 1.5  # factor within which the scatter of a sensor is that of another unit: a data sheet is no nearer
 _THOUSAND = 1e3
 _BEDS = 3.0  # factor by which pushes into one bed may differ: other depths, other feet
@@ -35,10 +45,11 @@ _MILLI = "mN (force_mN would say so)"
 def noise_unit(column: str, ratio: float) -> str | None:
     """What a column may be instead, by its scatter from row to row over the stated noise, as a question; None where
     that ratio is none of two units."""
-    factor, heading = _BY_NOISE.get(column, (1.0, ""))
-    if not heading or abs(math.log(ratio / factor)) > math.log(_LIKE):
-        return None
-    return say("unit_by_noise", column=column, unit=heading.split("_")[1], heading=heading)
+    for factor, unit, advice in _BY_NOISE.get(column, ()):
+        if ratio > 0 and abs(math.log(ratio / factor)) <= math.log(_LIKE):
+            size = "small" if factor > 1 else "large"
+            return say("unit_by_noise", column=column, unit=unit, advice=advice, size=size)
+    return None
 
 
 def push_units(campaign: Campaign) -> Iterator[tuple[str, str, str]]:

@@ -11,7 +11,7 @@ are made on the base model as it was fitted without effects, and on the law.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from coupling import Penetration
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.files import MODEL_COPY, keep_model
+from experiments.campaign.model_errors import SHARE, ModelErrors, errors_of
 from experiments.campaign.tables import BASE_NOTE, RANGE_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
@@ -34,7 +35,7 @@ from experiments.runs.whole_runs import publish
 from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
-from .findings import mean_of, returned_work
+from .findings import force_gap, mean_of, returned_work, with_fit_errors
 from .on_law import law_step, without_rest
 from .settings import PenetrateSettings, say
 from .units import Unit, make_run, make_spike, plan_units
@@ -78,13 +79,13 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
                 place = {"path": path, "number": number, "id": effect.id, "allowed": ", ".join(sorted(known))}
                 raise ValueError(say("unknown_number", **place, name=name, value=value))
             slots[name] = value
-    law = AmendedLaw(settings, model, {}, tuple(own))
+    law = AmendedLaw(settings, model, {}, tuple(own), errors=errors_of(str(path), model))
     stiffer = law.pair[0] / model.surface.stiffness if model.surface.stiffness > 0 else 1.0
     factors = {
         name: stiffer if known.get(name, "").startswith("spring") else size ** _POWERS.get(known.get(name, ""), 0)
         for name in slots
     }
-    return replace(law, slots={name: value * factors[name] for name, value in slots.items()})
+    return replace(law, slots={name: value * factors[name] for name, value in slots.items()}, factors=factors)
 
 
 def _own(path: Path, number: int, effect: EffectTable) -> OwnEffect:
@@ -123,6 +124,8 @@ class AmendedLaw:
     model: PenetrationModel
     slots: Mapping[str, float]  # numbers of the library's effects, of this spike's diameter
     own: tuple[OwnEffect, ...] = ()
+    factors: Mapping[str, float] = field(default_factory=dict)  # of `slots` over the file's numbers
+    errors: ModelErrors | None = None  # of the file's numbers
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -262,6 +265,31 @@ class AmendedLaw:
                 table[0, places[name if effect.push is not None else f"{effect.id}.{name}"]] = value
         return table
 
+    @property
+    def own_errors(self) -> ModelErrors | None:
+        """The errors of the numbers of this spike; None where the file has none, or K and C are of other tips."""
+        sizes = list(self.by_diameter)
+        mine = [size for size in sizes if math.isclose(size, self.settings.tip_diameter, rel_tol=1e-6)]
+        if self.errors is None or not sizes:
+            return self.errors
+        return self.errors.at(f"{mine[0]:g}") if mine else None
+
+    def peak_std(self, like: Penetration) -> float | None:
+        """Standard error of the peak force [N] of a driven run along the path of `like`, by the errors of the fit; None
+        where these are not known, or one of the numbers is not determined."""
+        errors, places = self.own_errors, slot_places(self.own)
+        if errors is None or errors.undetermined:
+            return None
+        table = np.repeat(self.numbers(speed=float(np.abs(like.velocity).max())), 2 * len(errors.names), axis=0)
+        for k, (name, std) in enumerate(zip(errors.names, errors.std, strict=True)):
+            slot = name if name in places else name.rpartition(".")[2]  # effects from files have their name in front
+            if slot in places:  # K and C of other diameters are in none
+                step = SHARE * std * self.factors.get(slot, 1.0)
+                table[2 * k : 2 * k + 2, places[slot]] += step, -step
+        lanes, path = np.zeros(len(table), np.int32), np.array([0, len(like.time)], dtype=np.int32)
+        peaks = push(table, lanes, path, like.depth, like.velocity, self.own, like.time).max(axis=1)
+        return errors.propagated(peaks[0::2], peaks[1::2])
+
     def run(self, unit: Unit, like: Penetration) -> Penetration:
         """The run of `unit` on the law, at the times of `like` (the same run on another ground) and from its start."""
         lane, path = np.zeros(1, np.int32), np.array([0, len(like.time)], dtype=np.int32)
@@ -355,7 +383,7 @@ def run_beside(
     for name, series in runs.items():
         folder.write_series(f"{name}.amended", series.columns())
     driven = [unit.id for unit in units if unit.kind == "driven"]
-    plain, amended = (_gap(driven, beds, others) for others in (models, runs))
+    plain, amended = (force_gap(driven, beds, others) for others in (models, runs))
     note = "rms difference over the bed's rms force, driven runs, in, at rest and out"
     quantities: dict[str, tuple[float | None, str, str]] = {
         "force_gap_spring_damper": (plain, "1", note),
@@ -404,12 +432,13 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
         fitted = [f"The model was fitted to {law.fitted_to}."] if law.fitted_to else []
         which = "compared" if law.has_base else "compared_inflated"
         compared = [say(which, law=law, plain=plain_stiffness)] if law.effects else []
+        errors = {name: law.peak_std(plain[id]) for name, id in _peaked(units).items()}
         made = Result.make(
             "penetrate",
             ground=settings.ground,
             version=__version__,
             title=f"A {settings.body_words} on the spring-damper, and with {law.words}",
-            quantities=quantities_of(found, std=None),
+            quantities=with_fit_errors(quantities_of(found, std=None), law.own_errors, errors),
             runs=[
                 {
                     "id": unit.id,
@@ -441,17 +470,22 @@ def _amended(run: Penetration) -> Json:
     return {f"amended_{name}": value for name, value in run.quantities().items()}
 
 
+def _peaked(units: Sequence[Unit]) -> dict[str, str]:
+    """Name of the peak force on the law -> id of its push; with the speed where there are several."""
+    driven = [unit for unit in units if unit.kind == "driven"]
+    return {f"peak_force_amended{f'@{unit.speed:g}' if len(driven) > 1 else ''}": unit.id for unit in driven}
+
+
 def _peaks(
     settings: PenetrateSettings, units: Sequence[Unit], plain: Runs, runs: Runs, law: AmendedLaw
 ) -> dict[str, tuple[float | None, str, str]]:
     """Peak forces [N] of the pushes on the spring-damper and on the law, for each speed where there are several."""
-    driven = [unit for unit in units if unit.kind == "driven"]
+    speeds = {unit.id: unit.speed for unit in units}
     found: dict[str, tuple[float | None, str, str]] = {}
-    for unit in driven:
-        at = f"@{unit.speed:g}" if len(driven) > 1 else ""
-        path = f"push to {1e3 * settings.depth:.3g} mm at {1e3 * unit.speed:.3g} mm/s"
-        for name, whose, made in (("amended", f", with {law.words}", runs), ("spring_damper", "", plain)):
-            found[f"peak_force_{name}{at}"] = (made[unit.id].peak_force, "N", f"{path}{whose}")
+    for name, id in _peaked(units).items():
+        path = f"push to {1e3 * settings.depth:.3g} mm at {1e3 * speeds[id]:.3g} mm/s"
+        found[name] = (runs[id].peak_force, "N", f"{path}, with {law.words}")
+        found[name.replace("amended", "spring_damper")] = (plain[id].peak_force, "N", path)
     return found
 
 
@@ -461,16 +495,3 @@ def _rest(units: Sequence[Unit], runs: Runs) -> float | None:
 
 def _returned(units: Sequence[Unit], runs: Runs) -> float | None:
     return mean_of([returned_work(runs[unit.id]) for unit in units if unit.kind == "driven"])
-
-
-def _gap(driven: Sequence[str], beds: Runs, others: Runs) -> float | None:
-    """Rms difference over the bed's rms force, rows below the surface, every run weighing the same."""
-    square = drag = 0.0
-    for name in driven:
-        bed, other = beds[name], others[name]
-        rows = bed.depth > 0
-        if rows.any():
-            force = np.interp(bed.time, other.time, other.force)  # steps of other seeds' beds differ in the sixth digit
-            square += float(np.mean((force[rows] - bed.force[rows]) ** 2))
-            drag += float(np.mean(bed.force[rows] ** 2))
-    return float(np.sqrt(square / drag)) if drag > 0 else None

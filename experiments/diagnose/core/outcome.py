@@ -297,21 +297,51 @@ class Diagnosis(Known):
     def parameters(self, effect: str) -> dict[str, Estimated]:
         """An effect in diagnosis.json: name -> value, std (None where data and priors do not determine it), unit."""
         found: dict[str, Estimated] = {}
-        parameters = self.best.model.parameters
         covariance = self.best.covariance(inflation=inflation(self.best))
         for form in (form for form in self.forms if form.effect == effect):
             loose = self.problem.form_std(form)
-            here = self.problem.reported(self.best.values, form)
-            slopes = {name: np.zeros(len(parameters)) for name in here}
-            for k, p in enumerate(parameters):
-                step = p.step if p.step is not None else 1e-4 * p.scale
-                moved = self.problem.reported({**self.best.values, p.name: self.best.values[p.name] + step}, form)
-                for name in here:
-                    slopes[name][k] = (moved[name][0] - here[name][0]) / step
-            for name, (value, unit) in here.items():
-                std = _error(self.best, covariance, slopes[name], loose.get(name, 0.0) * value)
+            for name, (value, unit, slope) in self._reported(form).items():
+                std = _error(self.best, covariance, slope, loose.get(name, 0.0) * value)
                 found[name] = {"value": float(value), "std": std, "unit": unit}
         return found
+
+    def _reported(self, form: Form) -> dict[str, tuple[float, str, Array]]:
+        """What is reported of a form of the best model: value, unit, and its derivatives by the parameters, shape
+        [p]."""
+        parameters = self.best.model.parameters
+        here = self.problem.reported(self.best.values, form)
+        slopes = {name: np.zeros(len(parameters)) for name in here}
+        for k, p in enumerate(parameters):
+            step = p.step if p.step is not None else 1e-4 * p.scale
+            moved = self.problem.reported({**self.best.values, p.name: self.best.values[p.name] + step}, form)
+            for name in here:
+                slopes[name][k] = (moved[name][0] - here[name][0]) / step
+        return {name: (value, unit, slopes[name]) for name, (value, unit) in here.items()}
+
+    def joint_errors(self) -> dict[str, Any]:
+        """Standard errors of the best model's shared numbers with their correlations, as model.toml notes them
+        (`ERRORS_NOTE` of `experiments.campaign.tables`)."""
+        covariance = self.best.covariance(inflation=inflation(self.best))
+        places = {p.name: k for k, p in enumerate(self.best.model.parameters)}
+        ways = np.eye(len(places))
+        slopes = {p.name: ways[places[p.name]] for p in self.problem.base if p.trial is None and p.name in places}
+        own = dict.fromkeys(slopes, 0.0)  # what a number is uncertain by beside the fit
+        for form in self.forms:
+            loose = self.problem.form_std(form)
+            for name, (value, _, slope) in self._reported(form).items():
+                slopes[f"{form.effect}.{name}"] = slope
+                own[f"{form.effect}.{name}"] = abs(loose.get(name, 0.0) * value)
+        stds = {name: _error(self.best, covariance, slope, own[name]) for name, slope in slopes.items()}
+        known = [name for name, std in stds.items() if std is not None]
+        jointly = np.array([slopes[name] for name in known]).reshape(len(known), len(places))
+        shared = jointly @ covariance @ jointly.T + np.diag([own[name] ** 2 for name in known])
+        size = np.sqrt(np.maximum(np.diag(shared), 1e-300))
+        return {
+            "names": known,
+            "std": [float(f"{stds[name]:.6g}") for name in known],
+            "correlation": [[float(f"{x:.6g}") for x in row] for row in shared / np.outer(size, size)],
+            "undetermined": [name for name, std in stds.items() if std is None],
+        }
 
 
 def _inflations(one: Fit, other: Fit) -> tuple[float, float]:

@@ -315,9 +315,13 @@ class Problem(Protocol):
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """Channel -> {"t_s", "measured", "model"} for plots, at the samples; units those of the channel."""
 
-    def write_model(self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None) -> None:
+    def write_model(
+        self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
+        errors: Mapping[str, object] | None = None,
+    ) -> None:  # fmt: skip
         """model.toml: the tables with the fitted values, and [[effect]] tables. `base`: values of the base model that
-        was fitted without these effects, which a comparison needs."""
+        was fitted without these effects, which a comparison needs. `errors`: of the values, a note
+        (`Diagnosis.joint_errors`)."""
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """One sentence: the trial or bench measurement that would distinguish the two."""

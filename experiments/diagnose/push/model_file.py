@@ -1,10 +1,10 @@
 """model.toml of pushes and drops: the campaign's tables with fitted numbers and effects."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.campaign import EffectTable, PenetrationCampaign, PenetrationModel
-from experiments.campaign.tables import BASE_NOTE, RANGE_NOTE
+from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, RANGE_NOTE
 
 from .data import Prepared
 from .parameters import comes_back, speeds_of
@@ -17,12 +17,15 @@ Pairs = dict[str, dict[str, float]]
 
 def model_of(
     tables: PenetrationCampaign, middle: float, pairs: Pairs, plain: Pairs, effects: Sequence[EffectTable],
-    trials: Sequence[Prepared],
+    trials: Sequence[Prepared], errors: Mapping[str, object] | None = None,
 ) -> PenetrationModel:  # fmt: skip
     """The tables of model.toml. `middle`: the diameter [m] whose K and C stand in [surface]; `pairs`: K and C beside
     the effects; `plain`: those of the base model that was fitted without effects, empty where there are none;
-    `trials`: those of the campaign, whose range is noted."""
-    notes: dict[str, Any] = {name: note for name, note in tables.notes.items() if name not in (BASE_NOTE, RANGE_NOTE)}
+    `trials`: those of the campaign, whose range is noted; `errors`: of the fitted numbers, noted too."""
+    ours = (BASE_NOTE, RANGE_NOTE, ERRORS_NOTE)
+    notes: dict[str, Any] = {name: note for name, note in tables.notes.items() if name not in ours}
+    if errors:
+        notes[ERRORS_NOTE] = dict(errors)
     if plain:
         notes[BASE_NOTE] = plain
     if covered := range_of(trials):

@@ -410,11 +410,12 @@ class PenetrationProblem(Problem):
             if rows.any()  # a sensor without readings here is none of its channels
         }  # fmt: skip
 
-    def write_model(self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None) -> None:
-        """model.toml. The slots of `penetration_law` are the parameters of an effect; where trials have several
-        diameters the middle one's K and C stand in [surface] and its diameter in [spike], all of them in [notes]. A
-        trial without a diameter of its own gets that of the campaign's [spike]. [notes] also has K and C of `base`,
-        the model without effects, where there are effects."""
+    def write_model(
+        self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
+        errors: Mapping[str, object] | None = None,
+    ) -> None:  # fmt: skip
+        """See `Problem`. Of several diameters the middle one stands in [surface] and [spike], all in [notes]. A trial
+        without a diameter gets that of the campaign's [spike]."""
         effects = tuple(
             EffectTable(id=form.effect, parameters={
                 **({} if self._file(form) else {"reference": self._scales.depth}),
@@ -424,7 +425,7 @@ class PenetrationProblem(Problem):
         )  # fmt: skip
         plain = self._pairs(base) if forms and base is not None else {}
         write_model(Path(path), model_of(
-            self.tables, self._middle, self._pairs(values), plain, effects, tuple(self._trials.values())
+            self.tables, self._middle, self._pairs(values), plain, effects, tuple(self._trials.values()), errors
         ))  # fmt: skip
 
     def _pairs(self, values: Values) -> Pairs:

@@ -227,7 +227,7 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     if found.verdict == "unknown":
         write_series(folder / "latent.csv", found.latent())
     path = folder / "model.toml"
-    problem.write_model(str(path), found.best_values, found.forms, found.base_values)
+    problem.write_model(str(path), found.best_values, found.forms, found.base_values, found.joint_errors())
     write_text(path, with_comments(path.read_text(encoding="utf-8"), diagnosis["equations"], problem.kind))
     if rows := diagnosis["evidence"]:
         write_series(folder / "evidence.csv", {

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
+from experiments.campaign.tables import ERRORS_NOTE
 from experiments.diagnose.core.effect_texts import advice
 from experiments.diagnose.fit.fitting import SCAN
 from experiments.diagnose.fit.forms import OwnEffect, shapes_of
@@ -289,7 +290,10 @@ class TumbleProblem(Problem):
                 channels[name] = {"t_s": data.time[mine], "measured": data.value[mine], "model": value[mine]}
         return channels
 
-    def write_model(self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None) -> None:
+    def write_model(
+        self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
+        errors: Mapping[str, object] | None = None,
+    ) -> None:  # fmt: skip
         """model.toml, which `hedgebed tumble --model` runs."""
         tables = self.data.tables
         numbers = {name: float(values.get(name, self.forward.nominal[name])) for name in SHARED}
@@ -301,7 +305,8 @@ class TumbleProblem(Problem):
             mine = effects.setdefault(form.effect, {})
             mine |= {name: value for name, (value, _) in self.reported(values, form).items() if math.isfinite(value)}
         model = TumbleModel(
-            **tables.model_dump(include={"format", "kind", "name", "notes"}),
+            **tables.model_dump(include={"format", "kind", "name"}),
+            notes={**tables.notes, **({ERRORS_NOTE: dict(errors)} if errors else {})},
             platform=tables.platform.model_copy(update={name: numbers[name] for name in ("mass", "inertia")}),
             surface=tables.surface.model_copy(update={name: numbers[name] for name in SHARED[2:]}),
             wheel=tables.wheel, rig=tables.rig, uncertainty=tables.uncertainty, sensors=tables.sensors,

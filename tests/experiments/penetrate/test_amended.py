@@ -9,7 +9,7 @@ from golden import golden
 
 from dem.grains.materials import Material
 from experiments.campaign import read_campaign
-from experiments.campaign.tables import BASE_NOTE
+from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE
 from experiments.cli.main import main
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
@@ -177,6 +177,41 @@ def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
     assert numbers["peak_force_amended"] == run["quantities"]["amended_peak_force"]["value"] > 0
     assert numbers["peak_force_spring_damper"] == run["quantities"]["model_peak_force"]["value"]
     assert "plastic-sinkage" in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_the_peak_force_of_a_model_has_the_error_that_its_numbers_and_their_correlation_make(tmp_path):
+    """F = K z + C v on the way in: var F = (z sK)^2 + (v sC)^2 + 2 r z v sK sC; a crater changes no loading."""
+    (s_k, s_c, s_f), r = (2.0, 0.05, 0.03), -0.6
+    note = (f'[notes.{ERRORS_NOTE}]\nnames = ["stiffness", "damping", "plastic-sinkage.crater_share"]\n'
+            f"std = [{s_k}, {s_c}, {s_f}]\ncorrelation = [[1, {r}, 0.2], [{r}, 1, 0.1], [0.2, 0.1, 1]]\n")  # fmt: skip
+    found = {}
+    for name, open_ones in (("known", "[]"), ("open", '["damping"]')):
+        (tmp_path / f"{name}.toml").write_text(MODEL + note + f"undetermined = {open_ones}\n" + CRATER)
+        settings = PenetrateSettings(
+            ground="spring-damper", model=str(tmp_path / f"{name}.toml"), load=0.1, depth=0.01, speeds=(0.1, 0.2),
+            other_speeds=(), drop_speeds=(), other_drop_speeds=(), frame_count=0,
+        )  # fmt: skip
+        found[name] = penetrate.run(settings, tmp_path / name)["quantities"]
+    numbers = found["known"]
+    for v in (0.1, 0.2):
+        peak = numbers[f"peak_force_amended@{v:g}"]
+        z = (peak["value"] - C * v) / K
+        expected = (z * s_k) ** 2 + (v * s_c) ** 2 + 2 * r * z * v * s_k * s_c
+        assert peak["std"] == pytest.approx(expected**0.5, rel=1e-3)
+        assert numbers[f"peak_force_spring_damper@{v:g}"]["std"] is None
+    assert (numbers["stiffness"]["std"], numbers["damping"]["std"]) == (s_k, s_c)
+    unknown = found["open"]["peak_force_amended@0.2"]
+    assert unknown["std"] is None and "determine damping" in unknown["note"]
+
+
+@pytest.mark.parametrize("wrong", ["std = [1.0]", "correlation = [[1.0, 0.0]]", 'std = ["a", "b"]', "names = 3"])
+def test_errors_of_a_model_that_do_not_belong_together_are_refused_by_name(law, wrong):
+    right = {"names": '["stiffness", "damping"]', "std": "[1.0, 0.1]", "correlation": "[[1, 0], [0, 1]]",
+             "undetermined": "[]"}  # fmt: skip
+    name, _, value = wrong.partition(" = ")
+    lines = [f"{key} = {value if key == name else own}\n" for key, own in right.items()]
+    with pytest.raises(ValueError, match=rf"model\.toml.*{ERRORS_NOTE}"):
+        law(f"[notes.{ERRORS_NOTE}]\n" + "".join(lines))
 
 
 def fitted_at(diameter, stiffness, damping):

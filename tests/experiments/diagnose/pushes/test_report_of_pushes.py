@@ -11,6 +11,7 @@ from golden import golden
 from penetration_campaigns import FORCE_STD, campaign_of, saved
 
 from experiments.campaign import Recording, read_campaign, read_model
+from experiments.campaign.tables import ERRORS_NOTE
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose import experiment
@@ -71,6 +72,20 @@ def result(diagnosed):
     """The result and diagnosis.json of the plates, and their run folder."""
     folder, found, _ = diagnosed
     return found, json.loads((folder / "diagnosis.json").read_text()), folder
+
+
+def test_the_model_file_notes_the_errors_of_the_fit_and_their_correlations(diagnosed):
+    folder, _, found = diagnosed
+    note = read_model(folder / "model.toml").notes[ERRORS_NOTE]
+    fitted = dict(found.base_parameters(found.best))
+    for effect in found.effects:
+        fitted |= {f"{effect}.{name}": entry for name, entry in found.parameters(effect).items()}
+    assert note["names"] == [name for name, entry in fitted.items() if entry["std"] is not None]
+    assert note["undetermined"] == [name for name, entry in fitted.items() if entry["std"] is None]
+    assert note["std"] == pytest.approx([fitted[name]["std"] for name in note["names"]], rel=1e-5)
+    correlation = np.array(note["correlation"])
+    assert correlation == pytest.approx(correlation.T) and np.diag(correlation) == pytest.approx(1.0)
+    assert np.linalg.eigvalsh(correlation).min() > -1e-5
 
 
 def test_a_depth_zero_of_one_push_is_found_from_its_replicates():
