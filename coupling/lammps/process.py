@@ -232,6 +232,8 @@ class Lammps:
         """End it, and remove its files. It is asked first, and killed where it does not end."""
         if self._kept is None:
             return
+        # Once only: after an interrupt the numbers of these descriptors may be those of another LAMMPS.
+        kept, self._kept = self._kept, None  # type: ignore[assignment]
         self._ended = self._ended or "LAMMPS was closed"
         os.close(self._commands)
         with suppress(subprocess.TimeoutExpired):
@@ -240,8 +242,7 @@ class Lammps:
         self._process.stdin.close()  # ends what has not ended
         self._process.wait()
         os.close(self._answers)
-        self._kept.cleanup()
-        self._kept = None  # type: ignore[assignment]
+        kept.cleanup()
 
     def __del__(self) -> None:
         with suppress(AttributeError, OSError):  # it never started

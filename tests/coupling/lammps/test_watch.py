@@ -4,8 +4,10 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -99,3 +101,24 @@ def test_an_error_of_lammps_is_told_apart_from_a_killed_rank():
         [lammps.tell(["nonsense"]), lammps.wait()]
     assert ended.value.refused
     lammps.close()
+
+
+def test_a_close_that_was_interrupted_leaves_alone_what_has_got_the_numbers_of_its_pipes(tmp_path):
+    """Else the pipes of another LAMMPS would be closed, which then ends by SIGTERM."""
+
+    def interrupted(within=None):
+        raise KeyboardInterrupt
+
+    lammps = object.__new__(process.Lammps)
+    kept = lammps._kept = tempfile.TemporaryDirectory(dir=tmp_path)
+    lammps._ended = ""
+    lammps._commands, lammps._answers = (os.open(os.devnull, os.O_WRONLY) for _ in range(2))
+    lammps._process = SimpleNamespace(wait=interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        lammps.close()
+    other = os.open(os.devnull, os.O_RDONLY)
+    assert other == lammps._commands
+    lammps.close()
+    os.fstat(other)
+    [os.close(each) for each in (other, lammps._answers)]
+    kept.cleanup()
