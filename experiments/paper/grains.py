@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["AngleOfBeds", "KeptAngle", "angles_of_beds", "kept_angles"]
+__all__ = ["AngleOfBeds", "KeptAngle", "angles_of_beds", "kept_angles", "packed_angles"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +22,7 @@ class KeptAngle:
 
 @dataclass(frozen=True, kw_only=True)
 class AngleOfBeds:
-    """The same tumble on several beds of one grain size (docs/results/tumble-sand)."""
+    """The same tumble on one or several beds of one grain size (docs/results/tumble-sand and paper-signs)."""
 
     surface: str  # Of `hedgebed paper`, beside which it stands
     grains: str  # The material that was computed
@@ -40,6 +40,11 @@ def kept_angles() -> tuple[KeptAngle, ...]:
 def angles_of_beds() -> tuple[AngleOfBeds, ...]:
     """Those of several beds each."""
     return tuple(AngleOfBeds(**entry) for entry in _tables("beds"))
+
+
+def packed_angles() -> tuple[AngleOfBeds, ...]:
+    """Those of JSC-1A of the right cohesion and density, one bed each."""
+    return tuple(AngleOfBeds(**entry) for entry in _tables("packed"))
 
 
 def _tables(name: str) -> Any:

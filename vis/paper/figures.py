@@ -317,10 +317,13 @@ def figure_signs(paper: PaperRun) -> Block | None:
                 axis.axvline(len(paper.torques) * number - 0.5, color=GREY, lw=0.8)
         axis.set_xlim(-0.5, len(places) - 0.5)
     axes[0, 0].set(ylabel="launch angle [degrees]", ylim=(-45.0, 62.0))
+    packed = [entry for entry in kept.get("packed", []) if entry["surface"] in surfaces]
+    denser = [handle(f"{_grains_of(packed, surfaces)} at the powder's density: one bed", BED, marker="D", ls="", ms=5)]
     legend_above(drawing, [
         handle(f"spring-damper of {' and '.join(surfaces)}", MODEL, marker="o", ls="", ms=6),
         handle(f"{_grains_of(kept['one_bed'], surfaces)}: one bed each", BED, marker="s", mfc="none", ls="", ms=6),
         handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three beds, 95 %", BED, marker="s", ls="", ms=6),
+        *(denser if packed else []),
         Patch(color=GREY, alpha=0.22, lw=0, label="the paper: motors about +22.5°, brakes below 0"),
     ], 2)  # fmt: skip
     named = " and ".join(_SOILS[name] for name in surfaces)
@@ -354,6 +357,8 @@ def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, floa
         angles = np.array(entry["angles"])
         half = stdtrit(len(angles) - 1, 0.975) * angles.std(ddof=1) / math.sqrt(len(angles))
         axis.errorbar(place + 0.2, angles.mean(), half, fmt="s", color=BED, ms=5.5, capsize=3)
+    for entry in of_this(kept.get("packed", [])):
+        axis.plot(place + 0.33, entry["angles"][0], "D", color=BED, ms=4.5)
 
 
 def figure_sweep(paper: PaperRun) -> Block | None:

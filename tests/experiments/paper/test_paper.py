@@ -18,7 +18,7 @@ from experiments.cli.main import main
 from experiments.paper.claims import Trials, claims, friction_of_a_rigid_pivot
 from experiments.paper.evidence import RIVALS, evidence, nats, rival_trials
 from experiments.paper.experiment import plan_jobs, run
-from experiments.paper.grains import angles_of_beds, kept_angles
+from experiments.paper.grains import angles_of_beds, kept_angles, packed_angles
 from experiments.paper.settings import PaperSettings
 from experiments.paper.transitions import slip_before_hop
 from experiments.platform.surfaces import find_surface
@@ -178,6 +178,16 @@ def test_angles_of_several_beds_are_those_of_the_kept_runs():
         case = ("jsc-" if entry.surface == "jsc1a" else "") + ("brake" if entry.torque == 6 else f"{entry.torque:g}")
         alike = [row for row in runs if row["case"] == case and float(row["grain_mm"]) == entry.grain]
         assert [float(row["angle_deg"]) for row in alike] == entry.angles, case
+
+
+def test_angles_at_the_density_of_jsc_1a_are_those_of_the_kept_runs():
+    with (RESULTS / "tumble-sand" / "runs.csv").open(encoding="utf-8") as file:
+        motor = [float(row["angle_deg"]) for row in csv.DictReader(file) if row["case"] == "jsc-packed-0.22"]
+    lines = (RESULTS / "paper-signs" / "runs.jsonl").read_text(encoding="utf-8").splitlines()
+    runs = [run for run in map(json.loads, lines) if (run["lever"], run["actuator"]) == ("jsc1a", "brake")]
+    assert {entry.torque: entry.angles for entry in packed_angles()} == {
+        0.22: motor, 6: [run["at_10mm"]["angle"] for run in runs]
+    }  # fmt: skip
 
 
 def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
