@@ -73,6 +73,7 @@ LEVERS: dict[str, dict[str, Any]] = {
     "jsc1a": JSC1A,
     "jsc1a, torque rise 0.25 s": JSC1A | {"effects": RISES, "actuators": ("motor",)},
     "jsc1a, from the surface": JSC1A | SURFACE,
+    "jsc1a, motor from the surface": JSC1A | SURFACE | {"actuators": ("motor",)},
     "weak sand, tip 24 mm": WIDE,
     "weak sand, tip 24 mm, from the surface": WIDE | SURFACE,
     "weak sand, tip 24 mm, torque rise 0.25 s": WIDE | {"effects": RISES, "actuators": ("motor",)},
