@@ -88,7 +88,8 @@ def bounce_warning(run: RobotRun, losses: dict[str, list[float]], law: str) -> l
     most = _most(losses)
     if most["count"] <= FEW_LOSSES:
         return []
-    remedy = say("bounces_bed" if law == DAMPED else "bounces_damped", law=DAMPED)
+    lossy = any(ground.retreat_damping > 0 for ground in run.ground.grounds[0])
+    remedy = say("bounces_bed" if law == DAMPED or lossy else "bounces_damped", law=DAMPED)
     return [say("bounces", law=law, remedy=remedy, **most)]
 
 

@@ -101,6 +101,12 @@ def test_a_foot_that_bounces_in_its_crater_is_counted_and_the_run_warns_of_it_on
     assert float(rise) == pytest.approx(1e3 * speeds.max() ** 2 / 2 / 9.81, rel=0.05)
     (warned,) = [said for said in result.warnings if "in its crater" in said]
     assert f"contact {count} times" in warned and "'power-irreversible'" in warned
+    lossy, lost = concluded(lander, tmp_path, **given, ground="rft", ground_parameters=("loss=1",))
+    assert not [said for said in lost.warnings if "in its crater" in said]
+    assert lossy.columns["fz"].max() == run.columns["fz"].max()  # the landing is the same
+    late = run.columns["time"] > 0.3
+    assert lossy.columns["fz"][late].max() < 2 * 1.5 * 9.81 < run.columns["fz"][late].max()
+    assert lossy.energy_residual < 1e-3
     _, damped = concluded(lander, tmp_path, **given, ground="power-irreversible")
     assert not [said for said in damped.warnings if "in its crater" in said]
     _, flies = concluded(lander, tmp_path, **BOUNCE, duration=0.4)
