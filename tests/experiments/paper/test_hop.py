@@ -285,6 +285,7 @@ def test_a_body_of_ones_own_takes_the_closed_forms_wheel_speed(tmp_path, capsys)
     assert result["numbers"]["mass"] == {"value": 4.0, "unit": "kg", "origin": "given"}
 
 
+@pytest.mark.long
 def test_a_distance_too_far_says_what_each_ground_allows(tmp_path, capsys):
     """Between the two limits the wheel speed for the ground that gives is named, and goes there."""
     _, error = hop(tmp_path, capsys, "--distance", "5000")

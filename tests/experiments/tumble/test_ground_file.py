@@ -159,6 +159,7 @@ def test_a_parameter_at_the_end_of_what_its_law_allows_moves_one_way(written):
     assert stds["force"] == pytest.approx(1.5)
 
 
+@pytest.mark.long
 def test_a_tumble_and_a_hop_on_a_file_state_deviations_and_what_no_law_knows(written, tmp_path):
     path = written(stds={"stiffness": 3.0, "damping": 0.1})
     on_law = tumble.run(tumble.Settings(ground=path, duration=1.0, threads=2), tmp_path / "a")
