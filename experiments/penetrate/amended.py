@@ -204,7 +204,7 @@ class AmendedLaw:
             return said
         # A drop has every speed below its own.
         least, most = 0.0 if dropped else min(driven), max(driven + dropped)
-        pushes = {*own.speeds, *own.other_speeds}
+        pushes = {*own.speeds, *(own.other_speeds if own.on_grains else ())}  # without a bed those of one seed
 
         def is_far(speed: float) -> bool:
             return not least / _SPEED <= speed <= most * _SPEED
@@ -427,6 +427,8 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             "work_returned_spring_damper": (_returned(units, plain), "1", "work out over work in, driven"),
             "work_returned_amended": (_returned(units, runs), "1", f"the same with {law.words}"),
         }
+        if settings.load is None:  # nothing was set down
+            found = {name: own for name, own in found.items() if not name.startswith(("sinkage", "load"))}
         falls = f"; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N" if settings.drop_speeds else ""
         spike = say("model_spike", s=settings, tip_mm=1e3 * settings.tip_diameter, falls=falls)
         fitted = [f"The model was fitted to {law.fitted_to}."] if law.fitted_to else []

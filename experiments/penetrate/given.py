@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -125,7 +126,7 @@ def settings_of_gravity(given: Json, fields: Mapping[str, FieldInfo]) -> Json:
 
 def settings_of_model(given: Json) -> Json:
     """`given` with the spike of its ``model`` where it gives none: tip, diameter, cone angle, mass, and the load m g of
-    the model's drops, where they all had one gravity and no mass is given.
+    the model's drops, where they all had one gravity and no mass is given; and without runs that nobody asked for.
 
     A file that cannot be read, or is no model of penetration, is refused later.
     """
@@ -144,7 +145,27 @@ def settings_of_model(given: Json) -> Json:
         gravities = [trial.gravity for trial in model.trial if trial.mode == "drop"]
         if gravities and math.isclose(min(gravities), max(gravities), rel_tol=1e-6):
             own["load"] = spike.mass * gravities[0]
-    return {name: value for name, value in own.items() if value is not None} | given
+    return {name: value for name, value in own.items() if value is not None} | _asked(given, model) | given
+
+
+def _asked(given: Json, model: PenetrationModel) -> Json:
+    """The runs on a model's law that nobody asked for, left out: no drops where pushes are given or the model has none,
+    and a way out at the fastest of the given speeds."""
+    found: Json = {}
+    pushes, drops = given.get("speeds"), [trial for trial in model.trial if trial.mode == "drop"]
+    if "drop_speeds" not in given and (pushes or not drops):
+        found |= {"drop_speeds": (), "other_drop_speeds": ()}
+    with suppress(TypeError, ValueError):  # what is not accepted is refused later
+        several = pushes if isinstance(pushes, list | tuple) else [pushes]
+        if several and "retreat_speed" not in given:
+            found["retreat_speed"] = max(several, key=_speed)
+    return found
+
+
+def _speed(value: Any) -> float:
+    """A speed [m/s], a number or a text with a unit; raises ValueError or TypeError for what is none."""
+    unit = find_unit("Speeds [m/s].")
+    return unit.value_of(value) if isinstance(value, str) and unit is not None else float(value)
 
 
 def settings_of_ground(given: Json) -> Json:

@@ -27,6 +27,8 @@ BY_FORMULA = "by Terzaghi, cohesion \N{PLUS-MINUS SIGN} 1 std"
 def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     """The short form of a result; None where it has no bed beside a spring-damper."""
     numbers = result.get("quantities", {})
+    if "stiffness_spring_damper" in numbers and "stiffness" in numbers:
+        return _of_model(result)
     if "sinkage_dem" not in numbers or "stiffness" not in numbers:
         return None
     load = f" under {quote(numbers['load']['value'], unit='N')}" if "load" in numbers else ""
@@ -67,6 +69,36 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     return Headline(
         ("", "bed", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
         tuple(map(foldable, warnings)), tuple(map(foldable, shown)), left,
+    )  # fmt: skip
+
+
+def _of_model(result: Mapping[str, Any]) -> Headline:
+    """What was asked of the law of a model.toml: peaks of pushes, sinkages, K and C, beside the spring-damper's."""
+    numbers = result["quantities"]
+    effects = " and ".join(result.get("model", {}).get("effects", ())) or "nothing added"
+
+    def cell(name: str, unit: str = "") -> str:
+        entry = numbers.get(name, {"value": None})
+        return "-" if entry["value"] is None else quote(entry["value"], entry.get("std"), unit or entry["unit"])
+
+    rows = []
+    for name in numbers:
+        if name.startswith("peak_force_amended"):
+            path = numbers[name].get("note", "").partition(", with")[0]
+            rows.append((f"peak force, {path}", cell(name), cell(name.replace("amended", "spring_damper"))))
+    if "sinkage_amended" in numbers:
+        load = quote(numbers["load"]["value"], unit="N")
+        rows.append((f"sinkage at rest under {load}", cell("sinkage_amended"), cell("sinkage_spring_damper")))
+    for name, words in (("stiffness", "stiffness K"), ("damping", "damping C")):
+        rows.append((words, cell(name), cell(f"{name}_spring_damper")))
+    rows.append(
+        ("work recovered on withdrawal", cell("work_returned_amended", "%"), cell("work_returned_spring_damper", "%"))
+    )
+    warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
+    shown = said[: findings_shown(warnings)]
+    return Headline(
+        ("", f"with {effects}", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
+        tuple(map(foldable, warnings)), tuple(map(foldable, shown)), len(said) - len(shown),
     )  # fmt: skip
 
 

@@ -33,6 +33,8 @@ __all__ = ["PLOTS", "draw_amended", "make_plots", "words_of_effects", "write_pen
 _MOST = 4
 """Panels in a row at most."""
 #: Plot -> the kind of run it is of.
+_FIRST = 1.0
+"""Time after the first touch of drops and set-downs that the figure of a law shows [s]."""
 _NEEDS = {"Drag against depth": "driven", "Work in and out": "driven", "Set down under its load": "set_down"}
 _NEEDS |= {"Drops": "drop", "Peaks of the drops": "drop"}
 #: What is drawn of every run, in the report's order: name in words -> function; None where there is no data.
@@ -185,8 +187,7 @@ def _write_law_report(report: Report) -> Path:
     ]
     laws = {"spring_damper": "spring-damper", "amended": f"with {words_of_effects(report.result)}"}
     laws = {"law": str(report.result["ground"])} if of_file else laws
-    sunk = {law: quote(numbers[f"sinkage_{law}"]["value"], None, "m") for law in laws}
-    tiles = [Tile("Sinks", sunk[law], words) for law, words in laws.items()]
+    tiles = [tile for law, words in laws.items() for tile in _law_tiles(numbers, law, words)]
     whose = f"no bed: the law of {'a ground file' if of_file else 'the model'} only"
     sections = [
         Section("", blocks),
@@ -194,6 +195,14 @@ def _write_law_report(report: Report) -> Path:
         again("hedgebed penetrate THIS_FOLDER/run.toml", "From where it was started:"),
     ]
     return report.write(sections, lead=["penetrate", whose], tiles=tiles)
+
+
+def _law_tiles(numbers: Result, law: str, words: str) -> list[Tile]:
+    """How deep a foot rests on a law, or where none is set down, the peak force of its one push."""
+    for title, name, unit in (("Sinks", f"sinkage_{law}", "m"), ("Peak force", f"peak_force_{law}", "N")):
+        if name in numbers:
+            return [Tile(title, quote(numbers[name]["value"], numbers[name]["std"], unit), words)]
+    return []
 
 
 def _by_speed(runs: Sequence[Run]) -> list[tuple[str, list[Run]]]:
@@ -220,11 +229,12 @@ def _draw_panel(axis: Axes, runs: Sequence[Run]) -> None:
         if not driven:
             inside = np.flatnonzero(series.depth > 0)
             start = float(series.time[inside[0]]) if len(inside) else float(series.time[0])
-            across, up = 1e3 * (series.time - start), 1e3 * series.depth
+            shown = series.time <= start + _FIRST  # later bounces are too close to be told apart
+            across, up = 1e3 * (series.time[shown] - start), 1e3 * series.depth[shown]
         axis.plot(across, up, **style)
     axis.axhline(0.0, color=GREY, lw=0.8)
     if driven:
         axis.set(xlabel="depth of the tip [mm]", ylabel="force of the ground [N]")
     else:
         axis.invert_yaxis()
-        axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")
+        axis.set(xlabel="time [ms], at most the first second", ylabel="depth of the tip [mm]")

@@ -22,6 +22,9 @@ Predict = Callable[[Sequence[tuple[Values, Sequence[Form]]], float, Array, Array
 _SPEEDS, _DEPTHS, _HOLDS = (0.3, 1.0, 3.0), (0.5, 1.0, 2.0), (0.0, 30.0)
 """Times the slowest and the fastest speed and the deepest depth of the campaign; seconds."""
 _ROWS = 200  # of a planned push
+_KNOWN = 0.1
+"""Share of the push's depth above which no reading is quoted: there the zero of the depth and the first contact, which
+no form describes, decide the force."""
 
 
 def best_push(
@@ -63,9 +66,11 @@ def best_push(
 
 
 def _apart(z: Array, v: Array, forces: Sequence[tuple[Array, Array]], std: float) -> dict[str, float]:
-    """The reading at which two predictions, each a force with its standard error [N], differ most over their errors."""
+    """The reading at which two predictions, each a force with its standard error [N], differ most over their errors,
+    below the depth at which its zero decides."""
     (one, one_std), (other, other_std) = forces
-    at = int(np.argmax(np.abs(one - other) / np.sqrt(one_std**2 + other_std**2 + std**2)))
+    apart = np.abs(one - other) / np.sqrt(one_std**2 + other_std**2 + std**2)
+    at = int(np.argmax(np.where(z >= _KNOWN * z.max(), apart, -1.0)))
     return {"depth_m": float(z[at]), "speed_m_s": float(v[at]), "one_N": float(one[at]), "other_N": float(other[at]),
             "one_std_N": float(one_std[at]), "other_std_N": float(other_std[at])}  # fmt: skip
 

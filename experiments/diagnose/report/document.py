@@ -159,8 +159,8 @@ def _sizes(found: Diagnosis) -> list[dict[str, Any]]:
 
     The signature is the root mean square of the change over the sensors' noise, as the hidden suite has it
     (docs/diagnose.md). Of the channel in which it is plainest: the change's root mean square and largest size in
-    `unit`, and its share of what the channel reads. `own_force`, of pushes: the effect's own share of the force at the
-    deepest reading, all other numbers of the best model kept.
+    `unit`, and its share of what the channel reads. `own_force`, of pushes: the effect's own share of the force where
+    it is largest, all other numbers of the best model kept.
     """
     sizes = []
     for effect in found.effects:
@@ -173,20 +173,19 @@ def _sizes(found: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _own_force(found: Diagnosis, rest: tuple[Form, ...]) -> dict[str, Any] | None:
-    """The force of an effect [N] at the deepest reading of a push [m], there the force of the whole model [N], and the
-    trial; `rest`: the other forms. None without pushes."""
-    deepest: dict[str, Any] | None = None
+    """The largest force of an effect [N] in the pushes, the depth [m] and the force of the whole model [N] there, and
+    the trial; `rest`: the other forms. None without pushes."""
+    most: dict[str, Any] | None = None
     for trial in (*found.fitted, *found.held_out):
         whole = found.problem.compare(found.best_values, found.forms, trial).get("force", {})
         if "depth_m" not in whole or not len(whole["depth_m"]):
             continue
-        place = int(np.argmax(whole["depth_m"]))
-        depth = float(whole["depth_m"][place])
-        if deepest is None or depth > deepest["depth_m"]:
-            without = found.problem.compare(found.best_values, rest, trial)["force"]["model"]
-            force = float(whole["model"][place])
-            deepest = {"trial": trial, "depth_m": depth, "force_N": force - float(without[place]), "of_N": force}
-    return deepest
+        own = whole["model"] - found.problem.compare(found.best_values, rest, trial)["force"]["model"]
+        place = int(np.argmax(np.abs(np.nan_to_num(own))))
+        if most is None or abs(own[place]) > abs(most["force_N"]):
+            most = {"trial": trial, "depth_m": float(whole["depth_m"][place]), "force_N": float(own[place]),
+                    "of_N": float(whole["model"][place])}  # fmt: skip
+    return most
 
 
 def _size(found: Diagnosis, values: Values, rest: tuple[Form, ...]) -> dict[str, Any]:
@@ -227,7 +226,8 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     if found.verdict == "unknown":
         write_series(folder / "latent.csv", found.latent())
     path = folder / "model.toml"
-    problem.write_model(str(path), found.best_values, found.forms, found.base_values, found.joint_errors())
+    diagnosis["errors"] = found.joint_errors()
+    problem.write_model(str(path), found.best_values, found.forms, found.base_values, diagnosis["errors"])
     write_text(path, with_comments(path.read_text(encoding="utf-8"), diagnosis["equations"], problem.kind))
     if rows := diagnosis["evidence"]:
         write_series(folder / "evidence.csv", {

@@ -58,7 +58,7 @@ def sure_sentences(diagnosis: Row) -> list[str]:
     best = next((row for row in diagnosis["evidence"] if set(row["effects"]) == set(names)), None)
     parts = [] if best is None else [f"{' + '.join(names)} is {best['score']:.0f} nats more likely than the base model"]
     before, after = (diagnosis["gap"][stage]["held_out"] for stage in ("before", "after"))
-    if before is not None:
+    if before is not None and "gap_with_scatter" not in diagnosis:  # else `scatter_sentence` has the gap that decides
         parts.append(f"on held-out trials it changes the gap from {numeral(before)} to {numeral(after)} "
                      "(1 is noise)")  # fmt: skip
     sure = f"Confidence: {'; '.join(parts)}" if parts else ""
@@ -105,8 +105,11 @@ _SPREAD_UNITS = {
 
 
 def spread_sentences(model_std: Mapping[str, float], *, granular: bool) -> list[str]:
-    """By what replicates differ beyond the sensors, a sentence for each kind. `model_std`: kind -> standard deviation;
+    """By what replicates differ beyond the sensors, in a sentence; of several kinds without sizes, which are guesses.
+    `model_std`: kind -> standard deviation;
     `granular`: whether the ground is a bed of grains."""
+    if len(model_std) > 1:
+        return [say("spreads", kinds=" and ".join(model_std))]
     whose = "the bed" if granular else "the surface, the rig or the start"
     return [
         say("spread", kind=kind, std=std, unit=_SPREAD_UNITS.get(kind, "(relative)"),
@@ -133,17 +136,7 @@ def size_sentences(diagnosis: Row) -> list[str]:
         return []
     most = max(size["signature"] for size in sizes)
     words = "; ".join(_size_words(size, is_small=_is_small(size, most)) for size in sizes)
-    return [f"How large: {words}. {say('refitted')}{_own_forces(sizes)}"]
-
-
-def _own_forces(sizes: Sequence[Row]) -> str:
-    """What each effect itself pushes with at the deepest reading; empty where no push shows it."""
-    shown = [(size["effect"], own) for size in sizes if (own := size.get("own_force"))]
-    if not shown:
-        return ""
-    own = shown[0][1]
-    forces = " and ".join(f"that of {effect} is {numeral(one['force_N'], 2)} N" for effect, one in shown)
-    return " " + say("own_force", depth_mm=1e3 * own["depth_m"], of=numeral(own["of_N"], 2), forces=forces)
+    return [f"How large: {words}. {say('refitted')}"]
 
 
 def remark_sentences(diagnosis: Row) -> list[str]:

@@ -9,6 +9,7 @@ from experiments.diagnose.fit.evidence import SMALL
 from experiments.diagnose.fit.gaps import numeral, size_words
 from experiments.diagnose.noise.spectrum import line_sentence
 from vis.diagnose.held_out import worsens_held_out
+from vis.page.numbers import foldable, quote
 
 from .sentences import (
     behind_words,
@@ -21,7 +22,7 @@ from .sentences import (
     unnamed_sentence,
     worse_sentences,
 )
-from .to_use import use_sentences
+from .to_use import law_sentences, number_words, use_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
@@ -100,7 +101,8 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         first += _residue(diagnosis)
     aside = list(dict.fromkeys(row["trial"] for row in diagnosis.get("set_aside", [])))
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
-    return [*_doubts(diagnosis), *_stated_far(diagnosis), *use_sentences(diagnosis), *apart, *first,
+    use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
+    return [*_doubts(diagnosis), *_stated_far(diagnosis), *use, *apart, *first,
             *scatter_sentence(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
 
 
@@ -125,7 +127,8 @@ def _far_words(bound: Mapping[str, Any]) -> str:
 def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
     """How large what is left is, and which numbers absorb a difference in structure; it decides nothing."""
     sentences = []
-    if left := diagnosis.get("residue", []):
+    left = diagnosis.get("residue", [])
+    if left and "gap_with_scatter" not in diagnosis:
         sizes = ", ".join(f"{row['rms']:.2g} {row['unit']} in {row['channel']}" for row in left)
         sentences.append(say("residue", sizes=sizes))
     if far := _strained(diagnosis, "after"):
@@ -153,12 +156,14 @@ def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
     if weighed is None:
         return []
     scatter = diagnosis.get("model_std", {})
-    kinds = [f"{kind.replace('_', ' ')} {size_words(kind, std)}" for kind, std in scatter.items()]
+    kinds = [kind.replace("_", " ") + ("" if len(scatter) > 1 else f" {size_words(kind, std)}")
+             for kind, std in scatter.items()]  # fmt: skip
+    apart = say("inseparable") if len(kinds) > 1 else ""
     freedom = weighed.get("freedom")
     s = "" if freedom == 1 else "s"
     return [say(
         "weighed_none" if diagnosis["verdict"] == "none" else "weighed_both",
-        scatter=f" ({', '.join(kinds)})" if kinds else "", before=_both(weighed["before"], {}),
+        scatter=f" ({' and '.join(kinds)}{apart})" if kinds else "", before=_both(weighed["before"], {}),
         after=_both(weighed["after"], weighed.get("after_std", {})),
         rests_on=f"; the scatter has {freedom} degree{s} of freedom" if freedom else "",
     )]  # fmt: skip
@@ -169,7 +174,7 @@ def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -
 
     def written(key: str) -> str:
         error = errors.get(key)
-        return numeral(gap[key] or 0.0) if error is None else f"{gap[key]:.2f} ± {error:.2g}"
+        return numeral(gap[key] or 0.0) if error is None else foldable(quote(gap[key], error))
 
     out = "" if gap["held_out"] is None else f" ({written('held_out')} held out)"
     return f"{written('fit')} fitted{out}"
@@ -227,10 +232,9 @@ def _numbers(leading: Mapping[str, Any]) -> list[str]:
     for effect, parameters in leading.get("parameters", {}).items():
         for name, told in parameters.items() if effect not in leading["certain"] else ():
             std = told["std"]
-            error = f" ± {std:.2g}" if std else ""
             # nothing that was seen changes with it there
             lost = std is None or std > _LOST * abs(told["value"]) > 0
-            value = f"{effect} {name} {told['value']:.4g}{'' if lost else error} {told['unit']}".removesuffix(" 1")
+            value = f"{effect} {name} {number_words({**told, 'std': None} if lost else told)}"
             parts.append(f"{value} (no standard error: small changes of it have no effect)" if lost else value)
     return [f"Its parameters, if it is the cause: {', '.join(parts)}."] if parts else []
 

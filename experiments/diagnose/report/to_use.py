@@ -1,15 +1,18 @@
-"""Which K and C of pushes and drops to use, and what their standard errors leave out."""
+"""Which K and C of pushes and drops to use, in which law, and what their standard errors leave out."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from experiments.diagnose.fit.gaps import numeral
 from vis.diagnose.usable import has_numbers_to_use, secant_depth
+from vis.page.numbers import foldable, quote
 
 from .sentences import say
 
-__all__ = ["use_sentences"]
+__all__ = ["law_sentences", "number_words", "use_sentences"]
 
+_NEUTRAL = 2.0  # standard errors within which a number is not distinguished from 0
+_STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
 _SHOWN = 4  # diameters whose K is in the sentence; of more it is in the table
 
 
@@ -42,9 +45,46 @@ def _bound(name: str, bound: float) -> str:
 
 
 def _words(name: str, entry: Mapping[str, Any]) -> str:
-    """K = 5932 ± 7.2 N/m at 60 mm"""
-    error = "" if entry["std"] is None else f" ± {entry['std']:.2g}"
-    return f"K = {entry['value']:.4g}{error} {entry['unit']}{_at(name)}"
+    """K = 5932 ± 7 N/m at 60 mm"""
+    return f"K = {number_words(entry)}{_at(name)}"
+
+
+def number_words(entry: Mapping[str, Any]) -> str:
+    """A fitted number with its standard error, both to the same digit, and its unit: 820 ± 120 N/m."""
+    known = entry["std"] is not None and entry.get("determined", True)
+    return foldable(quote(entry["value"], entry["std"] if known else None, entry["unit"], significant=4))
+
+
+def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
+    """The law of pushes with its numbers, which of these are not distinguished from 0, and which depend on one another;
+    none where nothing is named."""
+    rows = [row for row in diagnosis.get("equations", []) if row["equation"]]
+    if diagnosis.get("kind") != "penetration" or not (has_numbers_to_use(diagnosis) and rows):
+        return []
+    numbers = {effect["id"]: effect["parameters"] for effect in diagnosis["effects"]}
+    depth, parts = diagnosis.get("typical_depth_m"), []
+    for row in rows:
+        own = {name: numbers[row["effect"]][name] for name in row["units"] if name in numbers.get(row["effect"], {})}
+        listed = ", ".join(f"{name} = {number_words(entry)}" for name, entry in own.items())
+        parts.append(f"{row['effect']}: {row['equation']}" + (f", with {listed}" if listed else ""))
+    reference = "" if depth is None else say("reference", depth_mm=1e3 * depth)
+    weak = [
+        f"{name} = {number_words(entry)}"
+        for own in numbers.values() for name, entry in own.items()
+        if entry["std"] and entry.get("determined", True) and abs(entry["value"]) < _NEUTRAL * entry["std"]
+    ]  # fmt: skip
+    said = [say("law", parts="; ".join(parts), reference=reference)]
+    said += [say("neutral", listed=", ".join(weak))] if weak else []
+    pairs = _correlated(diagnosis.get("errors", {}))
+    return said + ([say("correlated", listed=", ".join(pairs))] if pairs else [])
+
+
+def _correlated(errors: Mapping[str, Any]) -> list[str]:
+    """The pairs of numbers that depend on one another most, with their correlation."""
+    names, table = errors.get("names", []), errors.get("correlation", [])
+    pairs = [(abs(table[j][k]), j, k) for k in range(len(names)) for j in range(k) if abs(table[j][k]) >= _STRONG]
+    shown = sorted(pairs, reverse=True)[:_PAIRS]
+    return [f"{names[j]} and {names[k]} ({table[j][k]:.2f})" for _, j, k in shown]
 
 
 def _at(name: str) -> str:

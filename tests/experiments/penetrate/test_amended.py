@@ -204,6 +204,20 @@ def test_the_peak_force_of_a_model_has_the_error_that_its_numbers_and_their_corr
     assert unknown["std"] is None and "determine damping" in unknown["note"]
 
 
+def test_one_push_is_predicted_alone_as_it_was_asked_for(tmp_path, capsys):
+    note = f'[notes.{ERRORS_NOTE}]\nnames = ["stiffness"]\nstd = [12.0]\ncorrelation = [[1.0]]\nundetermined = []\n'
+    push = '[[trial]]\nid = "p"\nmode = "driven"\nspeed = 0.05\ngravity = 9.81\ndata = "p.csv"\n'
+    (tmp_path / "model.toml").write_text(MODEL + note + push)
+    tokens = ["penetrate", "--ground", "spring-damper", "--model", str(tmp_path / "model.toml"), "--speeds", "50mm/s"]
+    assert main([*tokens, "--depth", "10mm", "--out", str(tmp_path / "run"), "--quiet"]) == 0
+    shown, result = capsys.readouterr().out, json.loads((tmp_path / "run" / "result.json").read_text())
+    assert [run["kind"] for run in result["runs"]] == ["driven"] and result["warnings"] == []
+    assert not any(name.startswith("sinkage") for name in result["quantities"])
+    assert "1.22 ± 0.12" in shown  # K z + C v, and z times the error of K
+    again = PenetrateSettings(ground="spring-damper", model=str(tmp_path / "model.toml"), speeds=(0.02,), load=0.1)
+    assert again.retreat_speed == 0.02 and {unit.kind for unit in plan_units(again)} == {"driven", "set_down"}
+
+
 @pytest.mark.parametrize("wrong", ["std = [1.0]", "correlation = [[1.0, 0.0]]", 'std = ["a", "b"]', "names = 3"])
 def test_errors_of_a_model_that_do_not_belong_together_are_refused_by_name(law, wrong):
     right = {"names": '["stiffness", "damping"]', "std": "[1.0, 0.1]", "correlation": "[[1, 0], [0, 1]]",
