@@ -1,14 +1,15 @@
 """`hedgebed bed list`, `bed show`, `bed share`: the beds there are, what one of them is, and one as a file to send.
 
-`hedgebed bed foot`: the force on a shape by the table that `bed test plates` measured.
+`hedgebed bed foot`: the force on a shape, or its depth under a load, by the table that `bed test plates` measured.
 """
 
 import json as json_module
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, CoercionError, Parameter
 from rich.console import Console
@@ -16,6 +17,9 @@ from rich.table import Table
 
 from experiments.runs.streams import refusing, say
 from experiments.runs.units import Unit, has_unit
+
+if TYPE_CHECKING:
+    from experiments.bed.standing import Standing
 
 __all__ = ["add_bed_commands"]
 
@@ -37,6 +41,7 @@ def _in_si(kind: str) -> Parameter:
 
 _Length = Annotated[float, _in_si("length")]
 _Gravity = Annotated[float, _in_si("acceleration")]
+_Force = Annotated[float, _in_si("force")]
 _Bed = Annotated[
     str, Parameter(help="A file, the folder of a run of bed make, or its name in the folder HEDGEBED_BEDS.")
 ]
@@ -139,18 +144,27 @@ def _foot(
     shape: Annotated[str, Parameter(help="ball, cone, cylinder, or a file of a closed surface (STL, OBJ).")],
     /,
     *,
-    depth: Annotated[_Length, Parameter(help="Depth of the origin of the shape [m]; a built-in one stands on it.")],
+    depth: Annotated[
+        _Length | None, Parameter(help="Depth of the origin of the shape [m]; a built-in one stands on it.")
+    ] = None,
+    load: Annotated[
+        _Force | None, Parameter(help="Instead of depth: the load, whose depth at rest is predicted [N].")
+    ] = None,
     gamma: Annotated[float, Parameter(help="Direction of motion below the horizontal [degrees].")] = 90.0,
     size: Annotated[_Length, Parameter(help="Diameter of a ball, cone or cylinder [m].")] = 0.024,
     scale: Annotated[_Length, Parameter(help="Unit of the file [m].")] = 1.0,
     gravity: Annotated[_Gravity | None, Parameter(help="Gravity; that of the table if not given [m/s2].")] = None,
     json: _Json = False,
 ) -> int:
-    """Predict the force of a bed on a shape of your own that is pushed, at the speed of the table's plates."""
+    """Predict the force of a bed on a shape of your own at a depth, or the depth at which it rests under a load.
+
+    The law is that of pushed plates, at their speed.
+    """
     import numpy as np
 
     from experiments.bed.plates import shaped
     from experiments.bed.plates_fit import direction_of
+    from experiments.bed.standing import standing_depth
     from experiments.bed.test_settings import SHAPES
     from rigid.digests import check_as_written
     from rigid.ground.rft_table import read_rft
@@ -158,6 +172,10 @@ def _foot(
     with refusing():
         check_as_written(table)
         found = read_rft(table)
+        if (depth is None) == (load is None):
+            raise ValueError("give either --depth (the force is predicted) or --load (the depth is predicted)")
+        if load is not None and gamma != 90:
+            raise ValueError(f"gamma = {gamma:g} degrees with --load: a load rests straight down, 90 was expected")
         for name, value in (("depth", depth), ("size", size), ("scale", scale), ("gravity", gravity)):
             if value is not None and not 0 < value < math.inf:
                 raise ValueError(f"{name} = {value:g} must be positive and finite")
@@ -166,7 +184,12 @@ def _foot(
         if shape not in SHAPES and not Path(shape).is_file():
             raise ValueError(f"shape = {shape!r} is no file, and no built-in shape: {', '.join(SHAPES)}")
         body, way = shaped(shape, size, scale), direction_of(gamma)
+        stands = None if load is None else standing_depth(found, body.pieces, load=load, gravity=gravity)
+        depth = stands.depth if stands is not None else depth
+        assert depth is not None
         warnings = found.beyond(body.pieces, depth=depth, direction=way)
+    if stands is not None:
+        return _show_standing(stands, warnings, json=json)
     force, std = found.force(body.pieces, depth=depth, direction=way, gravity=gravity)
     size_of_law = found.unseen * float(np.linalg.norm(force))
     if json:
@@ -185,6 +208,20 @@ def _foot(
         rms, worst = (100 * error for error in found.shape_errors)
         print(f"it missed other shapes by {rms:.0f} % (rms), by {worst:.0f} % at worst")
     print(f"its plates moved at {found.speed:.3g} m/s; the law does not depend on the speed")
+    for warning in warnings:
+        say(f"warning: {warning}")
+    return 0
+
+
+def _show_standing(stands: "Standing", warnings: Sequence[str], *, json: bool) -> int:
+    """Print the depth at rest with its 95 % interval, and what is not in it."""
+    if json:
+        print(json_module.dumps(asdict(stands) | {"unit": "m", "warnings": list(warnings)}, indent=2))
+        return 0
+    high = "no upper end is known" if stands.high is None else f"{1e3 * stands.high:.2g} mm"
+    print(f"depth at rest = {1e3 * stands.depth:.3g} mm; 95 %: {1e3 * stands.low:.2g} to {high}")
+    print(f"95 %: differences between beds, and the error of the law (rms {100 * stands.law_error:.0f} % of the force)")
+    print("not included: the size of the grains and of the bed, and the uppermost grains on which a foot may stand")
     for warning in warnings:
         say(f"warning: {warning}")
     return 0

@@ -99,7 +99,7 @@ def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) 
         work = _Work(settings, units, softening, folder, progress, plan)
         for seed in settings.seeds:
             work.run_seed(seed)
-        result = conclude(settings, units, softening, folder, progress)
+        result = conclude(settings, work.units, softening, folder, progress, missing=work.missing)
         folder.write_result(result)
         if settings.campaign is not None:
             campaign = campaign_of(settings, result, folder, sensors_of(settings))
@@ -124,18 +124,42 @@ class _Work:
     """The runs of one folder: all of them, and how each is carried out and kept."""
 
     settings: PenetrateSettings
-    units: Sequence[Unit]
+    planned: Sequence[Unit]
     softening: Softening
     folder: RunFolder
     progress: Progress
     plan: PenetratePlan
 
+    @property
+    def missing(self) -> dict[int, str]:
+        """Seed -> why its bed could not be prepared, of those so far."""
+        notes = {seed: self.folder.noted(_missing(seed), None) for seed in self.settings.seeds}
+        return {seed: str(note) for seed, note in notes.items() if note is not None}
+
+    @property
+    def units(self) -> list[Unit]:
+        """The runs, without those of beds that could not be prepared."""
+        return [unit for unit in self.planned if unit.seed not in self.missing]
+
     def run_seed(self, seed: int) -> None:
-        """All runs of one seed that are not finished yet, each from the same bed."""
+        """All runs of one seed that are not finished yet, each from the same bed; none where it cannot be prepared.
+
+        Raises RuntimeError where no bed of any seed can be prepared, and where a run cannot go on.
+        """
+        if seed in self.missing:
+            return
         todo = [unit for unit in self.units if unit.seed == seed and not self.folder.is_done(unit.id)]
         if not todo and self.folder.is_done(f"bed-{seed}"):
             return
-        bed = self._prepared(seed)
+        try:
+            bed = self._prepared(seed)
+        except RuntimeError as error:
+            missing = {**self.missing, seed: str(error)}
+            if len(missing) == len(self.settings.seeds):  # the last one is tried again when the run is resumed
+                raise RuntimeError("; ".join(missing.values())) from error
+            self.folder.mark_done(_missing(seed), str(error))
+            self.progress.message(f"warning: {say('bed_missing', why=error)}")
+            return
         self.plan.bed_is_there()
         softening = replace(self.softening, young=self._young(seed, prepared=True))
         facts = BedFacts.of(bed, seed, softening, self.settings.graded)
@@ -264,12 +288,17 @@ class _Work:
         return True
 
 
+def _missing(seed: int) -> str:
+    """The name under which a folder keeps why the bed of a seed could not be prepared."""
+    return f"missing-{seed}"
+
+
 def _remedy(error: RuntimeError) -> str:
     """What to change where the bed has failed."""
     if "overlap" in str(error):
         return "change young (stiffer grains), the speeds or max_overlap; where grains jam, finer ones or a larger bed"
     if "rest" in str(error) or "rain" in str(error):
-        return "change gravity, bed_size or the seed"
+        return "take another seed (seeds) or another bed_size"
     return "change time_step (shorter), young or the speeds"
 
 

@@ -20,7 +20,7 @@ NOT_INCLUDED = "  (without bed size, softness, speed)"
 """Below an interval: what is not in it."""
 ON_TOP = "  (negative: on the uppermost grains)"
 """Below a sinkage above depth 0."""
-BY_FORMULA = "by Terzaghi, cohesion \N{PLUS-MINUS SIGN} 1 std"
+BY_FORMULA = "by Terzaghi, cohesion at 95 %"
 """Depth that a formula gives where grains that stick are too large to show it."""
 
 

@@ -30,6 +30,8 @@ __all__ = ["answer", "how_sure", "made_units", "sinkage_interval"]
 
 _BESIDE = "jsc-1a-loose-cut"
 """The material to try where grains without cohesion do not bear."""
+_COVERED = 1.96
+"""Half of a 95 % interval over the standard deviation of a normal distribution [1]."""
 
 
 def made_units(settings: PenetrateSettings, units: Sequence[Unit]) -> list[Unit]:
@@ -113,14 +115,15 @@ def _stuck(settings: PenetrateSettings, material: Any) -> Json | None:
 def _by_terzaghi(settings: PenetrateSettings, material: Any, stiffness: float) -> tuple[Json, Json]:
     """The cohesion that a material has and needs, and the depths [m] where K = ``stiffness`` [N/m] carries the rest.
 
-    The ends are those of the cohesion plus and minus one standard deviation. Returns the numbers, and what the
+    The ends are those of the 95 % interval of the cohesion, which is not below 0. Returns the numbers, and what the
     sentences on them take, with "verdict": holds, sinks or open.
     """
     recipe, area = recipe_of(material), math.pi * settings.tip_diameter**2 / 4
     assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
     load, angle = settings.weight, friction_angle(material)
     needs = [load / (bearing_capacity(1.0, phi) * area) for phi in (angle, recipe.circle)]
-    least, most = max(0.0, recipe.cohesion - recipe.cohesion_std), recipe.cohesion + recipe.cohesion_std
+    half = _COVERED * recipe.cohesion_std
+    least, most = max(0.0, recipe.cohesion - half), recipe.cohesion + half
     shares = [max(0.0, 1.0 - most / min(needs)), max(0.0, 1.0 - least / max(needs))]
     low, high = (load * share / stiffness for share in shares)
     found: Json = {
@@ -128,7 +131,7 @@ def _by_terzaghi(settings: PenetrateSettings, material: Any, stiffness: float) -
         "friction_angles": [angle, recipe.circle], "cohesions_enough": needs, "depth_range": [low, high],
     }  # fmt: skip
     told: Json = {
-        "name": material.name, "beside": material.name, "cohesion": recipe.cohesion, "std": recipe.cohesion_std,
+        "name": material.name, "beside": material.name, "cohesion": recipe.cohesion, "least": least, "most": most,
         "angle": angle, "circle": recipe.circle, "large": f"{needs[0]:.2g}", "peak": f"{needs[1]:.2g}",
         "low": _length(low), "high": _length(high), "verdict": "holds" if high == 0 else "sinks" if low > 0 else "open",
     }  # fmt: skip

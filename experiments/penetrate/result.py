@@ -1,6 +1,6 @@
 """From the finished runs of a folder to the result of penetrate: the fit, the same runs on the law, what departs."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 
@@ -37,13 +37,22 @@ SHIPPED_RESULT = Path(__file__).parents[2] / "docs" / "results" / "penetrate-san
 
 
 def conclude(
-    settings: PenetrateSettings, units: list[Unit], softening: Softening, folder: RunFolder, progress: Progress
+    settings: PenetrateSettings,
+    units: list[Unit],
+    softening: Softening,
+    folder: RunFolder,
+    progress: Progress,
+    *,
+    missing: Mapping[int, str],
 ) -> Result:
-    """Fit, make the same runs on the law, compare; write the law's series; return the result."""
+    """Fit, make the same runs on the law, compare; write the law's series; return the result.
+
+    ``missing``: seed -> why its bed could not be prepared; ``units`` has no runs of it.
+    """
     progress.stage("spring-damper", total=1.0)
     notes = {unit.id: folder.done_data(unit.id) for unit in units}
     runs = {name: Penetration.from_columns(folder.read_series(name), note) for name, note in notes.items()}
-    facts = [BedFacts(**folder.done_data(f"bed-{seed}")) for seed in settings.seeds]
+    facts = [BedFacts(**folder.done_data(f"bed-{seed}")) for seed in settings.seeds if seed not in missing]
     material = beds.find_material(settings)
     findings = Findings(settings, units, runs, facts[0].time_step)
     for name, series in findings.models.items():
@@ -56,11 +65,12 @@ def conclude(
     quantities |= _standing_unknown(quantities, sure)
     codes = ({note.get("code") for note in notes.values()} | {folder.code}) - {None, ""}
     doubts = {
-        "fewer than three seeds: the spread between beds is not known well": len(settings.seeds) < 3,
+        "fewer than three seeds: the spread between beds is not known well": len(facts) < 3,
         "parts of this run were computed by different versions of the code: it may not repeat to the bit":
             len(codes) > 1,
     }  # fmt: skip
     found = [
+        *(say("bed_missing", why=why) for why in missing.values()),
         *fast_for_gravity(settings, material.friction),
         *map(stiffer_note, stiffened),
         None if stiffened else overlap_warning(overlap, settings, softening),
@@ -91,6 +101,7 @@ def conclude(
         "departures": departures,
         "bed": bed_entry(facts, settings, softening) | {
             "material": material.name, "rolling_friction": material.rolling_friction, "stiffened": stiffened,
+            **({"missing": {str(seed): why for seed, why in missing.items()}} if missing else {}),
         },
         "spike": asdict(make_spike(settings)) | {"load": settings.weight},
         "warnings": warnings,

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,13 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
     closed = 2e5 * alpha * math.pi * math.tan(half) / (3 * math.cos(half)) * 0.015**3
     assert found["force"][2] == pytest.approx(closed, rel=0.02)
     assert found["std"][2] == pytest.approx(0.05 * found["force"][2], rel=0.01)
+    # The force grows with z^3: so the depth for a load, and the ends by 1.96 times beds (5 %) and law (20 %) together.
+    # The surface is cut into rings, some 3 % of the depth high: that limits a small difference of depths.
+    stands, share = asked("--load", str(found["force"][2])), 1.96 * math.hypot(0.05, 0.2)
+    assert stands["depth"] == pytest.approx(0.015, rel=1e-4)
+    assert stands["std"] == pytest.approx(0.015 * 0.05 / 3, rel=0.1)
+    assert stands["low"] == pytest.approx(0.015 / (1 + share) ** (1 / 3), rel=0.02)
+    assert stands["high"] == pytest.approx(0.015 / (1 - share) ** (1 / 3), rel=0.02)
     for wrong, named in (
         (["cone", "--depth", "-1"], "depth"), (["mud.stl", "--depth", "0.01"], "mud.stl"),
         (["cone", "--depth", "0.01", "--gamma", "100"], "gamma"),
@@ -132,6 +140,9 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
         (["cone", "--depth", "1"], "deep"), (["cone", "--depth", "15s"], "depth"),
         (["cone", "--depth", "0.01", "--out", "x"], "`> FILE`"),
         (["cone", "--depth", "0.01", "--zzz", "1"], "bed foot --help"),
+        (["cone"], "--load"), (["cone", "--depth", "0.01", "--load", "1"], "--load"),
+        (["cone", "--load", "-1"], "load"), (["cone", "--load", "1e6N"], "largest depth"),
+        (["cone", "--load", "1", "--gamma", "45"], "gamma"),
     ):  # fmt: skip
         assert main(["bed", "foot", str(path), *wrong]) == BAD_INPUT
         assert named in capsys.readouterr().err
@@ -143,6 +154,17 @@ def test_forces_that_cancel_by_symmetry_are_printed_as_zero(capsys):
     assert main(["bed", "foot", str(KEPT / "rft.json"), "cylinder", "--size", "16mm", "--depth", "1.4mm"]) == DONE
     printed = [line.split(" = ")[1] for line in capsys.readouterr().out.splitlines()[:3]]
     assert printed[:2] == ["0 N", "0 N"] and float(printed[2].split()[0]) > 0.1
+
+
+def test_the_depth_for_a_load_is_printed_with_its_interval(capsys):
+    """A flat foot of 16 mm under 0.5 N; the force at that depth is the load."""
+    options = ["bed", "foot", str(KEPT / "rft.json"), "cylinder", "--size", "16mm"]
+    assert main([*options, "--load", "0.5N"]) == DONE
+    first = capsys.readouterr().out.splitlines()[0]
+    depth, low, high = (float(word) for word in re.findall(r"[\d.]+", first.replace("95 %", "")))
+    assert low < depth < high
+    assert main([*options, "--depth", f"{depth}mm", "--json"]) == DONE
+    assert json.loads(capsys.readouterr().out)["force"][2] == pytest.approx(0.5, rel=0.01)
 
 
 def test_at_a_tenth_of_the_speed_kept_plates_bear_more_by_what_the_page_says():

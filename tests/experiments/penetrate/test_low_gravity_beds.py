@@ -51,3 +51,33 @@ def test_a_foot_in_grains_that_stick_works_from_one_option_in_low_gravity(tmp_pa
     assert "rest" not in result
     assert result["quantities"]["sinkage_dem"]["value"] < 0.003
     assert result["quantities"]["max_overlap"]["value"] <= settings.max_overlap
+
+
+class Ringing:
+    """A bed whose energy falls a thousandth in a spell without drag, and ten times in one with drag."""
+
+    time_step, weight, mean_diameter = 1e-5, 1.0, 1.0
+
+    def __init__(self, drag_helps):
+        self.kinetic_energy, self.drags, self.drag_helps = 1e-2, [], drag_helps
+
+    def advance(self, steps, *, drag_time):
+        self.drags.append(bool(np.isfinite(drag_time)))
+        self.kinetic_energy *= 0.1 if self.drags[-1] and self.drag_helps else 0.999
+
+    def measure_surface(self):
+        self.measured = True
+
+    mark_origin = measure_surface
+
+
+def test_a_bed_that_rings_is_dragged_until_it_is_at_rest_and_must_be_without():
+    bed = Ringing(drag_helps=True)
+    beds._come_to_rest(bed, unit=1e-3)
+    assert bed.drags == [True] * 4 + [False]  # 1e-2 to below 1e-5
+    assert bed.measured
+
+
+def test_a_bed_that_never_rests_says_how_much_it_moves():
+    with pytest.raises(RuntimeError, match=r"within 0.09 s .* 0.0094 m g d .* less than 1e-05"):
+        beds._come_to_rest(Ringing(drag_helps=False), unit=1e-3)
