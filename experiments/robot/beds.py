@@ -15,6 +15,7 @@ from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import keeping_status, publish
 from vis.page.numbers import quantity as in_words_of
+from vis.robot.answer import BALLISTIC
 
 from . import say
 from .on_grains import RobotOnBed
@@ -100,6 +101,7 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
         departures={"sentences": [*([say("invalid")] if invalid else []), *sentences, *notes]},
         tables=[_each(seeds, results, answers)],
         sure=sure,
+        **({"ballistic": True} if any(set(BALLISTIC.values()) & set(one["quantities"]) for one in results) else {}),
         **{name: first[name] for name in OF_ALL},
         feet_reached=_mean_reached(results),
         beds=[

@@ -14,7 +14,7 @@ from coupling.robot import MujocoRobot, RobotRun
 from . import say
 from .settings import RobotSettings
 
-__all__ = ["fall_warning", "launched", "to_landing", "touch_words"]
+__all__ = ["at_end", "fall_warning", "launched", "to_landing", "touch_words"]
 
 Array = NDArray[np.float64]
 
@@ -41,6 +41,20 @@ def to_landing(run: RobotRun, heights: Array) -> str:
     end = float(run.columns["time"][-1])
     fall = _fall(height, speed, gravity) if gravity > 0 else -height / speed
     return say("landing", fall=fall, height=1e3 * height, wanted=_above(end + fall))
+
+
+def at_end(run: RobotRun, heights: Array) -> tuple[float, float, float] | None:
+    """What is left of a flight at the end of a run: rise of the centre of mass from there [m], its speed upwards [m/s],
+    and the time to the landing [s]; None where gravity alone does not bring the robot back.
+
+    ``heights``: as of `to_landing`. The rise is v^2 / 2 g, 0 where the robot already falls.
+    """
+    gravity = run.robot.gravity
+    if run.robot.hangs or not gravity > 0:
+        return None
+    speed = float(_upwards(run)[-1])
+    fall = _fall(max(0.0, float(heights[-1].min())), speed, gravity)
+    return max(0.0, speed) ** 2 / (2 * gravity), speed, fall
 
 
 def fall_warning(settings: RobotSettings, robot: MujocoRobot) -> list[str]:

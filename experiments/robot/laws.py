@@ -199,13 +199,15 @@ def settle_other_law(
 
 
 def of_sand(settings: RobotSettings, surface: Surface) -> bool:
-    """Whether the law is 3D-RFT with its own numbers, those of dry sand, on sand."""
-    return settings.ground == "rft" and surface.name == "sand" and not settings.ground_parameters
+    """Whether the law is 3D-RFT, whose defaults are those of dry sand, on sand."""
+    return settings.ground == "rft" and surface.name == "sand"
 
 
 def law_notes(settings: RobotSettings, surface: Surface) -> list[str]:
     """Which law a robot on sand stands on, in a sentence; none of another law."""
-    return [say("chosen_law", share=find_law("rft").rebound({}))] if of_sand(settings, surface) else []
+    if not of_sand(settings, surface):
+        return []
+    return [say("chosen_law", share=find_law("rft").rebound(given_parameters(settings)))]
 
 
 def _flat_in_grains(law: str, surface: Surface, largest: Largest) -> list[str]:

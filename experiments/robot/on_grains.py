@@ -32,6 +32,7 @@ from rigid.spatial.quaternions import to_matrix
 from . import say
 from .feet import feet_reached, heights_of
 from .flight import fall_warning, touch_words
+from .forms import forms_of
 from .plan import RobotPlan, width_of
 from .result import RobotFrames, conclude, deepest_at_start, quantities_of, write_series_of
 from .settings import RobotSettings
@@ -80,12 +81,14 @@ class RobotFollowed(Followed[RobotRun]):
             progress.message(sentence)
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
-        sure, said = sure_of_law(self.plan, _answer(run), self._answer_of)
-        return conclude(self.settings, self.plan, run, folder, sure=sure, sure_words=said)
+        best = _answer(run)
+        sure, said = sure_of_law(self.plan, best, self._answer_of)
+        forms = forms_of(self.plan, best, self._answer_of, sure=sure)
+        return conclude(self.settings, self.plan, run, folder, sure=sure, sure_words=said, forms=forms)
 
     def _answer_of(self, plan: RobotPlan) -> dict[str, float]:
         """The answer of the same robot on the law of another plan."""
-        run = RobotFollowed(self.settings, plan).run_on_law()
+        run = RobotFollowed(plan.settings, plan).run_on_law()
         run.run()
         return _answer(run)
 

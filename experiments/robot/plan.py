@@ -112,6 +112,7 @@ class RobotPlan:
         """What was not given, then the warnings."""
         chosen = [] if "ground" in self.settings.model_fields_set else [say("default_law", law=self.law)]
         means = {parameter.name: parameter.summary for parameter in find_law(self.law).parameters}
+        means.pop("gravity", None)  # the robot's too: its origin says enough
         means |= {name: say(f"means_{name}") for name in OF_LAW if name.startswith("mu_")}
         told = []
         for name, number in self.numbers.items():

@@ -19,6 +19,7 @@ from experiments.runs.result import quantities_of as as_quantities
 from experiments.runs.types import Json
 from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
+from vis.robot.answer import BALLISTIC
 
 from . import say
 from .energy import MOST_RESIDUAL, balance_warning
@@ -32,7 +33,8 @@ from .feet import (
     too_deep,
     too_fast,
 )
-from .flight import launched, to_landing
+from .flight import at_end, launched, to_landing
+from .forms import NO_FORMS, Forms
 from .laws import of_sand
 from .plan import RobotPlan
 from .settings import RobotSettings
@@ -52,6 +54,7 @@ FOOT = (
 """Of each foot in series/feet.csv, as `RobotRun.feet` has them; `height_m` of its lowest point stands beside them."""
 
 Array = np.ndarray
+Number = tuple[float | None, str, str]  # Value, unit and note
 
 
 class RobotFrames(PlatformFrames[RobotRun]):
@@ -151,16 +154,18 @@ def conclude(
     across: float = 0.0,
     sure: Json | None = None,
     sure_words: str = "",
+    forms: Forms = NO_FORMS,
 ) -> Result:
     """The result, its series written. On grains `beside` is the robot on the default law of the surface.
 
-    `sure`, `sure_words`: what a law leaves open, as `sure_of_law` has it.
+    `sure`, `sure_words`: what a law leaves open, as `sure_of_law` has it. `forms`: the same robot on the other laws.
     """
     robot, heights = run.robot, heights_of(run)
     write_series_of(run, folder)
     title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
     told = [sure_words] if sure_words else []
-    sentences = [*(told if sure else []), *_sentences(run, heights), *([] if sure else told), *plan.notes]
+    known = [*forms.words, *(told if sure else [])]
+    sentences = [*known, *_sentences(run, heights), *([] if sure or forms.words else told), *plan.notes]
     if run.energy_residual > MOST_RESIDUAL:
         title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
     warnings: list[str | None] = [
@@ -168,7 +173,7 @@ def conclude(
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
-        say("airborne", landing=to_landing(run, heights)) if _airborne(run, heights) else None,
+        _cut_off(run, heights) if _airborne(run, heights) else None,
         *bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law),
         *(too_deep(run, plan.law) if plan.fitted is None else []),
         *([] if settings.on_grains else too_fast(plan, run, heights)),
@@ -181,7 +186,7 @@ def conclude(
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
         "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
         "duration": settings.duration,
-        **({"sure": sure} if sure else {}),
+        **({"sure": sure} if sure else {}), **({"forms": forms.numbers} if forms.numbers else {}),
         "feet": [foot.name for foot in robot.feet], "feet_reached": feet_reached(run, heights),
         "warnings": warnings, "macro_step": run.macro_step, "robot_step": robot.step, "steps": run.master.count,
     }  # fmt: skip
@@ -217,8 +222,9 @@ def _ground_named(plan: RobotPlan) -> str:
         return f"a bed of {plan.surface.name}{' in LAMMPS' if plan.settings.ground == 'lammps' else ''}"
     if plan.fitted is not None:
         return f"{plan.fitted.material} ({plan.law})"
-    own = plan.law == "spring-damper" or of_sand(plan.settings, plan.surface)
-    return f"{plan.surface.name} ({plan.law})" if own else say("other_law", law=plan.law)
+    if of_sand(plan.settings, plan.surface):
+        return f"{plan.surface.name} ({', '.join((plan.law, *plan.settings.ground_parameters))})"
+    return f"{plan.surface.name} ({plan.law})" if plan.law == "spring-damper" else say("other_law", law=plan.law)
 
 
 def _beyond(plan: RobotPlan, run: RobotRun) -> list[str]:
@@ -243,7 +249,7 @@ def quantities_of(run: RobotRun, heights: Array) -> dict[str, Json]:
     flights, touched = _flights(run, heights)
     longest = max((end - begin for begin, end in flights), default=0)
     force = np.linalg.norm([rows[name] for name in ("fx", "fy", "fz")], axis=0)
-    found: dict[str, tuple[float | None, str, str]] = {
+    found: dict[str, Number] = {
         "displacement_x": (float(rows["x"][-1] - rows["x"][0]), "m", say("displacement")),
         "displacement_y": (float(rows["y"][-1] - rows["y"][0]), "m", "likewise"),
         "displacement_z": (float(rows["z"][-1] - rows["z"][0]), "m", "the same, upwards"),
@@ -260,6 +266,7 @@ def quantities_of(run: RobotRun, heights: Array) -> dict[str, Json]:
         "stability": (run.load, "1", say("stability")),
         "energy_residual": (run.energy_residual, "1", say("residual")),
     }
+    found |= _ballistic(run, heights, found)
     notes = {"coupling_residual": say("coupling"), "exchange_residual": say("exchange")}
     if isinstance(run.ground, BedFeet):
         notes |= {"dissipation_reversal": say("reversal")}
@@ -294,6 +301,38 @@ def _highest(run: RobotRun, touched: int | None) -> float:
     return float(z[touched or 0 :].max() - z[0])
 
 
+def _ballistic(run: RobotRun, heights: Array, found: Mapping[str, Number]) -> dict[str, Number]:
+    """The numbers of `BALLISTIC` of a run that ends in a flight; none of another.
+
+    In flight the centre of mass has the acceleration of gravity alone. The feet are taken to keep their place below it.
+    """
+    left = at_end(run, heights) if _airborne(run, heights) else None
+    if left is None:
+        return {}
+    rise, _, fall = left
+    rows, (begin, end) = run.columns, _flights(run, heights)[0][-1]
+    reached = {
+        "highest": float(rows["z"][-1] - rows["z"][0]) + rise,
+        "longest_flight": (end - begin) * run.macro_step + fall,
+        "clearance_largest": float(heights[-1].max()) + rise,
+    }
+    least = {name: found[name][0] for name in BALLISTIC if name in found}
+    least["clearance_largest"] = max(foot["clearance_largest"] for foot in feet_reached(run, heights).values())
+    return {
+        BALLISTIC[name]: (max(value, least[name] or 0.0), "s" if name == "longest_flight" else "m", say("ballistic"))
+        for name, value in reached.items()
+    }
+
+
+def _cut_off(run: RobotRun, heights: Array) -> str:
+    """The warning of a run that ends in a flight, in a sentence."""
+    left, landing = at_end(run, heights), to_landing(run, heights)
+    if left is None:
+        return say("airborne_for_ever", landing=landing)
+    _, touched = _flights(run, heights)
+    return say("airborne", speed=left[1], so_far=1e3 * _highest(run, touched), landing=landing)
+
+
 def _airborne(run: RobotRun, heights: Array) -> bool:
     """Whether the run ends in a flight."""
     flights, _ = _flights(run, heights)
@@ -309,13 +348,13 @@ def _sentences(run: RobotRun, heights: Array) -> list[str]:
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
     rise = 1e3 * _highest(run, touched)
     rose = say("rose", rise=rise) if rise >= 0 else say("stayed_below", rise=-rise)
-    told = [say("went", way=1e3 * way, rose=rose)]
+    told = launched(run, flights[0][0]) if flights else []
+    told.append(say("went", way=1e3 * way, rose=rose))
     longest = 1e3 * run.macro_step * max((end - begin for begin, end in flights), default=0)
     lost = bounce_words(crater_losses(run, heights, apart=APART))
     stayed = say("stayed_in_crater" if lost else "stayed")
     flew = say("flew", count=len(flights), apart=1e3 * APART, longest=longest) if flights else stayed
     told.append(" ".join([flew, *lost]))
-    told += launched(run, flights[0][0]) if flights else []
     sinkage, time = rows["sinkage"], rows["time"]
     deepest = int(sinkage.argmax())
     told.append(say("sank", depth=1e3 * sinkage[deepest], time=time[deepest], end=1e3 * sinkage[-1]))

@@ -11,6 +11,7 @@ from dataclasses import replace
 from experiments.platform.law_spread import moved, spread_of_law
 from experiments.runs.types import Json
 from vis.page.numbers import between, foldable, quote
+from vis.robot.answer import BALLISTIC
 
 from . import say
 from .plan import RobotPlan
@@ -27,9 +28,10 @@ Answer = Mapping[str, float]
 
 
 def answer_of(quantities: Mapping[str, Json], reached: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    """The numbers of `ANSWER` from the quantities and ``feet_reached`` of a result."""
-    clearance = max(foot["clearance_largest"] for foot in reached.values())
-    return {name: clearance if name == "clearance_largest" else float(quantities[name]["value"]) for name in ANSWER}
+    """The numbers of `ANSWER` from quantities and ``feet_reached`` of a result, ballistic ones before others."""
+    values = {name: one["value"] for name, one in quantities.items()}
+    values["clearance_largest"] = max(foot["clearance_largest"] for foot in reached.values())
+    return {name: float(values.get(BALLISTIC.get(name, name), values[name])) for name in ANSWER}
 
 
 def entry(name: str, value: float, low: float, high: float) -> Json:

@@ -58,6 +58,9 @@ def test_the_error_of_a_law_in_other_beds_is_a_share_in_per_cent(tmp_path):
     assert "<td>10.7 %</td>" in page.replace("\N{NO-BREAK SPACE}", " ")
 
 
+RANGE = {"low": 0.011, "high": 0.02, "unit": "m"}
+
+
 def robot_result(**more):
     """The numbers of a robot's result that its answer shows."""
     values = {"highest": 0.01, "longest_flight": 0.2, "clearance_largest": 0.02, "sinkage_largest": 0.0142}
@@ -78,18 +81,23 @@ def robot_result(**more):
             {"ground": "bed", "beds": [], "sure": {"sinkage_largest": {"value": 0.0142, "high": 0.0165, "unit": "m"}}},
             ("14 mm", "2 mm", "not known", "not known"),
         ),
-        ({"ground": "rft"}, ("14 mm", "not known", "no grains", "not known")),
-        (
-            {"ground": "rft", "sure": {"sinkage_largest": {"low": 0.011, "high": 0.02, "unit": "m"}}},
-            ("14 mm", "11 to 20 mm", "no grains", "not known"),
-        ),
+        ({"ground": "rft"}, ("14 mm", "not known")),
+        ({"ground": "rft", "forms": {"ranges": {"sinkage_largest": RANGE}}}, ("14 mm", "11 to 20 mm")),
+        ({"ground": "rft", "sure": {"sinkage_largest": RANGE}}, ("14 mm", "11 to 20 mm", "not known")),
     ],
 )
 def test_a_robot_states_each_error_of_its_answer_or_that_it_is_not_known(more, errors):
     numbers, _ = answer(answer_tiles(robot_result(**more)), robot_result(**more))
     sinkage = next(row for row in numbers.rows if row[0] == "Sinkage")
-    assert tuple(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in sinkage[1:5]) == errors
-    assert len(numbers.head) == 6
+    assert tuple(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in sinkage[1:-1]) == errors
+    assert len(numbers.head) == len(errors) + 2
+
+
+def test_a_flight_that_the_run_cuts_off_heads_the_answer_with_its_apex():
+    result = robot_result(ground="rft")
+    result["quantities"]["rise_ballistic"] = {"value": 4.1, "std": None, "unit": "m"}
+    tile = answer_tiles(result)[0]
+    assert tile.label == "Rise, ballistic" and tile.value.startswith("4.1")
 
 
 def test_the_terminal_of_a_robot_has_the_rows_of_its_report():

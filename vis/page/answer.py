@@ -54,8 +54,11 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     cells = [(*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), row[5]) for row in rows]
     notes = []
     if result.get("experiment") == "mujoco":
-        first = [] if "beds" in result else [say("one_bed" if on_grains else "range_of_law")]
-        notes = [text(" ".join([*first, say("no_error")]), small=True)]
+        keys = {
+            "one_bed": on_grains and "beds" not in result, "range_of_law": 0 in shown and not on_grains,
+            "laws_of_sand": "forms" in result, "no_error": True,
+        }  # fmt: skip
+        notes = [text(" ".join(say(key) for key, told in keys.items() if told), small=True)]
     elif on_grains and any("\N{EN DASH}" in row for row in cells):
         notes = [text(say("empty_cells"), small=True)]
     return [table(head, cells, words=True), *notes]

@@ -8,7 +8,7 @@ from typing import Any
 from vis.page.numbers import between, quantity, quote
 from vis.page.page import Tile
 
-__all__ = ["answer_tiles"]
+__all__ = ["BALLISTIC", "answer_tiles"]
 
 LABELS = {
     "highest": ("Rise", "of the centre of mass after the first touch, over its start"),
@@ -18,18 +18,25 @@ LABELS = {
     "largest_force": ("Largest force", "of the ground"),
 }
 """Number of the answer -> its label and note."""
-UNKNOWN, ONE_BED, NO_GRAINS = "not known", "one bed", "no grains"
+BALLISTIC = {
+    "highest": "rise_ballistic", "longest_flight": "flight_ballistic", "clearance_largest": "clearance_ballistic",
+}  # fmt: skip
+"""Number of the answer -> the quantity in its place where the end of the run cuts off a flight."""
+OF_FLIGHT = "ballistic: v² / 2 g of the speed at the end of the run"
+UNKNOWN, ONE_BED = "not known", "one bed"
 
 
 def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     """Rows of the table at the top of a report, each with its errors in words.
 
     Of chance: half of the 95 % interval over several beds, "one bed" on one, and on a law the range that its numbers
-    leave open. Of grain size, and of bed, softness and speed: no run of a robot has them.
+    leave open. Of grain size: a law has none. The third is on grains of bed, softness and speed, which no run of a
+    robot has, and on a law of its form: the range over the laws of sand.
     """
     quantities, sure, several = result["quantities"], result.get("sure") or {}, "beds" in result
     on_grains = several or "grains" in result or result.get("ground") == "bed"
-    size = UNKNOWN if on_grains else NO_GRAINS
+    forms = (result.get("forms") or {}).get("ranges") or {}
+    ballistic = result.get("ballistic") or any(name in quantities for name in BALLISTIC.values())
     reached = (result.get("feet_reached") or {}).values()
     found = dict(quantities)
     if "clearance_largest" not in quantities and reached:  # of several feet each has its own
@@ -39,13 +46,17 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     for name, (label, note) in LABELS.items():
         if name not in found:  # a folder of an older hedgebed
             continue
-        value, one = quantity(found[name]), sure.get(name)
-        chance = ONE_BED if on_grains else UNKNOWN
+        if ballistic and name in BALLISTIC:
+            label, note = f"{label}, ballistic", OF_FLIGHT
+        value, one = quantity(found.get(BALLISTIC.get(name, name), found[name])), sure.get(name)
+        chance, third = (ONE_BED if on_grains else ""), UNKNOWN
+        if name in forms:
+            third = between(forms[name]["low"], forms[name]["high"], forms[name]["unit"])
         if one is not None and several:
             value = quote(one["value"], one["high"] - one["value"], one["unit"])
             chance = "" if "±" in value else "0"  # `vis.page.answer` takes it from the value
         elif one is not None:
             chance = between(one["low"], one["high"], one["unit"])
-        rows.append(Tile(label, value, note, errors=(chance, size, UNKNOWN)))
+        rows.append(Tile(label, value, note, errors=(chance, UNKNOWN if on_grains else "", third)))
     note = "largest of all beds, of all there was" if several else "of all there was"
     return [*rows, Tile("Energy left over", quantity(quantities["energy_residual"]), note)]

@@ -62,6 +62,10 @@ def test_a_run_that_ends_in_the_air_says_when_it_lands_and_what_a_launch_means(l
     )
     assert float(re.findall(r"by ([0-9.]+) mm", launch)[0]) == pytest.approx(20.0, rel=0.02)
     assert not [said for said in whole.warnings if "cut off" in said]
+    for ballistic, own in (("rise_ballistic", "highest"), ("flight_ballistic", "longest_flight")):
+        assert short.quantities[ballistic].value == pytest.approx(whole.quantities[own].value, rel=0.02, abs=2e-4)
+        assert ballistic not in whole.quantities
+    assert short.quantities["highest"].value < whole.quantities["highest"].value - 5e-4
 
 
 def test_a_robot_that_is_still_falling_at_the_end_is_told_of_it_before_and_a_run_of_that_length_touches(

@@ -1,0 +1,100 @@
+"""By how much the answer of a robot depends on the form of its surface law: the same robot on the other laws of sand.
+
+Each law has its own defaults for sand in the gravity of the run. They differ in what a fast or a flat foot meets:
+inertia of the grains, damping, the power of the depth. None of them is the truth, so their range is an estimate of
+the error that the form of the law makes, and no bound.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from experiments.runs.types import Json
+from vis.page.numbers import between, foldable, quantity
+
+from . import say
+from .laws import given_parameters
+from .plan import RobotPlan, plan_robot
+from .settings import DEFAULT
+from .sure import ANSWER, Answer, entry
+
+__all__ = ["NO_FORMS", "Forms", "forms_of", "other_laws"]
+
+MOST_INERTIA = "inertia=10"
+"""The largest inertia of `rft`, beside its default of plates (rigid/ground/rft.py)."""
+LAWS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    (DEFAULT, ()), (DEFAULT, (MOST_INERTIA,)), ("spring-damper", ()), ("power-irreversible", ()),
+    ("katsuragi-durian", ()), ("bekker", ()),
+)  # fmt: skip
+"""Laws that have numbers for sand, with their parameters."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forms:
+    """The answer on several laws."""
+
+    numbers: Json = field(default_factory=dict)  # As result.json has it under ``forms``; empty without another law
+    words: tuple[str, ...] = ()  # Sentences on it
+
+
+NO_FORMS = Forms()
+
+
+def other_laws(plan: RobotPlan) -> dict[str, RobotPlan]:
+    """Name of each law of sand that this robot may stand on too, with its parameters -> its plan.
+
+    None where the ground is not sand, or where its numbers are given or from a file: what the other laws have are the
+    defaults for sand. The inertia of `rft` alone may be given. Laws that have no numbers for this gravity are left out.
+    """
+    s = plan.settings
+    own = s.stiffness is not None or s.damping is not None or s.scale_with_gravity is not None
+    own |= bool(set(given_parameters(s)) - ({"inertia"} if plan.law == DEFAULT else set()))
+    if plan.surface.name != "sand" or plan.fitted is not None or own:
+        return {}
+    found, here = {}, _named(plan.law, s.ground_parameters)
+    for law, parameters in LAWS:
+        if (name := _named(law, parameters)) == here:
+            continue
+        settings = s.model_copy(update={"ground": law, "ground_parameters": parameters, "controller": None})
+        try:
+            other = plan_robot(settings, model=plan.model)
+        except ValueError:  # no numbers for this gravity
+            continue
+        found[name] = replace(other, controller=plan.controller)
+    return found
+
+
+def forms_of(
+    plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Answer], *, sure: Mapping[str, Json]
+) -> Forms:
+    """The answer on the law of a run and on the others.
+
+    ``best``: answer of the run. ``follow``: runs the robot of a plan and returns its answer. ``sure``: the ranges of
+    the run's own law, which those over the laws include. A law on which the robot cannot run is named and left out.
+    """
+    answers, lost = {_named(plan.law, plan.settings.ground_parameters): best}, []
+    for name, other in other_laws(plan).items():
+        try:
+            answers[name] = follow(other)
+        except (RuntimeError, ValueError):  # lost, or an exchange that would be unstable
+            lost.append(name)
+    if len(answers) == 1:
+        return NO_FORMS
+    ranges = {}
+    for name in ANSWER:
+        values = [answer[name] for answer in answers.values()]
+        values += [sure[name][end] for end in ("low", "high") if name in sure]
+        ranges[name] = entry(name, best[name], min(values), max(values))
+    told = "highest" if best["longest_flight"] > 0 else "sinkage_largest"
+    unit, one = ANSWER[told], ranges[told]
+    each = "; ".join(
+        f"{law} {quantity({'value': answer[told], 'std': None, 'unit': unit})}" for law, answer in answers.items()
+    )
+    ends = between(one["low"], one["high"], unit)
+    words = [say(f"forms_{told}", ends=ends, each=each), *([say("forms_lost", laws=", ".join(lost))] if lost else [])]
+    numbers: Json = {"laws": answers, "ranges": ranges}
+    return Forms(numbers=numbers, words=tuple(map(foldable, words)))
+
+
+def _named(law: str, parameters: tuple[str, ...]) -> str:
+    """A law with the parameters that it is given."""
+    return ", ".join((law, *parameters))

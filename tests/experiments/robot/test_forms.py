@@ -1,0 +1,60 @@
+"""By how much a robot's answer depends on the form of its law: the same robot on the other laws of sand."""
+
+import pytest
+
+from experiments.robot.forms import NO_FORMS, forms_of, other_laws
+from experiments.robot.on_grains import RobotFollowed
+from experiments.robot.plan import plan_robot
+from experiments.robot.settings import RobotSettings
+from experiments.robot.sure import ANSWER
+
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+
+HOPPER = {"model": "hopper", "feet": ("foot",), "height": 0.012, "duration": 0.12}
+OF_1_G = "bekker"
+
+
+def planned(**given):
+    return plan_robot(RobotSettings(**HOPPER | given))
+
+
+def test_other_laws_are_those_with_numbers_for_this_gravity_and_never_the_own():
+    assert set(other_laws(planned())) == {
+        "rft, inertia=10", "spring-damper", "power-irreversible", "katsuragi-durian", OF_1_G,
+    }  # fmt: skip
+    low = other_laws(planned(gravity=0.098, ground="spring-damper"))
+    assert OF_1_G not in low and "spring-damper" not in low and "rft" in low
+    assert "rft, inertia=10" not in other_laws(planned(ground_parameters=("inertia=10",)))
+
+
+@pytest.mark.parametrize(
+    "given", [{"surface": "jsc1a"}, {"stiffness": 900.0}, {"ground_parameters": ("surface_friction=0.2",)}]
+)
+def test_numbers_of_another_ground_have_no_other_laws(given):
+    plan = planned(**given)
+    assert other_laws(plan) == {}
+    assert forms_of(plan, dict.fromkeys(ANSWER, 1.0), lambda _: pytest.fail("ran"), sure={}) == NO_FORMS
+
+
+def test_the_range_holds_each_law_and_a_law_that_fails_is_named():
+    plan, tried = planned(), []
+
+    def follow(other):
+        tried.append(other.law)
+        if other.law == "bekker":
+            raise RuntimeError
+        return dict.fromkeys(ANSWER, 0.1 * len(tried))
+
+    sure = {"highest": {"low": -0.5, "high": 0.6}}
+    forms = forms_of(plan, dict.fromkeys(ANSWER, 0.05), follow, sure=sure)
+    most = max(answer["highest"] for answer in forms.numbers["laws"].values())
+    assert forms.numbers["ranges"]["largest_force"]["low"] == 0.05
+    assert forms.numbers["ranges"]["largest_force"]["high"] == most == pytest.approx(0.1 * (len(tried) - 1))
+    assert forms.numbers["ranges"]["highest"]["low"] == -0.5
+    assert "bekker" in forms.words[-1] and "bekker" not in forms.numbers["laws"]
+
+
+def test_a_robot_on_another_law_moves_as_in_a_run_of_that_law():
+    other = other_laws(planned())["spring-damper"]
+    rows = [RobotFollowed(plan.settings, plan).run_on_law().run() for plan in (other, planned(ground="spring-damper"))]
+    assert rows[0]["sinkage"].max() > 1e-3 and (rows[0]["z"] == rows[1]["z"]).all()
