@@ -59,7 +59,8 @@ class FootForces(AbstractContextManager["FootForces"]):
     law, parameters, scales, under : as `LawFeet` has them; rebound and loss are the same in all parts. With neither
         `scales` nor `under`, a law of grains takes what `parameters` does not have from its defaults for sand, in the
         gravity of `model` and with shape and size of each foot in the posture of `data`, as `hedgebed mujoco` does.
-    depths : name of a part -> depth to which its parameters hold [m]; the first part that goes deeper warns, once.
+    depths, speeds : name of a part -> depth to which its parameters hold [m], and speed into the ground to which its
+        law was compared with grains [m/s]; the first part that is deeper, and the first that is faster, warns, once.
     mu_d : friction of sliding [1].
     slip_speed : below which friction falls with the slip [m/s]; a step of dt needs mu_d g dt at least.
 
@@ -84,6 +85,7 @@ class FootForces(AbstractContextManager["FootForces"]):
         scales: Mapping[str, float] | None = None,
         under: Mapping[str, Mapping[str, float]] | None = None,
         depths: Mapping[str, float] | None = None,
+        speeds: Mapping[str, float] | None = None,
     ) -> None:
         mujoco = self._mujoco = refuse_missing()
         check_above_zero("in m/s", slip_speed=slip_speed)
@@ -92,6 +94,7 @@ class FootForces(AbstractContextManager["FootForces"]):
             gravity = float(np.linalg.norm(model.opt.gravity))
             full = default_law(feet, foot_matrices(data, feet), law, given, gravity=gravity)
             law, scales, under = full["law"], full["scales"], full["under"]
+            speeds = full.get("speeds") if speeds is None else speeds
         scales, under = scales or {}, under or {}
         refuse_defaults(feet, law, given, under)
         found = find_law(law)
@@ -110,10 +113,11 @@ class FootForces(AbstractContextManager["FootForces"]):
                 own = under.get(part.name, given)
                 numbers = found.numbers(own, count=part.share * scales.get(part.name, 1.0))
                 limit = (depths or {}).get(part.name, math.inf)
-                groups += _groups(part, specialised(found, numbers), count, limit)
+                fastest = (speeds or {}).get(part.name, math.inf)
+                groups += _groups(part, specialised(found, numbers), count, limit, fastest)
                 count += len(part.centres)
             self._plans.append((foot, groups))
-        self._zeros, self._warned = [0.0] * count, False
+        self._zeros, self._warned, self._warned_fast = [0.0] * count, False, False
         self._forgotten = _Depths(self._zeros, self._zeros)  # of a law without memory
         self._apply, self._velocity = mujoco.mj_applyFT, mujoco.mj_objectVelocity
 
@@ -183,6 +187,15 @@ class FootForces(AbstractContextManager["FootForces"]):
             stacklevel=2,
         )
 
+    def _warn_fast(self, speed: float, name: str, fastest: float) -> None:
+        """Warn that a part goes into the ground faster than its law was compared with grains [m/s], once."""
+        self._warned_fast = True
+        warnings.warn(
+            f"foot {name!r} goes into the ground at {speed:.3g} m/s, and laws of sand were compared with grains up to "
+            f"{fastest:.3g} m/s (2.6 sqrt(g D)): faster, grains push harder, and a launch is faster",
+            stacklevel=2,
+        )
+
     def _push(self, data: Any, body: int, height: float, m: list[float], groups: Any, depths: _Depths) -> bool:
         """Force and torque of a foot about its origin into `_force` and `_torque`; whether there are any."""
         mu_d, slow, remembers, rebound = self._mu_d, self._slip, self._law.has_memory, self._rebound
@@ -191,7 +204,7 @@ class FootForces(AbstractContextManager["FootForces"]):
         m0, m1, m2, m3, m4, m5, m6, m7, m8 = m
         fx = fy = fz = tx = ty = tz = 0.0
         moving = None
-        for gx, gy, gz, ex, ey, ez, law, radius, spreads, points, limit, name in groups:
+        for gx, gy, gz, ex, ey, ez, law, radius, spreads, points, limit, fastest, name in groups:
             if height + m6 * gx + m7 * gy + m8 * gz > abs(m6) * ex + abs(m7) * ey + abs(m8) * ez:
                 continue
             self.points += len(points)
@@ -218,6 +231,8 @@ class FootForces(AbstractContextManager["FootForces"]):
                     self._velocity(self.model, data, self._kind, body, self._rates, 0)
                     moving = wx, wy, wz, vx, vy, vz = self._rates.tolist()
                 rate = wy * ax - wx * ay - vz
+                if rate > fastest and not self._warned_fast:
+                    self._warn_fast(rate, name, fastest)
                 if not remembers:
                     load = new_depth(depth, rate)
                 elif depth < (top := before[place]):  # `SurfaceLaw.force`, written out as it takes most of the time
@@ -263,14 +278,15 @@ def _springback_of(law: SurfaceLaw, parts: Sequence[Mapping[str, float]]) -> tup
 
 _Group = tuple[
     float, float, float, float, float, float, Specialised, float, dict[int, list[float]], list[tuple[Any, ...]], float,
-    str,
+    float, str,
 ]  # fmt: skip
 """Points of a part. Of all: the middle and half the sides of a box around them [m], the law, the radius of the
 balls that they are the lowest points of [m], or 0. Of each on an ellipsoid: its S as xx, xy, xz, yy, yz, zz [m]. Of
-each: its centre [m], its place among all points of the feet. Of all: the depth to which the law holds [m], the name."""
+each: its centre [m], its place among all points of the feet. Of all: the depth to which the law holds [m], the speed to
+which it was compared with grains [m/s], the name."""
 
 
-def _groups(part: Part, law: Specialised, first: int, limit: float) -> list[_Group]:
+def _groups(part: Part, law: Specialised, first: int, limit: float, fastest: float) -> list[_Group]:
     """The points of a part, the `first`th and on, in a lower and an upper half: mostly one of them is in the air.
 
     A part has balls of one radius, or ellipsoids.
@@ -288,5 +304,5 @@ def _groups(part: Part, law: Specialised, first: int, limit: float) -> list[_Gro
         spreads = {first + int(k): part.spreads[k][np.triu_indices(3)].tolist() for k in some}
         rows = [(*part.centres[k].tolist(), first + int(k)) for k in some]
         own = (radius, {}) if round_ else (0.0, spreads)
-        found.append((*middle.tolist(), *half.tolist(), law, *own, rows, limit, part.name))
+        found.append((*middle.tolist(), *half.tolist(), law, *own, rows, limit, fastest, part.name))
     return found

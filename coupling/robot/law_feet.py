@@ -29,8 +29,8 @@ class LawFeet(LawPoints):
     time_step : [s], of which a macro step has `substeps`.
     scales : name of a part -> how many times the law it has, such as its area over that the law is of [1].
     under : name of a part -> its own parameters, in place of `parameters`.
-    depths : name of a part -> depth to which its parameters hold [m], for those who report a run. All four are
-        those of `law_under_feet`.
+    depths, speeds : name of a part -> depth to which its parameters hold [m], and speed to which its law was compared
+        with grains [m/s], for those who report a run. All five are those of `law_under_feet` and `law_of_run`.
 
     Parameters that are of one foot or of one gravity, such as K, a radius or a gravity, have no defaults here. Raises
     ValueError for one of them that is not given, and for a law or parameter there is not.
@@ -53,8 +53,9 @@ class LawFeet(LawPoints):
         scales: Mapping[str, float] | None = None,
         under: Mapping[str, Mapping[str, float]] | None = None,
         depths: Mapping[str, float] | None = None,
+        speeds: Mapping[str, float] | None = None,
     ) -> None:
-        self.depths = dict(depths or {})
+        self.depths, self.speeds = dict(depths or {}), dict(speeds or {})
         self.feet, scales, under = list(feet), scales or {}, under or {}
         refuse_defaults(self.feet, law, parameters or {}, under)
         self.grounds: list[list[SurfaceGround]] = []

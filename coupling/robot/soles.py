@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,12 +15,15 @@ from rigid.ground.soles import Sole, ill_sized, of_one_foot, sized_law
 from .feet import Foot, Part
 
 __all__ = [
-    "TIP", "FeetLaw", "default_law", "foot_matrices", "law_under_feet", "outline", "plan_area", "refuse_defaults",
-    "sole_of",
+    "FASTEST", "TIP", "FeetLaw", "compared_speeds", "default_law", "foot_matrices", "law_under_feet", "outline",
+    "plan_area", "refuse_defaults", "sole_of",
 ]  # fmt: skip
 
 TIP = 0.012
 """Diameter of the tip that the defaults of the laws of grains are of [m] (`rigid.ground.laws`)."""
+FASTEST = 2.6
+"""Speed of a foot in the ground over sqrt(g D) up to which laws of sand were compared with grains [1]
+(docs/results/mujoco-laws/flat-foot.json); D: diameter of the circle with the area of the foot from above."""
 LEAST = 1e-3
 """Area of a part over that of the tip below which it counts as that much: of a plate that stands on its edge."""
 
@@ -32,6 +35,7 @@ class FeetLaw(TypedDict):
     under: dict[str, Mapping[str, float]]  # Name of a part -> its parameters
     scales: dict[str, float]  # Name of a part -> how many times the law it has [1]
     depths: dict[str, float]  # Name of a part -> depth to which its parameters hold [m]; empty where that is not known
+    speeds: NotRequired[dict[str, float]]  # Name of a part -> speed to which its law was compared with grains [m/s]
 
 
 def plan_area(vertices: Any) -> float:
@@ -136,6 +140,19 @@ def law_under_feet(
     return {"law": name, "under": under, "scales": scales, "depths": depths}
 
 
+def compared_speeds(feet: Sequence[Foot], matrices: ArrayLike, *, gravity: float) -> dict[str, float]:
+    """Name of each part -> speed of its foot to which laws of sand were compared with grains [m/s].
+
+    It is `FASTEST` sqrt(g D), D of the largest part of a foot. ``matrices``: as of `law_under_feet`. Empty without
+    ``gravity`` [m/s2].
+    """
+    found: dict[str, float] = {}
+    for foot, matrix in zip(feet, np.asarray(matrices, dtype=float), strict=True):
+        diameter = max(sole_of(part, matrix, of=TIP).diameter for part in foot.parts)
+        found |= dict.fromkeys((part.name for part in foot.parts), FASTEST * math.sqrt(gravity * diameter))
+    return found if gravity > 0 else {}
+
+
 def foot_matrices(data: Any, feet: Sequence[Foot]) -> Vector:
     """Rotation of each foot in an MjData from its own axes to the world's, shape (foot, 3, 3); after ``mj_forward``."""
     return np.array([data.xmat[foot.body] for foot in feet]).reshape(-1, 3, 3)
@@ -157,7 +174,8 @@ def default_law(
             f"feet in sand"
         )
     values = found.values(found.in_gravity(gravity, given))
-    return law_under_feet(feet, matrices, law, values, of=TIP, given=tuple(given))
+    own = law_under_feet(feet, matrices, law, values, of=TIP, given=tuple(given))
+    return own if hard else {**own, "speeds": compared_speeds(feet, matrices, gravity=gravity)}
 
 
 def refuse_defaults(

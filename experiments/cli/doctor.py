@@ -20,10 +20,12 @@ from experiments.runs.memory import cores_there, memory_there
 from experiments.runs.version import __version__
 from hedgebed_taichi import chosen, unknown_processor
 
-__all__ = ["Finding", "cache_folder", "examine", "show"]
+__all__ = ["TRIES", "Finding", "cache_folder", "examine", "show"]
 
 PYTHONS = ((3, 11), (3, 13))  # oldest and newest that Taichi has wheels for
 GIB = 2**30
+LIMIT = 90.0  # Time that a trial may take [s]
+TRIES = f"Taichi and OpenGL are tried: some seconds, on a busy machine up to {3 * LIMIT / 60:.0f} minutes"
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ def cache_folder() -> Path:
     return Path(given).expanduser() if given else Path.home() / ".cache" / "hedgebed"
 
 
-def probe(*arguments: str, timeout: float = 90.0) -> Answer:
+def probe(*arguments: str, timeout: float = LIMIT) -> Answer:
     """What `experiments.cli.probes` says to `arguments`, asked in a process of its own.
 
     A crash, a hang past `timeout` [s] or an exception comes back as ``{"ok": False, "reason": ...}``.
@@ -113,7 +115,7 @@ def _cache() -> Finding:
 def _opengl(answer: Answer) -> Finding:
     drawn = f"a picture off screen ({answer.get('renderer') or 'renderer unknown'})"
     detail = drawn if answer["ok"] else answer["reason"]
-    remedy = "apt install libegl1 libgl1-mesa-dri (runs work without it; plots stand in for the pictures)"
+    remedy = "only pictures need it: apt install libegl1 libgl1-mesa-dri, or try again when the machine is less busy"
     return Finding("OpenGL", answer["ok"], detail, remedy)
 
 

@@ -331,8 +331,9 @@ def _effects(
 
 def _doctor(*, json: _Json = False) -> int:
     """Check this machine and state what to install."""
-    from experiments.cli.doctor import examine, show
+    from experiments.cli.doctor import TRIES, examine, show
 
+    print(TRIES, file=sys.stderr)
     findings = examine()
     show(findings, as_json=json)
     return DONE if all(finding.ok for finding in findings if finding.required) else FAILED

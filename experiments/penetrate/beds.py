@@ -14,7 +14,7 @@ from experiments.grains.bearing import STICKING, Bearing, bearing_of, sinks_past
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.recipes import recipe_of
 from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material, stable_overlap
-from experiments.grains.staged import staged_bed
+from experiments.grains.staged import come_to_rest, staged_bed
 from experiments.runs.progress import Progress
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
@@ -30,13 +30,9 @@ __all__ = [
     "sinks_away", "stages_of", "stiffened", "within_numbers",
 ]  # fmt: skip
 
-_SPELL, _MOST_SPELLS = 1.5, 60
-"""How long grains are left to come to rest at a time [sqrt(d / g)], and how often at most."""
 _FLAT = 2.0
 """The same of flat tips over those that widen [1]: in `sand-weak` and `sand` moduli chosen without it had to be 1.8 and
 1.9 times as large (docs/results/penetrate-foot-sand-weak, -sand)."""
-_DRAG = 0.3  # Time of the drag at first [sqrt(d / g)]
-_STILL = 1e-5  # Mean kinetic energy at rest [m g d]
 
 
 def find_material(settings: PenetrateSettings) -> Any:
@@ -82,7 +78,7 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
     if first != settings.gravity:
         bed.set_gravity(settings.gravity)
         progress.stage(say("comes_to_rest", seed=seed, gravity=settings.gravity), total=1.0)
-        _come_to_rest(bed, unit=math.sqrt(settings.grain / first), progress=progress)
+        come_to_rest(bed, unit=math.sqrt(settings.grain / first), progress=progress)
     return bed
 
 
@@ -118,7 +114,7 @@ def stiffened(bed: Any, young: float, settings: PenetrateSettings) -> Any:
         bed.state(), material=bed.material.softened(young), time_step=step, max_overlap=bed.overlap_limit
     )
     made.material, made.recipe = bed.material.softened(young), bed.recipe
-    _come_to_rest(made, unit=math.sqrt(settings.grain / STANDARD_GRAVITY) * pace_of(settings))
+    come_to_rest(made, unit=math.sqrt(settings.grain / STANDARD_GRAVITY) * pace_of(settings))
     return made
 
 
@@ -131,32 +127,6 @@ def overlap_bound(settings: PenetrateSettings) -> float:
     if settings.young is not None or settings.time_step is not None:
         return settings.max_overlap
     return stable_overlap(find_material(settings), settings.max_overlap)
-
-
-def _come_to_rest(bed: Any, *, unit: float, progress: Progress | None = None) -> None:
-    """Let grains that have sprung apart come to rest, in a drag first; `unit`: sqrt(d / g) [s]. Then time is 0 again.
-
-    At rest as a bed is when it is prepared: their mean kinetic energy is below 1e-5 m g d, in the drag and then without
-    it. Without drag alone a bed that sticks rings as one spring, and its energy falls ten times in 1.6 s only (5,702
-    grains of 3.2 mm at 1e-3 g, docs/notes/penetrate.md). Raises RuntimeError where they do not come to rest.
-    """
-    steps, drag = math.ceil(_SPELL * unit / bed.time_step), max(_DRAG * unit, 4 * bed.time_step)
-    still, dragged, first = _STILL * bed.weight * bed.mean_diameter, True, 0.0
-    for spell in range(_MOST_SPELLS):
-        bed.advance(steps, drag_time=drag if dragged else math.inf)
-        ratio = bed.kinetic_energy / still
-        if ratio < 1 and not dragged:
-            break
-        dragged = dragged and (spell == 0 or ratio >= 1)
-        first = first or math.log(max(ratio, math.e))
-        if progress is not None:  # the logarithm of the energy falls evenly
-            progress.update(min(1.0, max(0.0, 1 - math.log(max(ratio, 1.0)) / first)))
-    else:
-        waited = _MOST_SPELLS * steps * bed.time_step
-        raise RuntimeError(say("not_at_rest", waited=waited, energy=ratio * _STILL, still=_STILL))
-    bed.measure_surface()
-    bed.mark_origin()
-    bed.max_overlap, bed.steps = 0.0, 0
 
 
 def choose_softness(settings: PenetrateSettings) -> Softening:

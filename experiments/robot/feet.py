@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupling.robot import LawFeet, RobotRun
+from coupling.robot.soles import FASTEST
 from experiments.grains.spells import spells
 
 from . import say
@@ -22,10 +23,6 @@ FEW_LOSSES = 3
 DAMPED = "power-irreversible"  # The law with memory whose damping stops a foot in its crater
 NAMES = ("clearance_largest", "clearance_end", "sinkage_largest", "sinkage_end")
 """Of each foot [m]."""
-
-FASTEST = 2.6
-"""Speed of a foot in the ground over sqrt(g D) up to which laws of sand were compared with grains [1]
-(docs/results/mujoco-laws/flat-foot.json); D: diameter of the circle with the area of the foot from above."""
 
 Array = NDArray[np.float64]
 

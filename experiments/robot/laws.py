@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 from coupling.robot import Foot, law_under_feet
 from coupling.robot.soles import TIP, FeetLaw
@@ -61,6 +61,7 @@ class OneLaw(TypedDict):
 
     law: str
     parameters: Mapping[str, float]
+    speeds: NotRequired[dict[str, float]]  # As of `FeetLaw`
 
 
 @dataclass(frozen=True, kw_only=True)

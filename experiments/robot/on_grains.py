@@ -24,7 +24,8 @@ from dem.contact.timestep import time_step_for
 from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps, moved_to_lammps
 from experiments.grains.on_bed import Forecast, PlatformOnBed
-from experiments.grains.softening import run_limit
+from experiments.grains.softening import Softening, run_limit
+from experiments.grains.staged import come_to_rest
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.spatial.quaternions import to_matrix
@@ -46,6 +47,7 @@ WIDE = 4.0
 PACE = 3.0
 """Grain-steps in a second of processor time [1e6]: the leg for 1 s on 3,921 grains, 1.2e8 grain-steps, took 62 s with
 its bed on one core (docs/notes/mujoco.md). Sleep makes it less."""
+SPARE = 0.2  # Share of the way and depth of the feet that the advised bed has more than it needs
 FEWEST_ACROSS = 5.0  # Grains across the widest part of a foot, below which it is refused [1]
 
 
@@ -222,8 +224,9 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
 
     def _work(self) -> str:
         """Grains, steps and processor time of the run without bed and pictures, in a sentence."""
-        count, steps = self.grain_count(), self.duration / self._time_step()
-        return say("work", count=count, steps=steps, minutes=count * steps / (60e6 * PACE), pace=PACE)
+        count, step = self.grain_count(), self._time_step()
+        run, bed = (count * time / step / (60e6 * PACE) for time in (self.duration, self.costs[self.bed_stage]))
+        return say("work", count=count, steps=self.duration / step, minutes=run, bed=bed, pace=PACE)
 
     def _time_step(self) -> float:
         """Of the grains [s]."""
@@ -243,9 +246,26 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         bed = ExpectedBed(0.5 * s.grain, run_limit(s.max_overlap), grains, step, repeatable=s.ground != "lammps")
         return check_exchange(robot, bed, substeps=s.substeps, iterations=s.iterations)
 
+    @property
+    def first_gravity(self) -> float:
+        return self.settings.settle_gravity or self.gravity
+
+    def prepare(self, softening: Softening, progress: Progress) -> Bed:
+        """The prepared bed in the gravity of the run.
+
+        Rigid grains without cohesion pack alike in any gravity, and settle sqrt(g / g') times as fast in a larger one.
+        """
+        bed = super().prepare(softening, progress)
+        if self.first_gravity != self.gravity:
+            bed.set_gravity(self.gravity)
+            come_to_rest(bed, unit=math.sqrt(self.settings.grain / self.first_gravity))
+        return bed
+
     def check(self) -> None:
         """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this robot."""
         s = self.settings
+        if s.settle_gravity is not None and s.settle_gravity < self.gravity:
+            raise ValueError(say("settle_below", s=s, gravity=self.gravity))
         check_lammps(s)
         for foot in self._robot.feet:
             if not foot.shapes:
@@ -275,18 +295,21 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         sizes = list(s.bed_size)
         wide = WIDE * max(width for width, _ in self._standing)
         for axis, (name, low, high) in enumerate(zip("xy", forecast.low, forecast.high, strict=True)):
-            need = high - low + 2 * s.grain
+            way = high - low
+            need = way + 2 * s.grain
             if s.bed_size[axis] < need:
                 words = {"size": s.bed_size[axis], "low": low, "high": high, "wanted": math.ceil(100 * need) / 100}
                 faults.append(say("too_short", s=s, name=name, **words))
+                need += SPARE * way
             sizes[axis] = max(s.bed_size[axis], math.ceil(100 * max(need, wide) - 1e-6) / 100)
         least = forecast.deepest + 2 * self.spike_diameter
         if s.bed_size[2] < least:
-            sizes[2] = math.ceil(1e3 * least) / 1e3
-            faults.insert(0, say("too_shallow", s=s, f=forecast, width=self.spike_diameter, least=sizes[2]))
+            sizes[2] = math.ceil(1e3 * (least + SPARE * forecast.deepest)) / 1e3
+            words = {"width": self.spike_diameter, "least": math.ceil(1e3 * least) / 1e3}
+            faults.insert(0, say("too_shallow", s=s, f=forecast, **words))
         if faults:
             told = " ".join(f"{size:g}" for size in sizes)
-            raise ValueError(say("all_sides", faults=". ".join(faults), sizes=told))
+            raise ValueError(say("all_sides", s=s, faults=". ".join(faults), sizes=told, spare=SPARE))
 
     @property
     def pressure(self) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
-from coupling.robot.soles import FeetLaw, plan_area, sole_of
+from coupling.robot.soles import FeetLaw, compared_speeds, plan_area, sole_of
 from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number, refuse_other_grains
 from experiments.platform.surfaces import Surface, find_surface, surface_of_grains
@@ -84,7 +84,11 @@ class RobotPlan:
     def feet_options(self, robot: MujocoRobot, *, as_spring: bool = False) -> FeetLaw | OneLaw:
         """The law of `law_feet`, scaled to each foot: arguments of `LawFeet` and `FootForces`."""
         own = law_of(self.settings, self.surface, self.fitted, self.numbers, rule=self.rule, as_spring=as_spring)
-        return own.options(robot.feet, [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)])
+        matrices = [to_matrix(turn) for turn in robot.pose.turn.reshape(-1, 4)]
+        found = own.options(robot.feet, matrices)
+        if self.surface.granular and self.fitted is None:
+            found["speeds"] = compared_speeds(robot.feet, matrices, gravity=robot.gravity)
+        return found
 
     @property
     def law(self) -> str:

@@ -97,6 +97,9 @@ class RobotSettings(GrainsSettings):
     bed_size: tuple[Positive, Positive, Positive] = (0.3, 0.3, 0.08)
     """On a bed: its size along x and y (both periodic) and its depth [m]; the feet start over its middle."""
     grain: Positive = Field(0.006, description="On a bed: mean grain diameter [m].")
+    settle_gravity: Positive | None = None
+    """On a bed: gravity in which it is prepared, lowered to that of the run before the robot starts, to save time
+    [m/s2]; that of the run if not given."""
     ranks: int | None = Field(None, ge=1, le=4096, description=RANKS)
     seeds: tuple[SeedNumber, ...] = ()
     """On a bed: seeds; each prepares one bed, and the result is the mean over the beds with its 95 % interval. One bed,
@@ -173,6 +176,8 @@ class RobotSettings(GrainsSettings):
         for name in NOT_OURS:
             if getattr(self, name) != fields[name].default:
                 return say(f"no_{name}", value=getattr(self, name))
+        if self.settle_gravity is not None and not self.on_grains:
+            return say("of_a_bed", name="settle_gravity", value=self.settle_gravity)
         if self.seeds and not self.on_grains:
             return say("of_a_bed", name="seeds", value=" ".join(map(str, self.seeds)))
         if self.seeds and self.seed != fields["seed"].default:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from dem import Bed
+from experiments.grains.staged import come_to_rest
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.settings import PenetrateSettings
@@ -73,11 +74,11 @@ class Ringing:
 
 def test_a_bed_that_rings_is_dragged_until_it_is_at_rest_and_must_be_without():
     bed = Ringing(drag_helps=True)
-    beds._come_to_rest(bed, unit=1e-3)
+    come_to_rest(bed, unit=1e-3)
     assert bed.drags == [True] * 4 + [False]  # 1e-2 to below 1e-5
     assert bed.measured
 
 
 def test_a_bed_that_never_rests_says_how_much_it_moves():
     with pytest.raises(RuntimeError, match=r"within 0.09 s .* 0.0094 m g d .* less than 1e-05"):
-        beds._come_to_rest(Ringing(drag_helps=False), unit=1e-3)
+        come_to_rest(Ringing(drag_helps=False), unit=1e-3)

@@ -1,16 +1,20 @@
 """What a run on a law of sand states of a foot that is faster or deeper than the law was compared with grains."""
 
 import re
+import warnings
 
 import numpy as np
 import pytest
 
-from experiments.robot.feet import FASTEST, heights_of, too_deep, too_fast
+from coupling.robot import FootForces, find_feet, load_model
+from coupling.robot.soles import FASTEST
+from experiments.robot.feet import heights_of, too_deep, too_fast
 from experiments.robot.on_grains import RobotFollowed
+from experiments.robot.own_loop import law_of_run
 from experiments.robot.plan import plan_robot
 from experiments.robot.settings import RobotSettings
 
-pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
 BALL = """<mujoco><worldbody><body pos="0 0 0.02"><joint type="slide" axis="0 0 1"/>
 <geom name="foot" size="0.015" mass="0.3"/></body></worldbody></mujoco>"""
@@ -44,6 +48,31 @@ def test_a_foot_faster_than_the_pushes_of_grains_is_warned_of_with_the_speed_of_
             assert float(times) == pytest.approx(froude, rel=0.05)
             assert float(speed) == pytest.approx(froude * np.sqrt(gravity * 0.03), rel=0.05)
             assert ("inertia = 1.1" in said) == (ground == "rft")
+
+
+@pytest.mark.parametrize("froude", [1.0, 4.0])
+@pytest.mark.parametrize("of_run", [True, False])
+def test_an_own_loop_warns_of_a_fast_foot_as_a_run_does(tmp_path, froude, of_run):
+    """At the speed v of the warning v / sqrt(g D) is above 2.6; a slower ball gives none."""
+    (tmp_path / "ball.xml").write_text(BALL, encoding="utf-8")
+    model = load_model(tmp_path / "ball.xml")
+    data = mujoco.MjData(model)
+    model.opt.timestep, limit = 2e-4, np.sqrt(9.81 * 0.03)
+    data.qpos[0], data.qvel[0] = -0.0045, -froude * limit
+    mujoco.mj_forward(model, data)
+    law = law_of_run(model, ["foot"], surface="sand").law if of_run else {"law": "rft"}
+    with (
+        warnings.catch_warnings(record=True) as caught,
+        FootForces(model, data, find_feet(model, data, ["foot"]), **law),
+    ):
+        warnings.simplefilter("always")
+        for _ in range(100):
+            mujoco.mj_step(model, data)
+    told = [str(one.message) for one in caught if "m/s" in str(one.message)]
+    assert len(told) == (froude > FASTEST)
+    for said in told:
+        speed, most = re.findall(r"([0-9.]+) m/s", said)
+        assert float(most) == pytest.approx(FASTEST * limit, rel=0.01) and float(speed) > float(most)
 
 
 def test_steel_and_a_slow_foot_have_no_inertia_of_grains(fallen):
