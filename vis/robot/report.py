@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from vis.film.film import ARROWS_OF_FEET, draw_runs, shown
 from vis.film.reel import SpaceReel
 from vis.page.page import Section, listing, table_of, text
-from vis.page.plots import AXES, AXIS_LINES, INK, Array, legend_above, line_styles, mean_over
+from vis.page.plots import AXES, AXIS_LINES, GREY, INK, Array, legend_above, line_styles, mean_over
 from vis.page.report import Report, given, report_of
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frames_of
@@ -30,6 +30,8 @@ REACHED = {
     "sinkage_end": "sinkage at the end [mm]",
 }  # fmt: skip
 """Number of a foot in result.json -> head of its column."""
+STILL = 1e-3
+"""Displacement below which an axis is left out of the path [mm]: a rail keeps a robot in its place."""
 HEIGHTS = (
     "Largest height and depth of the lowest point of each foot, from the undisturbed surface. The clearance is that "
     "after the first touch of any foot."
@@ -52,7 +54,7 @@ def write_robot_report(
     if "beds" in result:
         return write_beds_report(report)
     motion, feet, joints = (report.columns(f"series/{name}.csv") for name in ("motion", "feet", "joints"))
-    drawn = [report.draw("path", _draw_path(motion)), report.draw("ground", _draw_ground(motion, feet, result["feet"]))]
+    drawn = [report.draw("path", _draw_path(motion, feet)), report.draw("ground", _draw_ground(motion, feet, result["feet"]))]
     if (law := law_beside(home)) is not None:
         beside = draw_beside([motion], report.columns(f"series/{law}.csv"), law, called="grains")
         drawn.append(report.draw("beside", beside, law=law))
@@ -81,12 +83,17 @@ def _feet(reached: Mapping[str, Mapping[str, float]]) -> list[Section]:
     return [Section("The feet", [text(HEIGHTS), *blocks])] if blocks else []
 
 
-def _draw_path(motion: Columns) -> Figure:
-    drawing, way, feet = pair("displacement of the centre of mass [mm]", "feet that touch")
+def _draw_path(motion: Columns, feet: Columns) -> Figure:
+    """Path of the centre of mass, along the axes in which it moves, and the height of the lowest foot."""
+    drawing, way, low = pair("displacement [mm]", "height of the lowest foot [mm]")
     for axis, style in AXIS_LINES.items():
-        way.plot(motion["t_s"], 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0]), label=axis, **style)
-    feet.step(motion["t_s"], motion["touching"], color=INK, where="post", lw=1.0)
-    feet.yaxis.set_major_locator(MaxNLocator(integer=True))
+        moved = 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0])
+        if axis == "z" or np.ptp(moved) > STILL:
+            way.plot(motion["t_s"], moved, label=axis, **style)
+    heights = [column for name, column in feet.items() if name.endswith("_height_m")]
+    lowest = np.min(heights, axis=0) if heights else -motion["sinkage_m"]  # a folder of an older hedgebed
+    low.axhline(0.0, color=GREY, lw=0.8)
+    low.plot(motion["t_s"], 1e3 * lowest, color=INK, lw=1.2)
     legend_above(drawing, way.lines, 3)
     return drawing
 
