@@ -231,7 +231,7 @@ _RFT = (
             source="ours"),
     _number("gravity", "m/s2", EARTH_GRAVITY, "gravity of the grains: 1 g even in the rig", highest=100.0,
             above_lowest=True, source="docs/planar.md"),
-    _number("inertia", "1", 1.1, "lambda of the term lambda rho v_n^2", highest=10.0,
+    _number("inertia", "1", 1.1, "factor of rho v_n^2, the pressure of grains that are accelerated", highest=10.0,
             source="1.1 for plates dragged level, 1 for a wheel: Agarwal et al. (2021), see rft.py"),
 )  # fmt: skip
 """Of the grains, of all laws of 3D-RFT."""

@@ -54,7 +54,8 @@ def write_robot_report(
     if "beds" in result:
         return write_beds_report(report)
     motion, feet, joints = (report.columns(f"series/{name}.csv") for name in ("motion", "feet", "joints"))
-    drawn = [report.draw("path", _draw_path(motion, feet)), report.draw("ground", _draw_ground(motion, feet, result["feet"]))]
+    drawn = [report.draw("path", _draw_path(motion, feet))]
+    drawn.append(report.draw("ground", _draw_ground(motion, feet, result["feet"])))
     if (law := law_beside(home)) is not None:
         beside = draw_beside([motion], report.columns(f"series/{law}.csv"), law, called="grains")
         drawn.append(report.draw("beside", beside, law=law))
