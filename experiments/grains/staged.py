@@ -14,12 +14,13 @@ from experiments.runs.progress import Progress
 from . import say
 from .bed_progress import Stages
 
-__all__ = ["check_bed_stages", "come_to_rest", "staged_bed"]
+__all__ = ["check_bed_stages", "come_to_rest", "lower_gravity", "staged_bed"]
 
 _SPELL, _MOST_SPELLS = 1.5, 60
 """How long grains are left to come to rest at a time [sqrt(d / g)], and how often at most."""
 _DRAG = 0.3  # Time of the drag at first [sqrt(d / g)]
 _STILL = 1e-5  # Mean kinetic energy at rest [m g d]
+_CARRIED = 0.02  # Share of the weight by which the force on the floor may differ from it
 
 
 def check_bed_stages(
@@ -75,6 +76,25 @@ def staged_bed(
         raise RuntimeError(str(error)) from error
     assert prepared.bed is not None
     return prepared.bed
+
+
+def lower_gravity(bed: Any, gravity: float, *, unit: float) -> None:
+    """Lower gravity to this [m/s2], and let the grains come to rest until the floor carries their weight.
+
+    ``unit``: sqrt(d / g) in the gravity before [s]. Stiff grains ring for longer than their kinetic energy shows.
+    Raises RuntimeError where they do not come to rest.
+    """
+    bed.set_gravity(gravity)
+    come_to_rest(bed, unit=unit)
+    for _ in range(_MOST_SPELLS):
+        if abs(bed.floor_force / bed.weight - 1) < _CARRIED:
+            break
+        bed.advance(math.ceil(_SPELL * unit / bed.time_step))
+    else:
+        raise RuntimeError("the floor does not come to carry the weight of the bed after gravity was lowered")
+    bed.measure_surface()
+    bed.mark_origin()
+    bed.max_overlap, bed.steps = 0.0, 0
 
 
 def come_to_rest(bed: Any, *, unit: float, progress: Progress | None = None) -> None:

@@ -21,6 +21,8 @@ __all__ = ["NO_FORMS", "Forms", "forms_of", "other_laws"]
 
 MOST_INERTIA = "inertia=10"
 """The largest inertia of `rft`, beside its default of plates (rigid/ground/rft.py)."""
+OF_MOTION = {"inertia", "rebound", "loss", "loss_speed"}
+"""Parameters that change how a law follows a motion, not how strong the sand is."""
 LAWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (DEFAULT, ()), (DEFAULT, (MOST_INERTIA,)), ("spring-damper", ()), ("power-irreversible", ()),
     ("katsuragi-durian", ()), ("bekker", ()),
@@ -43,11 +45,11 @@ def other_laws(plan: RobotPlan) -> dict[str, RobotPlan]:
     """Name of each law of sand that this robot may stand on too, with its parameters -> its plan.
 
     None where the ground is not sand, or where its numbers are given or from a file: what the other laws have are the
-    defaults for sand. The inertia of `rft` alone may be given. Laws that have no numbers for this gravity are left out.
+    defaults for sand. Those of `OF_MOTION` may be given. Laws that have no numbers for this gravity are left out.
     """
     s = plan.settings
     own = s.stiffness is not None or s.damping is not None or s.scale_with_gravity is not None
-    own |= bool(set(given_parameters(s)) - ({"inertia"} if plan.law == DEFAULT else set()))
+    own |= bool(set(given_parameters(s)) - OF_MOTION)
     if plan.surface.name != "sand" or plan.fitted is not None or own:
         return {}
     found, here = {}, _named(plan.law, s.ground_parameters)

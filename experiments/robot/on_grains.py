@@ -25,7 +25,7 @@ from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps, moved_to_lammps
 from experiments.grains.on_bed import Forecast, PlatformOnBed
 from experiments.grains.softening import Softening, run_limit
-from experiments.grains.staged import come_to_rest
+from experiments.grains.staged import lower_gravity
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.spatial.quaternions import to_matrix
@@ -257,8 +257,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         """
         bed = super().prepare(softening, progress)
         if self.first_gravity != self.gravity:
-            bed.set_gravity(self.gravity)
-            come_to_rest(bed, unit=math.sqrt(self.settings.grain / self.first_gravity))
+            lower_gravity(bed, self.gravity, unit=math.sqrt(self.settings.grain / self.first_gravity))
         return bed
 
     def check(self) -> None:

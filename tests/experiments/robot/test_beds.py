@@ -9,6 +9,7 @@ from spatial_runs import EXAMPLES, grain_bed
 
 from experiments.compare.robots import read_moved
 from experiments.grains.bed_progress import show_bed
+from experiments.grains.on_bed import PlatformOnBed
 from experiments.platform.law_spread import moved
 from experiments.robot import experiment as robot
 from experiments.robot.feet import heights_of
@@ -145,6 +146,26 @@ def test_a_preparation_is_expected_to_last_longer_in_less_gravity_and_a_robot_is
     runs = [RobotSettings(**ON_BED, gravity=g) for g in (9.81, 0.0981)]
     costs = [RobotOnBed(settings, plan_robot(settings)).costs for settings in runs]
     assert costs[1]["bed"] == pytest.approx(10 * costs[0]["bed"]) and costs[0]["robot"] == costs[1]["robot"] == 0.2
+
+
+def test_a_bed_prepared_in_more_gravity_rests_in_that_of_the_run(monkeypatch):
+    """The floor carries the weight of the grains in the run's gravity."""
+    made = []
+    monkeypatch.setattr(PlatformOnBed, "prepare", lambda *_: made.append(grain_bed()) or made[0])
+    settings = RobotSettings(**ON_BED | {"grain": 0.006}, gravity=0.0981, settle_gravity=9.81)
+    on_bed = RobotOnBed(settings, plan_robot(settings))
+    assert on_bed.first_gravity == 9.81
+    bed = on_bed.prepare(None, Progress())
+    assert bed is made[0] and bed.gravity[2] == pytest.approx(-0.0981) and bed.steps == 0
+    assert bed.floor_force == pytest.approx(bed.weight, rel=0.02)
+
+
+def test_another_gravity_of_a_bed_is_refused_below_that_of_the_run_and_on_a_law():
+    settings = RobotSettings(**ON_BED, gravity=9.81, settle_gravity=1.0)
+    with pytest.raises(ValueError, match=r"settle_gravity = 1 m/s2 is below"):
+        RobotOnBed(settings, plan_robot(settings)).check()
+    with pytest.raises(ValueError, match=r"settle_gravity = 1\.0 belongs"):
+        RobotSettings(**HOPPER, settle_gravity=1.0)
 
 
 def surely(path, **given):
