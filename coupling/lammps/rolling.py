@@ -79,15 +79,17 @@ class RollingClasses:
         """The commands by which LAMMPS follows the loads."""
         if self.count == 1:
             return []
-        load = "-(f_load[1]+f_load[2]+f_load[3])"
-        cube = f"({self._pull:.17g}+{0.375 * SHARE / self.two_e:.17g}*({load}))/{self._first:.17g}"
+        ahead = f"v_load+{0.5 * (PERIOD + 1) / (PERIOD - 1):.17g}*(v_load-v_past)*(v_past!=0)"
+        cube = f"({self._pull:.17g}+{0.375 * SHARE / self.two_e:.17g}*({ahead}))/{self._first:.17g}"
         number = f"1+ln(v_cube*(v_cube>1)+(v_cube<=1))/{math.log(_STEP):.17g}"
         bounded = f"round(v_number*(v_number<{self.count})+{self.count}*(v_number>={self.count}))"
         return [
             "compute press all stress/atom NULL pair",
-            # One sample: with several, the values between two times are sums.
-            f"fix load all ave/atom {PERIOD} 1 {PERIOD} c_press[1] c_press[2] c_press[3]",
+            # Two samples, of which the second ends a mean that is not used: between them the values are the first.
+            f"fix load all ave/atom 1 2 {PERIOD} c_press[1] c_press[2] c_press[3]",
+            f"fix past all ave/atom {PERIOD} 1 {PERIOD} c_press[1] c_press[2] c_press[3]",
             f"fix lists all balance {PERIOD} 1e9 shift xy 1 1e9",
+            *(f"variable {name} atom -(f_{name}[1]+f_{name}[2]+f_{name}[3])" for name in ("load", "past")),
             f"variable cube atom {cube}",
             f"variable number atom {number}",
             f"variable class atom type+(abs(v_number-type)>{_HOLD})*({bounded}-type)",
