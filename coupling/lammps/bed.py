@@ -229,7 +229,7 @@ class LammpsBed:
         new = [line for body in self._bodies if not body.made for line in body.create()]
         late, now = ([line for body in self._bodies for line in body.motion(self.steps, late=k)] for k in (1, 0))
         names = [name for body in self._bodies for name in body.names]
-        self._lammps.tell([*(["unfix sums"] if self._sums.size else []), *late, *new])
+        self._lammps.tell([*(["unfix sums"] if self._sums.size else []), *late, *new, *self._classes.walls(names)])
         if names:
             # LAMMPS takes a region's velocity from its place a step before. So a setup with the bodies there comes
             # first, in which they touch nothing, lest contacts end.
@@ -360,12 +360,15 @@ class LammpsBed:
         return pairs[touching, 0], pairs[touching, 1], overlap[touching]
 
     def _loads(self, grains: Grains) -> Vector:
-        """Half the sum of r . F of each grain's contacts with grains, by their springs [N m], shape [grain_count]."""
+        """Load of each grain as `.rolling` has it, by the springs of grains and floor [N m], shape [grain_count]."""
         first, second, overlap = self._touching(grains.position)
         r_1, r_2 = self.radius[first], self.radius[second]
         force = spring_force(self._grain_row, self.material.cohesion, overlap, r_1 * r_2 / (r_1 + r_2))
         half = 0.5 * (r_1 + r_2 - overlap) * force
-        return sum((np.bincount(side, half, self.grain_count) for side in (first, second)), np.zeros(self.grain_count))
+        height = grains.position[:, 2]
+        pressed = np.maximum(0.0, self.radius - height)
+        floor = height * spring_force(self._rows[FLOOR], self.material.cohesion, pressed, self.radius) * (pressed > 0)
+        return sum((np.bincount(side, half, self.grain_count) for side in (first, second)), floor)
 
     def _look(self, position: Vector) -> tuple[Vector, Vector, Vector]:
         """`_touching`, with the largest overlap kept. Raises BedFailure past its bound, which only a look can see."""

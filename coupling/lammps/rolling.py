@@ -3,14 +3,15 @@
 Our law has the spring 8 G* a, which follows the contact radius a and so the load. In LAMMPS an atom type is a class of
 load: a grain's mean contact radius, in steps of 26 %. The spring of two types is 8 G* a of a contact that both carry.
 
-A grain's load is its virial W = 1/2 sum r_ij . F_ij, of `compute stress/atom`: its radius times the sum of the forces
-of its contacts with grains; those with floor and bodies are not counted. The force between i and j follows from the
+A grain's load W is its radius times the sum of the forces of its contacts: with grains its virial 1/2 sum r_ij . F_ij,
+of `compute stress/atom`, with floor and bodies the arm times the force. The force between i and j follows from the
 sums S = W / R of both as `SHARE` S_i S_j / (S_i + S_j). With Hertz' a^3 = 3 R* F / (4 E*) this is
 a^3 = 2 c_i c_j / (c_i + c_j), where c = 3 `SHARE` W / (16 E*) for a grain.
 
-Types change every `PERIOD` steps, by the loads `PERIOD` - 1 steps before. What a rank knows of grains beyond its
-border, or beyond the box's, is renewed with its neighbour lists alone. So `fix balance`, which never balances, makes
-these lists every `PERIOD` steps, and types change just before: all ranks have the same spring for a contact.
+Types change every `PERIOD` steps, by the loads of the step before, carried on in a straight line to the middle of the
+time in which they hold. What a rank knows of grains beyond its border, or beyond the box's, is renewed with its
+neighbour lists alone. So `fix balance`, which never balances, makes these lists every `PERIOD` steps, and types change
+just before: all ranks have the same spring for a contact.
 """
 
 import math
@@ -79,21 +80,35 @@ class RollingClasses:
         """The commands by which LAMMPS follows the loads."""
         if self.count == 1:
             return []
-        ahead = f"v_load+{0.5 * (PERIOD + 1) / (PERIOD - 1):.17g}*(v_load-v_past)*(v_past!=0)"
-        cube = f"({self._pull:.17g}+{0.375 * SHARE / self.two_e:.17g}*({ahead}))/{self._first:.17g}"
+        growth = f"{0.5 * (PERIOD + 1) / (PERIOD - 1):.17g}*(v_load-v_past)*(v_past!=0)"
+        ahead = (
+            "v_load+(v_growth>-0.5*v_load)*v_growth-(v_growth<=-0.5*v_load)*0.5*v_load"  # Half of what it is, or more
+        )
+        cube = f"({self._pull:.17g}+{0.375 * SHARE / self.two_e:.17g}*v_ahead)/{self._first:.17g}"
         number = f"1+ln(v_cube*(v_cube>1)+(v_cube<=1))/{math.log(_STEP):.17g}"
         bounded = f"round(v_number*(v_number<{self.count})+{self.count}*(v_number>={self.count}))"
         return [
             "compute press all stress/atom NULL pair",
             # Two samples, of which the second ends a mean that is not used: between them the values are the first.
-            f"fix load all ave/atom 1 2 {PERIOD} c_press[1] c_press[2] c_press[3]",
-            f"fix past all ave/atom {PERIOD} 1 {PERIOD} c_press[1] c_press[2] c_press[3]",
+            *self.walls([]),
+            f"fix load all ave/atom 1 2 {PERIOD} c_press[1] c_press[2] c_press[3] v_walls",
+            f"fix past all ave/atom {PERIOD} 1 {PERIOD} c_press[1] c_press[2] c_press[3] v_walls",
             f"fix lists all balance {PERIOD} 1e9 shift xy 1 1e9",
-            *(f"variable {name} atom -(f_{name}[1]+f_{name}[2]+f_{name}[3])" for name in ("load", "past")),
+            *(f"variable {name} atom f_{name}[4]-(f_{name}[1]+f_{name}[2]+f_{name}[3])" for name in ("load", "past")),
+            f"variable growth atom {growth}",
+            f"variable ahead atom {ahead}",
             f"variable cube atom {cube}",
             f"variable number atom {number}",
             f"variable class atom type+(abs(v_number-type)>{_HOLD})*({bounded}-type)",
         ]
+
+    def walls(self, names: Sequence[str]) -> list[str]:
+        """The command that has the forces of the floor and of these pieces of bodies count in the loads."""
+        if self.count == 1:
+            return []
+        arms = ("x", 5), ("y", 6), ("z", 7)
+        work = "+".join(f"({x}-f_{wall}[{k}])*f_{wall}[{k - 3}]" for wall in ["floor", *names] for x, k in arms)
+        return [f"variable walls atom {work}"]
 
     def runs(self, begin: int, steps: int, since: int) -> list[str]:
         """The commands of ``steps`` time steps from step ``begin``, with the changes of type among them.
