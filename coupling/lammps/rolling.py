@@ -80,25 +80,25 @@ class RollingClasses:
         """The commands by which LAMMPS follows the loads."""
         if self.count == 1:
             return []
-        growth = f"{0.5 * (PERIOD + 1) / (PERIOD - 1):.17g}*(v_load-v_past)*(v_past!=0)"
-        ahead = (
-            "v_load+(v_growth>-0.5*v_load)*v_growth-(v_growth<=-0.5*v_load)*0.5*v_load"  # Half of what it is, or more
-        )
-        cube = f"({self._pull:.17g}+{0.375 * SHARE / self.two_e:.17g}*v_ahead)/{self._first:.17g}"
-        number = f"1+ln(v_cube*(v_cube>1)+(v_cube<=1))/{math.log(_STEP):.17g}"
-        bounded = f"round(v_number*(v_number<{self.count})+{self.count}*(v_number>={self.count}))"
+        rate = 0.5 * (PERIOD + 1) / (PERIOD - 1)
+        # A variable is evaluated anew wherever it stands, so each stands seldom: max(0, x) = (x + |x|) / 2.
+        over = f"0.5*f_load+{rate:.17g}*(f_load-f_past)*(f_past!=0)"  # By how much the load to come is over half of it
+        to_come = "0.5*(f_load+v_over+abs(v_over))"
+        cube = f"({self._pull:.17g}+{0.375 * SHARE / self.two_e:.17g}*{to_come})/{self._first:.17g}-1"
+        number = f"1+ln(1+0.5*(v_cube+abs(v_cube)))/{math.log(_STEP):.17g}"
+        bounded = f"round({self.count}-0.5*(v_below+abs(v_below)))"
         return [
             "compute press all stress/atom NULL pair",
-            # Two samples, of which the second ends a mean that is not used: between them the values are the first.
             *self.walls([]),
-            f"fix load all ave/atom 1 2 {PERIOD} c_press[1] c_press[2] c_press[3] v_walls",
-            f"fix past all ave/atom {PERIOD} 1 {PERIOD} c_press[1] c_press[2] c_press[3] v_walls",
+            "variable pressed atom v_walls-(c_press[1]+c_press[2]+c_press[3])",
+            # Two samples, of which the second ends a mean that is not used: between them the values are the first.
+            f"fix load all ave/atom 1 2 {PERIOD} v_pressed",
+            f"fix past all ave/atom {PERIOD} 1 {PERIOD} v_pressed",
             f"fix lists all balance {PERIOD} 1e9 shift xy 1 1e9",
-            *(f"variable {name} atom f_{name}[4]-(f_{name}[1]+f_{name}[2]+f_{name}[3])" for name in ("load", "past")),
-            f"variable growth atom {growth}",
-            f"variable ahead atom {ahead}",
+            f"variable over atom {over}",
             f"variable cube atom {cube}",
             f"variable number atom {number}",
+            f"variable below atom {self.count}-v_number",
             f"variable class atom type+(abs(v_number-type)>{_HOLD})*({bounded}-type)",
         ]
 
