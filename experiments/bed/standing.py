@@ -51,7 +51,10 @@ def standing_depth(table: RftTable, pieces: Pieces, *, load: float, gravity: flo
     depth = depth_of(load, table.factors)
     if depth is None:
         strongest = force(table.factors, bottom + most)
-        raise ValueError(f"load = {load:g} N: the law carries {strongest:.3g} N at {most:.3g} m; less was expected")
+        raise ValueError(
+            f"load = {load:g} N: at most {strongest:.3g} N was expected, what the law carries at its largest depth of "
+            f"{most:.3g} m"
+        )
     loads = [force(factors, depth) for factors in table.left_out]
     spread = float(jackknife_std([[value] for value in loads])[0]) if len(loads) > 1 else None
     law = max(table.unseen, table.shape_errors[0] if table.shape_errors is not None else 0.0)
