@@ -25,7 +25,7 @@ from rigid.ground.specialised import Specialised, specialised
 from .body import MujocoRobot
 from .feet import Foot, Part, refuse_missing
 from .law_feet import LawFeet
-from .soles import default_law, foot_matrices, refuse_defaults
+from .soles import FASTEST, default_law, foot_matrices, refuse_defaults
 from .stability import check_exchange
 
 __all__ = ["FootForces"]
@@ -192,7 +192,7 @@ class FootForces(AbstractContextManager["FootForces"]):
         self._warned_fast = True
         warnings.warn(
             f"foot {name!r} goes into the ground at {speed:.3g} m/s, and laws of sand were compared with grains up to "
-            f"{fastest:.3g} m/s (2.6 sqrt(g D)): faster, grains push harder, and a launch is faster",
+            f"{fastest:.3g} m/s ({FASTEST} sqrt(g D)): faster, grains push harder, and a launch is faster",
             stacklevel=2,
         )
 

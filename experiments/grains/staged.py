@@ -92,9 +92,7 @@ def lower_gravity(bed: Any, gravity: float, *, unit: float) -> None:
         bed.advance(math.ceil(_SPELL * unit / bed.time_step))
     else:
         raise RuntimeError("the floor does not come to carry the weight of the bed after gravity was lowered")
-    bed.measure_surface()
-    bed.mark_origin()
-    bed.max_overlap, bed.steps = 0.0, 0
+    _begin_from_here(bed)
 
 
 def come_to_rest(bed: Any, *, unit: float, progress: Progress | None = None) -> None:
@@ -118,6 +116,11 @@ def come_to_rest(bed: Any, *, unit: float, progress: Progress | None = None) -> 
     else:
         waited = _MOST_SPELLS * steps * bed.time_step
         raise RuntimeError(say("not_at_rest", waited=waited, energy=ratio * _STILL, still=_STILL))
+    _begin_from_here(bed)
+
+
+def _begin_from_here(bed: Any) -> None:
+    """Measure the surface, and count time, displacements and the largest overlap from here on."""
     bed.measure_surface()
     bed.mark_origin()
     bed.max_overlap, bed.steps = 0.0, 0

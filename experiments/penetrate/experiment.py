@@ -139,22 +139,24 @@ class _Work:
     @property
     def units(self) -> list[Unit]:
         """The runs, without those of beds that could not be prepared."""
-        return [unit for unit in self.planned if unit.seed not in self.missing]
+        missing = self.missing
+        return [unit for unit in self.planned if unit.seed not in missing]
 
     def run_seed(self, seed: int) -> None:
         """All runs of one seed that are not finished yet, each from the same bed; none where it cannot be prepared.
 
         Raises RuntimeError where no bed of any seed can be prepared, and where a run cannot go on.
         """
-        if seed in self.missing:
+        missing = self.missing
+        if seed in missing:
             return
-        todo = [unit for unit in self.units if unit.seed == seed and not self.folder.is_done(unit.id)]
+        todo = [unit for unit in self.planned if unit.seed == seed and not self.folder.is_done(unit.id)]
         if not todo and self.folder.is_done(f"bed-{seed}"):
             return
         try:
             bed = self._prepared(seed)
         except RuntimeError as error:
-            missing = {**self.missing, seed: str(error)}
+            missing[seed] = str(error)
             if len(missing) == len(self.settings.seeds):  # the last one is tried again when the run is resumed
                 raise RuntimeError("; ".join(missing.values())) from error
             self.folder.mark_done(_missing(seed), str(error))
