@@ -193,6 +193,7 @@ def program(tmp_path_factory):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("blocks", [True, False])
 def test_the_c_loop_does_our_work_to_round_off(blocks, program, ours, tmp_path):
     """The same law and order of a step: what differs is the order of sums, and how that has grown in 1020 steps."""

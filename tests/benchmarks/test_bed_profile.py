@@ -8,6 +8,7 @@ from benchmarks.race import table
 from experiments.runs.progress import Progress
 
 
+@pytest.mark.long
 def test_a_profile_says_what_a_step_is_made_of(monkeypatch, tmp_path, capfd):
     monkeypatch.setattr(race, "prepare_grains", lambda count, **options: stack(layers=4))
     monkeypatch.setattr(race, "REPEATS", 2)

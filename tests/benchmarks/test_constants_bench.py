@@ -43,6 +43,7 @@ def test_a_constant_that_is_none_is_refused():
         constants.run(None, progress=Progress(), kind="push")
 
 
+@pytest.mark.long
 def test_verdicts_that_change_are_counted_and_a_stopped_study_goes_on(tmp_path, monkeypatch, capsys):
     asked = []
 

@@ -45,6 +45,7 @@ def test_a_bed_side_by_side_is_itself_in_every_copy():
     assert len({tuple(row) for row in np.round(back[:, 0, :2] / PERIOD).astype(int).tolist()}) == 6
 
 
+@pytest.mark.long
 def test_a_row_of_the_sweep_goes_into_the_table(tmp_path):
     row = worker.measure(layer(), arch="cpu", steps=20, precision="float64", rolling=True, warm=10)
     assert row["speed"] == pytest.approx(36 * 20 / row["wall_s"]) and row["packing"] > 0.1

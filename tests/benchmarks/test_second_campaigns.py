@@ -62,6 +62,7 @@ def test_every_noise_has_the_stated_standard_deviation(kind):
     assert np.std(read - np.linspace(0.0, 1.0, 40_000)) == pytest.approx(0.003, rel=0.04)
 
 
+@pytest.mark.long
 def test_a_camera_whose_scale_is_off_shows_a_first_pose_that_is_off_too():
     made, secret = make_tumble(5, rig=True, kind="camera-scale", strength=30.0, trials=4)
     scale = secret.parameters["camera-scale.scale"]

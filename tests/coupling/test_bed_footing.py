@@ -98,6 +98,7 @@ def test_the_books_close_with_the_grains_energies_in_them():
     assert max(np.ptp(along), np.ptp(up)) < 1e-13 * MASS
 
 
+@pytest.mark.long
 def test_the_result_converges_at_least_as_the_square_of_the_macro_step():
     """2 and 4 grain steps a macro step against 1: errors of H^2 - dt^2 stand as 16 - 1 to 4 - 1."""
     ends = []
@@ -272,6 +273,7 @@ def test_a_platform_that_comes_down_beyond_the_bed_says_so():
     assert "master.count" in run.state()
 
 
+@pytest.mark.long
 def test_the_spring_in_the_books_is_the_one_felt_all_over_a_spike_and_no_grain_gets_behind_its_shaft():
     """One grain at a time on the ball, the shaft, its flat upper end and that end's edge; lossless, so force = spring.
 

@@ -49,6 +49,7 @@ def test_nothing_of_the_beds_size_is_read_or_written_in_a_macro_step_in_a_gpus_l
     assert passed and max(passed) < 6 * bed.grain_count / 4
 
 
+@pytest.mark.long
 def test_reactions_in_a_gpus_layout_are_those_of_a_cpus_to_round_off(other_layouts):
     """A platform that a hand sets down on the layer: force on each of its rows, the floor's, the largest overlap."""
     found = []

@@ -274,6 +274,7 @@ def test_a_ball_that_rolls_into_grains_keeps_the_angular_momentum_of_all_to_roun
     assert given > 1e-6 and run.samples["angular_momentum_error"].max() < 1e-11 * given
 
 
+@pytest.mark.long
 def test_a_hand_sets_it_down_askew_until_the_grains_carry_it():
     run = dropped(duration=1e-3, lowering_speed=0.05)
     run.run()

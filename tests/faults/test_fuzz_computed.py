@@ -233,6 +233,7 @@ def elsewhere(warning):
     return issubclass(warning.category, DeprecationWarning)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", PARTS)
 def test_settings_of_any_kind_are_computed_or_refused_in_words(part, files, monkeypatch):
     """No traceback, no warning of numpy; a number that there is none of is null, with a note or a warning."""

@@ -141,6 +141,7 @@ def layers(gravity):
     return found["depth"] / d, found["time"] / unit
 
 
+@pytest.mark.long
 def test_a_ball_falls_into_grains_at_a_millionth_of_gravity_as_at_1_g():
     """Depth over d is a function of t sqrt(g / d): with g a power of 4 smaller no rounding differs, and no bit may."""
     depth, time = layers(9.81)

@@ -73,6 +73,7 @@ def jkr_energy(overlap, radius, young):
     return math.pi * w * unit**2 * (part(s) - part(0.25 ** (1 / 3)))
 
 
+@pytest.mark.long
 def test_the_force_curves_are_dmts_and_jkrs():
     """Grains over the floor, from beyond where JKR's pairs part to ten times that overlap; to round-off."""
     reach = jkr_range(surface_energy=GAMMA, radius=RADIUS, effective_young=STAR["plane"])
@@ -195,6 +196,7 @@ def test_pairs_that_touch_come_to_rest_at_the_overlap_of_no_load(law):
     assert np.abs(bed.grains().velocity).max() < 1e-8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", LAWS)
 def test_cohesion_holds_a_weightless_grain_against_sliding(law):
     """Coulomb's bound with the load F_n + 2 pi w R (DMT), F_n + 3 pi w R (JKR): x'' = g_x - mu load / m beyond it.

@@ -68,6 +68,7 @@ def test_rolling_and_twisting_springs_keep_their_torque_as_the_contact_grows(axi
     assert pair.energies()[2] == pytest.approx(held / ROOT ** (2 * power), rel=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [1e6, 0.2])
 def test_no_order_of_sliding_turning_and_closing_makes_energy_with_rescaled_springs(friction):
     """The work done, less what all springs hold, never falls; with displacement springs it does."""

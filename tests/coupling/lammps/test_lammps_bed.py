@@ -98,6 +98,7 @@ def pushed(bed, body, parts, steps=10):
     return np.array(found)
 
 
+@pytest.mark.long
 def test_a_spike_feels_the_force_of_our_bed_within_one_percent_in_the_first_milliseconds(in_lammps):
     ours = at_rest()
     theirs = in_lammps()
@@ -174,6 +175,7 @@ def test_an_octagonal_plate_feels_the_force_of_our_bed_on_one_rank_on_two_and_fr
     assert np.abs(again - after).max() < 0.01 * np.abs(after).max()
 
 
+@pytest.mark.long
 def test_grains_rebound_from_floor_bodies_and_grains_as_fast_as_their_restitution_says():
     """Rebound over approach is the restitution, by its definition, whatever bodies were added in between.
 

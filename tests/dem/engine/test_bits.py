@@ -132,6 +132,7 @@ def test_a_body_of_meshes_and_turned_boxes_keeps_the_bits_too(tmp_path):
     assert finish(elsewhere_too) == digests
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", [1, 2, 3])
 def test_a_file_of_an_older_format_is_read(two_threads, tmp_path, version):
     """Format 3: springs are not rescaled. 2: contacts do not remember their last step. 1: no word of cohesion."""
@@ -203,6 +204,7 @@ def test_load_in_this_process_goes_on_to_the_same_bits(two_threads):
         assert falling_bed.digest(bed) == digests[step]
 
 
+@pytest.mark.long
 @pytest.mark.cpu_only("chunks")
 def test_a_file_goes_on_in_other_chunks_to_round_off(two_threads, monkeypatch):
     """A bed saved in eight chunks, loaded into two: histories find their rows."""

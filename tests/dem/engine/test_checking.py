@@ -16,7 +16,11 @@ CHUNKS = pytest.mark.cpu_only("chunks")
 
 
 @pytest.fixture(
-    params=[pytest.param("one chunk", marks=CHUNKS), pytest.param("seven chunks", marks=CHUNKS), "grain chunks"]
+    params=[
+        pytest.param("one chunk", marks=[CHUNKS, pytest.mark.long]),
+        pytest.param("seven chunks", marks=CHUNKS),
+        pytest.param("grain chunks", marks=pytest.mark.long),
+    ]
 )
 def layout(request, engines, monkeypatch):
     if request.param == "seven chunks":

@@ -51,6 +51,7 @@ def test_only_the_last_state_held_is_taken_back_and_none_across_a_change_of_slee
         bed.rollback(second)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("changed", ["gravity", pytest.param("rules", marks=pytest.mark.cpu_only("sleep"))])
 def test_a_state_held_under_another_gravity_or_other_rules_of_sleep_is_not_taken_back(changed, engines):
     bed = made("chunks", engines)

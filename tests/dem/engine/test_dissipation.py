@@ -30,6 +30,7 @@ def overlaps(bed):
     return 2 * RADIUS - np.linalg.norm(position[i] - position[j], axis=1)
 
 
+@pytest.mark.long
 def test_the_engines_book_is_the_one_kept_outside_it():
     """Sixteen grains that collide, slide and roll, under gravity; a third to a tenth of the energy goes each way."""
     outside = record_energy(cluster(ROUGH, gravity=(30.0, 0, -100.0), time_step=4e-6), 1000)
@@ -102,6 +103,7 @@ def made(bed):
     return np.array([work[f"{part}_made"] / work[f"{part}_lost"] for part in ("tangential", "turning")])
 
 
+@pytest.mark.long
 def test_rescaled_springs_make_no_energy_in_a_cluster_and_displacement_springs_do():
     """Sixteen grains that collide, slide and roll; what is lost, less what is made, is what the book has."""
     found = {}

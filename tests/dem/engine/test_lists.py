@@ -73,7 +73,7 @@ def test_forces_and_motion_are_those_of_a_plain_double_loop(layout, reference):
     agrees(bed, reference)
 
 
-@pytest.mark.parametrize("cohesion", ["dmt", "jkr"])
+@pytest.mark.parametrize("cohesion", [pytest.param("dmt", marks=pytest.mark.long), "jkr"])
 def test_forces_of_cohesive_grains_are_those_of_a_plain_double_loop(cohesion, monkeypatch):
     """In seven chunks; JKR's equation for the contact radius is solved by bisection there."""
     monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 9)
@@ -151,6 +151,7 @@ def little_room(engines, monkeypatch):
     engines.overrides = {"neighbours_per_grain": -0.45, "near_per_grain": -0.48}  # of what all chunks have
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("layout", [{}, {"gpu": True, "neighbours_per_grain": -3.9, "near_per_grain": -3.99}])
 def test_lists_that_are_too_small_grow_to_the_same_bits(little_room, engines, layout):
     """In chunks and packed, as on a GPU; and the next bed begins with the room that this one needed."""

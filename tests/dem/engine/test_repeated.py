@@ -116,6 +116,7 @@ def test_copies_at_rest_stay_at_rest_as_their_piece_does(pair):
     same_in_every_copy(piece, long, within=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.cpu_only("sleep")
 def test_copies_that_nothing_reaches_sleep(pair):
     """A ball goes into the middle one of three."""

@@ -59,6 +59,7 @@ def pressed(layer, rules=None):
     return np.array(rows), bed_energies(bed, bodies={}), np.ptp(momentum)
 
 
+@pytest.mark.long
 def test_what_reaches_a_bed_is_the_same_with_grains_asleep(layer):
     """The force on a ball pressed in, energies; the floor's reaction, which has all the weight.
 
@@ -125,6 +126,7 @@ def test_the_bits_depend_on_neither_threads_nor_cuts_nor_where_it_goes_on(tmp_pa
     assert falling_bed.digest(again) == digests[400]
 
 
+@pytest.mark.long
 def test_a_held_state_is_taken_back_with_its_sleepers_to_the_same_bits(layer):
     def bits():
         return {name: values.tobytes() for name, values in bed.state().items()} | {"computed": bed.grain_steps}
@@ -163,6 +165,7 @@ def test_grains_fall_asleep_at_every_fourth_look_only(layer, monkeypatch):
     assert not np.any(np.array(fewer) % 96)
 
 
+@pytest.mark.long
 def test_a_bed_of_one_chunk_puts_to_sleep_what_is_slower_than_a_sleeper_may_be():
     """There slow grains, which may be faster, are not; grains that slide on a smooth floor keep their speed."""
     rules, d = Sleep(every=8, calm=0.05, settling=1), 4e-3

@@ -54,6 +54,7 @@ def swings(bed, *, wanted, read):
     return np.diff(crossings).mean() * step
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("pace", "stretch", "heavy"), [(4, 1.0, 16), (4, 2.0, 4), (4, 4.0, 1), (6, 2.0, 9)])
 def test_a_slow_grain_swings_on_the_floor_as_one_of_so_many_times_its_mass(monkeypatch, pace, stretch, heavy):
     """On Hertz's spring S = 2 E* sqrt(R delta), Johnson 1985."""
@@ -73,6 +74,7 @@ def test_a_slow_grain_spins_against_friction_as_one_of_so_many_times_its_inertia
     assert swings(bed, wanted=wanted, read=lambda grains: grains.spin[:, 1]) == pytest.approx(wanted, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_grain_that_is_pressed_is_not_slow_where_its_step_would_be_unstable(monkeypatch):
     """By the step that is stable with six neighbours, at the overlap that a ball makes as it goes down."""
     monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 60)

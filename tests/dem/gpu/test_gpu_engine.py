@@ -32,6 +32,7 @@ def same(found, wanted, *, within):
         assert np.abs(found[name] - value).max() <= within * np.abs(value).max(), name
 
 
+@pytest.mark.long
 def test_motion_reactions_and_losses_are_the_cpus_to_round_off(engines):
     """With rolling, the balance of energy and of angular momentum; new lists in between."""
     results = []
@@ -46,6 +47,7 @@ def test_motion_reactions_and_losses_are_the_cpus_to_round_off(engines):
     same(*results, within=1e-9)
 
 
+@pytest.mark.long
 def test_several_steps_in_a_kernel_give_the_bits_of_single_ones(engines, monkeypatch):
     engines.overrides = GPU
     states = []

@@ -9,6 +9,7 @@ import dem
 from dem.measure.element import press_element
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("stuff", "friction", "overlap"), [("sand-weak", None, 0.05), ("jsc-1a-dense", 0.05, 0.02)])
 def test_a_sample_comes_to_rest_under_its_pressure_soft_or_stiff(stuff, friction, overlap):
     """Grains that stick and are 13,000 times stiffer than the pressure shook under a servo too quick for them.

@@ -57,6 +57,7 @@ def test_grains_that_were_poured_dry_lie_densely_and_then_hang_on_the_floor(made
     bed.restore(state)
 
 
+@pytest.mark.long
 def test_a_lid_comes_off_a_bed_of_grains_that_stick(made):
     """Lids that stuck held grains aloft without end, and were said not to come to their pressure."""
     prepared, state = made

@@ -235,6 +235,7 @@ def test_a_grain_that_slides_over_a_body_drags_it_along_and_turns_it():
     assert bed.grains().spin[0, 2] > 0  # and friction rolls the grain: its near side is held back
 
 
+@pytest.mark.long
 def test_a_union_touches_a_grain_once():
     """Where ball and cylinder meet, a grain feels one contact; also where one is within the other."""
     at = (0.03, 0.03, 0.02)

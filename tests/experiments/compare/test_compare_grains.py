@@ -69,6 +69,7 @@ def test_a_tumble_on_grains_stands_beside_the_spring_damper_in_loads_sinkage_ene
     assert page.count("data:image/png") >= 6 and "no OpenGL" in page and "States" in page
 
 
+@pytest.mark.long
 def test_a_platform_of_50_g_is_set_down_at_rest_on_real_grains(runs):
     """Its speed when the torque begins is small beside what it falls in a millisecond of its own gravity."""
     path = read_series(runs / "light" / "trajectory.csv")

@@ -38,6 +38,7 @@ def compared(first, second, out):
     return json.loads((out / "result.json").read_text()), read_series(out / "series" / "compared.csv")
 
 
+@pytest.mark.long
 def test_two_laws_under_one_robot_stand_side_by_side_in_numbers_and_curves(runs, tmp_path):
     result, columns = compared(runs / "spring", runs / "rft", tmp_path / "both")
     assert [run["label"] for run in result["runs"]] == ["spring-damper", "rft"] and result["feet"] == ["foot"]

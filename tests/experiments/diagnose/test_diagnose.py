@@ -128,6 +128,7 @@ def test_a_hidden_effect_of_another_form_than_the_librarys_is_named_and_the_gap_
     assert {place.phase for place in found.where} & {"in", "out"}
 
 
+@pytest.mark.long
 def test_a_constant_force_at_one_speed_is_drag_or_friction_and_both_are_named():
     # b v^2 and f sign(v) are the same number while v is one and the spike never turns.
     def constant(z, v, top):

@@ -96,6 +96,7 @@ def test_a_trials_own_friction_and_bed_are_factors_on_what_all_share():
     assert {p.trial for p in problem.scatter["friction"]} == set(ids)
 
 
+@pytest.mark.long
 def test_replicates_whose_friction_scatters_are_told_from_replicates_that_do_not():
     """Factors with a std of 9 % about each condition's mean; torque and bed are the same in all."""
     factors = (1.1, 0.92, 1.0, 0.95, 1.12, 0.93)
@@ -188,6 +189,7 @@ def test_the_first_share_of_a_motion_is_what_the_whole_motion_begins_with(share)
     assert modes @ modes == pytest.approx(kept @ kept)
 
 
+@pytest.mark.long
 def test_an_effect_from_a_file_moves_the_batch_as_it_moves_the_accurate_integrator():
     """Mean square of the difference over the noise below a hundredth, as for the effects of the library."""
     rise = Effect(id="slow-drive", parameters={"rise": 0.16}, file=SLOW)

@@ -261,6 +261,7 @@ def test_k_of_a_diameter_that_was_not_fitted_is_a_power_law_and_is_said(law):
         assert any(word in said for said in found.warnings())
 
 
+@pytest.mark.long
 def test_a_set_down_that_does_not_come_to_rest_says_why(tmp_path):
     (tmp_path / "model.toml").write_text(MODEL)
     settings = PenetrateSettings(

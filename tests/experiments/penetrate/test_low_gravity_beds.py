@@ -16,6 +16,7 @@ SMALL = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_bed_made_stiffer_has_the_same_grains_in_their_places_at_rest(tmp_path, monkeypatch):
     monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path))
     settings = PenetrateSettings(**SMALL)

@@ -151,6 +151,7 @@ def test_where_the_middle_cannot_stand_the_runs_own_trial_is_the_nearest_that_ca
     assert "com-offset.x = 0.001" in " ".join(result["departures"]["sentences"])
 
 
+@pytest.mark.long
 def test_wheels_that_come_to_their_limit_are_sought_by_the_batch_and_tumble_as_one_by_one(monkeypatch):
     """145 rad/s are never reached at 0.06 N m, and at 0.22 N m only after a hop; one by one, three are integrated."""
     asked = []

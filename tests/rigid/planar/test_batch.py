@@ -288,6 +288,7 @@ def test_an_effect_of_one_s_own_file_runs_in_the_batch_as_well(tmp_path):
     assert np.abs(bare.theta - run.theta).max() > 5e-3
 
 
+@pytest.mark.long
 def test_every_hook_of_every_term_compiles_for_taichi():
     # One kernel with all effects on: if a term's source were no Taichi, this would not compile.
     every = tuple(Effect(id=id) for id, term in EFFECTS.items() if not term.sensor)
