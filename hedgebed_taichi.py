@@ -36,6 +36,8 @@ CHOICES = ("taichi", "quadrants")
 # The newest family of AMD processors that LLVM 15, Taichi's compiler, has a name for (Zen 3 and 4). For a later one it
 # computes two numbers at a time where the processor can do eight. An Intel that it does not know it judges by features.
 NEWEST_AMD_OF_LLVM_15 = 25
+# Taichi itself keeps 100 MB of compiled kernels. Those of our tests are more, so that each run would compile them anew.
+KEPT_KERNELS = 2**30  # [bytes]
 _PROCESSOR = Path("/proc/cpuinfo")
 
 
@@ -96,6 +98,8 @@ def _load() -> Any:
         "TI_SKIP_VERSION_CHECK": "ON",
         "TI_LOG_LEVEL": "error",
         "QD_LOG_LEVEL": "error",
+        "TI_OFFLINE_CACHE_MAX_SIZE_OF_FILES": str(KEPT_KERNELS),
+        "QD_OFFLINE_CACHE_MAX_SIZE_OF_FILES": str(KEPT_KERNELS),
     }.items():
         os.environ.setdefault(key, value)
     # quadrants says so whenever a field of vectors is filled; kernels that steps call have no such argument.

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import hedgebed_taichi
+from dem.engine import runtime
 
 CPUINFO = "processor\t: 0\nvendor_id\t: {}\ncpu family\t: {}\nmodel\t\t: 2\n"
 
@@ -52,6 +53,12 @@ def test_a_script_leaves_its_kernels_in_taichis_cache(tmp_path):
     environment["PYTHONPATH"] = str(Path(hedgebed_taichi.__file__).parent)
     subprocess.run([sys.executable, str(script)], env=environment, check=True)
     assert len([path for path in tmp_path.rglob("*") if path.is_file() and path != script]) > 5
+
+
+def test_compiled_kernels_are_kept_beyond_the_hundred_megabytes_of_taichi():
+    runtime.start(threads=1)
+    kept = hedgebed_taichi.ti.lang.impl.current_cfg().offline_cache_max_size_of_files
+    assert kept == hedgebed_taichi.KEPT_KERNELS > 1e8
 
 
 # Kernels with nothing, with a dataclass of arrays, and with a member that is an array; how often each was read.
