@@ -2,7 +2,7 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed bed make`; calling one imports what computes.
 
-Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `rigid.ground`, `vis`.
+Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.runs`, `rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

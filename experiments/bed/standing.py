@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from scipy import optimize
 
 from rigid.ground.rft_table import MOST, Pieces, RftTable, jackknife_std, law_force
+from rigid.intervals import NORMAL
 
 __all__ = ["Standing", "standing_depth"]
 
 _DOWN = (0.0, 0.0, -1.0)
-_COVERED = 1.96
-"""Half of a 95 % interval over the standard deviation of a normal distribution [1]."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ def standing_depth(table: RftTable, pieces: Pieces, *, load: float, gravity: flo
     loads = [force(factors, depth) for factors in table.left_out]
     spread = float(jackknife_std([[value] for value in loads])[0]) if len(loads) > 1 else None
     law = max(table.unseen, table.shape_errors[0] if table.shape_errors is not None else 0.0)
-    share = _COVERED * math.hypot(law, (spread or 0.0) / load)
+    share = NORMAL * math.hypot(law, (spread or 0.0) / load)
     depths = [depth_of(load, factors) for factors in table.left_out]
     known = [[d] for d in depths if d is not None]
     std = float(jackknife_std(known)[0]) if len(known) == len(depths) > 1 else None

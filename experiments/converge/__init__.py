@@ -2,7 +2,7 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed converge`; calling one imports what computes.
 
-Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.pool`, `experiments.runs`, `vis`.
+Imports `dem`, `experiments.grains`, `experiments.penetrate`, `experiments.pool`, `experiments.runs`, `rigid`, `vis`.
 """
 
 from experiments.runs.registry import face

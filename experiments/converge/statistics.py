@@ -19,11 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student_t
 
-__all__ = ["CONFIDENCE", "Extrapolation", "Interval", "Size", "apart", "extrapolate", "interval_of", "paired"]
+from rigid.intervals import student
 
-CONFIDENCE = 0.95
+__all__ = ["Extrapolation", "Interval", "Size", "apart", "extrapolate", "interval_of", "paired"]
+
 Array = NDArray[np.float64]
 
 
@@ -45,7 +45,7 @@ def interval_of(values: Sequence[float]) -> Interval | None:
     if count == 1:
         return Interval(float(values[0]), None, 1)
     error = float(np.std(values, ddof=1)) / math.sqrt(count)
-    return Interval(float(np.mean(values)), _student(count - 1) * error, count)
+    return Interval(float(np.mean(values)), student(count - 1) * error, count)
 
 
 def paired(one: Mapping[int, float], other: Mapping[int, float]) -> Interval | None:
@@ -165,8 +165,4 @@ def _half(shares: Array, errors: tuple[Array, Array] | None) -> float | None:
     if variance == 0:
         return 0.0
     freedom = variance**2 / float((parts**2 / errors[1]).sum())
-    return _student(freedom) * math.sqrt(variance)
-
-
-def _student(freedom: float) -> float:
-    return float(student_t.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
+    return student(freedom) * math.sqrt(variance)

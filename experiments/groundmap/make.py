@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
 
+from rigid.intervals import NORMAL, student
 from rigid.platform.rig import STANDARD_GRAVITY
 from rigid.result import write_text
 
-from .maps import DATA, NAMES, TO_STD
+from .maps import DATA, NAMES
 
 __all__ = ["made_cohesive", "made_map", "main"]
 
@@ -107,13 +107,13 @@ def _exponents(found: Mapping[str, Any]) -> list[float]:
 
 
 def _ratio_std(scatter: Sequence[float], beds: Sequence[int], k: int) -> float:
-    """Relative error of the mean of k over that of the first [1]: Student's half-width of 95 % over `TO_STD`.
+    """Relative error of the mean of k over that of the first [1]: Student's half-width of 95 % over `NORMAL`.
 
     Beds of all packings are taken to scatter alike, relative to their mean, so that the degrees of freedom add up.
     """
     free = sum(count - 1 for count in beds)
     pooled = math.sqrt(sum((count - 1) * s**2 for s, count in zip(scatter, beds, strict=True)) / free)
-    return float(student.ppf(0.975, free)) / TO_STD * pooled * math.sqrt(1 / beds[0] + 1 / beds[k])
+    return student(free) / NORMAL * pooled * math.sqrt(1 / beds[0] + 1 / beds[k])
 
 
 def _written(value: Any) -> str:

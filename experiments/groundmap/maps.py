@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 
 from dem.grains.materials import MATERIALS
+from rigid.intervals import NORMAL
 
 from .answers import Answer, Number, asked_of, check_depth, times
 from .cohesive import CohesiveMap
 from .settings import say
 
-__all__ = ["DATA", "TO_STD", "GroundMap", "Line", "read_map"]
+__all__ = ["DATA", "GroundMap", "Line", "read_map"]
 
 DATA = Path(__file__).with_name("maps.toml")
 NAMES = ("stiffness", "damping", "sinkage")
@@ -33,7 +34,6 @@ POWERS = {"stiffness": (1.0, 2.0), "damping": (0.5, 2.5), "sinkage": (0.0, 1.0)}
 """Powers of gravity and of the tip's diameter of each number. A speed has 0.5 and 0.5 (Froude number)."""
 ON_EARTH = 9.7
 """Gravity from which on sand is poured and tested in laboratories as grains that do not stick [m/s2]."""
-TO_STD = 1.96  # of a 95 % half-width
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Line:
             value = self.values[0] + share * (self.values[1] - self.values[0])
             chance = self.chance[0] + share * (self.chance[1] - self.chance[0])
         grain = self.grain * max(0.0, (self.finest - ratio) / (self.finest - first))
-        return Number(value, (chance + grain + self.rest) / TO_STD)
+        return Number(value, (chance + grain + self.rest) / NORMAL)
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class GroundMap:
         value = math.exp(float(np.interp(packing, self.packings, np.log(self.factors))))
         added = (value - 1) * self.packed[1] / self.lines["stiffness"].at(ratio).value
         chance = float(np.interp(packing, self.packings, self.factor_stds))
-        return Number(value, chance + abs(1 + added - value) / TO_STD)
+        return Number(value, chance + abs(1 + added - value) / NORMAL)
 
 
 def _line(table: Mapping[str, Any]) -> Line:

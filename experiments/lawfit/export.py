@@ -10,10 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scipy.stats import t as student_t
-
 from experiments.grains.softening import PACKING
 from experiments.runs.types import Json
+from rigid.intervals import student
 from rigid.result import write_json, write_text
 
 from .data import Data, Foundation
@@ -210,7 +209,7 @@ def _python(
     def call(depth: str, speed: str, numbers: str = "numbers") -> str:
         return f"_force({depth}, {speed}, {numbers}{passed})"
 
-    t = float(student_t.ppf(0.5 + 0.5 * CONFIDENCE, len(sets) - 2))
+    t = student(len(sets) - 2, CONFIDENCE)
     first, _, about = title.partition("\n")
     head = _HEAD.format(
         title=first, about=about, numbers=repr(sets[0]), names=names, left_out=",\n    ".join(map(repr, sets[1:])), t=t,

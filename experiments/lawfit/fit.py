@@ -19,7 +19,8 @@ from typing import Generic, Protocol, Self, TypeVar
 import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.stats import chi2
-from scipy.stats import t as student_t
+
+from rigid.intervals import student
 
 from .data import Array, Data
 
@@ -163,7 +164,7 @@ def mean_of(values: Array) -> Estimated:
 
 
 def _within(value: float, std: float, count: int) -> Estimated:
-    half = float(student_t.ppf(0.5 + 0.5 * CONFIDENCE, count - 1)) * std
+    half = student(count - 1, CONFIDENCE) * std
     return Estimated(value, std, value - half, value + half)
 
 

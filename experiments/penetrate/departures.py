@@ -12,6 +12,7 @@ import numpy as np
 
 from coupling import Penetration
 from experiments.runs.types import Json
+from rigid.intervals import half_width
 from vis.page.numbers import foldable, quote
 
 from .fit import Fit, fit_rows, spread
@@ -37,7 +38,7 @@ def departures(
     """The entry "departures" of result.json: table, exponents, returned work and sentences.
 
     `by_bed` are the driven runs, bed by bed; `beds` and `models` all runs by id, in the bed and on the spring-damper;
-    `sinkage` the resting depth (bed, model) [m], each with its spread between seeds (None: unknown).
+    `sinkage` the resting depth (bed, model) [m], each with half of its 95 % interval (None: unknown).
     """
     driven = [run for runs in by_bed for run in runs]
     table, exponents, rate = departure_table(driven, fit), depth_exponent(driven), rate_change(by_bed, fit)
@@ -161,7 +162,7 @@ def sentences(
     said = [*_by_depth(table), *_by_rate(rate)]
     if exponents:
         shown = "; ".join(
-            f"{foldable(quote(value, std, '1', significant=2))} at {speed:g} m/s ({_beds(count)})"
+            f"{_of_beds(value, std, count, '1')} at {speed:g} m/s ({_beds(count)})"
             for speed, (value, std, count) in exponents.items()
         )
         said.append(
@@ -170,9 +171,9 @@ def sentences(
     if sinkage is not None:
         bed, law = sinkage
         against = f", {_deeper(law[0] / bed[0])}" if bed[0] > 0 else ""
-        sunk, law_sunk = (foldable(quote(*depth, "m", significant=2)) for depth in sinkage)
+        sunk, law_sunk = (_with_half(*depth, "m") for depth in sinkage)
         if bed[0] < 0:
-            on_top = foldable(quote(-bed[0], bed[1], "m", significant=2))
+            on_top = _with_half(-bed[0], bed[1], "m")
             said.append(say("sinkage_on_top", bed=on_top, law=law_sunk))
         else:
             said.append(say("sinkage", bed=sunk, law=law_sunk, against=against))
@@ -211,6 +212,16 @@ def _of_drops(drops: Sequence[tuple[Penetration, Penetration]]) -> list[str]:
     return said
 
 
+def _of_beds(value: float, std: float | None, count: float, unit: str, *, significant: int = 2) -> str:
+    """A mean over beds with half of its 95 % interval, as far as beds show one."""
+    return _with_half(value, half_width(std, int(count)), unit, significant=significant)
+
+
+def _with_half(value: float, half: float | None, unit: str, *, significant: int = 2) -> str:
+    said = foldable(quote(value, half, unit, significant=significant))
+    return f"{said} (95 %)" if "±" in said else said
+
+
 def _of_peaks(gaps: Sequence[float]) -> str:
     return _compared(float(np.mean(gaps)), "above the bed's", "below the bed's", "as high as the bed's")
 
@@ -228,9 +239,8 @@ def _by_depth(table: Sequence[Mapping[str, Any]]) -> list[str]:
         worst = max(band, key=lambda row: abs(row["gap"]))
         others = [row["gap"] for row in band]
         pushes = _compared(worst["gap"], "too hard", "too softly", "as hard as the bed")
-        law, bed = (
-            foldable(quote(worst[f"{whose}_force"], worst.get(f"{whose}_std"), "N")) for whose in ("model", "bed")
-        )
+        law = foldable(quote(worst["model_force"], None, "N"))
+        bed = _of_beds(worst["bed_force"], worst.get("bed_std"), worst["beds"], "N", significant=3)
         text = say("band", where=where, pushes=pushes, row=worst, law=law, bed=bed, beds=_beds(worst["beds"]))
         if len(others) > 1:
             text += f"; over all speeds the gap there is {_range(others)}"

@@ -9,13 +9,16 @@ from statistics import fmean, stdev
 from typing import Any
 
 from experiments.runs.registry import Headline, findings_shown
+from rigid.intervals import half_width
 from vis.page.numbers import foldable, quote
+from vis.penetrate.errors import in_95
 from vis.penetrate.summary_parts import as_foot
 
-from .sure import in_words
+from .sure import in_words, known_within
 
 __all__ = ["penetrate_headline"]
 
+_SIDES = ("bed", "spring-damper")
 NOT_INCLUDED = "  (without bed size, softness, speed)"
 """Below an interval: what is not in it."""
 ON_TOP = "  (negative: on the uppermost grains)"
@@ -26,7 +29,7 @@ BY_FORMULA = "by Terzaghi, cohesion at 95 %"
 
 def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     """The short form of a result; None where it has no bed beside a spring-damper."""
-    numbers = result.get("quantities", {})
+    numbers = in_95(result)
     if "stiffness_spring_damper" in numbers and "stiffness" in numbers:
         return _of_model(result)
     if "sinkage_dem" not in numbers or "stiffness" not in numbers:
@@ -46,8 +49,8 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     given, back = (numbers.get(f"work_returned_{side}") for side in ("dem", "spring_damper"))
     if given and back and given["value"] is not None:
         rows.append(("work recovered on withdrawal", _quoted(given, "%"), _quoted(back, "%")))
-    for name, words in (("stiffness", "fitted stiffness K"), ("damping", "fitted damping C")):
-        rows.append((words, "", _quoted(numbers[name])))
+    rows.append(("fitted stiffness K", "", _stiffness(numbers["stiffness"], result)))
+    rows.append(("fitted damping C", "", _quoted(numbers["damping"])))
     if "drag_gap" in numbers:
         rows.append(("error of its force (rms, loading)", "", _quoted(numbers["drag_gap"], "%")))
     warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
@@ -66,8 +69,9 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     shown = [*rest, *shown]
     if result.get("spike", {}).get("tip") == "flat":
         warnings, shown = as_foot(warnings), as_foot(shown)
+    known = (f"{side}, 95 %" if any("±" in row[k] for row in rows) else side for k, side in enumerate(_SIDES, 1))
     return Headline(
-        ("", "bed", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
+        ("", *known), tuple(tuple(foldable(cell) for cell in row) for row in rows),
         tuple(map(foldable, warnings)), tuple(map(foldable, shown)), left,
     )  # fmt: skip
 
@@ -102,6 +106,16 @@ def _of_model(result: Mapping[str, Any]) -> Headline:
     )  # fmt: skip
 
 
+def _stiffness(entry: Mapping[str, Any], result: Mapping[str, Any]) -> str:
+    """K with both ends of its interval over several beds, which is that of its logarithm, as the report has it."""
+    sure = result.get("sure", {}).get("stiffness", {})
+    if sure.get("chance") is None or sure["one_bed"]:
+        return _quoted(entry)
+    value = quote(entry["value"], None, "1", significant=2)
+    low, high = sure["chance"]
+    return f"{value} ({known_within(low, high, '1')}) {entry['unit']}"
+
+
 def _with_errors(sure: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """The sinkage among real grains with the ends of its interval, or the depth to rest; as far as they are known."""
     for name, words in (
@@ -111,7 +125,7 @@ def _with_errors(sure: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         if name in sure:
             low, high = sure[name]["low"], sure[name]["high"]
             known = "not known" if low is None else f"at least {quote(low, None, 'm', significant=2)}"
-            shown = [(words, known if high is None else in_words(low, high, "m"), "")]
+            shown = [(words, known if high is None else known_within(low, high, "m"), "")]
             return [*shown, (NOT_INCLUDED, "", "")] if low is not None else shown
     return []
 
@@ -143,8 +157,8 @@ def _fastest_drop(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str
 
     def mean(key: str, unit: str) -> str:
         values = [numbers[key]["value"] for numbers in fastest if numbers.get(key, {}).get("value") is not None]
-        std = stdev(values) if len(values) > 1 else None
-        return _quoted({"value": fmean(values) if values else None, "std": std, "unit": unit})
+        half = half_width(stdev(values), len(values)) if len(values) > 1 else None
+        return _quoted({"value": fmean(values) if values else None, "std": half, "unit": unit})
 
     return [
         (f"{words} of the drop at {speed:g} m/s", mean(name, unit), mean(f"model_{name}", unit))

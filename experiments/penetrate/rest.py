@@ -17,21 +17,20 @@ from dem.grains.materials import MATERIALS
 from experiments.grains.bearing import COHESIONS, bearing_capacity, bearing_of, friction_angle, strength
 from experiments.grains.recipes import recipe_of
 from experiments.runs.types import Json
+from rigid.intervals import NORMAL
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.penetrate.summary import REAL_GRAINS
 
 from . import beds
 from .findings import Findings
 from .settings import PenetrateSettings, say
-from .sure import Interval, in_words, interval_of_rest, interval_of_sinkage, interval_of_stiffness
+from .sure import Interval, in_words, interval_of_rest, interval_of_sinkage, interval_of_stiffness, known_within
 from .units import Unit
 
 __all__ = ["answer", "how_sure", "made_units", "sinkage_interval"]
 
 _BESIDE = "jsc-1a-loose-cut"
 """The material to try where grains without cohesion do not bear."""
-_COVERED = 1.96
-"""Half of a 95 % interval over the standard deviation of a normal distribution [1]."""
 
 
 def made_units(settings: PenetrateSettings, units: Sequence[Unit]) -> list[Unit]:
@@ -122,7 +121,7 @@ def _by_terzaghi(settings: PenetrateSettings, material: Any, stiffness: float) -
     assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
     load, angle = settings.weight, friction_angle(material)
     needs = [load / (bearing_capacity(1.0, phi) * area) for phi in (angle, recipe.circle)]
-    half = _COVERED * recipe.cohesion_std
+    half = NORMAL * recipe.cohesion_std
     least, most = max(0.0, recipe.cohesion - half), recipe.cohesion + half
     shares = [max(0.0, 1.0 - most / min(needs)), max(0.0, 1.0 - least / max(needs))]
     low, high = (load * share / stiffness for share in shares)
@@ -209,10 +208,10 @@ def _in_a_sentence(findings: Findings, name: str, interval: Interval, unit: str)
         whence = say("chance_kept") if interval.one_bed else say("chance_beds", count=count)
         if name == "stiffness" and interval.one_bed and len(findings.seeds) > 1:
             whence = say("chance_not_separated")
-        return say("sure_within", what=what, ends=in_words(interval.low, interval.high, unit), whence=whence)
+        return say("sure_within", what=what, ends=known_within(interval.low, interval.high, unit), whence=whence)
     if interval.chance is None:
         return say("sure_unknown", what=what)
-    return say("sure_chance", what=what, ends=in_words(*interval.chance, unit), count=count)
+    return say("sure_chance", what=what, ends=known_within(*interval.chance, unit), count=count)
 
 
 def _two_digits(number: float) -> str:

@@ -14,6 +14,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
 from vis.page.numbers import foldable, quote
+from vis.penetrate.errors import in_95
 
 from . import beds
 from .amended import kept_law, run_beside
@@ -162,7 +163,7 @@ LEAST_CONDITIONS = 3
 
 def departures_in_words(findings: Findings) -> Json:
     """The entry "departures" of result.json: numbers, sentences, and the remarks that explain them, by name."""
-    numbers = findings.quantities()
+    numbers = _in_95(findings)
     sunk, law = ((numbers[name]["value"], numbers[name]["std"]) for name in ("sinkage_dem", "sinkage_spring_damper"))
     pair = (sunk, law) if sunk[0] is not None and law[0] is not None else None
     by_bed = [runs for seed in findings.seeds if (runs := findings.of("driven", seed))]
@@ -180,7 +181,7 @@ def departures_in_words(findings: Findings) -> Json:
 
 def warnings_of(findings: Findings) -> Iterator[str]:
     """What a reader has to know: runs that did not end as they should, a law that came out at its bound."""
-    numbers, settings, fit = findings.quantities(), findings.settings, findings.fit
+    numbers, settings, fit = _in_95(findings), findings.settings, findings.fit
     ends = {unit: findings.beds[unit.id].ended for unit in findings.units}
     for unit, ended in ends.items():
         if ended in ("max_time", "max_depth"):
@@ -261,7 +262,7 @@ def overlap_warning(overlap: float | None, settings: PenetrateSettings, softenin
 
 def _which_stiffness(findings: Findings) -> str | None:
     """When to use the fitted K, and when that of a foot that stands."""
-    standing, fitted = findings.standing_stiffness().get("stiffness_standing"), findings.fit.stiffness
+    standing, fitted = _in_95(findings).get("stiffness_standing"), findings.fit.stiffness
     if standing is None or fitted <= 0:
         return None
     interval = sinkage_interval(findings, beds.find_material(findings.settings))
@@ -285,7 +286,7 @@ def _which_stiffness(findings: Findings) -> str | None:
 
 def _at_surface(findings: Findings) -> str | None:
     """What the bed pushes back with before depth 0, where that matters; None below a tenth of the load."""
-    numbers = findings.at_surface()
+    numbers = _in_95(findings)
     force, load = numbers.get("surface_force"), findings.settings.weight
     if force is None or force["value"] <= 0.1 * load:
         return None
@@ -296,6 +297,13 @@ def _at_surface(findings: Findings) -> str | None:
     return say("at_surface", force=_words(force), share=share, grains=grains)
 
 
+def _in_95(findings: Findings) -> Json:
+    """The headline numbers with halves of 95 % intervals in place of standard deviations."""
+    entries = {"fits": findings.fit_entries(), "runs": findings.run_entries({})}
+    return in_95({"quantities": findings.quantities(), **entries})
+
+
 def _words(entry: Json) -> str:
-    """A quantity as a person quotes it: by its spread, else with two figures."""
-    return foldable(quote(entry["value"], entry["std"], entry["unit"], significant=2))
+    """A quantity of `_in_95` as a person quotes it: with its error, else with two figures."""
+    said = foldable(quote(entry["value"], entry["std"], entry["unit"], significant=2))
+    return f"{said} (95 %)" if "±" in said else said

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from experiments.grains.spells import spells
 from experiments.runs.result import quantity
 from experiments.runs.types import Json
+from rigid.intervals import student
 
 from . import say
 
@@ -49,8 +50,8 @@ class Sinking:
     @property
     def verdict(self) -> str:
         """The conclusion, as a sentence."""
-        slope, error, low, high, depth = (1e3 * x for x in (self.slope, self.error, self.low, self.high, self.depth))
-        rate = say("sinking_rate", slope=slope, error=error, low=low, high=high)
+        slope, low, high, depth = (1e3 * x for x in (self.slope, self.low, self.high, self.depth))
+        rate = say("sinking_rate", slope=slope, low=low, high=high)
         of = say("sinking_of", count=self.count, beds=self.beds, s="s" if self.beds > 1 else "", depth=depth)
         return say(
             "sinking" if self.low > 0 else "less_deep" if self.high < 0 else "not_sinking", rate=rate, of=of
@@ -87,16 +88,13 @@ def sinking_over(beds: Sequence[Sequence[Footfall]]) -> Sinking | None:
     free = sum(table.shape[1] for table in tables) - len(tables) - 1
     if free < 1:
         return None
-    # Here, since `hedgebed --help` imports this module; of scipy.stats, which takes longer still to import.
-    from scipy.special import stdtrit
-
     x = np.concatenate([number - number.mean() for number, _ in tables])
     y = np.concatenate([depth - depth.mean() for _, depth in tables])
     mean = float(np.concatenate([depth for _, depth in tables]).mean())
     slope = float(x @ y / (x @ x))
     left = y - slope * x
     error = float(np.sqrt(left @ left / free / (x @ x)))
-    half = float(stdtrit(free, 0.975)) * error
+    half = student(free) * error
     return Sinking(slope, error, slope - half, slope + half, mean, len(x), len(tables))
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vis.page.numbers import beside, column, plain, quantity, quote, typeset
+from vis.page.numbers import beside, between, column, plain, quantity, quote, typeset, within
 
 SPACE = "\N{NO-BREAK SPACE}"
 
@@ -71,3 +71,8 @@ def test_plain_keeps_to_its_digits():
 )
 def test_powers_of_a_title_are_raised_and_names_stay(given, set_):
     assert typeset(given) == set_
+
+
+def test_an_interval_that_begins_at_0_states_its_upper_end_alone():
+    assert within(0.0, 0.0066, "m").replace(SPACE, " ") == "below 6.6 mm"
+    assert within(0.001, 0.0066, "m") == between(0.001, 0.0066, "m")

@@ -13,8 +13,10 @@ import pytest
 from PIL import Image
 
 import vis
+from rigid.intervals import student
 from vis.page import plots
 from vis.page.folder import read_folder, read_series
+from vis.penetrate.errors import in_95
 from vis.penetrate.plot_drops import _running_mean
 from vis.penetrate.report import PLOTS, make_plots
 from vis.penetrate.summary import summarise
@@ -371,7 +373,8 @@ def test_one_bed_is_called_one_bed(tmp_path, make_run):
     said = summarise(edit_result(make_run(tmp_path, frames=0), keep_one))
     assert [row[0] for row in said["fit"]["table"]["rows"]] == ["this bed"]
     tile = next(tile for tile in said["tiles"] if tile["label"].startswith("Fitted"))
-    assert tile["value"].split() == ["230", "N/m"] and "1.4" in tile["note"]
+    # Student's t of five runs, 2.776, times the standard error
+    assert tile["value"].split() == ["230", "N/m"] and "3.9" in tile["note"]
     golden.golden("report/one_bed", tile["note"])
     assert not any("bed 1" in row[0] for row in said["runs"]["rows"])
     assert "all beds" not in json.dumps(said)
@@ -429,3 +432,20 @@ def test_the_rooms_own_names_are_loaded_when_asked_for():
     subprocess.run([sys.executable, "-c", code], check=True)
     with pytest.raises(AttributeError, match="no attribute 'write_raport'"):
         vis.write_raport
+
+
+def test_a_number_has_half_of_the_interval_over_the_beds_that_have_it(tmp_path, make_run):
+    """t s / sqrt(n): K of three beds, the sinkage of the two that came to rest, of a fit t times its error."""
+
+    def restless(result):
+        sets = [run for run in result["runs"] if run["kind"] == "set_down"]
+        del sets[0]["quantities"]["sinkage"]
+        result["quantities"]["stiffness_error"] = {"value": 2.0, "std": None, "unit": "N/m"}
+
+    result = edit_result(make_run(tmp_path, frames=0), restless).result
+    found, given = in_95(result), result["quantities"]
+    assert found["stiffness"]["std"] == pytest.approx(4.3027 * given["stiffness"]["std"] / 3**0.5, rel=1e-4)
+    assert found["sinkage_dem"]["std"] == pytest.approx(12.706 * given["sinkage_dem"]["std"] / 2**0.5, rel=1e-4)
+    assert found["grain_count"]["std"] == 0.0
+    fitted = sum(run["kind"] != "set_down" for run in result["runs"])
+    assert found["stiffness_error"]["value"] == pytest.approx(2.0 * student(fitted - 1))

@@ -27,6 +27,7 @@ __all__ = [
     "short",
     "typeset",
     "with_squares",
+    "within",
 ]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -125,6 +126,11 @@ def between(low: float, high: float, unit: str) -> str:
     scale = _scale(float(f"{high:.1e}"), unit)[0]
     bottom = f"{float(f'{low / scale:.2g}'):g}".replace("-", _MINUS) if low else "0"
     return f"{bottom} to {top}"
+
+
+def within(low: float, high: float, unit: str) -> str:
+    """Two ends as `between`, or "below 7.3 mm" where the lower one is 0, the least that such a number can be."""
+    return f"below {quote(high, None, unit, significant=2)}" if low == 0 else between(low, high, unit)
 
 
 def foldable(text: str) -> str:

@@ -1,4 +1,4 @@
 """Reports of the paper's figures and of hops, and a sketch of the model.
 
-Imports `vis.page`, `vis.pictures`.
+Imports `rigid`, `vis.page`, `vis.pictures`.
 """

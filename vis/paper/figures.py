@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
-from scipy.special import stdtrit
 
+from rigid.intervals import half_width
 from vis.page.folder import read_columns
 from vis.page.page import Block
 from vis.page.plots import BED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
@@ -355,7 +355,7 @@ def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, floa
         axis.plot(place, entry["angle"], "s", color=BED, mfc="none", ms=5.5)
     for entry in of_this(kept["beds"]):
         angles = np.array(entry["angles"])
-        half = stdtrit(len(angles) - 1, 0.975) * angles.std(ddof=1) / math.sqrt(len(angles))
+        half = half_width(float(angles.std(ddof=1)), len(angles))
         axis.errorbar(place + 0.2, angles.mean(), half, fmt="s", color=BED, ms=5.5, capsize=3)
     for entry in of_this(kept.get("packed", [])):
         axis.plot(place + 0.33, entry["angles"][0], "D", color=BED, ms=4.5)

@@ -1,4 +1,4 @@
 """The report of a spike in a bed: drag, drops, sinkage.
 
-Imports `vis.page`, `vis.pictures`, `vis.view`.
+Imports `rigid`, `vis.page`, `vis.pictures`, `vis.view`.
 """

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from rigid.intervals import half_width
 from vis.page.folder import RunFolder
-from vis.page.numbers import between, plain, quantity, quote, short
+from vis.page.numbers import between, plain, quantity, quote, short, within
 from vis.penetrate import summary_parts as words
+from vis.penetrate.errors import fit_part, fitted, in_95
 from vis.penetrate.summary_parts import say
 from vis.pictures.frames import frame_names
 
@@ -33,6 +35,7 @@ def summarise(run: RunFolder) -> dict[str, Any]:
     """
     result = run.result
     quantities, spike = words.mapping_of(result.get("quantities")), dict(words.mapping_of(result.get("spike")))
+    numbers = in_95(result)
     if spike.get("tip") != "cone":
         spike.pop("cone_angle", None)
     experiment = str(result.get("experiment") or words.setting_of(run, "command") or "")
@@ -46,12 +49,12 @@ def summarise(run: RunFolder) -> dict[str, Any]:
         "banner": _banner(run),
         "lead": _lead(run, experiment),
         "seeds": len({r.seed for r in run.runs if r.seed is not None}),
-        "tiles": named(_with_errors(_tiles(run, quantities), words.mapping_of(result.get("sure")))),
+        "tiles": named(_with_errors(_tiles(run, numbers), words.mapping_of(result.get("sure")))),
         "caveat": _caveat(result, quantities),
-        "answers": named(_answers(run, quantities)),
+        "answers": named(_answers(run, numbers)),
         "rest": named(words.rest_part(result)),
         "similarity": words.sentence(str(words.mapping_of(result.get("similarity")).get("sentence") or "")),
-        "fit": words.fit_part(result, quantities),
+        "fit": fit_part(result, numbers),
         "departures": named(words.departures_part(result)),
         "reference": words.reference_part(result),
         "bed": words.bed_part(result, quantities),
@@ -87,7 +90,6 @@ def _lead(run: RunFolder, experiment: str) -> list[str]:
 
 def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
     tiles: list[tuple[str, str, str]] = []
-    beds = len({r.seed for r in run.runs if r.seed is not None})
     model = quantity(quantities.get("sinkage_spring_damper"))
     if (needed := words.value_of(quantities, "depth_to_rest")) is not None:
         under = f"under {quantity(quantities['load'])}; " if words.value_of(quantities, "load") is not None else ""
@@ -105,22 +107,15 @@ def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]
         load = words.value_of(quantities, "load")
         under = f"under {quantity(quantities['load'])}" if load is not None else "under its load"
         note = f"{under}; the spring-damper predicts {model}"
-        stood = {"sinkage_dem": _in_95(quantities["sinkage_dem"], beds)}
-        tiles.append(("Sinks to rest at", _rests_at(stood), note))
+        tiles.append(("Sinks to rest at", _rests_at(quantities), note))
     if push := _push(run):
-        tiles.append((f"Largest force of {_grains(run)}", *_largest_push(run), push[1]))
+        tiles.append((f"Largest force of {_grains(run)}", *push))
     if words.value_of(quantities, "drag_gap") is not None:
         note = "rms difference over rms force, loading, all pushes"
-        tiles.append(("Error of the spring-damper", quantity(_in_95(quantities["drag_gap"], beds), unit="%"), note))
+        tiles.append(("Error of the spring-damper", quantity(quantities["drag_gap"], unit="%"), note))
     if words.value_of(quantities, "stiffness") is not None:
-        shown = quantity(_in_95(quantities["stiffness"], beds))
-        tiles.append(("Fitted stiffness K", shown, _fitted_note(run, quantities)))
+        tiles.append(("Fitted stiffness K", quantity(quantities["stiffness"]), _fitted_note(run, quantities)))
     return [{"label": label, "value": value, "note": note} for label, value, note in tiles]
-
-
-def _in_95(entry: Any, count: int) -> dict[str, Any]:
-    """A quantity with half of the 95 % interval of its mean over `count` beds in place of its standard deviation."""
-    return {**words.mapping_of(entry), "std": words.half_of_95(words.std_of({"it": entry}, "it"), count)}
 
 
 def _with_errors(tiles: list[dict[str, str]], sure: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -137,11 +132,11 @@ def _with_errors(tiles: list[dict[str, str]], sure: Mapping[str, Any]) -> list[d
             rows.append({**tile, "value": value, "errors": _errors(entry)})
             if name == "sinkage_dem":
                 known = entry["low"] is not None
-                ends = between(entry["low"], entry["high"], "m") if known else "not known"
+                ends = within(entry["low"], entry["high"], "m") if known else "not known"
                 note = say("of_real_grains") if known else words.sentence(str(entry["sentence"]))
                 rows.append({"label": "Sinkage among real grains (95 %)", "value": ends, "note": note})
             elif entry["low"] is not None:
-                ends = between(entry["low"], entry["high"], "N/m")
+                ends = within(entry["low"], entry["high"], "N/m")
                 rows.append({"label": "K among real grains (95 %)", "value": ends, "note": say("of_real_grains")})
         else:
             rows.append(tile)
@@ -164,14 +159,14 @@ def _errors(entry: Mapping[str, Any]) -> tuple[str, str, str]:
 
 
 def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
-    parts = [f"and damping C = {words.fitted(quantities, 'damping')}, for motion"]
+    parts = [f"and damping C = {fitted(quantities, 'damping')}, for motion"]
     drops = [r for r in run.of_kind("drop") if words.value_of(r.quantities, "stop_time") is not None]
     depths = [float(r.bed.depth.max()) for r in (*run.of_kind("driven"), *drops) if r.bed is not None]
     parts[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
     if "stiffness_standing" in quantities:
         parts.append(_standing(run, quantities))
     if words.std_of(quantities, "stiffness") is None and words.value_of(quantities, "stiffness_error") is not None:
-        parts.append(f"standard error of the fit: {quantity(quantities['stiffness_error'])}")
+        parts.append(f"error of the fit, 95{words.NBSP}%: {quantity(quantities['stiffness_error'])}")
     return "; ".join(parts)
 
 
@@ -223,13 +218,6 @@ def _frames(run: RunFolder) -> list[str]:
     ]
 
 
-def _largest_push(run: RunFolder) -> tuple[str]:
-    """The largest force of loading over all speeds, with half of its 95 % interval over the beds."""
-    speed, (force, std) = max(_peaks(run, "driven", "peak_force"), key=lambda peak: peak[1][0])
-    count = sum(r.kind == "driven" and r.speed == speed for r in run.runs)
-    return (quote(force, words.half_of_95(std, count), "N"),)
-
-
 def _push(run: RunFolder) -> tuple[str, str] | None:
     """The largest force of loading over all speeds, the speed of it, and the peaks at the other speeds."""
     by_speed = _peaks(run, "driven", "peak_force")
@@ -262,7 +250,7 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         answers[f"How large is the force of {_grains(run)}?"] = text
     if words.value_of(quantities, "drag_gap") is not None:
         text = (
-            f"With K = {words.fitted(quantities, 'stiffness')} and C = {words.fitted(quantities, 'damping')} its "
+            f"With K = {fitted(quantities, 'stiffness')} and C = {fitted(quantities, 'damping')} its "
             f"error during loading is {quantity(quantities['drag_gap'], unit='%')} of the bed's drag (rms difference "
             "over rms drag)."
         )
@@ -375,14 +363,14 @@ def _peak_gap(run: RunFolder) -> float | None:
 
 
 def _peaks(run: RunFolder, kind: str, key: str) -> list[tuple[float, tuple[float, float | None]]]:
-    """Speed -> mean over seeds and standard deviation between them (None for a single seed)."""
+    """Speed -> mean over seeds and half of its 95 % interval (None for a single seed)."""
     found = []
     for speed in run.speeds(kind):
         own = (r for r in run.runs if r.kind == kind and r.speed == speed)
         numbers = [n for r in own if (n := words.value_of(r.quantities, key)) is not None]
         if numbers:
-            std = float(np.std(numbers, ddof=1)) if len(numbers) > 1 else None
-            found.append((speed, (float(np.mean(numbers)), std)))
+            half = half_width(float(np.std(numbers, ddof=1)), len(numbers)) if len(numbers) > 1 else None
+            found.append((speed, (float(np.mean(numbers)), half)))
     return found
 
 

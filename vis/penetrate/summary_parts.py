@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
-from scipy import stats
 
 from vis.page.folder import PYTHON_RUNS, Run, RunFolder, Setting
 from vis.page.numbers import column, plain, quantity, quote, short, with_squares
@@ -18,7 +17,7 @@ from vis.page.sentences import Sentences
 
 __all__ = [
     "as_foot", "bed_part", "cell_text", "Departure", "departure_rows", "departures_part", "facts_table",
-    "fit_error", "fit_part", "fitted", "half_of_95", "joined", "label_of", "list_of", "mapping_of", "MINUS",
+    "fit_error", "joined", "label_of", "list_of", "mapping_of", "MINUS",
     "more_or_less", "NBSP", "numbers_table", "percent", "plain_value", "reference_part", "reproduce_part",
     "rest_part", "run_words", "runs_table", "sentence", "setting_of", "settings_table", "SHARES", "signed_percent",
     "std_of", "Table", "value_of",
@@ -37,15 +36,6 @@ SHARES = {
     "force_gap_spring_damper", "force_gap_amended", "max_overlap", "overlap",
     "overlap_quasi_static", "overlap_impact", "spread",
 }  # fmt: skip
-
-
-def fitted(quantities: Mapping[str, Any], key: str) -> str:
-    """K or C with its spread between beds, or for one bed with the standard error of the fit."""
-    entry = mapping_of(quantities.get(key))
-    error = value_of(quantities, f"{key}_error")
-    if entry.get("std") is None and error is not None:
-        entry = {**entry, "std": error}
-    return quantity(entry) if entry else "unknown"
 
 
 @dataclass(frozen=True)
@@ -167,11 +157,6 @@ def std_of(quantities: Any, key: str) -> float | None:
     return plain_value(mapping_of(mapping_of(quantities).get(key)).get("std"))
 
 
-def half_of_95(std: float | None, count: int) -> float | None:
-    """Half-width of Student's 95 % interval of a mean of `count` beds; None where beds show no spread."""
-    return None if std is None or count < 2 else float(stats.t.ppf(0.975, count - 1) * std / np.sqrt(count))
-
-
 def fit_error(fit: Mapping[str, Any], key: str) -> float | None:
     """Standard error of a bed's own fit; None where unknown."""
     entry = fit.get(key)
@@ -221,35 +206,6 @@ class Table(TypedDict, total=False):
 
 _OF_THE_BED = ("grain_count", "packing_fraction", "coordination_number", "surface", "young", "time_step", "max_overlap")
 _BARE_UNITS = {"1", "m", "m/s", "m/s2", "s", "kg", "N", "N/m", "N s/m", "Pa", "degrees"}
-
-
-def fit_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, Any] | None:
-    """What was fitted: a table of the pooled and the beds' own fits, and a note."""
-    if value_of(quantities, "stiffness") is None and not result.get("fits"):
-        return None
-    own = [mapping_of(fit) for fit in list_of(result.get("fits"))]
-    one = len(own) < 2
-    gap = quantity(quantities.get("drag_gap"), unit="%")
-    together = "this bed" if one else "all beds together"
-    rows = [[together, fitted(quantities, "stiffness"), fitted(quantities, "damping"), gap]]
-    for i, fit in enumerate([] if one else own):
-        gap = quote(value_of(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}"
-        units = {"stiffness": "N/m", "damping": "N s/m"}
-        numbers = (quote(value_of(fit, key), fit_error(fit, key), unit) for key, unit in units.items())
-        numbers = numbers if fit.get("separates", True) else ("not separated" for _ in units)
-        rows.append([f"bed {fit.get('seed', i + 1)} by itself", *numbers, gap])
-    errors = [
-        f"{name} {quantity(quantities[key])}"
-        for name, key in (("K", "stiffness_error"), ("C", "damping_error"))
-        if value_of(quantities, key) is not None
-    ]
-    if one:
-        notes = [say("fit_one_bed")] if value_of(quantities, "stiffness_error") is not None else []
-    else:
-        known = any(fit_error(fit, key) is not None for fit in own for key in ("stiffness", "damping"))
-        notes = [say("fit_errors", errors=joined(errors))] if errors else []
-        notes += [say("fit_spread")] if known else []
-    return {"table": {"head": ["fitted to", "K", "C", "drag gap"], "rows": rows}, "note": " ".join(notes)}
 
 
 def rest_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -314,6 +270,7 @@ def reference_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
     """By how much the numbers moved from those of another result, where it was compared with one."""
     reference = mapping_of(result.get("reference"))
     rows = []
+    head = ["", "there (± std)", "here (± std)", "change"]
     for key, entry in mapping_of(reference.get("moved")).items():
         moved = mapping_of(entry)
         unit = "%" if key in SHARES else str(moved.get("unit") or "1")
@@ -324,7 +281,10 @@ def reference_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
         rows.append([label_of(key), *sides, "\N{EN DASH}" if change is None else signed_percent(change)])
     if not rows:
         return None
-    return {"file": str(reference.get("file") or ""), "table": {"head": ["", "there", "here", "change"], "rows": rows}}
+    return {
+        "file": str(reference.get("file") or ""),
+        "table": {"head": head, "rows": rows},
+    }
 
 
 def bed_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, Any]:
@@ -368,7 +328,7 @@ def numbers_table(quantities: Mapping[str, Any]) -> Table | None:
         [label_of(key), cell_text(key, entry), str(mapping_of(entry).get("note") or "")]
         for key, entry in quantities.items()
     ]
-    return {"head": ["quantity", "value", "note"], "rows": rows, "text": True} if rows else None
+    return {"head": ["quantity", "value (± std)", "note"], "rows": rows, "text": True} if rows else None
 
 
 def facts_table(entries: Mapping[str, Any]) -> Table | None:

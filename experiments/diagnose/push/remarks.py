@@ -5,15 +5,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array
+from rigid.intervals import student
 
 __all__ = ["Push", "SURE", "contradict", "facts", "highest_damping", "highest_dampings", "how_to_determine"]
 
 _FAST = 0.8  # of the largest speed from which on a push is one of the fastest
 SURE = 2.0  # standard errors from which on a C is sure
+ONE_SIDED = 0.9  # two-sided: above each end are 5 %
 
 
 @dataclass(frozen=True)
@@ -61,10 +62,10 @@ def highest_damping(pushes: Sequence[Push]) -> float | None:
         return None
     own = [_two(push, lambda p: p.spring) for push, pace in zip(pushes, fast, strict=True) if pace > _FAST * max(fast)]
     found = np.array([c for _, c, _ in own])
-    error, times = own[0][2], float(student.ppf(0.95, np.inf))
+    error, times = own[0][2], student(math.inf, ONE_SIDED)
     if len(own) > 1:
         error = max(float(np.std(found, ddof=1)), *(s for _, _, s in own)) / math.sqrt(len(own))
-        times = float(student.ppf(0.95, len(own) - 1))
+        times = student(len(own) - 1, ONE_SIDED)
     return max(float(found.mean()) + times * error, 0.0)
 
 

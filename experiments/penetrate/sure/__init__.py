@@ -1,10 +1,20 @@
 """How sure the numbers of a spike or foot are: an interval for real grains from its beds and from kept runs.
 
-Imports `vis`.
+Imports `rigid`, `vis`.
 """
 
-from .interval import Interval, Trend, in_words, interval_of_rest, interval_of_sinkage, interval_of_stiffness, trends
+from .interval import (
+    Interval,
+    Trend,
+    in_words,
+    interval_of_rest,
+    interval_of_sinkage,
+    interval_of_stiffness,
+    known_within,
+    trends,
+)
 
 __all__ = [
-    "Interval", "Trend", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness", "trends",
+    "Interval", "Trend", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness",
+    "known_within", "trends",
 ]  # fmt: skip

@@ -21,16 +21,16 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
 
-from vis.page.numbers import between, foldable
+from rigid.intervals import half_width, student
+from vis.page.numbers import between, foldable, within
 
 __all__ = [
-    "Interval", "Trend", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness", "trends",
+    "Interval", "Trend", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness",
+    "known_within", "trends",
 ]  # fmt: skip
 
 _FILE = Path(__file__).with_name("trends.toml")
-_COVERED = 0.95
 
 
 @dataclass(frozen=True)
@@ -134,12 +134,19 @@ def _kept(trend: Trend, tip: str, scale: float) -> tuple[float, int] | None:
 
 def _half(values: Sequence[float], kept: tuple[float, int] | None) -> float | None:
     """Half-width of the interval of a mean; one bed has that of kept runs; None where there are none."""
-    count = len(values)
-    if count > 1:
-        return float(stats.t.ppf(0.5 + _COVERED / 2, count - 1) * np.std(values, ddof=1) / math.sqrt(count))
-    return None if kept is None else float(stats.t.ppf(0.5 + _COVERED / 2, kept[1]) * kept[0])
+    if len(values) > 1:
+        return half_width(float(np.std(values, ddof=1)), len(values))
+    return None if kept is None else student(kept[1]) * kept[0]
 
 
 def in_words(low: float, high: float, unit: str) -> str:
     """Two ends with two digits and one unit, for text that folds: "0 to 7.3 mm"."""
     return foldable(between(low, high, unit))
+
+
+def known_within(low: float, high: float, unit: str) -> str:
+    """What an interval of a sinkage or of K shows, for text that folds: "below 7.3 mm" where its lower end is 0.
+
+    That 0 is no result: the half-width is larger than the value.
+    """
+    return foldable(within(low, high, unit))

@@ -12,9 +12,10 @@ from experiments import groundmap as ground
 from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.groundmap.experiment import ground_file
 from experiments.groundmap.make import made_map
-from experiments.groundmap.maps import TO_STD, read_map
+from experiments.groundmap.maps import read_map
 from experiments.groundmap.settings import GroundSettings
 from rigid.ground_file import read_ground
+from rigid.intervals import NORMAL
 
 RESULTS = Path(__file__).parents[3] / "docs" / "results"
 POINT = {"gravity": 9.80665, "diameter": 0.012, "grain": 0.0002, "packing": None, "load": None}
@@ -39,7 +40,7 @@ def test_at_the_reference_it_answers_as_the_flagship_with_all_its_errors():
     for name in ("stiffness", "damping", "sinkage"):
         number = getattr(answer, name)
         assert number.value == pytest.approx(flagship[name]["value"], rel=1e-4)
-        assert number.std == pytest.approx(flagship[name]["total"] / TO_STD, rel=1e-4)
+        assert number.std == pytest.approx(flagship[name]["total"] / NORMAL, rel=1e-4)
 
 
 def test_in_grains_that_were_run_it_is_within_its_error_of_their_mean():
@@ -92,7 +93,7 @@ def test_the_error_of_packing_is_student_s_and_grows_with_the_way_from_the_beds_
     ]
     squares = [(entry["std"] / entry["value"]) ** 2 for entry in results]
     pooled = math.sqrt((2 * squares[0] + squares[1] + squares[2]) / 4)
-    expected = 2.776 / TO_STD * pooled * math.sqrt(1 / 3 + 1 / 2)
+    expected = 2.776 / NORMAL * pooled * math.sqrt(1 / 3 + 1 / 2)
     assert table.factor_stds[2] / table.factors[2] == pytest.approx(expected, rel=1e-3)
     dense = POINT | {"packing": table.packings[-1]}
     near, far = (table.answer(**dense | {"grain": grain}).stiffness for grain in (0.0024, 0.0002))

@@ -1,0 +1,102 @@
+"""Errors of a run's numbers as halves of 95 % intervals, in place of the standard deviations of result.json.
+
+A number over n beds has t s / sqrt(n), that of a fit t times its standard error by the jackknife over runs; t is
+Student's with n - 1 degrees of freedom, n the number of beds or of runs (`rigid.intervals`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rigid.intervals import half_width, student
+from vis.page.numbers import quantity, quote
+from vis.penetrate.summary_parts import fit_error, joined, list_of, mapping_of, say, std_of, value_of
+
+__all__ = ["fit_part", "fitted", "in_95"]
+
+_UNITS = {"stiffness": "N/m", "damping": "N s/m"}
+
+
+def in_95(result: Mapping[str, Any]) -> dict[str, Any]:
+    """The quantities of a result of penetrate, the std of each replaced by half of its 95 % interval over beds.
+
+    0, of exact numbers, stays; None for a number that fewer than two beds have. The standard errors of the fit, which
+    are values of their own, become halves of 95 % intervals too, None for fewer than two runs.
+    """
+    quantities, fits = mapping_of(result.get("quantities")), _mappings(result, "fits")
+    runs = _mappings(result, "runs")
+    beds = len({run.get("seed") for run in runs} - {None})
+    depths = [value_of(run.get("quantities"), "sinkage") for run in runs if run.get("kind") == "set_down"]
+    counts = dict.fromkeys((*_UNITS, "work_returned_spring_damper"), len(fits) or beds) | {
+        "sinkage_dem": sum(depth is not None for depth in depths),
+        "stiffness_standing": sum((depth or 0.0) > 0 for depth in depths),
+        "sinkage_spring_damper": sum((value_of(fit, "stiffness") or 0.0) > 0 for fit in fits) or beds,
+    }
+    found = {name: dict(entry) if isinstance(entry, Mapping) else entry for name, entry in quantities.items()}
+    for name in found:
+        if std := std_of(quantities, name):
+            found[name]["std"] = half_width(std, counts.get(name, beds))
+    for key in _UNITS:
+        if (error := value_of(quantities, f"{key}_error")) is not None:
+            found[f"{key}_error"]["value"] = _of_runs(error, _run_count(result, fits[0] if len(fits) == 1 else {}))
+    return found
+
+
+def fitted(numbers: Mapping[str, Any], key: str) -> str:
+    """K or C of `in_95` with its error over beds, or for one bed with that of the fit."""
+    entry = mapping_of(numbers.get(key))
+    error = value_of(numbers, f"{key}_error")
+    if entry.get("std") is None and error is not None:
+        entry = {**entry, "std": error}
+    return quantity(entry) if entry else "unknown"
+
+
+def fit_part(result: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, Any] | None:
+    """What was fitted: a table of the pooled and the beds' own fits, and a note. ``numbers``: of `in_95`."""
+    own = _mappings(result, "fits")
+    if value_of(numbers, "stiffness") is None and not own:
+        return None
+    one = len(own) < 2
+    gap = quantity(numbers.get("drag_gap"), unit="%")
+    rows = [["this bed" if one else "all beds together", *(fitted(numbers, key) for key in _UNITS), gap]]
+    halves = [{key: _half_of_fit(result, fit, key) for key in _UNITS} for fit in own]
+    for i, fit in enumerate([] if one else own):
+        gap = quote(value_of(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}"
+        cells = (quote(value_of(fit, key), halves[i][key], unit) for key, unit in _UNITS.items())
+        cells = cells if fit.get("separates", True) else ("not separated" for _ in _UNITS)
+        rows.append([f"bed {fit.get('seed', i + 1)} by itself", *cells, gap])
+    errors = [
+        f"{name} {quantity(numbers[key])}"
+        for name, key in (("K", "stiffness_error"), ("C", "damping_error"))
+        if value_of(numbers, key) is not None
+    ]
+    if one:
+        notes = [say("fit_one_bed")] if value_of(numbers, "stiffness_error") is not None else []
+    else:
+        known = any(half is not None for both in halves for half in both.values())
+        notes = [say("fit_errors", errors=joined(errors))] if errors else []
+        notes += [say("fit_spread")] if known else []
+    head = ["fitted to", "K (± 95 %)", "C (± 95 %)", "drag gap (± 95 %)"]
+    return {"table": {"head": head, "rows": rows}, "note": " ".join(notes)}
+
+
+def _half_of_fit(result: Mapping[str, Any], fit: Mapping[str, Any], key: str) -> float | None:
+    """Half of the 95 % interval of K or C of a bed's own fit; None where its error or its runs are unknown."""
+    error = fit_error(fit, key)
+    return None if error is None else _of_runs(error, _run_count(result, fit))
+
+
+def _run_count(result: Mapping[str, Any], fit: Mapping[str, Any]) -> int:
+    """The runs of a fit, by its own list, else all pushes and drops of its bed; without a bed those of all."""
+    runs = [run for run in _mappings(result, "runs") if run.get("kind") in ("driven", "drop")]
+    return len(list_of(fit.get("runs"))) or sum(run.get("seed") == fit.get("seed", run.get("seed")) for run in runs)
+
+
+def _of_runs(error: float, count: int) -> float | None:
+    """Half of the 95 % interval of a fit with this standard error by the jackknife over `count` runs."""
+    return student(count - 1) * error if count > 1 else None
+
+
+def _mappings(result: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
+    return [mapping_of(entry) for entry in list_of(result.get(name))]
