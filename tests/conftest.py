@@ -36,6 +36,26 @@ def one_core():
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def one_command_line():
+    """The options of all commands are set out once, not in each of a thousand calls of the command line."""
+    from experiments.cli import main
+    from experiments.runs import registry
+
+    built = main.build_app
+    apps: dict[tuple, object] = {}
+
+    def build_app():
+        known = tuple(registry.EXPERIMENTS.values())
+        if known not in apps:
+            apps[known] = built()
+        return apps[known]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(main, "build_app", build_app)
+        yield
+
+
 def heavy_files(durations: dict[str, float]) -> set[str]:
     """The files that `make fast` leaves out: it takes the quickest ones until its budget is used up."""
     total, heavy = 0.0, set()
