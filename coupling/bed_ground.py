@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from dem.engine.values import Grains
 from hedgebed_renamed import renamed, renamed_keywords
+from rigid.checks.unfit import UnfitSettingsError
 from rigid.ground.reaction import Contact, Facts, Reaction, State, Turned
 from rigid.platform.spike import Spike
 from rigid.spatial.quaternions import multiply, to_matrix
@@ -37,7 +38,7 @@ class GrainBed(Protocol):
         """Put a body of these shapes into the bed; its number."""
 
 
-class LeftTheBedError(RuntimeError):
+class LeftTheBedError(UnfitSettingsError):
     """The body came down where there is no bed, or down to its floor.
 
     `lacking`: how much bed it would have taken on that side [m]; 0 where the depth is not sufficient.

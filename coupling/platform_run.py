@@ -10,6 +10,7 @@ import numpy as np
 
 from hedgebed_renamed import renamed
 from rigid.checks import check_above_zero
+from rigid.checks.unfit import UnfitSettingsError
 from rigid.ground.reaction import Reaction, State
 from rigid.planar.trajectory import STATES
 
@@ -253,7 +254,7 @@ class PlatformRun(EnergyBalance, Stepper):
                 self.body.slow_placement(FIRMER)
                 self._settling = []
         if self.body.time > longest:  # 0 after its release
-            raise RuntimeError(
+            raise UnfitSettingsError(
                 f"the platform did not come to rest within {longest:.3g} s of being set down: the ground carried "
                 f"{self.master.wrench.force[2]:.3g} of {self._weight:.3g} N at the end"
             )

@@ -11,6 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from hedgebed_renamed import renamed_keywords
+from rigid.checks.unfit import UnfitSettingsError
 from rigid.ground.reaction import Reaction, State
 from rigid.model.trial import Trial
 from rigid.planar.trajectory import Tally, Trajectory
@@ -156,7 +157,7 @@ class CoupledTumble(PlatformRun):
             lowered.drag(False)
             self._settling = []
         elif self.body.time > lowered.begun + lowered.steps * lowered.every + LONGEST_CALM * lowered.sees:
-            raise RuntimeError(
+            raise UnfitSettingsError(
                 f"platform and grains did not come to rest in {LONGEST_CALM * lowered.sees:.3g} s under "
                 f"{lowered.last:.3g} m/s2: grains move at {speeds[2]:.2g} m/s, the platform at {max(speeds[:2]):.2g}, "
                 f"{mean[0]:.2g} of {self._weight:.2g} N are missing; choose a smaller settle_gravity"

@@ -6,6 +6,12 @@ from pydantic import Field, model_validator
 
 from experiments.runs.folder import RunFolder
 from experiments.runs.strict import StrictSettings
+from rigid.checks.unfit import UnfitSettingsError
+
+ENDINGS = {
+    error.__name__: error
+    for error in (KeyboardInterrupt, RuntimeError, UnfitSettingsError, ValueError, ZeroDivisionError)
+}
 
 
 class DigSettings(StrictSettings):
@@ -40,10 +46,8 @@ def dig(settings, folder, progress):
     print("a library that writes to stdout")
     for step in range(settings.steps):
         progress.update(step + 1)
-    if ending in ("KeyboardInterrupt", "RuntimeError", "ZeroDivisionError", "ValueError"):
-        raise {"KeyboardInterrupt": KeyboardInterrupt, "RuntimeError": RuntimeError, "ValueError": ValueError}.get(
-            ending, ZeroDivisionError
-        )("a grain was lost at t = 0.1 s")
+    if ending in ENDINGS:
+        raise ENDINGS[ending]("a grain was lost at t = 0.1 s")
     result = {
         "format": "hedgebed-result/1",
         "experiment": "dig",

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from rigid.checks.unfit import UnfitSettingsError
+
 from .feet import refuse_missing
 
 __all__ = [
@@ -15,7 +17,7 @@ __all__ = [
 SOFTER = "use a smaller time step of the model, or softer gains"
 
 
-class LostRobotError(RuntimeError):
+class LostRobotError(UnfitSettingsError):
     """A robot cannot go on: its state or control is no number, or its controller fails. `remedy`: what would do."""
 
     def __init__(self, message: str, *, remedy: str) -> None:

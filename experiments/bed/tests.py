@@ -25,6 +25,7 @@ from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
+from rigid.checks.unfit import UnfitSettingsError
 
 from .test_settings import BedTestSettings
 
@@ -102,7 +103,7 @@ def _beds(settings: BedTestSettings, bearing: float | None) -> Iterator[tuple[st
                     progress=progress and BedProgress(progress, f"bed of seed {seed}", asked_to_stop),
                 )  # fmt: skip
         except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
-            raise RuntimeError(f"the bed of seed {seed} could not be prepared: {error}") from error
+            raise UnfitSettingsError(f"the bed of seed {seed} could not be prepared: {error}") from error
 
     for seed in settings.seeds:
         yield f"seed{seed}", partial(prepared, seed)

@@ -22,6 +22,7 @@ from experiments.runs.result import Result, quantities_of
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import publish
+from rigid.checks.unfit import UnfitSettingsError
 
 from .settings import say
 from .tests import table, write_frame
@@ -65,7 +66,7 @@ def prepared_in(folder: RunFolder, progress: Progress, options: Mapping[str, Any
         with held_back() as asked_to_stop:
             prepared = prepare_as(**options, make=Bed, progress=Stages(progress, asked_to_stop), keep=keep)
     except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
-        raise RuntimeError(str(error)) from error
+        raise UnfitSettingsError(str(error)) from error
     save_prepared(prepared, file)
     if name is not None:
         save_prepared(prepared, shelf_path(name))

@@ -22,6 +22,7 @@ from experiments.runs.registry import Headline
 from experiments.runs.result import Result
 from experiments.runs.streams import RefusedError, file_words, say, stdout_to_stderr
 from experiments.runs.whole_runs import draw_report, keeping_status
+from rigid.checks.unfit import UnfitSettingsError
 from vis.page.numbers import beside, with_squares
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "redraw_old_report", "show_folder"]
@@ -51,6 +52,9 @@ def carry_out(
             from coupling.lammps.process import LammpsEndedError  # loads Taichi
             from experiments.pool.workers import SchedulerGoneError
 
+            unfit = isinstance(error, UnfitSettingsError)
+            if unfit and fresh:
+                _refuse_without_work(folder, error)
             again = "the same settings would fail the same way again"
             if isinstance(error, LammpsEndedError) and not error.refused:
                 again = _goes_on(folder)
@@ -58,19 +62,18 @@ def carry_out(
                 again = f"`HEDGEBED_SCHEDULER=tcp://... hedgebed resume {folder.path}` goes on with another scheduler"
             say(f"failed: {error}")
             say(f"what was finished is kept in {folder.path}; {again}")
-            return FAILED
+            return BAD_INPUT if unfit else FAILED
         except (ValueError, OverflowError) as error:
-            if isinstance(error, OverflowError):
+            unfit = isinstance(error, OverflowError)
+            if unfit:
                 error = ValueError(f"with these settings {registry.TOO_LARGE}").with_traceback(error.__traceback__)
-            if fresh and not folder.has_work:  # refused before any work: leave nothing behind
-                if {item.name for item in folder.path.iterdir()} <= {"run.toml", "status.json", "lock"}:
-                    shutil.rmtree(folder.path)
-                raise RefusedError(str(error)) from error
+            if fresh:
+                _refuse_without_work(folder, error)
             with suppress(OSError):
                 write_text(folder.path / "traceback.txt", traceback.format_exc())
             say(f"failed: {error}")
             say(f"what was finished is kept in {folder.path}, and where it failed in traceback.txt there")
-            return FAILED
+            return BAD_INPUT if unfit else FAILED
         except OSError as error:
             from dem.prepare.specification import cache_folder
 
@@ -82,6 +85,15 @@ def carry_out(
             say(f"failed; what there was is in {folder.path}")
             return FAILED
     return show_folder(folder, as_json=as_json, verbose=verbose)
+
+
+def _refuse_without_work(folder: RunFolder, error: Exception) -> None:
+    """Raise RefusedError where a new folder holds no work yet; nothing of it is left behind."""
+    if folder.has_work:
+        return
+    if {item.name for item in folder.path.iterdir()} <= {"run.toml", "status.json", "lock"}:
+        shutil.rmtree(folder.path)
+    raise RefusedError(str(error)) from error
 
 
 def _goes_on(folder: RunFolder) -> str:

@@ -16,6 +16,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.whole_runs import publish
+from rigid.checks.unfit import failed_as
 
 from . import say
 from .bed_progress import show_bed
@@ -109,7 +110,7 @@ class Followed(ABC, Generic[Run]):
                 self.write_series(run, folder.path)
                 left, when = left + say("series_kept"), f"at {run.time:.4g} s"
             clock = say("own_time") if " at t = " in str(error) else ""
-            raise RuntimeError(f"{when}: {error}{clock}; {_remedy(error)}; {left}") from error
+            raise failed_as(error, f"{when}: {error}{clock}; {_remedy(error)}; {left}") from error
         folder.save_checkpoint(CHECKPOINT, run.state())
         return found
 

@@ -24,6 +24,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
+from rigid.checks.unfit import failed_as
 from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
@@ -202,7 +203,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         try:
             return self.laid_out(self.prepare(softening, progress))
         except RuntimeError as error:
-            raise RuntimeError(say("not_prepared", error=error)) from error
+            raise failed_as(error, say("not_prepared", error=error)) from error
 
     def prepare(self, softening: Softening, progress: Progress) -> Bed:
         """The prepared bed, from the cache if it is there."""

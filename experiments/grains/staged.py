@@ -10,6 +10,7 @@ from dem.grains.sizes import sizes_of
 from dem.prepare.prepare import prepare_as
 from dem.prepare.recipe import check_stages, parse_stage
 from experiments.runs.progress import Progress
+from rigid.checks.unfit import UnfitSettingsError
 
 from . import say
 from .bed_progress import Stages
@@ -73,7 +74,7 @@ def staged_bed(
     try:
         prepared = prepare_as(material, make=Bed, stages=stages, **options, progress=shown)
     except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
-        raise RuntimeError(str(error)) from error
+        raise UnfitSettingsError(str(error)) from error
     assert prepared.bed is not None
     return prepared.bed
 

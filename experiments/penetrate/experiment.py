@@ -30,6 +30,7 @@ from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import PictureCosts, draw_report, whole_run
+from rigid.checks.unfit import UnfitSettingsError, failed_as
 
 from . import beds
 from .amended import run_without_bed
@@ -158,7 +159,7 @@ class _Work:
         except RuntimeError as error:
             missing[seed] = str(error)
             if len(missing) == len(self.settings.seeds):  # the last one is tried again when the run is resumed
-                raise RuntimeError("; ".join(missing.values())) from error
+                raise failed_as(error, "; ".join(missing.values())) from error
             self.folder.mark_done(_missing(seed), str(error))
             self.progress.message(f"warning: {say('bed_missing', why=error)}")
             return
@@ -196,11 +197,11 @@ class _Work:
             try:
                 return beds.prepare_bed(self.settings, seed, young, self.progress)
             except ValueError as error:  # found while it was prepared, as a packing that cannot be reached
-                raise RuntimeError(f"the bed of seed {seed}: {error}") from error
+                raise UnfitSettingsError(f"the bed of seed {seed}: {error}") from error
             except RuntimeError as error:
                 if not self._made_stiffer(error, seed):
                     failed = f"the bed of seed {seed} could not be prepared: {error}; {_remedy(error)}"
-                    raise RuntimeError(failed) from error
+                    raise failed_as(error, failed) from error
 
     def _notes(self, seed: int) -> list[Json]:
         """Where grains of a seed were made stiffer, and by how much, so far."""
@@ -277,7 +278,7 @@ class _Work:
             if self._made_stiffer(error, unit.seed, unit):
                 return False
             folder.save_checkpoint(f"{unit.id}.failed", stepper.state())
-            raise RuntimeError(say("failed", unit=unit, error=error, remedy=_remedy(error))) from error
+            raise failed_as(error, say("failed", unit=unit, error=error, remedy=_remedy(error))) from error
         self.plan.is_over(unit, stepper.time)
         folder.write_series(unit.id, series.columns())
         all_of_them = bed.grain_count * stepper.count * settings.substeps

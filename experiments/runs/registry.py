@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from pydantic import BaseModel
 
+from rigid.checks.unfit import UnfitSettingsError
+
 if TYPE_CHECKING:
     from experiments.runs.progress import Progress
     from experiments.runs.result import Result
@@ -115,8 +117,8 @@ class Experiment:
         if check is not None:
             try:
                 check(settings)
-            except RuntimeError as error:  # a short trial that fails; a kind of it is something else
-                if type(error) is not RuntimeError:
+            except RuntimeError as error:  # a short trial that fails; another kind of it is something else
+                if type(error) is not RuntimeError and not isinstance(error, UnfitSettingsError):
                     raise
                 raise ValueError(f"with these settings a short trial fails: {error}") from error
             except OverflowError as error:

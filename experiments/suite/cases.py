@@ -273,9 +273,12 @@ def keep(folder: Path, target: Path) -> None:
         digests = {name: digest_of(made / name) for name in KEPT}
         kept = {name: cost.get(name) for name in ("processor_time", "updated")} | {"digests": digests}
         write_json(made / "cost.json", kept)
-        if not target.exists():
+        try:
             made.rename(target)
             return
+        except OSError:  # it is there already, maybe since a moment, by another command
+            if not target.is_dir():
+                raise
         (target / "result.json").unlink(missing_ok=True)
         for path in sorted(made.iterdir(), key=lambda path: path.name == "result.json"):
             path.replace(target / path.name)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid.checks import check_above_zero, check_not_negative
+from rigid.checks.unfit import UnfitSettingsError
 from rigid.model.trial import POSITIVE, Trial
 from rigid.planar.simulate import check_step, step_bound
 from rigid.planar.trajectory import LAUNCH_DISTANCE, STATES
@@ -121,7 +122,7 @@ def simulate_batch(
     stands = column["status"] != 3
     wrong = np.flatnonzero(column["status"] == 2)
     if len(wrong):
-        raise RuntimeError(f"the motion of trial {wrong[0]} of the batch is no longer finite")
+        raise UnfitSettingsError(f"the motion of trial {wrong[0]} of the batch is no longer finite")
     for name in SUMMARY:
         column[name][~stands] = np.nan
     deep = np.flatnonzero(column["status"] == 1)

@@ -12,6 +12,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from rigid.checks.unfit import UnfitSettingsError
+
 from .dynamics import LOST, THETA, WHEEL, Modes, System
 from .events import KINKS, Monitor, Watch, cubic, let_go, monitors, precision, resolve, triggered
 from .methods import Implicit, Interpolant, Step, attempt, interpolant
@@ -124,7 +126,7 @@ class _Motion:
         step = self._attempt(h)
         if not math.isfinite(step.error):
             if h < 1e-12:
-                raise RuntimeError(f"the motion is no longer finite at t = {self.time:.6g} s")
+                raise UnfitSettingsError(f"the motion is no longer finite at t = {self.time:.6g} s")
             self.h, went.rejected = 0.1 * h, went.rejected + 1
             return
         if step.error > 1 and h > _SHORTEST:

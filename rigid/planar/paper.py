@@ -8,6 +8,8 @@ a step. It is here to show what that step does; the located integrator is the on
 import math
 from collections.abc import Callable
 
+from rigid.checks.unfit import UnfitSettingsError
+
 from .dynamics import INNER, INNER_SPEED, LOST, OMEGA, THETA, VX, VY, WHEEL, WORK, Modes, System, X, Y
 from .events import resolve
 from .statics import at_rest
@@ -60,7 +62,7 @@ def integrate_fixed(
         z[WORK] += time_step * (rate[WORK] / turning * mean if turning else system.s.torque * mean)
         z[LOST] += time_step * rate[LOST]
         if not all(map(math.isfinite, z)):
-            raise RuntimeError(f"the motion is no longer finite at t = {time:.6g} s")
+            raise UnfitSettingsError(f"the motion is no longer finite at t = {time:.6g} s")
         rate = _read_modes(system, time, z, modes, before, speeds)
         if modes.state != transitions[-1][1]:
             transitions.append((time, modes.state, z[THETA]))

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import RK45
 
+from rigid.checks.unfit import UnfitSettingsError
 from rigid.platform.actuation import TorqueHistory
 
 from .motion import FRICTION_WORK, GROUND_WORK, TORQUE_WORK, H, L, Modes, Motion, P, Q, R
@@ -82,7 +83,7 @@ class Integration:
             z, error = self._attempt(first, h)
             if not math.isfinite(error):
                 if h < 1e-12:
-                    raise RuntimeError(f"the motion is no longer finite at t = {self.time:.6g} s")
+                    raise UnfitSettingsError(f"the motion is no longer finite at t = {self.time:.6g} s")
                 h *= 0.1
             elif error > 1 and h > SHORTEST and not self.fixed:
                 h *= max(0.2, 0.9 * error**-0.2)

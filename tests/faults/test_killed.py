@@ -1,8 +1,8 @@
 """Long experiments killed (kill -9) at random moments and resumed: the same bits as of a run left alone.
 
 Each experiment is killed once, `make torture` kills as often as HEDGEBED_KILLS says, in all. HEDGEBED_KILLED_KEPT names
-a file to which every run adds a line as it ends; kills that it has are not done again. A kill counts only where the run
-had kept a file before.
+a file to which every run adds a line as it ends, with what each kill met; kills that it has are not done again. A kill
+counts only where the run had kept a file before.
 """
 
 import json
@@ -136,6 +136,28 @@ def where(folder):
     return NOTHING if last is None else str(last.relative_to(folder))
 
 
+def newest_checkpoint(out):
+    """The newest checkpoint of a run, of its members and of its bed under way, from which the run goes on."""
+    paths = [*out.rglob("checkpoint/*"), *Path(f"{out}-cache").glob("unfinished/*")]
+    whole = [path for path in paths if path.is_file() and path.name[0] != "." and path.suffix != ".before"]
+    newest = max(whole, key=lambda path: path.stat().st_mtime_ns, default=None)
+    return NOTHING if newest is None else str(newest.relative_to(out.parent))
+
+
+def test_the_newest_checkpoint_of_a_killed_run_is_that_of_a_bed_under_way_too(tmp_path):
+    """No file that was being written, none that a newer one has replaced, and no status."""
+    out, found = tmp_path / "out", [newest_checkpoint(tmp_path / "out")]
+    names = ("out-cache/unfinished/sand.npz", "out/members/a/checkpoint/b.npz", "out/checkpoint/b.npz.before",
+             "out/checkpoint/.b.npz.1.tmp", "out/status.json")  # fmt: skip
+    for age, name in enumerate(names):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+        os.utime(path, (age, age))
+        found.append(newest_checkpoint(out))
+    assert found == [NOTHING, names[0], *[names[1]] * 4]
+
+
 def kept_of(name):
     """Lines of runs of the experiment in the file, if there is one."""
     lines = Path(KEPT).read_text().splitlines() if KEPT and Path(KEPT).exists() else []
@@ -166,7 +188,8 @@ def test_an_experiment_killed_at_random_moments_ends_in_the_same_bits(name, tmp_
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-                moments.append({"after_s": round(time.monotonic() - began, 2), "last_kept": where(out)})
+                after = {"after_s": round(time.monotonic() - began, 2)}
+                moments.append(after | {"last_kept": where(out), "checkpoint": newest_checkpoint(out)})
                 killed += counted(moments[-1:])
             else:
                 break

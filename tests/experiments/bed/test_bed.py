@@ -13,7 +13,7 @@ from dem.prepare.bedfile import read_preparation
 from experiments.bed import make as bed_make
 from experiments.bed import refine as bed_refine
 from experiments.bed.settings import BedRefineSettings, BedSettings
-from experiments.cli.main import BAD_INPUT, DONE, FAILED, STOPPED, main
+from experiments.cli.main import BAD_INPUT, DONE, STOPPED, main
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import read_series
 from hedgebed_taichi import ti
@@ -138,12 +138,12 @@ def test_what_cannot_be_made_is_refused_before_any_work(options, said, tmp_path,
     assert not (tmp_path / "run").exists()
 
 
-def test_a_packing_that_turns_out_to_be_out_of_reach_fails_with_what_was_reached(tmp_path, capsys, monkeypatch):
+def test_a_packing_that_turns_out_to_be_out_of_reach_is_bad_input_with_what_was_reached(tmp_path, capsys, monkeypatch):
     def unreachable(**options):
         raise ValueError("packing = 0.63 cannot be reached: 8 taps brought the bed from 0.55 to 0.57")
 
     monkeypatch.setattr(experiments.bed.work, "prepare_as", unreachable)
-    assert main([*MAKE, "--out", str(tmp_path / "run")]) == FAILED
+    assert main([*MAKE, "--out", str(tmp_path / "run")]) == BAD_INPUT
     assert "packing = 0.63" in capsys.readouterr().err
 
 

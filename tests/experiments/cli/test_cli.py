@@ -244,6 +244,15 @@ def test_failed_says_why_without_a_traceback(dig, capsys):
     assert "grain was lost" in status["reason"]
 
 
+def test_settings_that_only_the_computation_shows_to_be_bad_are_bad_input_and_what_is_computed_is_kept(dig, capsys):
+    assert main(["dig", "--ending", "UnfitSettingsError", "--out", "a"]) == 2
+    text = capsys.readouterr().err
+    assert "grain was lost" in text and "kept in a;" in text
+    assert "Traceback" not in text and "resume" not in text
+    assert json.loads(Path("a/status.json").read_text())["status"] == "failed"
+    assert Path("a/series/dig.csv").exists()
+
+
 def test_a_value_found_wrong_after_work_began_is_a_sentence(dig, capsys):
     assert main(["dig", "--ending", "ValueError", "--out", "a"]) == 1
     text = capsys.readouterr().err

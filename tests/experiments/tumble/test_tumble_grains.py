@@ -522,7 +522,7 @@ def test_a_run_that_leaves_the_bed_says_where_and_keeps_its_state_and_series(tmp
     monkeypatch.setattr(PlanarOnBed, "stepper", stepper)
     out = tmp_path / "left"
     given = ("--surface", "sand", "--ground", "bed", "--bed-size", "0.4", "0.06", "0.046", "--frame-count", "0")
-    assert main(["tumble", *given, "--duration", "0.3", "--quiet", "--out", str(out)]) == 1
+    assert main(["tumble", *given, "--duration", "0.3", "--quiet", "--out", str(out)]) == 2
     said = capsys.readouterr().err.replace("\n", " ")
     assert all(number in said for number in ("at 0.05 s:", "spike 7", "0.01 m ahead", "by 0.04 m"))
     assert json.loads((out / "status.json").read_text())["status"] == "failed"
