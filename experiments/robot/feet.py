@@ -128,9 +128,7 @@ def too_fast(plan: RobotPlan, run: RobotRun, heights: Array) -> list[str]:
     froude, name, speed, diameter = max(found)
     if froude <= FASTEST:
         return []
-    law = plan.law if plan.law == "rft" else "other"
-    inertia = plan.numbers["inertia"].value if "inertia" in plan.numbers else None
-    cause = say(f"inertia_of_{law}", law=plan.law, inertia=inertia)
+    cause = say("inertia_of_rft", inertia=plan.numbers["inertia"].value) if plan.law == "rft" else ""
     return [say("too_fast", name=name, speed=speed, froude=froude, diameter=1e3 * diameter, most=FASTEST, cause=cause)]
 
 

@@ -5,18 +5,53 @@ upwards therefore rises by v^2 / 2 g and is back at its height after 2 v / g.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupling.robot import MujocoRobot, RobotRun
+from experiments.grains.spells import spells
 
 from . import say
 from .settings import RobotSettings
 
-__all__ = ["at_end", "fall_warning", "launched", "to_landing", "touch_words"]
+__all__ = ["APART", "Flights", "at_end", "fall_warning", "find_flights", "launched", "to_landing", "touch_words"]
+
+APART = 5e-3  # A flight lasts at least that long [s]
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Flights:
+    """When a robot flies, in rows of its run."""
+
+    rows: tuple[tuple[int, int], ...]
+    """From and to which."""
+    touched: int | None
+    """Of the first touch; None where nothing touches."""
+    at_end: bool
+    """Whether the run ends in a flight."""
+    longest: float
+    """Duration of the longest [s], 0 without any."""
+
+
+def find_flights(run: RobotRun, heights: Array) -> Flights:
+    """The flights of a run. ``heights``: as of `to_landing`.
+
+    A robot flies while nothing touches, after the first touch, for `APART` at least, if at some time of it all feet are
+    above the undisturbed surface: a foot that loses contact in its own crater does not fly.
+    """
+    free = run.columns["touching"] == 0
+    if free.all():
+        return Flights((), None, at_end=False, longest=0.0)
+    touched, lasting = int(np.argmin(free)), max(1, round(APART / run.macro_step))
+    lowest = heights.min(axis=1)
+    found = [(touched + low, touched + high) for low, high in spells(free[touched:]) if high - low >= lasting]
+    rows = tuple((low, high) for low, high in found if lowest[low:high].max() > 0.0)
+    longest = max((end - begin for begin, end in rows), default=0) * run.macro_step
+    return Flights(rows, touched, at_end=bool(rows) and rows[-1][1] == len(free), longest=longest)
 
 
 def launched(run: RobotRun, begin: int) -> list[str]:

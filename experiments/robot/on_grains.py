@@ -32,7 +32,7 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .feet import feet_reached, heights_of
-from .flight import fall_warning, touch_words
+from .flight import fall_warning, find_flights, touch_words
 from .forms import forms_of
 from .plan import RobotPlan, width_of
 from .result import RobotFrames, conclude, deepest_at_start, quantities_of, write_series_of
@@ -98,7 +98,7 @@ class RobotFollowed(Followed[RobotRun]):
 def _answer(run: RobotRun) -> dict[str, float]:
     """The answer of a run."""
     heights = heights_of(run)
-    return answer_of(quantities_of(run, heights), feet_reached(run, heights))
+    return answer_of(quantities_of(run, heights, find_flights(run, heights)), feet_reached(run, heights))
 
 
 def _stepping(settings: RobotSettings) -> Mapping[str, Any]:

@@ -11,7 +11,6 @@ from coupling.robot.models import actuators_of, joints_of
 from dem.prepare.prepare import fingerprint
 from experiments.grains import bed_result as grains
 from experiments.grains.softening import Softening
-from experiments.grains.spells import spells
 from experiments.grains.tracked_frames import PlatformFrames
 from experiments.runs.folder import write_series
 from experiments.runs.result import Result
@@ -33,7 +32,7 @@ from .feet import (
     too_deep,
     too_fast,
 )
-from .flight import at_end, launched, to_landing
+from .flight import APART, Flights, at_end, find_flights, launched, to_landing
 from .forms import NO_FORMS, Forms
 from .laws import of_sand
 from .plan import RobotPlan
@@ -41,7 +40,6 @@ from .settings import RobotSettings
 
 __all__ = ["RobotFrames", "conclude", "deepest_at_start", "write_series_of"]
 
-APART = 5e-3  # A flight lasts at least that long [s]
 BELOW = 1e-3  # What is no foot and goes deeper than this is worth a warning [m]
 UNITS = {
     "time": "t_s", "x": "x_m", "y": "y_m", "z": "z_m", "kinetic_energy": "kinetic_J", "potential_energy": "potential_J",
@@ -161,11 +159,12 @@ def conclude(
     `sure`, `sure_words`: what a law leaves open, as `sure_of_law` has it. `forms`: the same robot on the other laws.
     """
     robot, heights = run.robot, heights_of(run)
+    flights = find_flights(run, heights)
     write_series_of(run, folder)
     title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
     told = [sure_words] if sure_words else []
     known = [*forms.words, *(told if sure else [])]
-    sentences = [*known, *_sentences(run, heights), *([] if sure or forms.words else told), *plan.notes]
+    sentences = [*known, *_sentences(run, heights, flights), *([] if sure or forms.words else told), *plan.notes]
     if run.energy_residual > MOST_RESIDUAL:
         title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
     warnings: list[str | None] = [
@@ -173,7 +172,7 @@ def conclude(
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
-        _cut_off(run, heights) if _airborne(run, heights) else None,
+        _cut_off(run, heights, flights) if flights.at_end else None,
         *bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law),
         *(too_deep(run, plan.law) if plan.fitted is None else []),
         *([] if settings.on_grains else too_fast(plan, run, heights)),
@@ -181,7 +180,7 @@ def conclude(
     if plan.fitted is not None:
         warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]
     result: Json = {
-        "title": title, "status": "done", "quantities": quantities_of(run, heights),
+        "title": title, "status": "done", "quantities": quantities_of(run, heights, flights),
         "departures": {"sentences": sentences},
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
         "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
@@ -191,7 +190,7 @@ def conclude(
         "warnings": warnings, "macro_step": run.macro_step, "robot_step": robot.step, "steps": run.master.count,
     }  # fmt: skip
     if softening is not None and beside is not None and isinstance(run.ground, BedFeet):
-        rows = beside.columns
+        rows, lifted = beside.columns, heights_of(beside)
         write_series(
             folder / "series" / f"{settings.default_law}.csv",
             {UNITS[name]: rows[name] for name in ("time", "x", "y", "z", "touching", "fz", "sinkage")},
@@ -201,7 +200,7 @@ def conclude(
         result["grains"] = grains.bed_numbers(settings, run, bed, softening, in_rig=False) | {
             "mode": say("one_gravity", gravity=plan.numbers["gravity"].value),
             "origin": [float(number) for number in run.ground.origin],
-            "beside": quantities_of(beside, heights_of(beside)), "beside_law": settings.default_law,
+            "beside": quantities_of(beside, lifted, find_flights(beside, lifted)), "beside_law": settings.default_law,
         }  # fmt: skip
         if settings.sleep:
             done, awake = (result["grains"][key] for key in ("grain_steps", "grain_steps_all_awake"))
@@ -240,14 +239,12 @@ def _beyond(plan: RobotPlan, run: RobotRun) -> list[str]:
     return fitted.beyond(**{name: max(value, fitted.range[name][0]) for name, value in found.items()})
 
 
-def quantities_of(run: RobotRun, heights: Array) -> dict[str, Json]:
+def quantities_of(run: RobotRun, heights: Array, flights: Flights) -> dict[str, Json]:
     """The numbers that every run of a robot has, as result.json holds them; a value is null where there is none.
 
-    `heights`: as of `heights_of`.
+    `heights`: as of `heights_of`. `flights`: as of `find_flights`.
     """
-    rows, balance = run.columns, run.balance_numbers
-    flights, touched = _flights(run, heights)
-    longest = max((end - begin for begin, end in flights), default=0)
+    rows, balance, touched = run.columns, run.balance_numbers, flights.touched
     force = np.linalg.norm([rows[name] for name in ("fx", "fy", "fz")], axis=0)
     found: dict[str, Number] = {
         "displacement_x": (float(rows["x"][-1] - rows["x"][0]), "m", say("displacement")),
@@ -255,8 +252,8 @@ def quantities_of(run: RobotRun, heights: Array) -> dict[str, Json]:
         "displacement_z": (float(rows["z"][-1] - rows["z"][0]), "m", "the same, upwards"),
         "highest": (_highest(run, touched), "m", say("highest")),
         "first_touch": (None if touched is None else float(rows["time"][touched]), "s", say("first_touch")),
-        "flights": (float(len(flights)), "1", say("flights", apart=1e3 * APART)),
-        "longest_flight": (longest * run.macro_step, "s", say("longest_flight")),
+        "flights": (float(len(flights.rows)), "1", say("flights", apart=1e3 * APART)),
+        "longest_flight": (flights.longest, "s", say("longest_flight")),
         "sinkage_largest": (float(rows["sinkage"].max()), "m", "of the lowest point of any foot"),
         "sinkage_end": (float(rows["sinkage"][-1]), "m", "the same, at the end"),
         **feet_quantities(feet_reached(run, heights)),
@@ -266,7 +263,7 @@ def quantities_of(run: RobotRun, heights: Array) -> dict[str, Json]:
         "stability": (run.load, "1", say("stability")),
         "energy_residual": (run.energy_residual, "1", say("residual")),
     }
-    found |= _ballistic(run, heights, found)
+    found |= _ballistic(run, heights, flights, found)
     notes = {"coupling_residual": say("coupling"), "exchange_residual": say("exchange")}
     if isinstance(run.ground, BedFeet):
         notes |= {"dissipation_reversal": say("reversal")}
@@ -275,21 +272,6 @@ def quantities_of(run: RobotRun, heights: Array) -> dict[str, Json]:
         notes |= {f"dissipated_{name}": say("by_grains") for name in run.losses}
     found |= {name: (*balance[name], note) for name, note in notes.items()}
     return as_quantities(found, std=None)
-
-
-def _flights(run: RobotRun, heights: Array) -> tuple[list[tuple[int, int]], int | None]:
-    """Rows from and to which the robot flies, and the row of the first touch.
-
-    It flies while nothing touches, after the first touch, for `APART` at least, if at some time of it all feet are
-    above the undisturbed surface: a foot that loses contact in its own crater does not fly.
-    """
-    free = run.columns["touching"] == 0
-    if free.all():
-        return [], None
-    touched, lasting = int(np.argmin(free)), max(1, round(APART / run.macro_step))
-    lowest = heights.min(axis=1)
-    found = [(touched + low, touched + high) for low, high in spells(free[touched:]) if high - low >= lasting]
-    return [(low, high) for low, high in found if lowest[low:high].max() > 0.0], touched
 
 
 def _highest(run: RobotRun, touched: int | None) -> float:
@@ -301,16 +283,16 @@ def _highest(run: RobotRun, touched: int | None) -> float:
     return float(z[touched or 0 :].max() - z[0])
 
 
-def _ballistic(run: RobotRun, heights: Array, found: Mapping[str, Number]) -> dict[str, Number]:
+def _ballistic(run: RobotRun, heights: Array, flights: Flights, found: Mapping[str, Number]) -> dict[str, Number]:
     """The numbers of `BALLISTIC` of a run that ends in a flight; none of another.
 
     In flight the centre of mass has the acceleration of gravity alone. The feet are taken to keep their place below it.
     """
-    left = at_end(run, heights) if _airborne(run, heights) else None
+    left = at_end(run, heights) if flights.at_end else None
     if left is None:
         return {}
     rise, _, fall = left
-    rows, (begin, end) = run.columns, _flights(run, heights)[0][-1]
+    rows, (begin, end) = run.columns, flights.rows[-1]
     reached = {
         "highest": float(rows["z"][-1] - rows["z"][0]) + rise,
         "longest_flight": (end - begin) * run.macro_step + fall,
@@ -324,41 +306,32 @@ def _ballistic(run: RobotRun, heights: Array, found: Mapping[str, Number]) -> di
     }
 
 
-def _cut_off(run: RobotRun, heights: Array) -> str:
+def _cut_off(run: RobotRun, heights: Array, flights: Flights) -> str:
     """The warning of a run that ends in a flight, in a sentence."""
     left, landing = at_end(run, heights), to_landing(run, heights)
     if left is None:
         return say("airborne_for_ever", landing=landing)
-    _, touched = _flights(run, heights)
-    return say("airborne", speed=left[1], so_far=1e3 * _highest(run, touched), landing=landing)
+    return say("airborne", speed=left[1], so_far=1e3 * _highest(run, flights.touched), landing=landing)
 
 
-def _airborne(run: RobotRun, heights: Array) -> bool:
-    """Whether the run ends in a flight."""
-    flights, _ = _flights(run, heights)
-    return bool(flights) and flights[-1][1] == len(run.columns["touching"])
-
-
-def _sentences(run: RobotRun, heights: Array) -> list[str]:
+def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
     """What happened, in words."""
-    rows = run.columns
-    flights, touched = _flights(run, heights)
+    rows, flown, touched = run.columns, flights.rows, flights.touched
     if touched is None:
         return [f"{say('touches_nothing')} {to_landing(run, heights)}."]
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
     rise = 1e3 * _highest(run, touched)
     rose = say("rose", rise=rise) if rise >= 0 else say("stayed_below", rise=-rise)
-    told = launched(run, flights[0][0]) if flights else []
+    told = launched(run, flown[0][0]) if flown else []
     told.append(say("went", way=1e3 * way, rose=rose))
-    longest = 1e3 * run.macro_step * max((end - begin for begin, end in flights), default=0)
     lost = bounce_words(crater_losses(run, heights, apart=APART))
     stayed = say("stayed_in_crater" if lost else "stayed")
-    flew = say("flew", count=len(flights), apart=1e3 * APART, longest=longest) if flights else stayed
+    flew = say("flew", count=len(flown), apart=1e3 * APART, longest=1e3 * flights.longest) if flown else stayed
     told.append(" ".join([flew, *lost]))
     sinkage, time = rows["sinkage"], rows["time"]
     deepest = int(sinkage.argmax())
     told.append(say("sank", depth=1e3 * sinkage[deepest], time=time[deepest], end=1e3 * sinkage[-1]))
-    if flights and deepest > flights[0][0]:
-        begin = flights[0][0]
+    if flown and deepest > flown[0][0]:
+        begin = flown[0][0]
         told.append(say("sank_in_push", depth=1e3 * sinkage[:begin].max(), launch=time[begin]))
     return told

@@ -13,6 +13,7 @@ from experiments.grains.on_bed import PlatformOnBed
 from experiments.platform.law_spread import moved
 from experiments.robot import experiment as robot
 from experiments.robot.feet import heights_of
+from experiments.robot.flight import find_flights
 from experiments.robot.on_grains import RobotFollowed, RobotOnBed
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import quantities_of, write_series_of
@@ -70,7 +71,8 @@ def law_in_place_of_grains(computed):
         if computed == [1, 2]:
             raise KeyboardInterrupt
         run = followed(**HOPPER, height=0.01 * seed, duration=0.12)
-        numbers, heights, rows = quantities_of(run, heights_of(run)), heights_of(run), run.columns
+        heights, rows = heights_of(run), run.columns
+        numbers = quantities_of(run, heights, find_flights(run, heights))
         write_series_of(run, folder.path)
         columns = {"t_s": rows["time"], "z_m": rows["z"], "sinkage_m": rows["sinkage"]}
         write_series(folder.path / "series" / "rft.csv", columns)

@@ -11,6 +11,7 @@ from experiments.groundmap import Settings as GroundSettings
 from experiments.groundmap import check as check_ground
 from experiments.groundmap.maps import read_map
 from experiments.robot.feet import heights_of
+from experiments.robot.flight import find_flights
 from experiments.robot.on_grains import RobotFollowed, RobotOnBed
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import quantities_of
@@ -211,7 +212,8 @@ def test_a_foot_that_loses_contact_in_its_crater_does_not_fly():
     long = [(b, n) for b, n in zip(begins, lengths, strict=True) if n * run.macro_step >= 5e-3]
     rising = [b for b, n in long if heights[b : b + n].max() > 0]
     assert len(long) > len(rising) > 1
-    assert quantities_of(run, heights_of(run))["flights"]["value"] == len(rising)
+    flights = find_flights(run, heights_of(run))
+    assert quantities_of(run, heights_of(run), flights)["flights"]["value"] == len(rising)
 
 
 @pytest.mark.parametrize(("wide", "said"), [(0.2, ["0.24 m"]), (0.25, [])])
