@@ -8,6 +8,15 @@ Imports `experiments.campaign`, `rigid`, `vis.page`.
 """
 
 from .findings import find_implausible, loud_sensors, missing_sensors, said_once, without_companions
+from .template import template_warning
 from .unstated import find_unstated
 
-__all__ = ["find_implausible", "find_unstated", "loud_sensors", "missing_sensors", "said_once", "without_companions"]
+__all__ = [
+    "find_implausible",
+    "find_unstated",
+    "loud_sensors",
+    "missing_sensors",
+    "said_once",
+    "template_warning",
+    "without_companions",
+]

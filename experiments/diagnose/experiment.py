@@ -9,7 +9,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, read_campaign
-from experiments.check import find_implausible, find_unstated, missing_sensors, said_once
+from experiments.check import find_implausible, find_unstated, missing_sensors, said_once, template_warning
 from experiments.diagnose.settings import DiagnoseSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.kernel_cache import free_kernel_cache
@@ -87,6 +87,9 @@ def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> Proble
 
 def _compute(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) -> Result:
     options = settings.model_dump(exclude={"campaign"})
+    made_up = template_warning(read_campaign(settings.campaign))
+    if made_up is not None:
+        progress.message(f"warning: {made_up}")
     found = diagnose_campaign(settings.campaign, **options, progress=progress)
     for file in settings.effect_file:  # model.toml names it
         shutil.copyfile(file, folder.path / Path(file).name)
@@ -94,7 +97,7 @@ def _compute(settings: DiagnoseSettings, folder: RunFolder, progress: Progress) 
         progress.message(finding.what)
     with threadpool_limits(1):
         diagnosis = write_diagnosis(folder.path, found)
-    return _result(found, diagnosis)
+    return _result(found, diagnosis, made_up)
 
 
 run, resume = computed_run("diagnose", DiagnoseSettings, _compute, check=lambda settings: None)
@@ -111,7 +114,7 @@ def _quantity(entry: Json, *, at_end: bool) -> Json:
     return {**number, "note": "standard error of the fit, right if the model is and the noise has the size found"}
 
 
-def _result(found: Diagnosis, diagnosis: Json) -> Result:
+def _result(found: Diagnosis, diagnosis: Json, made_up: str | None) -> Result:
     parts = [(stage, part) for stage in ("before", "after") for part in ("fit", "held_out")]
     quantities: Json = {
         f"gap_{stage}_{part}": {"value": diagnosis["gap"][stage][part], "std": None, "unit": "1",
@@ -150,7 +153,7 @@ def _result(found: Diagnosis, diagnosis: Json) -> Result:
     noises = [together([colour]) for colour in found.colours.values()]
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
     sentences += spread_sentences(found.model_std, granular=found.problem.granular)
-    warnings = [finding.what for finding in said_once(found.findings)]
+    warnings = [*filter(None, [made_up]), *(finding.what for finding in said_once(found.findings))]
     if not found.problem.covered.get("withdrawal", True):
         warnings.append("no push was withdrawn: the model was fitted to loading only, and states nothing of withdrawal")
     beside = "beside the effects named it means another thing"

@@ -21,6 +21,7 @@ from experiments.check import (
     loud_sensors,
     missing_sensors,
     said_once,
+    template_warning,
     without_companions,
 )
 from experiments.check.replicas import condition_of, condition_words, odd_replicates
@@ -165,7 +166,7 @@ def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding])
         },
         tables=[{"title": "", "head": head, "rows": rows}],
         trials=trials, recordings=recordings, findings=[{name: vars(f)[name] for name in facts} for f in findings],
-        warnings=[finding.what for finding in said_once(findings)],
+        warnings=[*filter(None, [template_warning(campaign)]), *(finding.what for finding in said_once(findings))],
     )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """`hedgebed campaign new`, `check` and `from-run`: templates that hold, faults all said at once, odd data found."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -13,6 +14,7 @@ from dem import Material
 from experiments.campaign import Campaign, Recording, read_campaign, write_campaign
 from experiments.campaign import tables as known
 from experiments.campaign.files import new_campaign
+from experiments.check import template_warning
 from experiments.cli.main import main
 from experiments.diagnose.inspection import find_faults
 from experiments.penetrate import beds
@@ -64,13 +66,42 @@ def test_a_new_campaign_is_checked_with_a_report(tmp_path, capsys):
     assert main(["campaign", "check", str(tmp_path / "c"), "--out", str(tmp_path / "run"), "--quiet"]) == 0
     said = capsys.readouterr().out
     assert "drop 0.4 m/s" in said and "nothing found" in " ".join(said.split())
-    assert "Nothing odd" in (tmp_path / "run" / "report.html").read_text()
+    assert "are made up" in (tmp_path / "run" / "report.html").read_text()
     again = ["campaign", "check", str(tmp_path / "run" / "run.toml"), "--out", str(tmp_path / "again"), "--quiet"]
     assert main([*again, "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     # the speeds of both pushes change the force by less than its noise
     assert [trial["alike"] for trial in result["trials"]] == [2, 2, 1]
     assert result["recordings"][2]["rate"] == pytest.approx(1000.0)
+
+
+@BOTH
+def test_a_campaign_with_recordings_of_the_template_is_warned_of(tmp_path, kind, capsys):
+    """By their numbers, whatever the files are called; one that is replaced is left out, and none is no warning."""
+    folder = new_campaign(tmp_path / "c", kind=kind)
+    assert template_warning(read_campaign(folder)).startswith("all recordings")
+    assert main(["campaign", "check", str(folder), "--out", str(tmp_path / "run"), "--quiet"]) == 0
+    assert "are made up" in " ".join(capsys.readouterr().out.split())
+    campaign = read_campaign(folder)
+
+    def replaced(count):
+        changed = {trial.id for trial in campaign.tables.trial[:count]}
+        recordings = {
+            key: Recording({name: values + (name != "t_s") * 1e-6 for name, values in recording.columns.items()})
+            if key[0] in changed
+            else recording
+            for key, recording in campaign.recordings.items()
+        }
+        return dataclasses.replace(campaign, recordings=recordings)
+
+    first, *others = (trial.id for trial in campaign.tables.trial)
+    said = template_warning(replaced(1))
+    assert first not in said and all(name in said for name in others)
+    own = write_campaign(tmp_path / "own", replaced(len(others) + 1))
+    assert main(["campaign", "check", str(own), "--out", str(tmp_path / "checked"), "--quiet"]) == 0
+    assert "are made up" not in " ".join(capsys.readouterr().out.split())
+    page = (tmp_path / "checked" / "report.html").read_text()
+    assert ("Nothing odd" in page) == (kind == "penetration")  # that of tumbles has a wheel without a recording
 
 
 # check: what cannot be read
