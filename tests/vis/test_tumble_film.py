@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from vis.compare.report import _alike
+from vis.film import film
 from vis.film.cameras import _Space, layout
 from vis.film.film import Sheet, film_times, moments, run_film_job
 from vis.film.reel import Reel, SpaceReel
@@ -181,10 +182,10 @@ def test_two_runs_are_pictured_at_the_times_of_the_one_with_frames(folder, tmp_p
 
 def test_stills_film_and_tracks_are_drawn_without_opengl(folder):
     job = {
-        "runs": [(str(folder), Reel(folder).spikes)], "labels": None, "by": "displacement",
+        "runs": [(str(folder), Reel(folder).spikes)], "labels": None,
         "pictures": [
-            {"file": str(folder / "still.png"), "times": [1.0], "size": [640, 360]},
-            {"file": str(folder / "film.gif"), "times": [0.0, 0.5, 1.0], "size": [320, 180]},
+            {"file": str(folder / "still.png"), "times": [1.0], "size": [640, 360], "by": "displacement"},
+            {"file": str(folder / "film.gif"), "times": [0.0, 0.5, 1.0], "size": [320, 180], "by": "displacement"},
         ],
     }  # fmt: skip
     seen = []
@@ -344,3 +345,41 @@ def test_words_above_two_pictures_do_not_lie_on_each_other(hop, monkeypatch):
     boxes = [text.get_window_extent() for text in pages[0].texts]
     assert len(boxes) >= 6
     assert not [(a, b) for a, b in combinations(boxes, 2) if a.overlaps(b)]
+
+
+def test_the_end_of_a_robot_on_grains_shows_heights_with_the_surface_in_the_middle_of_the_scale(tmp_path, monkeypatch):
+    """Under a foot that goes 8 mm deep the scale reaches 8 mm: blue above the surface, red below, then one grey."""
+    surface, grains = 0.05, np.random.default_rng(1).uniform((0.0, 0.0, 0.0), (0.2, 0.2, 0.055), (300, 3))
+    result = {
+        "title": "cube on a bed of sand", "experiment": "mujoco", "ground": "bed",
+        "grains": {"origin": [0, 0, surface]}, "trial": {"weight": {"value": 2.0}},
+    }  # fmt: skip
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    (tmp_path / "trajectory.csv").write_text("t_s,z_m\n0.0,0.0\n1.0,0.0\n")
+    cube = BLOCK * (np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) - [0.5, 0.5, 0.0])
+    faces = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5]])
+    writer = FrameWriter(tmp_path, name="robot")
+    for now in (0.0, 0.5, 1.0):
+        held = {"position": grains, "radius": np.full(300, 2e-3), "displacement": np.zeros((300, 3))}
+        low = np.array([0.1, 0.1, surface - 0.008 * now])
+        writer.write(now, held, {"spikes": (cube + low, faces), "hull": (cube + low + [0, 0, BLOCK], faces)})
+    reel, jobs = SpaceReel(tmp_path), []
+    monkeypatch.setattr(film, "carry_out", lambda job, *rest, **more: jobs.append(job) or ("opengl", []))
+    drawn = film.draw_runs([reel], tmp_path, "robot", by="displacement", film=True)
+    assert [picture["by"] for picture in jobs[0]["pictures"]] == [
+        "displacement",
+        "displacement",
+        "height",
+        "displacement",
+    ]
+    assert "height" in drawn.stills[-1].caption and "height" not in drawn.stills[0].caption
+    assert reel.colour_top("height") == 8.0
+    frame = reel.frame(2)
+    page = canvas.Page((400, 300), "height", 8.0)
+    colours = page.colours(frame.grains)
+    deeper = grains[:, 2] - surface < -8e-3
+    assert np.ptp(colours[deeper], axis=0).max() == 0.0
+    assert (colours[grains[:, 2] > surface + 3e-3, 2] > colours[grains[:, 2] > surface + 3e-3, 0]).all()  # blue
+    near = (grains[:, 2] < surface - 3e-3) & ~deeper
+    assert (colours[near, 0] > colours[near, 2]).all()  # red
+    Sheet([reel], (400, 250), by="height", opengl=False).draw(1.0)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypedDict
 
@@ -62,6 +63,8 @@ class _Picture(TypedDict):
     file: str
     times: list[float]
     size: Sequence[int]
+    by: str
+    """What grains are coloured by."""
 
 
 class FilmJob(TypedDict):
@@ -70,7 +73,6 @@ class FilmJob(TypedDict):
     runs: list[tuple[str, tuple[float, float] | None]]
     """Folder, and in the plane the diameter of a spike and its length out of the hull [m]; None: a run in space."""
     labels: list[str] | None
-    by: str
     pictures: list[_Picture]
 
 
@@ -238,25 +240,33 @@ def draw_runs(
     planned = moments(reels, labels)
     stills = [Picture(home / "figures" / f"{stem}-{name}.png", title, caption) for name, title, _, caption in planned]
     pictures: list[_Picture] = [
-        {"file": str(still.file), "times": [time], "size": kind.still}
+        {"file": str(still.file), "times": [time], "size": kind.still, "by": by}
         for still, (_, _, time, _) in zip(stills, planned, strict=True)
     ]
+    if _shows_heights(reels):  # what the robot leaves in the bed
+        pictures[-1]["by"] = canvas.HEIGHT
+        stills[-1] = replace(stills[-1], caption=f"{stills[-1].caption} {say('by_height')}")
     moving = None
     if film:
         times = film_times(reels).tolist()
-        pictures.append({"file": str(home / "film.gif"), "times": times, "size": kind.film})
+        pictures.append({"file": str(home / "film.gif"), "times": times, "size": kind.film, "by": by})
         about = "" if isinstance(kind, SpaceReel) else f" of {times[-1]:.3g} s"
         caption = f"{len(times)} pictures{about}; the camera follows, the colours keep their scale."
         moving = Picture(home / "film.gif", "The film", caption)
     job: FilmJob = {
         "runs": [(str(reel.folder), reel.spikes if isinstance(reel, Reel) else None) for reel in reels],
         "labels": list(labels) if labels else None,
-        "by": by,
         "pictures": pictures,
     }
     costs = [1.0] * sum(len(picture["times"]) for picture in pictures)
     method, note = carry_out(job, run_film_job, costs, progress, failed=kind.failed, without=kind.without)
     return Pictures(stills, moving, method, note)
+
+
+def _shows_heights(reels: Sequence[AnyReel]) -> bool:
+    """Whether the still at the end shows heights: of one run in space on grains whose undisturbed surface is known."""
+    only = reels[0]
+    return len(reels) == 1 and isinstance(only, SpaceReel) and only.on_grains and only.surface is not None
 
 
 def shown(drawn: Pictures, *, first: int = 0) -> list[Block]:
@@ -274,17 +284,17 @@ def run_film_job(job: FilmJob, *, opengl: bool, step: Callable[[], None] = lambd
         SpaceReel(folder) if spikes is None else Reel(folder, like=(spikes[0], spikes[1]))
         for folder, spikes in job["runs"]
     ]
-    sheets: dict[tuple[int, ...], Sheet] = {}
+    sheets: dict[tuple[int, int, str], Sheet] = {}
 
-    def draw(size: Sequence[int], time: float) -> NDArray[np.uint8]:
-        key = (int(size[0]), int(size[1]))
+    def draw(size: Sequence[int], by: str, time: float) -> NDArray[np.uint8]:
+        key = (int(size[0]), int(size[1]), by)
         if key not in sheets:
-            sheets[key] = Sheet(reels, key, by=job["by"], opengl=opengl, labels=job["labels"])
+            sheets[key] = Sheet(reels, key[:2], by=by, opengl=opengl, labels=job["labels"])
         return sheets[key].draw(time)
 
     try:
         for picture in job["pictures"]:
-            images = (draw(picture["size"], time) for time in picture["times"])
+            images = (draw(picture["size"], picture["by"], time) for time in picture["times"])
             write_pictures(Path(picture["file"]), images, step, frame_ms=100)
     finally:
         for each in sheets.values():

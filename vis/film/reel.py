@@ -18,7 +18,7 @@ from rigid.result import read_result
 from vis.page.folder import read_columns
 from vis.page.plots import Array
 from vis.page.report import Result
-from vis.pictures.canvas import colour_top, moved_since
+from vis.pictures.canvas import HEIGHT, colour_top, moved_since, nice_above
 from vis.pictures.frames import Frame, Frames, frames_of, grains_box, read_frames
 from vis.pictures.meshes import in_place, spike_mesh
 
@@ -148,6 +148,18 @@ class SpaceReel(_Filmed):
             return 0.0
         origin = (self.result.get("grains") or {}).get("origin")
         return None if origin is None else float(origin[2])
+
+    def grains(self, found: Frame) -> dict[str, NDArray[Any]]:
+        """Those of a frame as any reel has them, with the height over the undisturbed surface where that is known."""
+        known = super().grains(found)
+        return known if self.surface is None else known | {HEIGHT: known["position"][:, 2] - self.surface}
+
+    def colour_top(self, by: str) -> float:
+        """As of any reel; that of heights is the largest sinkage of a foot, at least a grain's diameter."""
+        if by != HEIGHT or self.radius is None or self.surface is None:
+            return super().colour_top(by)
+        deepest = max(0.0, self.surface - float(self.ends[:, 0].min()))
+        return nice_above(1e3 * max(2.0 * self.radius, deepest))
 
     @property
     def what(self) -> str:

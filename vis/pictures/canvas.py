@@ -24,8 +24,8 @@ from vis.page.numbers import quote
 from vis.page.plots import DASHED, INK, styled
 
 __all__ = [
-    "COLOURS", "FORCE", "HALO", "Page", "blank_page", "colour_top", "colour_values", "colourmap", "draw_force",
-    "draw_measure", "even_steps", "moved_since", "nice_above", "pixels",
+    "COLOURS", "FORCE", "HALO", "HEIGHT", "Page", "blank_page", "colour_top", "colour_values", "colourmap",
+    "draw_force", "draw_measure", "even_steps", "moved_since", "nice_above", "pixels",
 ]  # fmt: skip
 
 #: What grains are coloured by: name -> (label with unit, factor from SI).
@@ -35,6 +35,11 @@ COLOURS: dict[str, tuple[str, float]] = {
     "force": ("net contact force [mN]", 1e3),
     "coordination": ("contacts of the grain [1]", 1.0),
 }
+HEIGHT = "height"
+"""A further colouring, of the ends of runs in space: height over the undisturbed surface, around 0."""
+_LABELS = COLOURS | {HEIGHT: ("height over the undisturbed surface [mm]", 1e3)}
+_DEEPER = "#cfc8bb"
+"""Of grains that lie deeper than the scale of heights."""
 HALO = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
 """Box of a word on a picture."""
 FORCE: dict[str, Any] = {
@@ -61,13 +66,14 @@ def colour_values(grains: dict[str, NDArray[Any]], by: str) -> NDArray[np.float6
 
     Raises ValueError: an unknown `by`, or a frame without the field it needs.
     """
-    if by not in COLOURS:
+    if by not in _LABELS:
         raise ValueError(f"colour is {by!r}; it must be one of {', '.join(COLOURS)}")
     name = "velocity" if by == "speed" else by
     if name not in grains:
         raise ValueError(f"the frame has no {name!r} to colour the grains by")
     field = np.asarray(grains[name], dtype=np.float64)
-    return COLOURS[by][1] * (np.linalg.norm(field, axis=1) if field.ndim == 2 else np.abs(field))
+    amount = np.linalg.norm(field, axis=1) if field.ndim == 2 else field if by == HEIGHT else np.abs(field)
+    return _LABELS[by][1] * amount
 
 
 def moved_since(grains: dict[str, NDArray[Any]], first: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -109,7 +115,7 @@ def even_steps(top: float) -> NDArray[np.float64]:
 
 
 class Page:
-    """A page of 4:3 for pictures that share a colour scale, which begins at 0.
+    """A page of 4:3 for pictures that share a colour scale, which begins at 0; that of heights has 0 in its middle.
 
     ``size``: Width and height [pixels]. ``by``: What grains are coloured by, a key of `COLOURS`. ``top``: Upper end of
     the scale, in the unit of its label.
@@ -117,6 +123,8 @@ class Page:
 
     def __init__(self, size: tuple[int, int], by: str, top: float) -> None:
         self.size, self.by, self.norm, self.map = size, by, Normalize(0.0, top), colourmap()
+        if by == HEIGHT:
+            self.norm, self.map = Normalize(-top, top), colormaps["RdBu"].with_extremes(under=_DEEPER)
 
     def colours(self, grains: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
         """Colours of the grains of a frame, shape (n, 4)."""
@@ -159,9 +167,11 @@ class Page:
     def colour_bar(self, figure: Figure, place: tuple[float, float, float, float], fontsize: float) -> Colorbar:
         """The bar of the colour scale: left, foot, width, height in fractions of the figure."""
         scale = ScalarMappable(self.norm, self.map)
-        bar = figure.colorbar(scale, cax=figure.add_axes(place), extend="max", extendfrac=0.04)
-        bar.set_ticks(even_steps(float(self.norm.vmax or 1.0)).tolist())
-        bar.set_label(COLOURS[self.by][0], fontsize=fontsize)
+        both = self.by == HEIGHT
+        bar = figure.colorbar(scale, cax=figure.add_axes(place), extend="both" if both else "max", extendfrac=0.04)
+        steps = even_steps(float(self.norm.vmax or 1.0))
+        bar.set_ticks([*-steps[:0:-1], *steps] if both else steps.tolist())
+        bar.set_label(_LABELS[self.by][0], fontsize=fontsize)
         bar.outline.set_visible(False)  # type: ignore[operator]
         return bar
 
