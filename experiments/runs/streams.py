@@ -4,10 +4,13 @@ import os
 import re
 import signal
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
+from io import IOBase
 from pathlib import Path
 from types import FrameType
+from zipfile import ZipFile
 
 from cyclopts import CoercionError, MissingArgumentError
 from cyclopts.exceptions import UnknownOptionError, UnusedCliTokensError
@@ -56,8 +59,26 @@ def fault_words(error: Exception) -> str:
 
 
 def file_words(error: OSError, place: str) -> str:
-    """Which file could not be read or written, and why; `place` where the system does not name the file."""
-    return f"{error.filename or place}: {error.strerror or error}"
+    """Which file could not be read or written, and why; `place` where neither the system nor `_written` names it."""
+    return f"{error.filename or _written(error) or place}: {error.strerror or error}"
+
+
+def _written(error: OSError) -> str:
+    """The file that was being written when the error arose; empty where none is found.
+
+    The system names a file that it cannot open, but not one that it cannot write further, as on a full disk. So the
+    innermost open file that the error passed on its way is taken.
+    """
+    found = None
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        for value in frame.f_locals.values():
+            name = getattr(value, "filename" if isinstance(value, ZipFile) else "name", None)
+            if isinstance(value, ZipFile | IOBase) and isinstance(name, str | Path):
+                found = Path(name)
+    if found is None:
+        return ""
+    # A file that is written whole or not at all (`dem.files.arrays.whole_file`) has a folder of its own until then.
+    return str(found if found.parent.exists() else found.parent.parent / found.name)
 
 
 def is_number(word: str) -> bool:

@@ -25,7 +25,7 @@ FULL = os.strerror(errno.ENOSPC)
 def quick(monkeypatch, tmp_path):
     """No report is drawn."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
 
 
 def numbers(folder):
@@ -123,6 +123,28 @@ frame_count = 0
 checkpoint_interval = 0.2
 threads = 1
 """
+
+
+@pytest.mark.long
+def test_a_full_disk_under_the_cache_is_named_by_the_file_of_the_bed_and_with_room_the_run_goes_on(
+    tmp_path, monkeypatch, capsys
+):
+    """A page of 4 kB; what is kept of the bed takes some 100. The system names no file that it cannot write further."""
+    Path("case.toml").write_text(GRAINS.replace("speeds = [0.2, 0.4]", "speeds = [0.4]"))
+    tokens = ["penetrate", "case.toml", "--quiet", "--out"]
+    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path / "room"))
+    assert main([*tokens, "whole"]) == 0
+    (name,) = (path.name for path in (tmp_path / "room" / "beds").glob("*.npz"))
+    with small_disk(tmp_path / "cache", 4096) as cache:
+        monkeypatch.setenv("HEDGEBED_CACHE", str(cache))
+        status, said = said_of([*tokens, "out"], capsys)
+        assert status == 1 and f"failed: {cache / 'unfinished' / name}: {FULL}\n" in said, said
+        assert "Traceback" not in said and not list(cache.rglob("*.npz"))
+        subprocess.run(["mount", "-o", "remount,size=4m", cache], check=True)
+        assert main(["resume", "out", "--quiet"]) == 0
+    assert numbers(tmp_path / "out") == numbers(tmp_path / "whole")
+
+
 OFTEN = """
 import sys
 import dem.prepare.laboratory

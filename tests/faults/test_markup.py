@@ -3,9 +3,13 @@
 import json
 import re
 import tomllib
+from pathlib import Path
 
 import pytest
+from faults.damaged_folders import CALIBRATE, Kind, case, patched
 
+import dem
+import experiments
 from benchmarks.view import Browser, chromium
 from experiments.campaign.files import new_campaign
 from experiments.cli.main import main
@@ -45,6 +49,7 @@ def opened(browser, page):
     assert browser.value("window.taken") is None
     assert browser.value(INERT) == 0
     assert browser.value("document.querySelectorAll('img[src=x], svg[onload]').length") == 0
+    assert browser.value("[...document.scripts].filter((e) => e.text.trim().startsWith('window.taken')).length") == 0
     return browser.value("document.body.textContent"), browser.value("document.scripts.length")
 
 
@@ -89,6 +94,65 @@ def test_no_name_in_a_campaign_runs_in_the_page_of_its_diagnosis_or_is_toml(brow
     for path in (tmp_path / "out").rglob("*.toml"):
         trials = tomllib.loads(path.read_text(encoding="utf-8")).get("trial", [])
         assert "made-by-a-name" not in [trial["id"] for trial in trials]
+
+
+NAME = "<img src=x onerror='window.taken = 1'>"
+"""Markup that can be the name of a file: it has no slash."""
+
+
+def own_platform(name):
+    """Write a platform file of this name; the file."""
+    shipped = Path(experiments.__file__).parent / "examples" / "platform-cube" / "cube.toml"
+    text = shipped.read_text(encoding="utf-8").replace('name = "cube"', f"name = {json.dumps(name)}")
+    Path(f"{name}.toml").write_text(text, encoding="utf-8")
+    return f"{name}.toml"
+
+
+def compared():
+    """Two runs whose folders have markup for a name."""
+    runs = [f"{number} {NAME}" for number in (1, 2)]
+    for run, torque in zip(runs, ("0.2", "0.15"), strict=True):
+        assert main(["tumble", "--duration", "0.3", "--torque", torque, "--out", run, "--quiet"]) == 0
+    return ["compare", *runs], NAME
+
+
+def swept():
+    """Two platforms, one of a file with markup for a name."""
+    over = json.dumps([own_platform(NAME), own_platform("cube")])
+    case(f'experiment = "tumble"\nworkers = 1\n[fixed]\nduration = 0.1\nrig = 0.03\n[over]\nplatform = {over}\n')
+    return ["sweep", "case.toml"], NAME
+
+
+def calibrated():
+    """A material of a file with markup for a name, which the page does not show."""
+    (Path(f"{NAME}.toml")).write_bytes((Path(dem.__file__).parent / "presets" / "sand.toml").read_bytes())
+    case(f"material = {json.dumps(f'{NAME}.toml')}\n{CALIBRATE}")
+    return ["calibrate", "case.toml"], ""
+
+
+def diagnosed():
+    """A campaign of tumbles with markup in all its names; the page shows those of its trials."""
+    new_campaign(Path("campaign"), kind="tumble")
+    marked(Path("campaign"), MARKUP[1])
+    return ["diagnose", "campaign"], MARKUP[1].replace("/", "")
+
+
+@pytest.mark.parametrize("make", [compared, swept, calibrated, diagnosed])
+def test_no_name_of_a_file_and_no_text_of_a_result_runs_in_the_page_of(make, browser, tmp_path, monkeypatch):
+    """Beds of `calibrate` are stand-ins."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.MonkeyPatch.context() as patch:
+        patched(Kind(print, (), fake=True), patch)
+        words, shown = make()
+        assert main([*words, "--out", "run", "--quiet"]) == 0
+    run = tmp_path / "run"
+    text, scripts = opened(browser, write_report(run))
+    assert shown in text
+    result = json.loads((run / "result.json").read_text(encoding="utf-8"))
+    (run / "result.json").write_text(json.dumps(texts_marked(result, MARKUP[0])), encoding="utf-8")
+    (run / "status.json").write_text('{"status": "done"}')
+    text, found = opened(browser, write_report(run))
+    assert MARKUP[0] in text and found == scripts
 
 
 def texts_marked(value, markup):
