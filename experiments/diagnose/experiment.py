@@ -26,6 +26,7 @@ from .fit.forms import OwnEffect, load_own
 from .fit.gaps import numeral
 from .fit.problem import Problem
 from .noise.colour import together
+from .push.frame import at_the_tip
 from .report.document import write_diagnosis
 from .report.sentences import findings_in_words, spread_sentences, told_tables, where_sentences
 from .report.summary import summary_sentences, title_words
@@ -35,17 +36,18 @@ __all__ = ["check", "diagnose_campaign", "make_problem", "resume", "run"]
 
 def check(settings: DiagnoseSettings) -> None:
     """Raise ValueError, naming file and line or key, for a campaign that cannot be read or diagnosed."""
-    _make_problem(Path(settings.campaign), settings.effect_file)
+    _make_problem(Path(settings.campaign), settings.effect_file, settings.frame_stiffness)
 
 
 def diagnose_campaign(
     campaign: str | Path, *, thorough: bool = False, seed: int = 0, effect_file: Sequence[str | Path] = (),
-    progress: Progress | None = None,
+    frame_stiffness: float | None = None, progress: Progress | None = None,
 ) -> Diagnosis:  # fmt: skip
     """The diagnosis of the campaign in a folder, without files. Raises ValueError as `check` does. `effect_file`:
-    Python files with effects of one's own, which are among the candidates."""
+    Python files with effects of one's own, which are among the candidates. `frame_stiffness`: of what is between drive
+    and tip of the pushes [N/m], see `at_the_tip`."""
     free_kernel_cache()
-    measured, problem = _make_problem(Path(campaign), effect_file)
+    measured, problem = _make_problem(Path(campaign), effect_file, frame_stiffness)
     shown = progress or Progress()
     stage = ""
 
@@ -71,17 +73,24 @@ def diagnose_campaign(
     return replace(found, findings=(*missing_sensors(measured), *unstated, *odd, *findings_in_words(found.findings)))
 
 
-def _make_problem(folder: Path, effect_file: Sequence[str | Path]) -> tuple[Campaign, Problem]:
+def _make_problem(
+    folder: Path, effect_file: Sequence[str | Path], frame_stiffness: float | None
+) -> tuple[Campaign, Problem]:
     campaign = read_campaign(folder)
     own = tuple(load_own(file) for file in effect_file)
     with threadpool_limits(1):
-        return campaign, make_problem(campaign, own=own)
+        return campaign, make_problem(campaign, own=own, frame_stiffness=frame_stiffness)
 
 
-def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> Problem:
-    """The problem of a campaign of either kind, `own` among its candidates. Raises ValueError where there is none."""
+def make_problem(
+    campaign: Campaign, *, own: Sequence[OwnEffect] = (), frame_stiffness: float | None = None
+) -> Problem:  # fmt: skip
+    """The problem of a campaign of either kind, `own` among its candidates, the depth of its pushes that of the tip
+    behind a frame of `frame_stiffness` [N/m]. Raises ValueError where there is none."""
     package = {"penetration": "push", "tumble": "tumble"}[campaign.tables.kind]
-    found: Problem = import_module(f"experiments.diagnose.{package}.problem").make_problem(campaign, own=own)
+    corrected = at_the_tip(campaign, frame_stiffness)
+    frame = {} if frame_stiffness is None else {"frame": frame_stiffness}
+    found: Problem = import_module(f"experiments.diagnose.{package}.problem").make_problem(corrected, own=own, **frame)
     return found
 
 

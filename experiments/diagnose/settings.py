@@ -16,6 +16,9 @@ class DiagnoseSettings(StrictSettings):
     same design)."""
     effect_file: tuple[str, ...] = Field((), json_schema_extra={"option_alias": "--effects-from"})
     """Python files with effects of your own, added to the candidates (docs/diagnose.md)."""
+    frame_stiffness: float | None = Field(None, gt=0, allow_inf_nan=False)
+    """Stiffness of drive and frame, in series with the ground [N/m]: force over it is subtracted from the depth of
+    pushes (default: the depth as read)."""
     seed: int = Field(
         0, ge=0, description="Seed of the simulated campaigns that calibrate the test for a missing effect."
     )

@@ -82,14 +82,17 @@ def test_pairs_are_counted_by_the_signature_of_the_weaker_effect():
 def test_ninety_percent_intervals_of_base_parameters_are_counted_by_number():
     def told(value, **more):
         numbers = {"stiffness": {"value": value, "std": 1.0}, "mass": {"value": 5.0, "std": 0.1}}
-        return {"hidden": {"base": {"stiffness": 100.0, "mass": 5.1}}, "base_parameters": numbers, **more}
+        hidden = {"base": {"stiffness": 100.0, "mass": 5.1}, "apparent": {"stiffness": 101.0}}
+        return {"hidden": hidden, "base_parameters": numbers, **more}
 
-    found = summarise([
+    summary = summarise([
         case(["adhesion"], "named", ["adhesion"], **told(101.6)), case((), "none", signature=0.0, **told(101.7)),
         case((), "unknown", signature=0.0, **told(100.0)),
-    ])["base_parameters"]  # fmt: skip
+    ])  # fmt: skip
+    found = summary["base_parameters"]
     assert found["by_name"] == {"mass": {"share": 1.0, "of": 2}, "stiffness": {"share": 0.5, "of": 2}}
     assert found["intervals_90_hold_truth"] == {"share": 0.75, "of": 4}
+    assert summary["apparent_parameters"]["by_name"] == {"stiffness": {"share": 1.0, "of": 2}}
 
 
 def test_baselines_stand_beside_us_on_the_very_same_cases():

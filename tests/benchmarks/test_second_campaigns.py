@@ -83,6 +83,18 @@ def test_structure_comes_out_as_large_as_it_was_asked_for():
         assert secret.extra["structure"] == pytest.approx(size, rel=0.4)
 
 
+@pytest.mark.parametrize("seed", [1001005, 1031011])
+def test_apparent_k_is_that_of_frame_and_ground_in_series_less_the_loose_grains(seed):
+    """F = K (z - l) behind a spring k: a line through 0 is below that of both springs by 1 to 3 l over the depth."""
+    made, told = make_push(seed, kind="null", trials=6)
+    assert {trial["mode"] for trial in made.tables["trial"]} == {"driven"}  # a drop has no frame
+    legs, ground = told.extra["legs"], told.extra["base"]["stiffness"]
+    series = 1.0 / (1.0 / ground + 1.0 / legs["frame"])
+    loose = legs["soft"] / max(float(made.columns[key]["depth_m"].max()) for key in made.columns)
+    lower = 1.0 - told.extra["apparent"]["stiffness"] / series
+    assert loose < lower < 3.0 * loose
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_seed_makes_one_campaign_and_it_is_valid(kind, tmp_path):
     maker = KINDS[kind]

@@ -17,19 +17,19 @@ Pairs = dict[str, dict[str, float]]
 
 def model_of(
     tables: PenetrationCampaign, middle: float, pairs: Pairs, plain: Pairs, effects: Sequence[EffectTable],
-    trials: Sequence[Prepared], errors: Mapping[str, object] | None = None,
+    covered: Mapping[str, Any], errors: Mapping[str, object] | None = None,
 ) -> PenetrationModel:  # fmt: skip
     """The tables of model.toml. `middle`: the diameter [m] whose K and C stand in [surface]; `pairs`: K and C beside
     the effects; `plain`: those of the base model that was fitted without effects, empty where there are none;
-    `trials`: those of the campaign, whose range is noted; `errors`: of the fitted numbers, noted too."""
+    `covered`: the range of the campaign's trials (`range_of`), noted; `errors`: of the fitted numbers, noted too."""
     ours = (BASE_NOTE, RANGE_NOTE, ERRORS_NOTE)
     notes: dict[str, Any] = {name: note for name, note in tables.notes.items() if name not in ours}
     if errors:
         notes[ERRORS_NOTE] = dict(errors)
     if plain:
         notes[BASE_NOTE] = plain
-    if covered := range_of(trials):
-        notes[RANGE_NOTE] = covered
+    if covered:
+        notes[RANGE_NOTE] = dict(covered)
     if len(pairs) > 1:
         notes["fitted_by_diameter"] = pairs
     same = {name: getattr(tables, name) for name in ("format", "kind", "name", "uncertainty", "sensors")}
@@ -40,13 +40,15 @@ def model_of(
     return PenetrationModel(**same, spike=spike, surface=surface, notes=notes, trial=listed, effect=tuple(effects))
 
 
-def range_of(trials: Sequence[Prepared]) -> dict[str, Any]:
+def range_of(trials: Sequence[Prepared], frame_stiffness: float | None = None) -> dict[str, Any]:
     """What the pushes among `trials` cover: greatest depth [m], slowest and fastest speed on the way in [m/s], and
-    whether one came out again; empty without pushes."""
+    whether one came out again; the stiffness of the frame that was subtracted from their depth [N/m], where it was.
+    Empty without pushes."""
     pushes = [trial for trial in trials if trial.driven]
     if not pushes:
         return {}
     speeds = [float(speeds_of(trial)[1]) for trial in pushes]
     deepest = max(float(trial.path.depth.max()) for trial in pushes)
+    frame = {} if frame_stiffness is None else {"frame_stiffness_N_m": frame_stiffness}
     return {"depth_m": float(f"{deepest:.4g}"), "speed_m_s": [float(f"{v:.4g}") for v in (min(speeds), max(speeds))],
-            "withdrawal": comes_back(pushes)}  # fmt: skip
+            "withdrawal": comes_back(pushes), **frame}  # fmt: skip

@@ -52,12 +52,13 @@ _FAILED = 1e3
 _SHALLOW = 0.02  # share of D that counts as just below the surface
 
 
-def make_problem(campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> PenetrationProblem:
-    """The problem of a campaign of kind "penetration", `own` among its candidates.
-
-    Raises ValueError where none of its trials can be used, or an effect acts where a single spike has nothing.
-    """
-    return PenetrationProblem(campaign, own=own)
+def make_problem(
+    campaign: Campaign, *, own: Sequence[OwnEffect] = (), frame: float | None = None
+) -> PenetrationProblem:  # fmt: skip
+    """The problem of a campaign of kind "penetration", `own` among its candidates. `frame`: stiffness [N/m] that was
+    subtracted from its depths (`at_the_tip`), noted in `covered`. Raises ValueError where none of its trials can be
+    used, or an effect acts where a single spike has nothing."""
+    return PenetrationProblem(campaign, own=own, frame=frame)
 
 
 class PenetrationProblem(Problem):
@@ -75,7 +76,7 @@ class PenetrationProblem(Problem):
     own_base = "diameter_m"
     special_scatter = ("depth zero", "force zero")
 
-    def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = ()) -> None:
+    def __init__(self, campaign: Campaign, *, own: Sequence[OwnEffect] = (), frame: float | None = None) -> None:
         tables = campaign.tables
         for effect in own:
             other = [hook for hook in effect.term.hooks if hook not in PENETRATION_HOOKS]
@@ -108,7 +109,7 @@ class PenetrationProblem(Problem):
         parts += [(t.info.condition, len(t.time), round(float(t.time[-1]), 3)) for t in prepared]
         self.design = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
         speeds = np.array([s for trial in prepared for s in speeds_of(trial)])
-        self.covered, self.typical_depth = range_of(prepared), self._scales.depth
+        self.covered, self.typical_depth = range_of(prepared, frame), self._scales.depth
         self.how_to_determine = how_to_determine(self.covered.get("speed_m_s", ()))
         differ = speeds.max() > 1.05 * max(speeds.min(), 1e-12)
         self.forms = push_forms(
@@ -424,9 +425,8 @@ class PenetrationProblem(Problem):
             for form in forms
         )  # fmt: skip
         plain = self._pairs(base) if forms and base is not None else {}
-        write_model(Path(path), model_of(
-            self.tables, self._middle, self._pairs(values), plain, effects, tuple(self._trials.values()), errors
-        ))  # fmt: skip
+        numbers = self._pairs(values)
+        write_model(Path(path), model_of(self.tables, self._middle, numbers, plain, effects, self.covered, errors))
 
     def _pairs(self, values: Values) -> Pairs:
         """Diameter [m] as text -> K [N/m] and C [N s/m]."""

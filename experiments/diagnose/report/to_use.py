@@ -36,7 +36,13 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     bounds = "".join(_bound(name, after[name]["at_most"]) for name in is_open[:_SHOWN] if "at_most" in after[name])
     covered = diagnosis.get("covered", {})
     no_way_out = "" if covered.get("withdrawal", True) else f" {say('no_withdrawal')}"
-    return [sentence + (say("c_is_open", bounds=bounds) if is_open else "") + no_way_out]
+    return [sentence + (say("c_is_open", bounds=bounds) if is_open else "") + _in_series(covered) + no_way_out]
+
+
+def _in_series(covered: Mapping[str, Any]) -> str:
+    """What else than the ground gives way in pushes, and so lowers K; empty without pushes."""
+    frame = covered.get("frame_stiffness_N_m")
+    return (f" {say('in_series')}" if frame is None else f" {say('at_the_tip', frame=frame)}") if covered else ""
 
 
 def _bound(name: str, bound: float) -> str:
