@@ -242,15 +242,15 @@ def test_the_arrow_of_four_weights_is_cut_at_the_edge_and_says_its_number(folder
 @pytest.mark.parametrize("words", ["made up", "made up of " + "many words " * 14])
 def test_a_title_ends_where_the_panels_end(folder, monkeypatch, words):
     """In full size where it has room; a long one in smaller letters, none of which is cut off."""
-    reel, pixels, ends = Reel(folder), canvas.pixels, []
+    reel, drawn, ends = Reel(folder), canvas.drawn, []
     reel.result["title"] = words
 
     def measured(page):
         title = next(text for text in page.texts if text.get_text().startswith("Made up"))
         ends.append((title.get_window_extent().x1 / page.bbox.width, title.get_fontsize()))
-        return pixels(page)
+        return drawn(page)
 
-    monkeypatch.setattr(canvas, "pixels", measured)
+    monkeypatch.setattr(canvas, "drawn", measured)
     sheet = Sheet([reel], (640, 360), by="displacement", opengl=False)
     sheet.draw(0.0)
     ((end, size),) = ends
@@ -338,11 +338,12 @@ def test_lines_of_x_and_y_on_one_another_both_show_and_joints_have_none_of_the_a
 
 def test_words_above_two_pictures_do_not_lie_on_each_other(hop, monkeypatch):
     """Titles, lines of time and state, and the weight's; at the size of a report's picture."""
-    pixels, pages = canvas.pixels, []
-    monkeypatch.setattr(canvas, "pixels", lambda page: pages.append(page) or pixels(page))
+    drawn, pixels, pages = canvas.drawn, canvas.pixels, []
+    monkeypatch.setattr(canvas, "drawn", lambda page: pages.append(page) or drawn(page))
+    monkeypatch.setattr(canvas, "pixels", lambda page, over: pages.append(page) or pixels(page, over=over))
     reels = [SpaceReel(hop[0]), SpaceReel(hop[0])]
     Sheet(reels, SpaceReel.still, by="displacement", opengl=False, labels=["bed of sand", "spring-damper"]).draw(0.0)
-    boxes = [text.get_window_extent() for text in pages[0].texts]
+    boxes = [text.get_window_extent() for page in pages for text in page.texts]
     assert len(boxes) >= 6
     assert not [(a, b) for a, b in combinations(boxes, 2) if a.overlaps(b)]
 
@@ -383,3 +384,15 @@ def test_the_end_of_a_robot_on_grains_shows_heights_with_the_surface_in_the_midd
     near = (grains[:, 2] < surface - 3e-3) & ~deeper
     assert (colours[near, 0] > colours[near, 2]).all()  # red
     Sheet([reel], (400, 250), by="height", opengl=False).draw(1.0)
+
+
+def test_a_picture_has_nothing_of_the_one_that_was_drawn_before_it(folder):
+    """What stays is drawn once: a later picture of a sheet is bitwise the first of another, the bar of colours too."""
+    reel = Reel(folder)
+    sheet, other = (Sheet([reel], (640, 360), by="displacement", opengl=False) for _ in range(2))
+    first, later = sheet.draw(0.0), sheet.draw(1.0)
+    assert np.array_equal(later, other.draw(1.0)) and not np.array_equal(first, later)
+    left, foot, wide, high = reel.bar
+    rows = slice(round(360 * (1 - foot - high)), round(360 * (1 - foot)))
+    bar = later[rows, round(640 * left) : round(640 * (left + wide))]
+    assert len(np.unique(bar.reshape(-1, 3), axis=0)) > 50

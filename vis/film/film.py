@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -47,6 +47,8 @@ ARROWS, ARROWS_OF_FEET = say("arrows"), say("arrows_of_feet")
 MOST_FRAMES = 48
 _GRAVITY = re.compile(r"\b(?:rig|free) at \S+ m/s2")
 """In the title of a tumble."""
+_INCHES = 12.8
+"""Width of a sheet, which sets the size of its letters."""
 _TITLE = 15.0
 """Size of a title [points]."""
 _TALLEST = 2.0
@@ -101,6 +103,7 @@ class Sheet:
         self.shorter = float(np.clip(_TALLEST * self.weight / peak, _LEAST, 1.0)) if peak > 0.0 else 1.0
         reach = max(reel.reach for reel in self.reels)
         self.panels = layout(self.reels)
+        self._still: Any = None
         self.stages, self.ways = [], []
         for panel in self.panels:
             own = (round(panel.place[2] * size[0]), round(panel.place[3] * size[1]))
@@ -111,28 +114,39 @@ class Sheet:
     def draw(self, time: float) -> NDArray[np.uint8]:
         """The sheet at `time` [s], shape (height, width, 3)."""
         with styled():
-            sheet = canvas.blank_page(self.size, 12.8)
+            if self._still is None:
+                self._still = canvas.drawn(self._always())
+            sheet = canvas.blank_page(self.size, _INCHES)
             for number in range(len(self.panels)):
                 self._panel(sheet, number, time)
             for number, reel in enumerate(self.reels):
-                left = next(panel.place[0] for panel in self.panels if panel.run == number)
-                title = str(reel.result["title"]) if len(self.reels) == 1 else _with_surface(self.labels[number], reel)
-                right = max(p.place[0] + p.place[2] for p in self.panels if p.run == number)
-                _entitle(sheet, typeset(capital(title)), left, right)
                 line = reel.line(reel.nearest(time), short=len(self.reels) > 1)  # beside it stands the weight
-                sheet.text(left, 0.93, line, fontsize=13, va="top", color="#444444")
-            for panel in self.panels:
-                if panel.camera.arrow:
-                    share = self.shorter * panel.camera.arrow
-                    long = share * panel.place[3] * float(sheet.get_size_inches()[1])
-                    right = panel.place[0] + panel.place[2]
-                    canvas.draw_measure(sheet, right=right, height=0.915, length=long, weight=self.weight)
+                sheet.text(self._left(number), 0.93, line, fontsize=13, va="top", color="#444444")
             if all(len(reel.states) for reel in self.reels):
                 runs = [{"t_s": reel.series["t_s"], "state": reel.states} for reel in self.reels]
                 state_strip(sheet, runs, self.labels, time)
-            if any(reel.on_grains for reel in self.reels):
-                self.page.colour_bar(sheet, self.reels[0].bar, 10.5)
-            return canvas.pixels(sheet)
+            return canvas.pixels(sheet, over=self._still)
+
+    def _always(self) -> Figure:
+        """The sheet with what is the same at all times, and lies on nothing else: titles, the weight, the colours."""
+        sheet = canvas.blank_page(self.size, _INCHES)
+        for number, reel in enumerate(self.reels):
+            title = str(reel.result["title"]) if len(self.reels) == 1 else _with_surface(self.labels[number], reel)
+            right = max(p.place[0] + p.place[2] for p in self.panels if p.run == number)
+            _entitle(sheet, typeset(capital(title)), self._left(number), right)
+        for panel in self.panels:
+            if panel.camera.arrow:
+                share = self.shorter * panel.camera.arrow
+                long = share * panel.place[3] * float(sheet.get_size_inches()[1])
+                right = panel.place[0] + panel.place[2]
+                canvas.draw_measure(sheet, right=right, height=0.915, length=long, weight=self.weight)
+        if any(reel.on_grains for reel in self.reels):
+            self.page.colour_bar(sheet, self.reels[0].bar, 10.5)
+        return sheet
+
+    def _left(self, number: int) -> float:
+        """Where the first panel of a run begins, a share of the sheet."""
+        return next(panel.place[0] for panel in self.panels if panel.run == number)
 
     def close(self) -> None:
         """Free the windows."""

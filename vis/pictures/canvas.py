@@ -25,7 +25,7 @@ from vis.page.plots import DASHED, INK, styled
 
 __all__ = [
     "COLOURS", "FORCE", "HALO", "HEIGHT", "Page", "blank_page", "colour_top", "colour_values", "colourmap",
-    "draw_force", "draw_measure", "even_steps", "moved_since", "nice_above", "pixels",
+    "draw_force", "draw_measure", "drawn", "even_steps", "moved_since", "nice_above", "pixels",
 ]  # fmt: skip
 
 #: What grains are coloured by: name -> (label with unit, factor from SI).
@@ -217,11 +217,24 @@ def blank_page(size: tuple[int, int], inches: float) -> Figure:
     return figure
 
 
-def pixels(figure: Figure) -> NDArray[np.uint8]:
-    """A figure drawn, shape (height, width, 3)."""
+def drawn(figure: Figure) -> Any:
+    """A figure drawn once, for `pixels` to draw others of its size over."""
     canvas = figure.canvas
     assert isinstance(canvas, FigureCanvasAgg)
     canvas.draw()
+    return canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
+
+
+def pixels(figure: Figure, *, over: Any = None) -> NDArray[np.uint8]:
+    """A figure drawn, shape (height, width, 3); without its own ground `over` what `drawn` returned."""
+    canvas = figure.canvas
+    assert isinstance(canvas, FigureCanvasAgg)
+    if over is None:
+        canvas.draw()
+    else:
+        canvas.restore_region(over)  # type: ignore[no-untyped-call]
+        figure.patch.set_visible(False)
+        figure.draw(canvas.get_renderer())  # type: ignore[no-untyped-call]
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
