@@ -21,7 +21,7 @@ from pydantic import BaseModel, ValidationError
 from experiments.runs.folder import BusyError, RunFolder, holding, write_text
 from experiments.runs.progress import Progress
 from experiments.runs.registry import Experiment, find_experiment
-from experiments.runs.streams import naming
+from experiments.runs.streams import file_words, naming
 from experiments.runs.whole_runs import keeping_status, without_reports
 
 __all__ = ["After", "Outcome", "Task", "Tell", "carry_out", "code_of", "done_before", "name_of", "received", "task_of"]
@@ -176,7 +176,8 @@ def carry_out(task: Task, tell: Tell, shown: Progress | None = None) -> Outcome:
         if task.path.is_dir():
             with suppress(OSError):
                 write_text(task.path / "traceback.txt", traceback.format_exc())
-        return Outcome(task.name, fault=" ".join(f"{type(error).__name__}: {error}".split()))
+        said = file_words(error, f"a file below {task.path}") if isinstance(error, OSError) else str(error)
+        return Outcome(task.name, fault=" ".join(f"{type(error).__name__}: {said}".split()))
 
 
 def _with_after(task: Task, tell: Tell, shown: Progress | None) -> Outcome:

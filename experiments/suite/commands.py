@@ -13,7 +13,7 @@ from rich.table import Table
 from experiments.pool.tasks import Outcome
 from experiments.pool.together import Planned, Where, run_all, whole_folder
 from experiments.runs.progress import duration, make_progress
-from experiments.runs.streams import refusing, say, stdout_to_stderr
+from experiments.runs.streams import file_words, refusing, say, stdout_to_stderr
 from experiments.runs.strict import Scheduler, Workers, described
 from experiments.runs.types import Json
 from experiments.suite.cases import EXPERIMENTS, KEPT, LONGEST, Case, cases, estimate, keep, planned, standing
@@ -136,7 +136,8 @@ def _run(
             say("stopped; the same command continues")
             return 3
         except (OSError, RuntimeError) as error:
-            say(f"failed: {error}; the same command continues")
+            said = file_words(error, f"a file below {work} or {results}") if isinstance(error, OSError) else error
+            say(f"failed: {said}; the same command continues")
             return 1
     if failed:
         say(f"without a result: {', '.join(failed)}")

@@ -1,5 +1,6 @@
 """Lists of runs: in how many processes, what is done already, who cannot see a folder, Ctrl-C, the same numbers."""
 
+import errno
 import json
 import os
 import signal
@@ -123,6 +124,18 @@ def test_a_file_that_is_only_on_the_disk_of_a_worker_is_named(tmp_path):
     assert whole_folder(here.task, "result.json").is_dir() and whole_folder(one.task, "trajectory.csv").is_dir()
     with pytest.raises(RuntimeError, match=r"trajectory\.csv.*workers must see .*here"):
         whole_folder(here.task, "trajectory.csv")
+
+
+def test_a_run_on_a_full_disk_names_the_file_that_was_being_written(tmp_path, monkeypatch):
+    """The system does not name it."""
+
+    def run(settings, folder, *, progress):
+        with Path("/dev/full").open("wb", buffering=0) as file:
+            file.write(b"a")
+
+    monkeypatch.setattr("experiments.tumble.experiment.run", run)
+    (one,) = tumbles(tmp_path, [0.2])
+    assert tasks.carry_out(one.task, float).fault == f"OSError: /dev/full: {os.strerror(errno.ENOSPC)}"
 
 
 def test_a_member_of_converge_and_calibrate_is_named_by_all_code_that_computes_it(monkeypatch):
