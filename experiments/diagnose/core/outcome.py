@@ -286,11 +286,12 @@ class Diagnosis(Known):
     def base_parameters(self, one: Fit) -> dict[str, Estimated]:
         """The base model's shared numbers in one of the fits: name -> value, std (standard error; None where data and
         priors do not determine it), unit."""
-        covariance = one.covariance(inflation=inflation(one))
+        covariance, between = one.covariance(inflation=inflation(one)), _between(one)
         places = {p.name: k for k, p in enumerate(one.model.parameters)}
         ways = np.eye(len(places))
         return {
-            p.name: {"value": one.values[p.name], "std": _error(one, covariance, ways[places[p.name]]), "unit": p.unit}
+            p.name: {"value": one.values[p.name], "unit": p.unit,
+                     "std": _error(one, covariance, ways[k := places[p.name]], between=float(between[k]))}
             for p in self.problem.base if p.trial is None and p.name in places
         }  # fmt: skip
 
@@ -326,12 +327,16 @@ class Diagnosis(Known):
         ways = np.eye(len(places))
         slopes = {p.name: ways[places[p.name]] for p in self.problem.base if p.trial is None and p.name in places}
         own = dict.fromkeys(slopes, 0.0)  # what a number is uncertain by beside the fit
+        between = {name: float(_between(self.best)[places[name]]) for name in slopes}
         for form in self.forms:
             loose = self.problem.form_std(form)
             for name, (value, _, slope) in self._reported(form).items():
                 slopes[f"{form.effect}.{name}"] = slope
                 own[f"{form.effect}.{name}"] = abs(loose.get(name, 0.0) * value)
-        stds = {name: _error(self.best, covariance, slope, own[name]) for name, slope in slopes.items()}
+        stds = {
+            name: _error(self.best, covariance, slope, own[name], between=between.get(name, 0.0))
+            for name, slope in slopes.items()
+        }
         known = [name for name, std in stds.items() if std is not None]
         jointly = np.array([slopes[name] for name in known]).reshape(len(known), len(places))
         shared = jointly @ covariance @ jointly.T + np.diag([own[name] ** 2 for name in known])
@@ -354,9 +359,21 @@ def _with_error(force: float, std: float) -> str:
     return f"{force:.3g} ± {std:.2g} N" if std > 0 else f"{force:.3g} N"
 
 
-def _error(found: Fit, covariance: Array, slope: Array, more: float = 0.0) -> float | None:
-    """Standard error of a number by its derivatives, shape [p], and by `more`; None where it is not determined."""
-    std = math.hypot(math.sqrt(max(float(slope @ covariance @ slope), 0.0)), more)
+def _between(one: Fit) -> Array:
+    """Least standard error of each parameter from how trials differ, shape [p]: of pushes fitted together with drops,
+    whose K and C are not the same where a frame gives way (a drop has none); else 0."""
+    modes = {info.condition[0] for info in one.model.infos}
+    if one.model.problem.kind != "penetration" or len(modes) < 2:
+        return np.zeros(len(one.model.parameters))
+    return np.sqrt(np.maximum(np.diag(one.covariance_by_trial()), 0.0))
+
+
+def _error(
+    found: Fit, covariance: Array, slope: Array, more: float = 0.0, *, between: float = 0.0
+) -> float | None:  # fmt: skip
+    """Standard error of a number by its derivatives, shape [p], and by `more`, at least `between`; None where it is not
+    determined."""
+    std = max(math.hypot(math.sqrt(max(float(slope @ covariance @ slope), 0.0)), more), between)
     return std if math.isfinite(std) and not found.leaves_open(slope) else None
 
 

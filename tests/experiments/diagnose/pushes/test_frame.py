@@ -1,13 +1,17 @@
 """Pushes whose depth is read behind a compliant frame: K and C with its stiffness stated, and without."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, drop_trial, saved
 
+from experiments.diagnose.core.outcome import _between
 from experiments.diagnose.experiment import check, make_problem
-from experiments.diagnose.fit.fitting import Model, Whitener, fit
+from experiments.diagnose.fit.fitting import Fit, Model, Whitener, fit
+from experiments.diagnose.fit.problem import Parameter
 from experiments.diagnose.push.frame import at_the_tip
 from experiments.diagnose.report.to_use import use_sentences
 from experiments.diagnose.settings import DiagnoseSettings
@@ -76,3 +80,28 @@ def test_the_report_states_what_is_in_series_with_the_ground(campaign):
         covered = make_problem(campaign, frame_stiffness=stated).covered
         assert words in use_sentences(told | {"covered": covered})[0]
     assert "frame" not in use_sentences(told)[0]  # drops have none
+
+
+def test_the_standard_error_by_trial_is_that_of_a_mean_of_trials_that_differ():
+    """Three trials of four rows that read 1, 2 and 3 with a noise of 1: mean 2, s / sqrt(3) with s = 1; by the rows
+    1 / sqrt(12)."""
+    (k,) = [Parameter(name="k", unit="1", value=0.0, std=math.inf, scale=2.0)]
+    problem = SimpleNamespace(samples=lambda id: SimpleNamespace(time=np.arange(4.0)))
+    model = SimpleNamespace(parameters=(k,), problem=problem, infos=[SimpleNamespace(id=id) for id in "abc"])
+    found = Fit(model, {"k": 2.0}, np.repeat([1.0, 0.0, -1.0], 4), np.full((12, 1), 2.0), 8.0, 0.0, np.array([True]))
+    assert found.covariance()[0, 0] == pytest.approx(1.0 / 12.0)
+    assert found.covariance_by_trial()[0, 0] == pytest.approx(1.0 / 3.0)
+
+
+def test_k_of_pushes_behind_a_frame_and_of_drops_is_as_uncertain_as_they_differ(campaign):
+    drops = [(f"d{n}", "drop", v, drop_trial(law, speed=v, seed=n)) for n, v in enumerate((0.2, 0.4))]
+    pushes = [(t.id, "driven", t.speed, campaign.recordings[t.id, "data"]) for t in campaign.tables.trial]
+    problem = make_problem(campaign_of([*pushes, *drops]))
+    found = {
+        len(ids): fit(Model(problem, Whitener.white(problem), ids))
+        for ids in (tuple(trial.id for trial in problem.trials), tuple("0123"))
+    }
+    rows = math.sqrt(found[6].covariance()[0, 0])
+    between = float(_between(found[6])[0])
+    assert 5.0 * rows < between < STIFFNESS - STIFFNESS / (1.0 + STIFFNESS / FRAME)
+    assert not _between(found[4]).any()  # all pushes are behind the frame
