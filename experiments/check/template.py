@@ -16,16 +16,13 @@ def template_warning(campaign: Campaign) -> str | None:
     A recording is known by its numbers, whatever its file or trial is called.
     """
     template = read_campaign(TEMPLATES / f"template-{campaign.tables.kind}").recordings.values()
-    found = [
-        trial.id
-        for trial in campaign.tables.trial
-        if any(_same(campaign.recordings[trial.id, sensor], known) for sensor in trial.files for known in template)
-    ]
-    if not found:
-        return None
-    if len(found) == len(campaign.tables.trial):
+    of_template = {trial.id: list[bool]() for trial in campaign.tables.trial}
+    for (trial, _), recording in campaign.recordings.items():
+        of_template[trial].append(any(_same(recording, known) for known in template))
+    if all(map(all, of_template.values())):
         return say("all_of_template")
-    return say("of_template", trials=", ".join(found), s="s" if len(found) > 1 else "")
+    found = [trial for trial, known in of_template.items() if any(known)]
+    return say("of_template", trials=", ".join(found), s="s" if len(found) > 1 else "") if found else None
 
 
 def _same(one: Recording, other: Recording) -> bool:

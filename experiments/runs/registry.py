@@ -117,7 +117,7 @@ class Experiment:
         if check is not None:
             try:
                 check(settings)
-            except RuntimeError as error:  # a short trial that fails; another kind of it is something else
+            except RuntimeError as error:  # a short trial that fails; other subclasses are raised again
                 if type(error) is not RuntimeError and not isinstance(error, UnfitSettingsError):
                     raise
                 raise ValueError(f"with these settings a short trial fails: {error}") from error

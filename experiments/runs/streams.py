@@ -67,7 +67,7 @@ def _written(error: OSError) -> str:
     """The file that was being written when the error arose; empty where none is found.
 
     The system names a file that it cannot open, but not one that it cannot write further, as on a full disk. So the
-    innermost open file that the error passed on its way is taken.
+    innermost open file in the frames of the traceback is taken.
     """
     found = None
     for frame, _ in traceback.walk_tb(error.__traceback__):

@@ -340,6 +340,7 @@ def tiny(ours, tmp_path, monkeypatch):
         monkeypatch.setenv(f"HEDGEBED_BENCH_{name}", value)
 
 
+@pytest.mark.long
 def test_coordination_from_positions_is_that_of_the_beds_own_lists(ours):
     """The bed's has the floor's contacts as well."""
     heat = ours.heat(20)

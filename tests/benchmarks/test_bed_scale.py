@@ -12,6 +12,7 @@ from benchmarks.race.scale import field_bytes
 from experiments.runs.progress import Progress
 
 
+@pytest.mark.long
 def test_the_bytes_of_fields_are_those_of_their_arrays():
     bed = Ours(stack(), threads=1).warmed()
     sizes = field_bytes(bed)

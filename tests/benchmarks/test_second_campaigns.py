@@ -123,6 +123,7 @@ def test_a_crater_beside_loose_first_grains_is_not_named_adhesion_alone():
     assert found.after.held_out < 1.2
 
 
+@pytest.mark.long
 def test_a_force_that_relaxes_in_a_hold_tells_its_time_constant():
     """The rows of a hold count: a time constant 4 % below the true one leaves more of the fast pushes."""
     campaign, told = KINDS["second-push"].make(seed=971006, kind="relaxation", strength=39.065, trials=6)

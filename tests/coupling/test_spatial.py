@@ -286,6 +286,7 @@ def test_a_hand_sets_it_down_askew_until_the_grains_carry_it():
     assert rows["sinkage"][0] > 0
 
 
+@pytest.mark.long
 def test_where_it_leaves_the_bed_across_is_said():
     run = dropped(duration=0.2, velocity=(0.0, 0.9, -0.2))
     with pytest.raises(LeftTheBedError, match=r"left of the bed, which is 0.06 m wide"):

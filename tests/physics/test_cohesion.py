@@ -91,6 +91,7 @@ def test_the_force_curves_are_dmts_and_jkrs():
         assert (grains.coordination == (wanted[law] != 0)).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", LAWS)
 def test_pushes_on_a_body_have_cohesion_and_their_work_from_no_load_to_parting_is_that_of_pulling_a_grain_off(law):
     """DMT: integral of 2 pi w R - k d^1.5 from 0 to d_0, where it is 0: 1.2 pi w R d_0, k = 4/3 E* sqrt(R).

@@ -449,3 +449,9 @@ def test_a_number_has_half_of_the_interval_over_the_beds_that_have_it(tmp_path, 
     assert found["grain_count"]["std"] == 0.0
     fitted = sum(run["kind"] != "set_down" for run in result["runs"])
     assert found["stiffness_error"]["value"] == pytest.approx(2.0 * student(fitted - 1))
+
+
+def test_without_a_bed_the_error_of_a_models_number_is_its_95_percent_interval():
+    runs = [{"kind": "push", "seed": None}, {"kind": "push", "seed": None}]
+    given = {"stiffness": {"value": 900.0, "std": 10.0, "unit": "N/m"}}
+    assert in_95({"quantities": given, "runs": runs})["stiffness"]["std"] == pytest.approx(19.6, rel=1e-3)

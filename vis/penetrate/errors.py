@@ -1,7 +1,8 @@
 """Errors of a run's numbers as halves of 95 % intervals, in place of the standard deviations of result.json.
 
 A number over n beds has t s / sqrt(n), that of a fit t times its standard error by the jackknife over runs; t is
-Student's with n - 1 degrees of freedom, n the number of beds or of runs (`rigid.intervals`).
+Student's with n - 1 degrees of freedom, n the number of beds or of runs (`rigid.intervals`). Without a bed it is 1.96
+standard errors of the model.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rigid.intervals import half_width, student
+from rigid.intervals import NORMAL, half_width, student
 from vis.page.numbers import quantity, quote
 from vis.penetrate.summary_parts import fit_error, joined, list_of, mapping_of, say, std_of, value_of
 
@@ -22,7 +23,8 @@ def in_95(result: Mapping[str, Any]) -> dict[str, Any]:
     """The quantities of a result of penetrate, the std of each replaced by half of its 95 % interval over beds.
 
     0, of exact numbers, stays; None for a number that fewer than two beds have. The standard errors of the fit, which
-    are values of their own, become halves of 95 % intervals too, None for fewer than two runs.
+    are values of their own, become halves of 95 % intervals too, None for fewer than two runs. Without a bed the std of
+    a result is the standard error of a model's number, of a normal distribution.
     """
     quantities, fits = mapping_of(result.get("quantities")), _mappings(result, "fits")
     runs = _mappings(result, "runs")
@@ -36,7 +38,7 @@ def in_95(result: Mapping[str, Any]) -> dict[str, Any]:
     found = {name: dict(entry) if isinstance(entry, Mapping) else entry for name, entry in quantities.items()}
     for name in found:
         if std := std_of(quantities, name):
-            found[name]["std"] = half_width(std, counts.get(name, beds))
+            found[name]["std"] = half_width(std, counts.get(name, beds)) if beds else NORMAL * std
     for key in _UNITS:
         if (error := value_of(quantities, f"{key}_error")) is not None:
             found[f"{key}_error"]["value"] = _of_runs(error, _run_count(result, fits[0] if len(fits) == 1 else {}))

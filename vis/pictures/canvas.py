@@ -226,7 +226,7 @@ def drawn(figure: Figure) -> Any:
 
 
 def pixels(figure: Figure, *, over: Any = None) -> NDArray[np.uint8]:
-    """A figure drawn, shape (height, width, 3); without its own ground `over` what `drawn` returned."""
+    """A figure drawn, shape (height, width, 3); drawn over the picture `over`, without its background."""
     canvas = figure.canvas
     assert isinstance(canvas, FigureCanvasAgg)
     if over is None:

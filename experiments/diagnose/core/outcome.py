@@ -327,7 +327,8 @@ class Diagnosis(Known):
         ways = np.eye(len(places))
         slopes = {p.name: ways[places[p.name]] for p in self.problem.base if p.trial is None and p.name in places}
         own = dict.fromkeys(slopes, 0.0)  # what a number is uncertain by beside the fit
-        between = {name: float(_between(self.best)[places[name]]) for name in slopes}
+        apart = _between(self.best)
+        between = {name: float(apart[places[name]]) for name in slopes}
         for form in self.forms:
             loose = self.problem.form_std(form)
             for name, (value, _, slope) in self._reported(form).items():
@@ -368,9 +369,7 @@ def _between(one: Fit) -> Array:
     return np.sqrt(np.maximum(np.diag(one.covariance_by_trial()), 0.0))
 
 
-def _error(
-    found: Fit, covariance: Array, slope: Array, more: float = 0.0, *, between: float = 0.0
-) -> float | None:  # fmt: skip
+def _error(found: Fit, covariance: Array, slope: Array, more: float = 0.0, *, between: float = 0.0) -> float | None:
     """Standard error of a number by its derivatives, shape [p], and by `more`, at least `between`; None where it is not
     determined."""
     std = max(math.hypot(math.sqrt(max(float(slope @ covariance @ slope), 0.0)), more), between)

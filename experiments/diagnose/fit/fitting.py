@@ -121,16 +121,15 @@ class Fit:
         """Of the values, in their units, shape [p, p], from how trials differ: the sandwich of K.-Y. Liang and
         S. L. Zeger (1986, Biometrika 73, 13-22), each trial one unit, times n / (n - 1) of n trials; 0 of one trial.
 
-        It holds where trials do not have the same values, which `covariance` takes for granted; few trials tell it
-        roughly.
+        It holds also where trials do not have the same values, which `covariance` assumes. Few trials give a rough
+        estimate.
         """
-        parameters, count = self.model.parameters, len(self.model.infos)
+        parameters, count = self.model.parameters, len(self.model.trials)
         scales = np.array([p.scale for p in parameters])
         pull = self.prior_precision() * np.array([self.values[p.name] - p.value for p in parameters]) / scales
-        ends = np.cumsum([0, *(len(self.model.problem.samples(info.id).time) for info in self.model.infos)])
         gradients = np.array([
-            self.jacobian[low:high].T @ self.modes[low:high] + pull * [p.trial == info.id for p in parameters]
-            for info, low, high in zip(self.model.infos, ends[:-1], ends[1:], strict=True)
+            self.jacobian[rows].T @ self.modes[rows] + pull * [p.trial == trial for p in parameters]
+            for trial, rows in self.model.rows().items()
         ])  # fmt: skip
         bread = self.covariance() / scales
         return bread @ gradients.T @ gradients @ bread.T * count / max(count - 1, 1) * (count > 1)

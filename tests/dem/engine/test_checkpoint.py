@@ -39,6 +39,7 @@ def test_a_bed_goes_on_from_what_it_held_to_the_same_bits_as_often_as_one_likes(
         assert bits(bed) == after and (bed.reactions() == push).all()
 
 
+@pytest.mark.long
 @pytest.mark.cpu_only("sleep")
 def test_only_the_last_state_held_is_taken_back_and_none_across_a_change_of_sleep_or_book(engines):
     bed = made("chunks", engines)

@@ -43,6 +43,7 @@ def test_the_engines_book_is_the_one_kept_outside_it():
         assert np.abs(own - outside.parts[name]).max() < 5e-5 * first, name
 
 
+@pytest.mark.long
 def test_what_is_held_and_what_was_taken_is_the_first_energy_to_second_order():
     """Kinetic and Hertz's energy, and the works against dashpots, friction and turning."""
     gaps = []

@@ -73,7 +73,8 @@ def test_forces_and_motion_are_those_of_a_plain_double_loop(layout, reference):
     agrees(bed, reference)
 
 
-@pytest.mark.parametrize("cohesion", [pytest.param("dmt", marks=pytest.mark.long), "jkr"])
+@pytest.mark.long
+@pytest.mark.parametrize("cohesion", ["dmt", "jkr"])
 def test_forces_of_cohesive_grains_are_those_of_a_plain_double_loop(cohesion, monkeypatch):
     """In seven chunks; JKR's equation for the contact radius is solved by bisection there."""
     monkeypatch.setattr(dem.engine.engine, "GRAINS_PER_CHUNK", 9)
@@ -111,6 +112,7 @@ def agrees(bed, reference):
     assert (bed.contact_counts() == counts).all()
 
 
+@pytest.mark.long
 def test_other_skins_give_the_same_motion(monkeypatch):
     """New lists at every few steps, or hardly ever: the same to round-off."""
     results, made = [], []

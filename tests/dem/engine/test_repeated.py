@@ -87,6 +87,7 @@ def test_it_has_the_grains_of_its_piece_in_every_copy_one_length_further(pair):
     assert long.material == piece.material and long.recipe == {"seed": 3, "repeats": TIMES}
 
 
+@pytest.mark.long
 def test_contacts_keep_their_history_within_copies_and_across_the_seams(pair):
     piece, long = pair
     n = piece.grain_count
@@ -106,6 +107,7 @@ def test_contacts_keep_their_history_within_copies_and_across_the_seams(pair):
     assert all(np.allclose(found[key], wanted[key], rtol=within, atol=within * 1e-6) for key in wanted)
 
 
+@pytest.mark.long
 def test_copies_at_rest_stay_at_rest_as_their_piece_does(pair):
     piece, long = pair
     assert piece.kinetic_energy < 1e-4 * piece.weight * D
@@ -155,6 +157,7 @@ def test_in_a_higher_box_the_grains_are_as_they_were_and_what_flies_up_comes_bac
     assert higher.grains().position[:, 2].max() < 0.05
 
 
+@pytest.mark.long
 def test_what_cannot_be_repeated_is_refused_by_name(pair):
     piece, _ = pair
     for times in (0, -1, 1.5, True):

@@ -63,6 +63,7 @@ def test_a_slow_grain_swings_on_the_floor_as_one_of_so_many_times_its_mass(monke
     assert swings(bed, wanted=wanted, read=lambda grains: grains.position[:, 2]) == pytest.approx(wanted, rel=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("spin_stretch", "stout"), [(1.0, 16), (2.0, 4), (4.0, 1)])
 def test_a_slow_grain_spins_against_friction_as_one_of_so_many_times_its_inertia(monkeypatch, spin_stretch, stout):
     """On Mindlin's spring, its mass as it is: 1 / m + r^2 / I with I = 0.4 m r^2, so many times."""

@@ -26,6 +26,7 @@ def test_a_bed_says_what_it_is():
         assert part in repr(bed)
 
 
+@pytest.mark.long
 def test_old_names_of_a_bed_warn_and_do_the_same():
     bed = cloud.make()
     with pytest.warns(DeprecationWarning, match=r"use Bed\.track_contact_work"):

@@ -61,6 +61,7 @@ def test_several_steps_in_a_kernel_give_the_bits_of_single_ones(engines, monkeyp
     assert all(np.array_equal(states[0][name], states[1][name]) for name in states[0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", ["cpu", "gpu"])
 def test_a_file_of_the_one_goes_on_with_the_other(first, engines, tmp_path, monkeypatch):
     """Histories and forces come over: sixty steps later both are the same to round-off."""

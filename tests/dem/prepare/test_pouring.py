@@ -81,6 +81,7 @@ def test_sand_poured_with_little_friction_lies_as_densely_as_the_densest_toyoura
     assert bed.whole.material == replace(SAND, young=bed.whole.material.young)
 
 
+@pytest.mark.long
 def test_grains_cannot_change_their_density(made):
     poured = Specification.of(SAND, size=BED["size"], grain=GRAIN).poured(0.2)
     assert poured.material.rolling_friction == 1e-9

@@ -20,6 +20,7 @@ def gap(bed, before):
     return np.abs(off).max(), max(np.abs(value).max() for value in changed.values())
 
 
+@pytest.mark.long
 def test_a_cloud_between_periodic_sides_turns_by_what_crosses_them_alone():
     """No gravity, no floor, no body: grains of 5 mm fly about and through both sides for 2000 steps."""
     rng = np.random.default_rng(3)

@@ -81,6 +81,7 @@ def test_grains_stand_beside_a_law_and_grains_in_lammps_have_their_own_name(runs
     assert result["quantities"]["gap_lift"]["value"] == 0.0
 
 
+@pytest.mark.long
 def test_numbers_of_a_part_of_a_run_are_those_of_its_rows(runs):
     """Flights count from the first touch to the end of the part, and end with it."""
     moved = read_moved(runs / "spring", RunFolder.open(runs / "spring").read_result())
@@ -97,6 +98,7 @@ def test_numbers_of_a_part_of_a_run_are_those_of_its_rows(runs):
     assert before == {"flights": 0.0, "longest_flight": 0.0}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("other", "said"),
     [

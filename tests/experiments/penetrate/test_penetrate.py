@@ -166,6 +166,7 @@ penetrate.run(settings, folder)
 KILLABLE = {"seeds": (1,), "checkpoint_interval": 1e-3}
 
 
+@pytest.mark.long
 def test_a_run_killed_in_a_drop_goes_on_to_the_same_bits(fake, tmp_path):
     """kill -9 in the middle of a drop; not even Python gets to tidy up."""
     whole, broken = tmp_path / "whole", tmp_path / "broken"

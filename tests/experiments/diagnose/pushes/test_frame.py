@@ -86,8 +86,8 @@ def test_the_standard_error_by_trial_is_that_of_a_mean_of_trials_that_differ():
     """Three trials of four rows that read 1, 2 and 3 with a noise of 1: mean 2, s / sqrt(3) with s = 1; by the rows
     1 / sqrt(12)."""
     (k,) = [Parameter(name="k", unit="1", value=0.0, std=math.inf, scale=2.0)]
-    problem = SimpleNamespace(samples=lambda id: SimpleNamespace(time=np.arange(4.0)))
-    model = SimpleNamespace(parameters=(k,), problem=problem, infos=[SimpleNamespace(id=id) for id in "abc"])
+    rows = {trial: slice(4 * n, 4 * n + 4) for n, trial in enumerate("abc")}
+    model = SimpleNamespace(parameters=(k,), trials=tuple(rows), rows=lambda: rows)
     found = Fit(model, {"k": 2.0}, np.repeat([1.0, 0.0, -1.0], 4), np.full((12, 1), 2.0), 8.0, 0.0, np.array([True]))
     assert found.covariance()[0, 0] == pytest.approx(1.0 / 12.0)
     assert found.covariance_by_trial()[0, 0] == pytest.approx(1.0 / 3.0)
