@@ -18,7 +18,7 @@ from vis.page.numbers import foldable, quote
 from .fit import Fit, fit_rows, spread
 from .settings import say
 
-__all__ = ["departure_table", "departures", "depth_exponent", "rate_change", "sentences"]
+__all__ = ["departure_table", "departures", "depth_exponent", "rate_change", "sentences", "with_half"]
 
 Known = tuple[float, float | None]
 """A number and its standard deviation, None where unknown."""
@@ -171,9 +171,9 @@ def sentences(
     if sinkage is not None:
         bed, law = sinkage
         against = f", {_deeper(law[0] / bed[0])}" if bed[0] > 0 else ""
-        sunk, law_sunk = (_with_half(*depth, "m") for depth in sinkage)
+        sunk, law_sunk = (with_half(*depth, "m") for depth in sinkage)
         if bed[0] < 0:
-            on_top = _with_half(-bed[0], bed[1], "m")
+            on_top = with_half(-bed[0], bed[1], "m")
             said.append(say("sinkage_on_top", bed=on_top, law=law_sunk))
         else:
             said.append(say("sinkage", bed=sunk, law=law_sunk, against=against))
@@ -214,10 +214,11 @@ def _of_drops(drops: Sequence[tuple[Penetration, Penetration]]) -> list[str]:
 
 def _of_beds(value: float, std: float | None, count: float, unit: str, *, significant: int = 2) -> str:
     """A mean over beds with half of its 95 % interval, as far as beds show one."""
-    return _with_half(value, half_width(std, int(count)), unit, significant=significant)
+    return with_half(value, half_width(std, int(count)), unit, significant=significant)
 
 
-def _with_half(value: float, half: float | None, unit: str, *, significant: int = 2) -> str:
+def with_half(value: float, half: float | None, unit: str, *, significant: int = 2) -> str:
+    """A number as a person quotes it, with half of its 95 % interval where that is known."""
     said = foldable(quote(value, half, unit, significant=significant))
     return f"{said} (95 %)" if "±" in said else said
 

@@ -22,6 +22,7 @@ from experiments.grains.graded import graded_quantities
 from experiments.grains.softening import Softening
 from experiments.runs.types import Json
 from rigid import SpringDamper
+from vis.penetrate.errors import in_95
 
 from .fit import Fit, drag_gap, fit_spring_damper, moments_of, spread
 from .settings import STANDARD_GRAVITY, PenetrateSettings, say
@@ -200,6 +201,12 @@ class Findings:
                 law, spread(laws), "1", "the same on the fitted law; spread: on the laws fitted to each bed"
             ),
         }
+
+    @cached_property
+    def in_95(self) -> dict[str, Any]:
+        """`quantities` with halves of 95 % intervals in place of standard deviations."""
+        entries = {"fits": self.fit_entries(), "runs": self.run_entries({})}
+        return in_95({"quantities": self.quantities(), **entries})
 
     def run_entries(self, notes: Mapping[str, Mapping[str, Any]]) -> list[Json]:
         """The entry "runs": one per run, the model's numbers under model_*; `notes` are what was kept of each."""

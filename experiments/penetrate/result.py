@@ -13,12 +13,10 @@ from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
-from vis.page.numbers import foldable, quote
-from vis.penetrate.errors import in_95
 
 from . import beds
 from .amended import kept_law, run_beside
-from .departures import departures
+from .departures import departures, with_half
 from .findings import BedFacts, Findings, bed_entry, bed_quantities, drop_note
 from .fit import MOST_CORRELATED
 from .reference import compare_with, read_reference
@@ -163,7 +161,7 @@ LEAST_CONDITIONS = 3
 
 def departures_in_words(findings: Findings) -> Json:
     """The entry "departures" of result.json: numbers, sentences, and the remarks that explain them, by name."""
-    numbers = _in_95(findings)
+    numbers = findings.in_95
     sunk, law = ((numbers[name]["value"], numbers[name]["std"]) for name in ("sinkage_dem", "sinkage_spring_damper"))
     pair = (sunk, law) if sunk[0] is not None and law[0] is not None else None
     by_bed = [runs for seed in findings.seeds if (runs := findings.of("driven", seed))]
@@ -181,7 +179,7 @@ def departures_in_words(findings: Findings) -> Json:
 
 def warnings_of(findings: Findings) -> Iterator[str]:
     """What a reader has to know: runs that did not end as they should, a law that came out at its bound."""
-    numbers, settings, fit = _in_95(findings), findings.settings, findings.fit
+    numbers, settings, fit = findings.in_95, findings.settings, findings.fit
     ends = {unit: findings.beds[unit.id].ended for unit in findings.units}
     for unit, ended in ends.items():
         if ended in ("max_time", "max_depth"):
@@ -262,7 +260,7 @@ def overlap_warning(overlap: float | None, settings: PenetrateSettings, softenin
 
 def _which_stiffness(findings: Findings) -> str | None:
     """When to use the fitted K, and when that of a foot that stands."""
-    standing, fitted = _in_95(findings).get("stiffness_standing"), findings.fit.stiffness
+    standing, fitted = findings.in_95.get("stiffness_standing"), findings.fit.stiffness
     if standing is None or fitted <= 0:
         return None
     interval = sinkage_interval(findings, beds.find_material(findings.settings))
@@ -286,7 +284,7 @@ def _which_stiffness(findings: Findings) -> str | None:
 
 def _at_surface(findings: Findings) -> str | None:
     """What the bed pushes back with before depth 0, where that matters; None below a tenth of the load."""
-    numbers = _in_95(findings)
+    numbers = findings.in_95
     force, load = numbers.get("surface_force"), findings.settings.weight
     if force is None or force["value"] <= 0.1 * load:
         return None
@@ -297,13 +295,6 @@ def _at_surface(findings: Findings) -> str | None:
     return say("at_surface", force=_words(force), share=share, grains=grains)
 
 
-def _in_95(findings: Findings) -> Json:
-    """The headline numbers with halves of 95 % intervals in place of standard deviations."""
-    entries = {"fits": findings.fit_entries(), "runs": findings.run_entries({})}
-    return in_95({"quantities": findings.quantities(), **entries})
-
-
 def _words(entry: Json) -> str:
-    """A quantity of `_in_95` as a person quotes it: with its error, else with two figures."""
-    said = foldable(quote(entry["value"], entry["std"], entry["unit"], significant=2))
-    return f"{said} (95 %)" if "±" in said else said
+    """A quantity of `in_95` as a person quotes it: with its error, else with two figures."""
+    return with_half(entry["value"], entry["std"], entry["unit"])

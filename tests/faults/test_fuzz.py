@@ -9,7 +9,6 @@ import json
 import random
 import shutil
 import subprocess
-from functools import cache
 from pathlib import Path
 from typing import get_args
 
@@ -20,7 +19,6 @@ from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
 from experiments.campaign.files import new_campaign
-from experiments.cli.main import build_app
 from experiments.runs import registry
 from experiments.runs.registry import EXPERIMENTS
 from rigid.result import toml_value
@@ -75,8 +73,6 @@ def no_work(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(registry.Experiment, "run", over)
     monkeypatch.setattr(registry.Experiment, "headline_of", lambda self, result: None)
-    # The options of all commands, which take most of the time of a case, are the same each time.
-    monkeypatch.setattr("experiments.cli.main.build_app", cache(build_app))
 
 
 @pytest.mark.parametrize(("target", "variable"), [("fuzz", "FUZZED"), ("torture", "KILLED")])

@@ -12,7 +12,6 @@ import signal
 import warnings
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from shutil import rmtree
 
@@ -20,7 +19,6 @@ import pytest
 from faults.fuzzing import ALL, CASES, in_words, kept, outcome
 
 import experiments
-from experiments.cli.main import build_app
 from experiments.runs import whole_runs
 from experiments.runs.registry import EXPERIMENTS, TOO_LARGE
 from rigid.ground.laws import GROUNDS
@@ -191,7 +189,6 @@ def files(tmp_path, monkeypatch):
         patch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
         assert outcome("ground", "--out", "looked-up", "--quiet")[0] == 0
     Path("law.toml").write_bytes(Path("looked-up/ground.toml").read_bytes())
-    monkeypatch.setattr("experiments.cli.main.build_app", cache(build_app))
 
 
 @contextmanager

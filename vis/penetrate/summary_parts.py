@@ -270,7 +270,6 @@ def reference_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
     """By how much the numbers moved from those of another result, where it was compared with one."""
     reference = mapping_of(result.get("reference"))
     rows = []
-    head = ["", "there (± std)", "here (± std)", "change"]
     for key, entry in mapping_of(reference.get("moved")).items():
         moved = mapping_of(entry)
         unit = "%" if key in SHARES else str(moved.get("unit") or "1")
@@ -281,10 +280,8 @@ def reference_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
         rows.append([label_of(key), *sides, "\N{EN DASH}" if change is None else signed_percent(change)])
     if not rows:
         return None
-    return {
-        "file": str(reference.get("file") or ""),
-        "table": {"head": head, "rows": rows},
-    }
+    head = ["", "there (± std)", "here (± std)", "change"]
+    return {"file": str(reference.get("file") or ""), "table": {"head": head, "rows": rows}}
 
 
 def bed_part(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> dict[str, Any]:

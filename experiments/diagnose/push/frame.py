@@ -1,11 +1,11 @@
 """The depth of the tip of pushes whose depth is read at a drive, behind a frame of known stiffness."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from experiments.campaign import Campaign, PenetrationCampaign
+from rigid.checks import check_above_zero
 
 __all__ = ["at_the_tip"]
 
@@ -26,8 +26,7 @@ def at_the_tip(campaign: Campaign, frame_stiffness: float | None) -> Campaign:
     """
     if frame_stiffness is None:
         return campaign
-    if not (math.isfinite(frame_stiffness) and frame_stiffness > 0.0):
-        raise ValueError(f"frame_stiffness = {frame_stiffness:g}: a number above 0 N/m was expected")
+    check_above_zero("N/m", frame_stiffness=frame_stiffness)
     tables = campaign.tables
     pushes = [t for t in tables.trial if t.mode == "driven"] if isinstance(tables, PenetrationCampaign) else []
     if not pushes:
