@@ -368,7 +368,8 @@ def build_app() -> App:
             home = home[word]
         group = GROUPS.get(experiment.group)
         command = _experiment_command(experiment)
-        home.command(command, name=name, help=experiment.summary, group=group, sort_key=place)
+        about = f"{experiment.summary}\n\n{experiment.details}".strip()
+        home.command(command, name=name, help=about, group=group, sort_key=place)
     if "campaign" in registry.EXPERIMENTS:
         app["campaign"].command(_campaign_new, name="new")
         app["campaign"].command(
@@ -378,12 +379,12 @@ def build_app() -> App:
         )
     app.command(_resume, name="resume", group=GROUPS["keep"])
     if "tumble" in registry.EXPERIMENTS:
-        from experiments.cli.fmu import fmu_command
+        from experiments.cli.fmu import VARIABLES, fmu_command
         from experiments.cli.render import render
         from experiments.cli.view import view
 
         about = "Write platform, rig and ground as an FMU (FMI 3, co-simulation) for another simulation program."
-        app.command(fmu_command(), name="fmu", help=about, group=GROUPS["simulate"])
+        app.command(fmu_command(), name="fmu", help=f"{about}\n\n{VARIABLES}", group=GROUPS["simulate"])
         app.command(render, name="render", group=GROUPS["keep"])
         app.command(view, name="view", group=GROUPS["keep"])
         from experiments.suite.commands import add_suite_commands

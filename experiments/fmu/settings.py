@@ -11,7 +11,28 @@ from rigid.ground_file import is_ground_file
 
 from . import say
 
-__all__ = ["FmuSettings"]
+__all__ = ["OUTPUTS", "FmuSettings"]
+
+OUTPUTS = {
+    "x": ("m", "Position of the centre along the surface"),
+    "z": ("m", "Height of the centre over the undisturbed surface"),
+    "theta": ("rad", "Angle of the platform, clockwise"),
+    "vx": ("m/s", "Velocity along the surface"),
+    "vz": ("m/s", "Velocity upwards"),
+    "omega": ("rad/s", "Angular velocity of the platform, clockwise"),
+    "wheel_speed": ("rad/s", "Speed of the wheel; a positive torque of the motor increases it"),
+    "force_x": ("N", "Force of the ground along the surface, mean of the last inner step"),
+    "force_z": ("N", "Force of the ground upwards, likewise"),
+    "moment": ("N.m", "Moment of the ground about the centre, clockwise, likewise"),
+    "depth": ("m", "Depth of the lowest tip"),
+    "kinetic_energy": ("J", "Of platform and counterweight, without the wheel's spin"),
+    "potential_energy": ("J", "Weight times height of the centre"),
+    "torque_work": ("J", "Work of motor and brake on the platform"),
+    "ground_work": ("J", "Work on the ground"),
+    "ground_energy": ("J", "Stored in the ground's springs"),
+    "energy_residual": ("J", "Torque work less ground work and less the increase of both energies"),
+}
+"""Unit and meaning of each output of the FMU, by name; beside them stands `normal_force` of each row of spikes [N]."""
 
 
 class FmuSettings(PlatformSettings):

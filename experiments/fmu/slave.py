@@ -32,7 +32,7 @@ from rigid.ground_file import is_ground_file
 
 from . import say
 from .driven import DrivenPlatform
-from .settings import FmuSettings
+from .settings import OUTPUTS, FmuSettings
 
 __all__ = ["MADE_OF", "PlatformSlave", "plan_platform"]
 
@@ -73,28 +73,26 @@ SIGNED = ("x_start", "theta_start", "vx_start", "vz_start", "omega_start", "whee
 """Parameters below 0 in their own right."""
 Values = dict[str, float | str | bool]
 Answer = Callable[[DrivenPlatform], float]
-OUTPUTS: dict[str, tuple[str, str, Answer]] = {
-    "x": ("m", "Position of the centre along the surface", lambda run: run.body.place[0]),
-    "z": ("m", "Height of the centre over the surface", lambda run: run.body.place[1]),
-    "theta": ("rad", "Angle of the platform, clockwise", lambda run: run.body.place[2]),
-    "vx": ("m/s", "Velocity along the surface", lambda run: run.body.rates[0]),
-    "vz": ("m/s", "Velocity upwards", lambda run: run.body.rates[1]),
-    "omega": ("rad/s", "Angular velocity of the platform, clockwise", lambda run: run.body.rates[2]),
-    "wheel_speed": ("rad/s", "Speed of the wheel", lambda run: run.body.wheel_speed),
-    "force_x": ("N", "Force of the ground along the surface, mean of the last inner step",
-                lambda run: run.master.wrench.force[0]),
-    "force_z": ("N", "Force of the ground upwards, likewise", lambda run: run.master.wrench.force[2]),
-    "moment": ("N.m", "Moment of the ground about the centre, clockwise, likewise",
-               lambda run: run.master.wrench.torque[1]),
-    "depth": ("m", "Depth of the lowest tip", lambda run: run.depth),
-    "kinetic_energy": ("J", "Of platform and counterweight, without the wheel's spin",
-                       lambda run: run.body.kinetic_energy(0.0)),
-    "potential_energy": ("J", "Weight times height of the centre", lambda run: run.body.potential_energy),
-    "torque_work": ("J", "Work of motor and brake on the platform", lambda run: run.body.torque_work),
-    "ground_work": ("J", "Work on the ground", lambda run: run.master.exchange.given),
-    "ground_energy": ("J", "Stored in the ground's springs", lambda run: run.ground.energies()["springs"]),
-    "energy_residual": ("J", "What the energy balance does not account for", lambda run: run.energy_residual),
-}  # fmt: skip
+ANSWERS: dict[str, Answer] = {
+    "x": lambda run: run.body.place[0],
+    "z": lambda run: run.body.place[1],
+    "theta": lambda run: run.body.place[2],
+    "vx": lambda run: run.body.rates[0],
+    "vz": lambda run: run.body.rates[1],
+    "omega": lambda run: run.body.rates[2],
+    "wheel_speed": lambda run: run.body.wheel_speed,
+    "force_x": lambda run: run.master.wrench.force[0],
+    "force_z": lambda run: run.master.wrench.force[2],
+    "moment": lambda run: run.master.wrench.torque[1],
+    "depth": lambda run: run.depth,
+    "kinetic_energy": lambda run: run.body.kinetic_energy(0.0),
+    "potential_energy": lambda run: run.body.potential_energy,
+    "torque_work": lambda run: run.body.torque_work,
+    "ground_work": lambda run: run.master.exchange.given,
+    "ground_energy": lambda run: run.ground.energies()["springs"],
+    "energy_residual": lambda run: run.energy_residual,
+}
+"""What each of `OUTPUTS` is, of a run."""
 
 
 def plan_platform(settings: FmuSettings) -> TumblePlan:
@@ -164,11 +162,12 @@ class PlatformSlave(Fmi3Slave):
             Float64("torque", description="Torque of the motor on the platform, clockwise", **moving)
         )
         self.register_variable(Float64("brake", description="Largest torque of the brake on the wheel", **moving))
-        outputs = OUTPUTS | {
-            f"normal_force[{row + 1}]": ("N", f"Normal force on row {row + 1} of spikes, likewise", _load(row))
+        outputs = [(name, *OUTPUTS[name], answer) for name, answer in ANSWERS.items()]
+        outputs += [
+            (f"normal_force[{row + 1}]", "N", f"Normal force on row {row + 1} of spikes, likewise", _load(row))
             for row in range(self._rows)
-        }
-        for name, (unit, text, answer) in outputs.items():
+        ]
+        for name, unit, text, answer in outputs:
             self.register_variable(
                 Float64(
                     name, description=text, unit=unit, causality=Fmi3Causality.output, getter=self._answer(answer),

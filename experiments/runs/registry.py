@@ -86,6 +86,7 @@ class Experiment:
     presets: tuple[Preset, ...] = ()
     subject: str = ""  # Setting that the first argument is (the first two, of a setting of two)
     example: str = ""  # File in experiments/cases, of an experiment whose case has no default
+    details: str = ""  # What `--help` adds to the summary
     headline: str = ""  # "module:function" from a result to its `Headline`; empty: all is shown
 
     def settings_class(self) -> type[BaseModel]:
