@@ -9,6 +9,7 @@ import json
 import re
 import shutil
 import subprocess
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -184,8 +185,11 @@ def test_campaigns_with_something_wrong_are_checked_or_refused_in_words(kind, pa
             shutil.rmtree("one", ignore_errors=True), shutil.rmtree("out", ignore_errors=True)
             shutil.copytree("new", "one")
             (Path("one") / change.file).write_text(change.made(files[change.file]), encoding="utf-8")
-            status, said = outcome("campaign", "check", "one", "--out", "out", "--quiet")
+            with warnings.catch_warnings(record=True) as warned:
+                warnings.simplefilter("always")
+                status, said = outcome("campaign", "check", "one", "--out", "out", "--quiet")
             assert status in (0, 2) and in_words(said), said
+            assert not [str(each.message) for each in warned if not issubclass(each.category, DeprecationWarning)]
             if ALL and status == 0:
                 assert "<script>" not in (Path("out") / "report.html").read_text(encoding="utf-8")
             counts[status] += 1
