@@ -70,7 +70,10 @@ paces = []
 LISTS = {
     "converge": (CONVERGE,),
     "calibrate": (CALIBRATE.replace("workers = 1\n", ""),),
-    "experiments run": tuple(f"{TUMBLE_ON_GRAINS}duration = 0.02\nseed = {seed}\n" for seed in (1, 2)),
+    "experiments run": tuple(
+        TUMBLE_ON_GRAINS.replace("torque = 0.01", f"torque = {torque}") + "duration = 0.02\ncheckpoint_interval = 0.2\n"
+        for torque in (0.01, 0.008)
+    ),
     "validate": (),
 }
 """Commands that compute a list of runs, with their cases."""
@@ -220,6 +223,13 @@ def test_a_push_on_grains_of_a_killed_worker_goes_on_elsewhere_from_its_checkpoi
     assert pushed == (serial / series).read_bytes() and len(pushed.splitlines()) > kept
 
 
+def in_the_middle(runs, workers):
+    """The worker that is in the middle of one of these runs, which has kept something, and that run."""
+    found = busy(runs, workers)
+    kept = [path for name in ("checkpoint", "series") for path in (found[1] / name).glob("*")] if found else []
+    return found if kept else None
+
+
 def of_list(name, home, out):
     """The command of a list of runs that answers into `out`, and the folder of the runs. Its cases are in `home`."""
     if name == "experiments run":
@@ -246,7 +256,10 @@ def told(name, out):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LISTS)
 def test_a_list_of_runs_whose_worker_is_killed_ends_in_the_numbers_of_a_serial_one(name, tmp_path):
-    """One of two workers is killed (-9) in the middle of a run; beds are prepared anew by the serial command."""
+    """One of two workers is killed (-9) in the middle of a run, which goes on elsewhere.
+
+    The serial command prepares beds of its own.
+    """
     pytest.importorskip("distributed")
     found, alone = tmp_path / "found", tmp_path / "alone"
     with ExitStack() as stack:
@@ -254,7 +267,8 @@ def test_a_list_of_runs_whose_worker_is_killed_ends_in_the_numbers_of_a_serial_o
         tokens, runs = of_list(name, tmp_path, found)
         given = {"home": tmp_path, "log": tmp_path / "client.log", "HEDGEBED_CACHE": str(tmp_path / "cache")}
         client = stack.enter_context(started(*tokens, "--scheduler", file, **given))
-        victim, left = awaited(lambda: busy(runs, workers))
+        where = busy if name == "validate" else in_the_middle
+        victim, left = awaited(lambda: where(runs, workers))
         victim.send_signal(signal.SIGKILL)
         victim.wait()
         assert not (left / "result.json").exists()
