@@ -85,16 +85,19 @@ def resumed(stopped, home, change):
     return (home / SERIES).read_bytes(), said
 
 
+def without(*paths):
+    """What removes these files of the present folder."""
+    return lambda: [path.unlink() for path in paths]
+
+
 @pytest.fixture(scope="module")
 def series(stopped, tmp_path_factory):
-    """The series from the newest checkpoint, and from the one before it."""
+    """The series from the newest checkpoint, from the one before it, and from the start: no two are the same."""
     home = tmp_path_factory.mktemp("series")
-    newest, before = (
-        resumed(stopped, home / name, change)[0]
-        for name, change in (("whole", lambda: None), ("without", NEWEST.unlink))
-    )
-    assert newest != before  # new lists of neighbours, from another step on
-    return newest, before
+    kept = {"newest": without(), "before": without(NEWEST), "anew": without(NEWEST, BEFORE)}
+    found = {name: resumed(stopped, home / name, change)[0] for name, change in kept.items()}
+    assert len(set(found.values())) == 3  # new lists of neighbours, from another step on
+    return found
 
 
 def cut(path):
@@ -106,16 +109,14 @@ def cut(path):
 @pytest.mark.parametrize("seed", range(DAMAGES))
 def test_a_damaged_checkpoint_of_lammps_gives_way_to_the_one_before_it(seed, stopped, series, tmp_path):
     """Or the damage met what is not read, such as the time of day: then the run goes on from this checkpoint."""
-    newest, before = series
     found, said = resumed(stopped, tmp_path / "home", lambda: damaged(NEWEST, random.Random(seed)))
-    assert found == (before if f"{NEWEST} is damaged" in said else newest), said
+    assert found == series["before" if f"{NEWEST} is damaged" in said else "newest"], said
 
 
 @pytest.mark.long
 def test_a_checkpoint_of_lammps_that_is_cut_off_gives_way_and_of_two_neither_is_used(stopped, series, tmp_path):
-    newest, before = series
     found, said = resumed(stopped, tmp_path / "one", lambda: cut(NEWEST))
-    assert found == before and f"{NEWEST} is damaged" in said
-    anew, said = resumed(stopped, tmp_path / "both", lambda: [cut(NEWEST), cut(BEFORE)])
+    assert found == series["before"] and f"{NEWEST} is damaged" in said
+    found, said = resumed(stopped, tmp_path / "both", lambda: [cut(NEWEST), cut(BEFORE)])
     assert f"{NEWEST} is damaged" in said and f"{BEFORE} is damaged" in said
-    assert anew not in (newest, before) and anew.count(b"\n") == newest.count(b"\n")
+    assert found == series["anew"]

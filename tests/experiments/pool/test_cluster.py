@@ -77,6 +77,7 @@ LISTS = {
     "validate": (),
 }
 """Commands that compute a list of runs, with their cases."""
+QUICKER = ("calibrate", "validate")
 CHECKED = ("hertz-force", "t1")
 """Of the cases of `validate`, those that are computed."""
 _PATIENCE = 300.0  # [s]
@@ -253,8 +254,9 @@ def told(name, out):
     return {"rows": rows} | {path.name: path.read_bytes() for path in out.glob("series/*.csv")}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", LISTS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=pytest.mark.long if one in QUICKER else pytest.mark.slow) for one in LISTS]
+)
 def test_a_list_of_runs_whose_worker_is_killed_ends_in_the_numbers_of_a_serial_one(name, tmp_path):
     """One of two workers is killed (-9) in the middle of a run, which goes on elsewhere.
 
