@@ -200,14 +200,14 @@ def test_campaigns_with_something_wrong_are_checked_or_refused_in_words(kind, pa
 @pytest.mark.parametrize(
     ("change", "made"),
     [
-        (Change("a", 0, "line left out"), "2, 3 4\n"),
-        (Change("a", 1, "line of another place", 0), "one\none\n2, 3 4\n"),
-        (Change("a", 1, "word", 0, "nan"), "one\nnan, 3 4\n"),
-        (Change("a", 1, "character", 3, "["), "one\n2, [ 4\n"),
+        (Change("a", 0, "line left out"), "2,3 4\n"),
+        (Change("a", 1, "line of another place", 0), "one\none\n2,3 4\n"),
+        (Change("a", 1, "word", 0, "nan"), "one\nnan,3 4\n"),
+        (Change("a", 1, "character", 2, "["), "one\n2,[ 4\n"),
     ],
 )
 def test_a_change_of_a_file_is_one_line_word_or_character(change, made):
-    assert change.made("one\n2, 3 4\n") == made
+    assert change.made("one\n2,3 4\n") == made
 
 
 def test_what_the_fuzzer_finds_is_told_by_its_simplest_change():
