@@ -1,4 +1,4 @@
-"""Temporary folders of benchmarks, which do not stay: those of a process that was killed are removed by the next one.
+"""Temporary folders of benchmarks, which do not stay: those of a killed process are removed by one an hour later.
 
 A folder belongs to the process that holds its lock. The system releases the lock when the process ends, also by kill.
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 
 __all__ = ["scratch"]
 
-_NEW = 60.0  # A folder younger than this may not have its lock yet [s]
+_NEW = 3600.0  # A younger folder may not have its lock yet, or be that of an older version, which took none [s]
 _WRITES_ON = 5.0  # For so long processes that were killed may still write into the folder [s]
 
 
