@@ -13,7 +13,6 @@ Beside it stand the grain-steps of the tumbles at 0.22 N m and 0.0085 g whose re
 
 import json
 import math
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from benchmarks.race.entrants import TIME_STEP, PeerError
 from benchmarks.race.grains import DIAMETER, Grains, prepare_grains
 from benchmarks.race.machine import begin_timing, wide_console
 from benchmarks.race.pushing import Push, Pushed, push_lammps, push_ours
+from benchmarks.race.scratch import scratch
 from dem import Sleep
 from experiments.runs.types import Json
 
@@ -71,8 +71,8 @@ def run(
     progress.stage("LAMMPS")
     peer = None
     try:
-        with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as name:
-            peer = push_lammps(bed, push, points=few, ranks=cores, folder=Path(name))
+        with scratch() as folder:
+            peer = push_lammps(bed, push, points=few, ranks=cores, folder=folder)
     except PeerError as problem:
         remarks.append(str(problem))
     bench["answer"] = answer_of(bed, push, ours, awake, peer)

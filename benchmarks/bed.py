@@ -18,7 +18,6 @@ HEDGEBED_BENCH_SIZES, each a multiple of the first.
 import os
 import shutil
 import statistics
-import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
@@ -31,6 +30,7 @@ from benchmarks.race.grains import BENCH, DIAMETER, SPREAD, Grains, coordination
 from benchmarks.race.machine import begin_timing, environment_numbers, wide_console
 from benchmarks.race.profile import profile_bed
 from benchmarks.race.scale import keep_bed, scale_of
+from benchmarks.race.scratch import scratch
 from benchmarks.race.yardstick import compile_yardstick, yardsticks
 from experiments.runs.types import Json
 
@@ -182,9 +182,9 @@ def _profile(bench: Json, settings: Settings, cores: int, progress: Any) -> None
     for count in settings.sizes:
         progress.stage(f"{count:,} grains")
         grains = prepare_grains(count, threads=cores, progress=progress)
-        with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as name:
+        with scratch() as folder:
             bed, said = profile_bed(
-                grains, steps=settings.steps_for(count), repeats=REPEATS, threads=cores, folder=Path(name)
+                grains, steps=settings.steps_for(count), repeats=REPEATS, threads=cores, folder=folder
             )  # fmt: skip
         bench["profile"].append(bed)
         bench["remarks"] += [remark for remark in said if remark not in bench["remarks"]]
@@ -204,8 +204,8 @@ def _scale(bench: Json, settings: Settings, cores: int, progress: Any) -> None:
         {"bed": first * _SETTLING_STEPS / _EXPECTED_SPEED} | {f"{n:,} grains": 20 + t for n, t in work.items()}
     )
     progress.stage("bed")
-    with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as name:
-        path = Path(name) / "bed.npz"
+    with scratch() as folder:
+        path = folder / "bed.npz"
         keep_bed(path, prepare_grains(first, threads=cores, progress=progress), cores)
         for count in sizes:
             progress.stage(f"{count:,} grains")
@@ -271,8 +271,7 @@ def _race(
     }  # fmt: skip
     ours = Lane(Ours(grains, threads=cores))
     rolling = [Lane(Ours(grains, threads=cores, rolling=True))] if settings.shown else []
-    with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as name:
-        folder = Path(name)
+    with scratch() as folder:
         write_data(folder / "bed.data", grains)
         theirs = [Lane(entrant) for peer in peers for entrant in _theirs(peer, grains, folder, cores)]
         racing = [lane for lane in theirs if lane.entrant.counted and not lane.entrant.rolling]

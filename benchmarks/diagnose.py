@@ -14,7 +14,6 @@ import ast
 import hashlib
 import json
 import math
-import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -34,6 +33,7 @@ from .diagnosis.table import CASES_FILE, read_cases, show, summarise
 from .diagnosis.worker import answer, begin
 from .hidden.suite import KINDS, make_case, suite
 from .race.machine import now
+from .race.scratch import scratch
 from .second.campaigns import KINDS as SECOND
 
 __all__ = ["continues", "digest", "read_cases", "run"]
@@ -165,8 +165,8 @@ def _one(kind: str, case: Json, ask: Ask, before: Json | None, wanted: bool) -> 
     """One record; `before` is one that lacks the baselines only."""
     campaign, hidden = make_case(kind, case)
     record = before
-    with tempfile.TemporaryDirectory(prefix="hedgebed-bench-") as place:
-        folder = write_campaign(Path(place) / "campaign", campaign)
+    with scratch() as place:
+        folder = write_campaign(place / "campaign", campaign)
         said = ask(str(folder)) if record is None else {}
         campaign = read_campaign(folder)  # in the format's units
     if record is None:

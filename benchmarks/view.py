@@ -16,14 +16,15 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 
+from benchmarks.race.scratch import scratch
 from experiments.runs.types import Json
 from vis.pictures.frames import FrameWriter
 from vis.view.page import write_view
@@ -74,20 +75,26 @@ class Browser:
         command = chromium()
         if command is None:
             raise RuntimeError("there is no Chromium (Debian: apt install chromium)")
-        self._home = tempfile.mkdtemp(prefix="hedgebed-chromium-")
+        with ExitStack() as ending:
+            self._start(command, size, ending.enter_context(scratch("hedgebed-chromium-")), ending)
+            self._ending = ending.pop_all()
+
+    def _start(self, command: str, size: tuple[int, int], home: Path, ending: ExitStack) -> None:
+        """Chromium, whose files are all in `home`, with a page; `ending` ends it."""
         ours_in, theirs_out = os.pipe()
         theirs_in, ours_out = os.pipe()
         options = [
             "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--disable-gpu",
             "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run",
             "--host-resolver-rules=MAP * ~NOTFOUND",
-            f"--window-size={size[0]},{size[1]}", f"--user-data-dir={self._home}", "about:blank",
+            f"--window-size={size[0]},{size[1]}", f"--user-data-dir={home}", "about:blank",
         ]  # fmt: skip
         self._child = subprocess.Popen(
             [sys.executable, "-c", _START, str(theirs_in), str(theirs_out), command, *options],
             pass_fds=(theirs_in, theirs_out), start_new_session=True,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ | {"TMPDIR": str(home)},
         )  # fmt: skip
+        ending.callback(self._end, ours_in, ours_out)
         os.close(theirs_in)
         os.close(theirs_out)
         self._in, self._out, self._unread, self._count = ours_in, ours_out, b"", 0
@@ -104,11 +111,13 @@ class Browser:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._ending.close()
+
+    def _end(self, *pipes: int) -> None:
         os.killpg(self._child.pid, signal.SIGKILL)
         self._child.wait()
-        os.close(self._in)
-        os.close(self._out)
-        shutil.rmtree(self._home, ignore_errors=True)
+        for pipe in pipes:
+            os.close(pipe)
 
     def call(self, method: str, **parameters: Any) -> Any:
         """The result of a command of the protocol. Raises RuntimeError where it fails."""

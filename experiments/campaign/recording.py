@@ -25,6 +25,7 @@ _TIME_OF_A_PUSH = (
     ". A push at one constant speed has the time depth / speed: add the column t_s = depth_m / speed, the speed in m/s"
 )
 _MOST_REPORTED = 5  # faults of one kind of one file; of the rest the number
+_LARGEST = 1e50  # Of a cell, in its unit: powers of a larger one can overflow
 
 Conversion = Callable[[float], float]
 
@@ -193,6 +194,9 @@ def _number(path: Path, line: int, name: str, cell: str, convert: Conversion, fa
         return math.nan
     if math.isinf(value):
         faults.append(f"{path}, line {line}: {name} = {cell!r}, a finite number or nan was expected")
+        return math.nan
+    if abs(value) > _LARGEST:
+        faults.append(f"{path}, line {line}: {name} = {cell!r}, at most {_LARGEST:g} or nan was expected")
         return math.nan
     return convert(value)
 

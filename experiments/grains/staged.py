@@ -83,7 +83,7 @@ def lower_gravity(bed: Any, gravity: float, *, unit: float) -> None:
     """Lower gravity to this [m/s2], and let the grains come to rest until the floor carries their weight.
 
     ``unit``: sqrt(d / g) in the gravity before [s]. Stiff grains ring for longer than their kinetic energy shows.
-    Raises RuntimeError where they do not come to rest.
+    Raises UnfitSettingsError where they do not come to rest.
     """
     bed.set_gravity(gravity)
     come_to_rest(bed, unit=unit)
@@ -92,7 +92,7 @@ def lower_gravity(bed: Any, gravity: float, *, unit: float) -> None:
             break
         bed.advance(math.ceil(_SPELL * unit / bed.time_step))
     else:
-        raise RuntimeError("the floor does not come to carry the weight of the bed after gravity was lowered")
+        raise UnfitSettingsError("the floor does not come to carry the weight of the bed after gravity was lowered")
     _begin_from_here(bed)
 
 
@@ -101,7 +101,7 @@ def come_to_rest(bed: Any, *, unit: float, progress: Progress | None = None) -> 
 
     At rest as a bed is when it is prepared: their mean kinetic energy is below 1e-5 m g d, in the drag and then without
     it. Without drag alone a bed that sticks rings as one spring, and its energy falls ten times in 1.6 s only (5,702
-    grains of 3.2 mm at 1e-3 g, docs/notes/penetrate.md). Raises RuntimeError where they do not come to rest.
+    grains of 3.2 mm at 1e-3 g, docs/notes/penetrate.md). Raises UnfitSettingsError where they do not come to rest.
     """
     steps, drag = math.ceil(_SPELL * unit / bed.time_step), max(_DRAG * unit, 4 * bed.time_step)
     still, dragged, first = _STILL * bed.weight * bed.mean_diameter, True, 0.0
@@ -116,7 +116,7 @@ def come_to_rest(bed: Any, *, unit: float, progress: Progress | None = None) -> 
             progress.update(min(1.0, max(0.0, 1 - math.log(max(ratio, 1.0)) / first)))
     else:
         waited = _MOST_SPELLS * steps * bed.time_step
-        raise RuntimeError(say("not_at_rest", waited=waited, energy=ratio * _STILL, still=_STILL))
+        raise UnfitSettingsError(say("not_at_rest", waited=waited, energy=ratio * _STILL, still=_STILL))
     _begin_from_here(bed)
 
 

@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from experiments.grains.settings import GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
+from rigid.checks import nearest
 from vis.page.sentences import Sentences
 
 __all__ = ["ON_ANY_GROUND", "SpatialSettings"]
@@ -15,6 +16,7 @@ say = Sentences(__package__)
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 ZERO = (0.0, 0.0, 0.0)
+GROUNDS = ("spring-damper", "bed")
 ON_ANY_GROUND = (
     "lowering_speed", "substeps", "body_steps", "extrapolation", "iterations", "frame_count", "checkpoint_interval",
 )  # fmt: skip
@@ -27,7 +29,7 @@ class SpatialSettings(GrainsSettings):
     # The surface
     surface: str | None = None
     """Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; brick if not given."""
-    ground: Literal["spring-damper", "bed"] = "spring-damper"
+    ground: str = "spring-damper"
     """Law of the force of the ground: spring-damper, or bed (of grains)."""
     stiffness: Positive | None = None
     """Stiffness K under one spike [N/m]; if not given, half of the surface's, which is for a row of two."""
@@ -80,10 +82,26 @@ class SpatialSettings(GrainsSettings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        for finding in (self._friction(), self._gravity(), self._actuation(), self._placement(), self._of_a_bed()):
+        for finding in (
+            self._known_ground(),
+            self._friction(),
+            self._gravity(),
+            self._actuation(),
+            self._placement(),
+            self._of_a_bed(),
+        ):
             if finding:
                 raise ValueError(finding)
         return self
+
+    def _known_ground(self) -> str | None:
+        if self.ground in GROUNDS:
+            return None
+        return (
+            say("in_lammps")
+            if self.ground == "lammps"
+            else say("no_ground", s=self, known=nearest(self.ground, GROUNDS))
+        )
 
     def _friction(self) -> str | None:
         above = self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s

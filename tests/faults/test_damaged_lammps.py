@@ -7,7 +7,7 @@ the same checkpoint on one rank, LAMMPS has the same numbers, so the series tell
 import os
 import random
 import shutil
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
 from itertools import count
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from small_cases import GRAINS
 import experiments.penetrate.experiment
 from coupling.lammps import LammpsMissingError, find_lammps
 from experiments.cli.main import main
+from experiments.runs import folder, whole_runs
 
 DAMAGES = int(os.environ.get("HEDGEBED_DAMAGES", "3"))
 CASE = GRAINS.replace("depth = 0.006", "depth = 0.004") + """
@@ -49,49 +50,73 @@ def stopped_after(steps):
         yield
 
 
-@pytest.fixture
-def stopped(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
     """A run in LAMMPS that was stopped twice in its push: it has two checkpoints, which no test changes."""
     try:
         find_lammps()
     except LammpsMissingError as missing:
         pytest.skip(str(missing))
-    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
-    monkeypatch.setenv("HEDGEBED_CACHE", str(tmp_path / "cache"))
-    home = tmp_path / "stopped"
+    home = tmp_path_factory.mktemp("whole") / "stopped"
     home.mkdir()
-    monkeypatch.chdir(home)
-    with stopped_after(40):
+    with pytest.MonkeyPatch.context() as patch, stopped_after(40):
+        patch.setattr(whole_runs, "write_report", lambda *given: None)
+        patch.setenv("HEDGEBED_CACHE", str(home.parent / "cache"))
+        patch.chdir(home)
         assert main(["penetrate", case(CASE), "--out", "run", "--quiet"]) == 3
         assert main(["resume", "run", "--quiet"]) == 3
-    assert NEWEST.exists() and BEFORE.exists() and not SERIES.exists()
+        assert NEWEST.exists() and BEFORE.exists() and not SERIES.exists()
     return home
 
 
-@pytest.mark.long
-def test_a_damaged_checkpoint_of_lammps_gives_way_to_the_one_before_it(stopped, tmp_path, monkeypatch, capsys):
-    def resumed(name, change):
-        """The series of a copy of the run that is resumed after the change, and what it said."""
-        monkeypatch.chdir(shutil.copytree(stopped, tmp_path / name))
+def resumed(stopped, home, change):
+    """The series of a copy of the run, in the new folder `home`, that is resumed after the change; what it said."""
+    shutil.copytree(stopped, home)
+    log = home.with_suffix(".log")
+    with pytest.MonkeyPatch.context() as patch, log.open("w", encoding="utf-8") as file, redirect_stderr(file):
+        patch.setattr(whole_runs, "write_report", lambda *given: None)
+        patch.setattr(folder, "_TOLD", set())
+        patch.setenv("HEDGEBED_CACHE", str(stopped.parent / "cache"))
+        patch.chdir(home)
         change()
-        capsys.readouterr()
-        status, said = main(["resume", "run", "--quiet"]), capsys.readouterr().err
-        assert status == 0 and "Traceback" not in said, said
-        return SERIES.read_bytes(), said
+        status = main(["resume", "run", "--quiet"])
+    said = log.read_text(encoding="utf-8")
+    assert status == 0 and "Traceback" not in said, said
+    return (home / SERIES).read_bytes(), said
 
-    def both_damaged():
-        for path in (NEWEST, BEFORE):
-            path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
-    newest, before = (resumed(*given)[0] for given in (("whole", lambda: None), ("without", NEWEST.unlink)))
-    assert newest != before  # new lists of neighbours, from another step on
-    gave_way = 0
-    for seed in range(DAMAGES):
-        found, said = resumed(f"damaged{seed}", lambda seed=seed: damaged(NEWEST, random.Random(seed)))
-        named = f"{NEWEST} is damaged" in said
-        assert found == (before if named else newest), said
-        gave_way += named
-    assert gave_way > 0
-    anew, said = resumed("both", both_damaged)
+def without(*paths):
+    """What removes these files of the present folder."""
+    return lambda: [path.unlink() for path in paths]
+
+
+@pytest.fixture(scope="module")
+def series(stopped, tmp_path_factory):
+    """The series from the newest checkpoint, from the one before it, and from the start: no two are the same."""
+    home = tmp_path_factory.mktemp("series")
+    kept = {"newest": without(), "before": without(NEWEST), "anew": without(NEWEST, BEFORE)}
+    found = {name: resumed(stopped, home / name, change)[0] for name, change in kept.items()}
+    assert len(set(found.values())) == 3  # new lists of neighbours, from another step on
+    return found
+
+
+def cut(path):
+    """Leave half of a file."""
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(DAMAGES))
+def test_a_damaged_checkpoint_of_lammps_gives_way_to_the_one_before_it(seed, stopped, series, tmp_path):
+    """Or the damage met what is not read, such as the time of day: then the run goes on from this checkpoint."""
+    found, said = resumed(stopped, tmp_path / "home", lambda: damaged(NEWEST, random.Random(seed)))
+    assert found == series["before" if f"{NEWEST} is damaged" in said else "newest"], said
+
+
+@pytest.mark.long
+def test_a_checkpoint_of_lammps_that_is_cut_off_gives_way_and_of_two_neither_is_used(stopped, series, tmp_path):
+    found, said = resumed(stopped, tmp_path / "one", lambda: cut(NEWEST))
+    assert found == series["before"] and f"{NEWEST} is damaged" in said
+    found, said = resumed(stopped, tmp_path / "both", lambda: [cut(NEWEST), cut(BEFORE)])
     assert f"{NEWEST} is damaged" in said and f"{BEFORE} is damaged" in said
-    assert anew not in (newest, before) and anew.count(b"\n") == newest.count(b"\n")
+    assert found == series["anew"]

@@ -6,16 +6,18 @@ passes adds a line; parts that it has are not done again.
 """
 
 import json
-import random
+import re
 import shutil
 import subprocess
+import warnings
+from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
+from typing import Literal, get_args
 
 import pytest
 from faults import fuzzing
 from faults.fuzzing import ALL, CASES, in_words, kept, outcome
-from hypothesis import HealthCheck, given, seed, settings
+from hypothesis import HealthCheck, find, given, seed, settings
 from hypothesis import strategies as st
 
 from experiments.campaign.files import new_campaign
@@ -116,47 +118,105 @@ def test_settings_of_any_kind_are_run_or_refused_in_words(part, no_work):
         fuzz()
 
 
-def mangled(text, chance):
-    """A file of a campaign with one thing another: a word, a line, a character."""
-    lines = text.splitlines(keepends=True)
-    place = chance.randrange(len(lines))
-    words = lines[place].replace(",", " , ").split(" ")
-    odd = ["", "nan", "-1", "1e308", "0", "x", "<script>alert(1)</script>", '"', "[", "é", "1,2", "true", "-0.0", "\t"]
-    kind = chance.randrange(4)
-    if kind == 0:
-        lines[place] = " ".join([*words[: len(words) // 2], chance.choice(odd), *words[len(words) // 2 + 1 :]])
-    elif kind == 1:
-        del lines[place]
-    elif kind == 2:
-        lines.insert(place, lines[chance.randrange(len(lines))])
-    else:
-        at = chance.randrange(len(lines[place]) + 1)
-        lines[place] = lines[place][:at] + chance.choice(odd) + lines[place][at + 1 :]
-    return "".join(lines)
+ODD = ["", "0", "-1", "x", "nan", "1e308", "-0.0", "true", "1,2", "[", '"', "\t", "é", "<script>alert(1)</script>"]
 
 
-@pytest.mark.parametrize("part", range(-(-CASES // (20 * 2 * CAMPAIGNS)) if ALL else 1))
+@dataclass(frozen=True)
+class Change:
+    """One thing of a file that is another: `line` counts from 0; `place` of a word or a character, or another line."""
+
+    file: str
+    line: int
+    how: Literal["line left out", "line of another place", "word", "character"]
+    place: int = 0
+    odd: str = ""
+
+    def made(self, text):
+        """The text with the change."""
+        lines = text.splitlines(keepends=True)
+        given = lines[self.line]
+        if self.how == "line left out":
+            del lines[self.line]
+        elif self.how == "line of another place":
+            lines.insert(self.line, lines[self.place])
+        elif self.how == "word":
+            words = re.split(r"(,| )", given)
+            lines[self.line] = "".join([*words[: self.place], self.odd, *words[self.place + 1 :]])
+        else:
+            lines[self.line] = given[: self.place] + self.odd + given[self.place + 1 :]
+        return "".join(lines)
+
+
+@st.composite
+def changes(draw, files):
+    """A change of one of these files, by their texts; simplest is the first file without its first line."""
+    file = draw(st.sampled_from(sorted(files)))
+    lines = files[file].splitlines(keepends=True)
+    line = draw(st.integers(0, len(lines) - 1))
+    how = draw(st.sampled_from(get_args(Change.__annotations__["how"])))
+    counts = {"line of another place": len(lines), "word": len(re.split(r"(,| )", lines[line]))}
+    if how == "line left out":
+        return Change(file, line, how)
+    place = draw(st.integers(0, counts.get(how, len(lines[line]) + 1) - 1))
+    odd = "" if how == "line of another place" else draw(st.sampled_from(ODD))
+    return Change(file, line, how, place, odd)
+
+
+CAMPAIGN_PARTS = range(-(-CASES // (20 * 2 * CAMPAIGNS)) if ALL else 1)
+
+
+@pytest.mark.parametrize("part", CAMPAIGN_PARTS)
 @pytest.mark.parametrize("kind", ["tumble", "penetration"])
 def test_campaigns_with_something_wrong_are_checked_or_refused_in_words(kind, part, tmp_path, monkeypatch):
     """No markup of a campaign gets into the page as such."""
-    source = tmp_path / "new"
-    with kept(f"campaigns {kind} {part}") as counts:
-        monkeypatch.chdir(tmp_path)
-        new_campaign(source, kind=kind)
-        if not ALL:
-            monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
-        count = CAMPAIGNS if ALL else 4
-        for number in range(part * count, (part + 1) * count):
-            chance = random.Random(number)
+    monkeypatch.chdir(tmp_path)
+    new_campaign(tmp_path / "new", kind=kind)
+    files = {path.name: path.read_text(encoding="utf-8") for path in Path("new").iterdir()}
+    if not ALL:
+        monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda folder, progress: None)
+    with kept(f"changed campaigns {kind} {part}") as counts:
+
+        @seed(f"{kind} {part}")
+        @settings(
+            max_examples=CAMPAIGNS if ALL else 4, deadline=None, suppress_health_check=list(HealthCheck), database=None
+        )
+        @given(change=changes(files))
+        def fuzz(change):
             shutil.rmtree("one", ignore_errors=True), shutil.rmtree("out", ignore_errors=True)
             shutil.copytree("new", "one")
-            path = chance.choice(sorted(path for path in (tmp_path / "one").rglob("*") if path.is_file()))
-            path.write_text(mangled(path.read_text(encoding="utf-8"), chance), encoding="utf-8")
-            status, said = outcome("campaign", "check", "one", "--out", "out", "--quiet")
-            assert status in (0, 2) and in_words(said), (number, path, said)
+            (Path("one") / change.file).write_text(change.made(files[change.file]), encoding="utf-8")
+            with warnings.catch_warnings(record=True) as warned:
+                warnings.simplefilter("always")
+                status, said = outcome("campaign", "check", "one", "--out", "out", "--quiet")
+            assert status in (0, 2) and in_words(said), said
+            assert not [str(each.message) for each in warned if not issubclass(each.category, DeprecationWarning)]
             if ALL and status == 0:
-                assert "<script>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8"), number
+                assert "<script>" not in (Path("out") / "report.html").read_text(encoding="utf-8")
             counts[status] += 1
+
+        fuzz()
+
+
+@pytest.mark.parametrize(
+    ("change", "made"),
+    [
+        (Change("a", 0, "line left out"), "2,3 4\n"),
+        (Change("a", 1, "line of another place", 0), "one\none\n2,3 4\n"),
+        (Change("a", 1, "word", 0, "nan"), "one\nnan,3 4\n"),
+        (Change("a", 1, "character", 2, "["), "one\n2,[ 4\n"),
+    ],
+)
+def test_a_change_of_a_file_is_one_line_word_or_character(change, made):
+    assert change.made("one\n2,3 4\n") == made
+
+
+def test_what_the_fuzzer_finds_is_told_by_its_simplest_change():
+    """Of all changes of two files that lose the word `tip`, one without a place or a word."""
+    files = {"a.csv": "t_s,z_m\n0,1\n" * 20, "campaign.toml": "format = 1\n[spike]\ntip = 'flat'\n"}
+    lost = find(
+        changes(files), lambda change: "tip" in files[change.file] and "tip" not in change.made(files[change.file])
+    )
+    assert lost == Change("campaign.toml", 2, "line left out")
 
 
 @pytest.mark.parametrize("line", [1, 3])

@@ -13,9 +13,12 @@ from multiprocessing.forkserver import ensure_running
 from pathlib import Path
 
 import pytest
-from faults.damaged_folders import CALIBRATE, KINDS, ON_GRAINS, SWEEP, TUMBLE, Kind, case, patched
+from faults.damaged_folders import CALIBRATE, CONVERGE, KINDS, ON_GRAINS, SWEEP, TUMBLE, Kind, case, patched
 from faults.test_damaged_folders import files_of
+from faults.test_damaged_lammps import CASE as IN_LAMMPS
+from faults.test_killed import CASES
 
+from coupling.lammps import LammpsMissingError, find_lammps
 from dem.files.arrays import read_arrays
 from experiments.campaign.files import new_campaign
 from experiments.cli.main import main
@@ -23,7 +26,10 @@ from experiments.runs.folder import RunFolder
 
 ROOT = Path(__file__).resolve().parents[2]
 MANY = 300.0  # Longest that a pair takes [s], also on a busy machine
-ANSWERS = ("*/result.json", "*/*.csv", "*/*.nc", "*/series/*.csv", "*/ground.toml", "*/bed.npz", "results/*/*.csv")
+ANSWERS = (
+    "*/result.json", "*/*.csv", "*/*.nc", "*/series/*.csv", "*/ground.toml", "*/material.toml", "*/bed.npz",
+    "results/*/*.csv",
+)  # fmt: skip
 BED = ["bed", "make", "--stages", "rain", "level", "--size", "0.024", "0.024", "0.02", "--threads", "1"]
 
 
@@ -37,6 +43,7 @@ class Pair:
     statuses: tuple[tuple[int, int], ...] = ((0, 2),)
     fake: bool = False
     tier: str = ""
+    in_lammps: bool = False
 
 
 def written(text, name="case.toml"):
@@ -58,6 +65,11 @@ PAIRS = {
     "sweep, resumed": Pair(["resume", "run"], NOTHING, KINDS["sweep, members"].make, (*BOTH, (0, 2)), tier="long"),
     "sweep, one folder of members": Pair([*SWEEP, "--members", "members"], OUTS, statuses=BOTH, tier="long"),
     "calibrate": Pair(["calibrate", "case.toml"], make=written(CALIBRATE), fake=True),
+    "converge": Pair(["converge", "case.toml"], make=written(CONVERGE), fake=True, tier="long"),
+    "converge, one folder of members": Pair(
+        ["converge", "case.toml", "--members", "members"], OUTS, written(CONVERGE), statuses=BOTH, fake=True,
+        tier="long",
+    ),
     "diagnose": Pair(
         ["diagnose", "campaign"], make=lambda: new_campaign(Path("campaign"), kind="penetration"), tier="long"
     ),
@@ -66,7 +78,12 @@ PAIRS = {
         written(TUMBLE, "cases/grains/grains1-small.toml"), statuses=BOTH, tier="slow",
     ),
     "bed make": Pair(BED, tier="slow"),
+    "bed calibrate": Pair(["bed", "calibrate", "case.toml"], make=written(CASES["bed calibrate"]), tier="long"),
     "penetrate, one cache": Pair(["penetrate", "case.toml"], OUTS, written(ON_GRAINS), statuses=BOTH, tier="slow"),
+    "penetrate in LAMMPS": Pair(["penetrate", "case.toml"], make=written(IN_LAMMPS), tier="slow", in_lammps=True),
+    "penetrate in LAMMPS, one cache": Pair(
+        ["penetrate", "case.toml"], OUTS, written(IN_LAMMPS), statuses=BOTH, tier="slow", in_lammps=True
+    ),
 }  # fmt: skip
 
 
@@ -132,6 +149,11 @@ MARKED = [
 @pytest.mark.parametrize("name", MARKED)
 def test_two_commands_at_once_lose_nothing(name, processes, tmp_path, monkeypatch):
     pair = PAIRS[name]
+    if pair.in_lammps:
+        try:
+            find_lammps()
+        except LammpsMissingError as missing:
+            pytest.skip(str(missing))
     statuses, said = carry_out(pair, pair.ends, tmp_path / "both", processes)
     assert tuple(sorted(statuses)) in pair.statuses and "Traceback" not in said, said
     if 2 in statuses:

@@ -286,6 +286,7 @@ def test_what_is_wrong_with_a_table_is_said_by_file_and_key(tmp_path, old, new, 
     [
         ("-0.1,0.0,0.18,0.0", "-0.1,0.0,high,0.0", ["line 2", "y_m = 'high'", "number or nan"]),
         ("-0.1,0.0,0.18,0.0", "-0.1,0.0,inf,0.0", ["line 2", "y_m = 'inf'", "finite"]),
+        ("-0.1,0.0,0.18,0.0", "-0.1,0.0,-1e308,0.0", ["line 2", "y_m = '-1e308'", "1e+50"]),
         ("-0.1,0.0,0.18,0.0", "-0.1,0.0,0.18", ["line 2", "found 3 cells, expected 4"]),
         ("-0.1,0.0,0.18,0.0", ",0.0,0.18,0.0", ["line 2", "t_s is missing"]),
         ("0.2,0.01", "0.05,0.01", ["line 5", "t_s runs backwards", "0.1 s to 0.05 s"]),

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from dem import Bed
-from experiments.grains.staged import come_to_rest
+from experiments.grains.staged import come_to_rest, lower_gravity
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.settings import PenetrateSettings
+from rigid.checks.unfit import UnfitSettingsError
 
 SMALL = {
     "bed_size": (0.024, 0.024, 0.018), "grain": 0.003, "tip_diameter": 0.006, "depth": 0.004, "shaft_length": 0.014,
@@ -63,7 +64,7 @@ class Ringing:
     def __init__(self, drag_helps):
         self.kinetic_energy, self.drags, self.drag_helps = 1e-2, [], drag_helps
 
-    def advance(self, steps, *, drag_time):
+    def advance(self, steps, *, drag_time=np.inf):
         self.drags.append(bool(np.isfinite(drag_time)))
         self.kinetic_energy *= 0.1 if self.drags[-1] and self.drag_helps else 0.999
 
@@ -81,5 +82,13 @@ def test_a_bed_that_rings_is_dragged_until_it_is_at_rest_and_must_be_without():
 
 
 def test_a_bed_that_never_rests_says_how_much_it_moves():
-    with pytest.raises(RuntimeError, match=r"within 0.09 s .* 0.0094 m g d .* less than 1e-05"):
+    with pytest.raises(UnfitSettingsError, match=r"within 0.09 s .* 0.0094 m g d .* less than 1e-05"):
         come_to_rest(Ringing(drag_helps=False), unit=1e-3)
+
+
+def test_a_floor_that_never_carries_the_bed_in_the_lowered_gravity_is_a_setting_that_does_not_fit():
+    """Exit status 2, as where the grains never rest."""
+    bed = Ringing(drag_helps=True)
+    bed.floor_force, bed.set_gravity = 0.5, lambda gravity: None
+    with pytest.raises(UnfitSettingsError, match="the floor"):
+        lower_gravity(bed, 0.1, unit=1e-3)
