@@ -178,11 +178,14 @@ def _show_headline(headline: Headline, console: Console) -> None:
     """A short table, what to be warned of, and the findings that matter most."""
     table = Table(box=None, pad_edge=False)
     for place, name in enumerate(headline.head):
-        table.add_column(name, justify="left" if place == 0 else "right", no_wrap=place > 0)
+        longest = max((len(row[place]) for row in headline.rows), default=0)
+        words = place > 0 and longest > _NARROW
+        narrow = None if place == 0 or words else longest
+        table.add_column(name, justify="left" if place == 0 or words else "right", min_width=narrow)
     for row in headline.rows:
         table.add_row(*map(Text, row))
     console.print(table, markup=False)
-    for mark, texts in (("warning: ", headline.warnings), ("- ", headline.sentences)):
+    for mark, texts in (("", headline.notes), ("warning: ", headline.warnings), ("- ", headline.sentences)):
         for text in texts:
             folded = textwrap.wrap(
                 with_squares(text), console.width, initial_indent=mark, subsequent_indent=" " * len(mark)

@@ -63,6 +63,7 @@ class Headline:
     warnings: tuple[str, ...]
     sentences: tuple[str, ...]
     left: int  # findings that are left to the report
+    notes: tuple[str, ...] = ()  # what the columns of the table mean
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,8 @@ class Experiment:
     presets: tuple[Preset, ...] = ()
     subject: str = ""  # Setting that the first argument is (the first two, of a setting of two)
     example: str = ""  # File in experiments/cases, of an experiment whose case has no default
-    headline: str = ""  # "module:function" from a result to its `Headline`; empty: all is shown
+    answer: str = ""  # "module:function" from a result to the rows of its report's table
+    headline: str = ""  # "module:function" from a result to its `Headline`; without both all is shown
 
     def settings_class(self) -> type[BaseModel]:
         """The settings class. Quick: it imports no Taichi."""
@@ -103,8 +105,15 @@ class Experiment:
 
     def headline_of(self, result: Mapping[str, Any]) -> Headline | None:
         """The short form of a result; None where it is shown in full."""
-        module, _, name = self.headline.partition(":")
-        return getattr(import_module(module), name)(result) if module else None
+        module, _, name = (self.answer or self.headline).partition(":")
+        if not module or not result.get("quantities"):
+            return None
+        found = getattr(import_module(module), name)(result)
+        if not self.answer:
+            return found
+        from .headline import headline_of_tiles  # `vis.page.answer` takes a while to load
+
+        return headline_of_tiles(found, result)
 
     def code(self) -> str:
         """The module's ``fingerprint()`` of the code that computes, empty where it has none."""

@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-
 from experiments.robot.headline import robot_headline
+
 from vis.page.answer import MOST_ROWS, answer, write_page
 from vis.page.page import Page, Section, Tile, listing, text
 from vis.report import write_report
