@@ -11,7 +11,7 @@ Both names are text here so that help does not wait for Taichi.
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -64,6 +64,7 @@ class Headline:
     sentences: tuple[str, ...]
     left: int  # findings that are left to the report
     notes: tuple[str, ...] = ()  # what the columns of the table mean
+    tables: tuple[Mapping[str, Any], ...] = ()  # further ones of the result
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,7 @@ class Experiment:
     subject: str = ""  # Setting that the first argument is (the first two, of a setting of two)
     example: str = ""  # File in experiments/cases, of an experiment whose case has no default
     answer: str = ""  # "module:function" from a result to the rows of its report's table
+    tables: bool = False  # Whether the terminal shows the tables of the result below those rows
     headline: str = ""  # "module:function" from a result to its `Headline`; without both all is shown
 
     def settings_class(self) -> type[BaseModel]:
@@ -113,7 +115,8 @@ class Experiment:
             return found
         from .headline import headline_of_tiles  # `vis.page.answer` takes a while to load
 
-        return headline_of_tiles(found, result)
+        shown = headline_of_tiles(found, result)
+        return replace(shown, tables=tuple(result.get("tables", ()))) if shown is not None and self.tables else shown
 
     def code(self) -> str:
         """The module's ``fingerprint()`` of the code that computes, empty where it has none."""

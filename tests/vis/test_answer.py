@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from experiments.robot.headline import robot_headline
 
+from experiments.runs.headline import headline_of_tiles
 from vis.page.answer import MOST_ROWS, answer, write_page
 from vis.page.page import Page, Section, Tile, listing, text
 from vis.report import write_report
@@ -102,7 +102,8 @@ def test_a_flight_that_the_run_cuts_off_heads_the_answer_with_its_apex():
 
 def test_the_terminal_of_a_robot_has_the_rows_of_its_report():
     result = robot_result(ground="rft")
-    shown, (numbers, _) = robot_headline(result), answer(answer_tiles(result), result)
+    shown = headline_of_tiles(answer_tiles(result), result)
+    numbers, _ = answer(answer_tiles(result), result)
     assert len(shown.rows) == MOST_ROWS
     assert [row[:2] for row in shown.rows] == [
         tuple(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row[:2]) for row in numbers.rows

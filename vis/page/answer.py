@@ -67,6 +67,8 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
         keys = [key for key, so in told.items() if so]
     else:
         keys = ["empty_cells"] if on_grains else []
+    if experiment == "ground":
+        return (say("of_std"), *_ERRORS[1:]), keys
     if "ground_file" in result:
         return (say("of_the_law"), *_ERRORS[1:]), keys
     if experiment == "penetrate" or "beds" in result:
