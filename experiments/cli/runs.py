@@ -16,6 +16,7 @@ from rich.text import Text
 
 from experiments.runs import registry
 from experiments.runs.folder import RunFolder, write_text
+from experiments.runs.headline import headline_of
 from experiments.runs.kernel_cache import free_kernel_cache
 from experiments.runs.progress import Progress, make_progress
 from experiments.runs.registry import Headline
@@ -128,7 +129,7 @@ def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> i
     console = Console(file=sys.stdout, highlight=False)
     console.print(with_squares(result.get("title", "")), markup=False, style="italic")
     experiment = registry.EXPERIMENTS.get(folder.command)
-    headline = experiment.headline_of(result) if experiment is not None and not verbose else None
+    headline = headline_of(experiment, result) if experiment is not None and not verbose else None
     if headline is not None:
         _show_headline(headline, console)
     else:

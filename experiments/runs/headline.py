@@ -4,15 +4,29 @@ Everything else is in the report and in result.json, and with ``--verbose`` on t
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 from vis.page.answer import answer
 from vis.page.numbers import foldable
 from vis.page.page import Tile
 
-from .registry import Headline, findings_shown
+from .registry import Experiment, Headline, findings_shown
 
-__all__ = ["headline_of_tiles"]
+__all__ = ["headline_of", "headline_of_tiles"]
+
+
+def headline_of(experiment: Experiment, result: Mapping[str, Any]) -> Headline | None:
+    """The short form of a result of the experiment; None where it is shown in full."""
+    module, _, name = (experiment.answer or experiment.headline).partition(":")
+    if not module or not result.get("quantities"):
+        return None
+    found = getattr(import_module(module), name)(result)
+    if not experiment.answer:
+        return found
+    shown = headline_of_tiles(found, result)
+    return replace(shown, tables=tuple(result.get("tables", ()))) if shown is not None and experiment.tables else shown
 
 
 def headline_of_tiles(tiles: Sequence[Tile], result: Mapping[str, Any]) -> Headline | None:

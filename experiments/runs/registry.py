@@ -11,7 +11,7 @@ Both names are text here so that help does not wait for Taichi.
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -104,19 +104,6 @@ class Experiment:
     def resume(self, folder: Path, *, progress: Any) -> "Result":
         """Finish the run in `folder`; return the result."""
         return import_module(self.module).resume(folder, progress=progress)
-
-    def headline_of(self, result: Mapping[str, Any]) -> Headline | None:
-        """The short form of a result; None where it is shown in full."""
-        module, _, name = (self.answer or self.headline).partition(":")
-        if not module or not result.get("quantities"):
-            return None
-        found = getattr(import_module(module), name)(result)
-        if not self.answer:
-            return found
-        from .headline import headline_of_tiles  # `vis.page.answer` takes a while to load
-
-        shown = headline_of_tiles(found, result)
-        return replace(shown, tables=tuple(result.get("tables", ()))) if shown is not None and self.tables else shown
 
     def code(self) -> str:
         """The module's ``fingerprint()`` of the code that computes, empty where it has none."""
