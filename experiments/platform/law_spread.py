@@ -113,8 +113,10 @@ def spread_of_surface(
         except (RuntimeError, ValueError):
             return {}
 
-    moves = ((one.std / (one.ends[1] - one.ends[0]), *(at(one.name, end) for end in one.ends)) for one in uncertain)
-    return _spread(best, ((share, below, above) for share, below, above in moves))
+    moves = (
+        (one.std / (high - low), at(one.name, low), at(one.name, high)) for one in uncertain for low, high in [one.ends]
+    )
+    return _spread(best, moves)
 
 
 def spread_entries(

@@ -43,13 +43,12 @@ class Bias:
     def concerns(self, result: Mapping[str, Any], number: str) -> bool:
         """Whether it is of this `number` of this result, whose model has no further terms."""
         trial = result.get("trial") or {}
-        given = {name: (trial.get(name) or {}).get("value") for name in ("torque", "gravity_sim")}
-        same = all(
-            wanted is None or (isinstance(given[name], int | float) and math.isclose(given[name], wanted, rel_tol=0.01))
-            for name, wanted in (("torque", self.torque), ("gravity_sim", self.gravity_sim))
-        )
+        for name, wanted in (("torque", self.torque), ("gravity_sim", self.gravity_sim)):
+            found = (trial.get(name) or {}).get("value")
+            if wanted is not None and (found is None or not math.isclose(found, wanted, rel_tol=0.01)):
+                return False
         names = (number, result.get("surface"), result.get("actuator"), result.get("ground"))
-        return same and not result.get("effects") and names == (
+        return not result.get("effects") and names == (
             self.number, self.surface, self.actuator, "spring-damper"
         )  # fmt: skip
 

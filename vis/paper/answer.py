@@ -15,11 +15,10 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     """Rows of the table at the top of a report: the hop from rigid ground, and from that of the run."""
     quantities, ground = result["quantities"], result["surface"]
     time = cell_of(quantities["flight_time"]["value"], None, "s")
-    rigid = {"law": False}
     rows = [
-        law_row(result, "wheel_speed", "Wheel speed, rigid ground", quantities["wheel_speed"]["note"], **rigid),
-        law_row(result, "launch_speed", "Launch, rigid ground", beside="launch_angle", **rigid),
-        law_row(result, "distance", "Distance, rigid ground", f"in {time}", **rigid),
+        law_row(result, "wheel_speed", "Wheel speed, rigid ground", quantities["wheel_speed"]["note"], law=False),
+        law_row(result, "launch_speed", "Launch, rigid ground", beside="launch_angle", law=False),
+        law_row(result, "distance", "Distance, rigid ground", f"in {time}", law=False),
         law_row(result, "model_launch_speed", f"Launch from {ground}", "planar model", beside="model_launch_angle"),
         law_row(result, "model_distance", f"Distance from {ground}", "the same wheel"),
     ]
