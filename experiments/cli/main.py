@@ -153,7 +153,7 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
         parameters.append(further)
     parameters += [option_of(name, field) for name, field in fields.items() if name != experiment.subject]
     parameters += [*flags, *map(reserved_option, ("out", "json", "quiet"))]
-    parameters += [reserved_option("verbose")] if experiment.headline else []
+    parameters += [reserved_option("verbose")] if experiment.answer or experiment.headline else []
     command.__name__ = experiment.name.replace(" ", "_")
     return with_parameters(command, parameters)
 

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from experiments.runs import registry
 from experiments.runs.folder import RunFolder, write_text
+from experiments.runs.headline import headline_of
 from experiments.runs.kernel_cache import free_kernel_cache
 from experiments.runs.progress import Progress, make_progress
 from experiments.runs.registry import Headline
@@ -128,7 +129,7 @@ def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> i
     console = Console(file=sys.stdout, highlight=False)
     console.print(with_squares(result.get("title", "")), markup=False, style="italic")
     experiment = registry.EXPERIMENTS.get(folder.command)
-    headline = experiment.headline_of(result) if experiment is not None and not verbose else None
+    headline = headline_of(experiment, result) if experiment is not None and not verbose else None
     if headline is not None:
         _show_headline(headline, console)
     else:
@@ -178,16 +179,33 @@ def _show_headline(headline: Headline, console: Console) -> None:
     """A short table, what to be warned of, and the findings that matter most."""
     table = Table(box=None, pad_edge=False)
     for place, name in enumerate(headline.head):
-        table.add_column(name, justify="left" if place == 0 else "right", no_wrap=place > 0)
+        words = place > 0 and max((len(row[place]) for row in headline.rows), default=0) > _NARROW
+        right = place > 0 and not words
+        table.add_column(name, justify="right" if right else "left", no_wrap=right)
     for row in headline.rows:
         table.add_row(*map(Text, row))
     console.print(table, markup=False)
-    for mark, texts in (("warning: ", headline.warnings), ("- ", headline.sentences)):
+    for mark, texts in (("", headline.notes), ("warning: ", headline.warnings), ("- ", headline.sentences)):
         for text in texts:
             folded = textwrap.wrap(
                 with_squares(text), console.width, initial_indent=mark, subsequent_indent=" " * len(mark)
             )
             print("\n".join(folded))
+    _show_tables(headline.tables, console)
+
+
+def _show_tables(tables: Sequence[Mapping[str, Any]], console: Console) -> None:
+    """Tables of a result under their titles."""
+    for listed in tables:
+        if listed["title"]:
+            console.print(listed["title"], markup=False, style="italic")
+        shown = Table(box=None, pad_edge=False)
+        for place, heading in enumerate(listed["head"]):
+            narrow = all(len(str(row[place])) <= _NARROW for row in listed["rows"])
+            shown.add_column(heading, no_wrap=place == 0 and narrow)
+        for row in listed["rows"]:
+            shown.add_row(*(Text(str(cell)) for cell in row))
+        console.print(shown, markup=False)
 
 
 def _show_all(result: Mapping[str, Any], console: Console) -> None:
@@ -214,16 +232,7 @@ def _show_all(result: Mapping[str, Any], console: Console) -> None:
         table.add_row(name, _number(value, std), *cells, _unit(quantity.get("unit", ""), value, std))
     if quantities:
         console.print(table, markup=False)
-    for listed in result.get("tables", []):
-        if listed["title"]:
-            console.print(listed["title"], markup=False, style="italic")
-        shown = Table(box=None, pad_edge=False)
-        for place, heading in enumerate(listed["head"]):
-            narrow = all(len(str(row[place])) <= _NARROW for row in listed["rows"])
-            shown.add_column(heading, no_wrap=place == 0 and narrow)
-        for row in listed["rows"]:
-            shown.add_row(*(Text(str(cell)) for cell in row))
-        console.print(shown, markup=False)
+    _show_tables(result.get("tables", []), console)
     for sentence in result.get("departures", {}).get("sentences", []):
         console.print(with_squares(f"- {sentence}"), markup=False)
     for warning in result.get("warnings", []):

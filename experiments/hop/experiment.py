@@ -6,18 +6,26 @@ same hop from compliant ground (`experiments.hop.on_surface`); the result has bo
 """
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from experiments.platform.ground_file import law_warnings, range_warnings, with_kept_ground
-from experiments.platform.law_spread import Answer, spread_of_law, with_spread
+from experiments.platform.law_spread import (
+    Answer,
+    moved,
+    spread_entries,
+    spread_of_law,
+    spread_of_surface,
+    uncertain_of,
+    with_spread,
+)
 from experiments.platform.numbers import keep_platform
+from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantities_of, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.tumble.result import trajectory_columns
-from rigid.ground_file import GroundFile
 from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch_speed_for, least_viable_angle
 from rigid.model.trial import Trial
 from rigid.planar.simulate import simulate
@@ -34,6 +42,8 @@ OF_THE_LAW = (
     "model_distance", "speed_factor", "distance_factor", "model_escape_ratio",
 )  # fmt: skip
 """Quantities that depend on the law of the ground."""
+_SPREAD_OF = {"model_wheel_speed": "wheel speed", "model_launch_speed": "launch speed", "model_distance": "distance"}
+"""Numbers whose spread a sentence states -> what it calls them."""
 
 
 def check(settings: HopSettings) -> None:
@@ -72,19 +82,33 @@ def _on_given_ground(settings: HopSettings, plan: HopPlan, hop: Hop) -> tuple[Su
     )
 
 
-def _with_the_law_s(settings: HopSettings, plan: HopPlan, hop: Hop, best: dict[str, Json]) -> dict[str, Json]:
-    """The quantities `best`, with the standard deviation that follows from that of the ground file's parameters."""
-    assert plan.fitted is not None
+def _with_the_law_s(
+    settings: HopSettings, plan: HopPlan, hop: Hop, best: dict[str, Json]
+) -> tuple[dict[str, Json], Json, str]:
+    """The quantities `best` with the standard deviation that follows from those of the law's parameters.
+
+    Also ``law_spread`` of the result, and a sentence.
+    """
     escape = best["escape_speed"]["value"]
 
-    def answer(fitted: GroundFile) -> Answer:
-        other = plan_on(plan, fitted)
+    def answer_of(other: HopPlan) -> Answer:
         given, sought = _on_given_ground(settings, other, hop)
         found = _model_quantities(other, hop, given, escape)
         return {name: entry["value"] for name, entry in found.items()} | {"model_wheel_speed": sought}
 
+    def of_surface(name: str, value: float) -> Answer:
+        return answer_of(replace(plan, stiffness=value) if name == "stiffness" else replace(plan, damping=value))
+
     of_the_law = {name: entry["value"] for name, entry in best.items() if name in OF_THE_LAW}
-    return with_spread(best, spread_of_law(plan.fitted, answer, of_the_law))
+    if plan.fitted is not None:
+        law, parameters = "file", [name for name, _, _ in moved(plan.fitted)]
+        stds = spread_of_law(plan.fitted, lambda file: answer_of(plan_on(plan, file)), of_the_law)
+    else:
+        uncertain = uncertain_of(plan.numbers, find_surface(plan.surface))
+        law, parameters = "", [one.name for one in uncertain]
+        stds = spread_of_surface(uncertain, of_surface, of_the_law)
+    found = with_spread(best, stds) if plan.fitted is not None or parameters else best
+    return found, *spread_entries(found, _SPREAD_OF, surface=plan.surface, law=law, parameters=parameters)
 
 
 def _trial(settings: HopSettings, plan: HopPlan, hop: Hop) -> Trial | None:
@@ -138,9 +162,11 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "escape_speed": quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
         "escape_ratio": quantity(left.speed / escape if escape else None, "1", say("of_escape")),
     } | _model_quantities(plan, hop, given, escape)
-    if plan.fitted is not None and given is not None:
-        quantities = _with_the_law_s(settings, plan, hop, quantities)
     said = _sentences(plan, hop, given, speed=speed, by_brake=by_brake, sought=sought)
+    law: Json = {"parameters": []}
+    if given is not None:
+        quantities, law, sentence = _with_the_law_s(settings, plan, hop, quantities)
+        said.append(sentence)
     asked = {"distance": f"of {plan.distance or 0:g} m", "wheel_speed": f"from {settings.wheel_speed_0 or 0:g} rad/s"}
     asked["torque"] = f"by {settings.torque or 0:g} N m"
     answer = ""
@@ -158,6 +184,7 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         asks_for=settings.asks_for,
         surface=plan.surface,
         departures={"sentences": said},
+        law_spread=law,
         platform={
             "name": plan.platform.name,
             "mass": plan.platform.mass,

@@ -34,6 +34,8 @@ class Surface:
     spike: float | None = None
     """Diameter of the spikes with ball tips that K and C are of [m]; None: of no certain ones."""
     guess: bool = False  # whether nothing but judgement stands behind the numbers
+    stiffness_std: float | None = None  # standard deviation of K [N/m]; None: not known
+    damping_std: float | None = None  # of C [N s/m]
     stiffness_range: tuple[float, float] | None = None
     """Within which K may lie [N/m], where runs leave it that open; None: `source` states what is known."""
 

@@ -63,6 +63,8 @@ class Headline:
     warnings: tuple[str, ...]
     sentences: tuple[str, ...]
     left: int  # findings that are left to the report
+    notes: tuple[str, ...] = ()  # what the columns of the table mean
+    tables: tuple[Mapping[str, Any], ...] = ()  # further ones of the result
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,9 @@ class Experiment:
     subject: str = ""  # Setting that the first argument is (the first two, of a setting of two)
     example: str = ""  # File in experiments/cases, of an experiment whose case has no default
     details: str = ""  # What `--help` adds to the summary
-    headline: str = ""  # "module:function" from a result to its `Headline`; empty: all is shown
+    answer: str = ""  # "module:function" from a result to the rows of its report's table
+    tables: bool = False  # Whether the terminal shows the tables of the result below those rows
+    headline: str = ""  # "module:function" from a result to its `Headline`; without both all is shown
 
     def settings_class(self) -> type[BaseModel]:
         """The settings class. Quick: it imports no Taichi."""
@@ -101,11 +105,6 @@ class Experiment:
     def resume(self, folder: Path, *, progress: Any) -> "Result":
         """Finish the run in `folder`; return the result."""
         return import_module(self.module).resume(folder, progress=progress)
-
-    def headline_of(self, result: Mapping[str, Any]) -> Headline | None:
-        """The short form of a result; None where it is shown in full."""
-        module, _, name = self.headline.partition(":")
-        return getattr(import_module(module), name)(result) if module else None
 
     def code(self) -> str:
         """The module's ``fingerprint()`` of the code that computes, empty where it has none."""

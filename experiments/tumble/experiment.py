@@ -11,8 +11,17 @@ from typing import Literal
 
 from experiments.campaign.files import keep_model
 from experiments.platform.ground_file import naming_gravity, with_kept_ground
-from experiments.platform.law_spread import Answer, spread_of_law, with_spread
+from experiments.platform.law_spread import (
+    Answer,
+    moved,
+    spread_entries,
+    spread_of_law,
+    spread_of_surface,
+    uncertain_of,
+    with_spread,
+)
 from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
+from experiments.platform.surfaces import find_surface, surface_names
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -31,6 +40,13 @@ from .synthesis import check_tumble_campaign, write_tumble_campaign
 from .trial import TumblePlan, plan_tumble
 
 __all__ = ["check", "resume", "run"]
+
+_SPREAD_OF = {
+    "trajectory_angle": "trajectory angle",
+    "max_speed": "largest speed",
+    "sinkage_largest": "largest sinkage",
+}
+"""Numbers whose spread a sentence states -> what it calls them."""
 
 
 def check(settings: TumbleSettings) -> None:
@@ -81,18 +97,49 @@ def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -
     return simulate(trial, duration=duration, method=method, sample_interval=interval), full
 
 
-def _with_the_law_s(
-    settings: TumbleSettings, plan: TumblePlan, best: dict[str, Json], copied: Path | None, platform: PlatformNumbers
-) -> dict[str, Json]:
-    """The quantities `best`, with the standard deviation that follows from that of the ground file's parameters."""
-    assert plan.fitted is not None
+def _add_spread(
+    settings: TumbleSettings, plan: TumblePlan, result: Json, copied: Path | None, platform: PlatformNumbers
+) -> None:
+    """Add the standard deviations that follow from those of the law's parameters, and a sentence on them.
 
-    def answer(fitted: GroundFile) -> Answer:
-        other = replace(plan, trial=plan_tumble(settings, model_file=copied, platform=platform, fitted=fitted).trial)
+    With a sweep or the coupling they are not known, since each takes two more trials a parameter.
+    """
+    best: dict[str, Json] = result["quantities"]
+    depends, fitted, surface = _of_the_law(best), plan.fitted, plan.surface
+
+    def answer_of(other: TumblePlan) -> Answer:
         trajectory, _ = _integrate(settings, other, duration=settings.duration)
         return {name: entry["value"] for name, entry in quantities_of(trajectory).items()}
 
-    return with_spread(best, spread_of_law(plan.fitted, answer, _of_the_law(best)))
+    def of_file(file: GroundFile) -> Answer:
+        again = plan_tumble(settings, model_file=copied, platform=platform, fitted=file)
+        return answer_of(replace(plan, trial=again.trial))
+
+    def of_surface(name: str, value: float) -> Answer:
+        trial = plan.trial
+        moved_trial = replace(trial, stiffness=value) if name == "stiffness" else replace(trial, damping=value)
+        return answer_of(replace(plan, trial=moved_trial))
+
+    if settings.sweep or settings.method == "coupled":
+        if fitted is not None:
+            result["quantities"] = with_spread(best, dict.fromkeys(depends))
+        return
+    if fitted is not None:
+        parameters = [name for name, _, _ in moved(fitted)]
+        stds, law = spread_of_law(fitted, of_file, depends), "file"
+    else:
+        uncertain = uncertain_of(plan.numbers, find_surface(surface)) if surface in surface_names() else []
+        parameters = [one.name for one in uncertain]
+        stds, law = (
+            spread_of_surface(uncertain, of_surface, depends),
+            "" if plan.trial.ground is None else settings.ground,
+        )
+    if fitted is not None or parameters:
+        result["quantities"] = with_spread(best, stds)
+    result["law_spread"], sentence = spread_entries(
+        result["quantities"], _SPREAD_OF, surface=surface, law=law, parameters=parameters
+    )
+    result["departures"]["sentences"].append(sentence)
 
 
 def _of_the_law(quantities: dict[str, Json]) -> dict[str, float | None]:
@@ -119,14 +166,7 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     else:
         trajectory, full = _integrate(settings, plan, duration=settings.duration)
         result = result_of(settings, plan, trajectory, full)
-    if plan.fitted is not None:
-        known = sweep is None and settings.method != "coupled"  # each deviation takes two trials a parameter
-        found = result["quantities"]
-        result["quantities"] = (
-            _with_the_law_s(settings, plan, found, copied, platform)
-            if known
-            else with_spread(found, dict.fromkeys(_of_the_law(found)))
-        )
+    _add_spread(settings, plan, result, copied, platform)
     progress.update(1.0)
     write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
     folder.write_series("motion", motion_columns(trajectory))

@@ -74,7 +74,7 @@ def no_work(monkeypatch, tmp_path):
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(registry.Experiment, "run", over)
-    monkeypatch.setattr(registry.Experiment, "headline_of", lambda self, result: None)
+    monkeypatch.setattr("experiments.cli.runs.headline_of", lambda experiment, result: None)
 
 
 @pytest.mark.parametrize(("target", "variable"), [("fuzz", "FUZZED"), ("torture", "KILLED")])

@@ -1,16 +1,20 @@
 """A report begins with its answer: six numbers at most, their errors, a picture, three findings; the rest is folded."""
 
+import math
 import re
 import shutil
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from experiments.robot.headline import robot_headline
+from experiments.runs.headline import headline_of, headline_of_tiles
+from experiments.runs.registry import EXPERIMENTS
 from vis.page.answer import MOST_ROWS, answer, write_page
 from vis.page.page import Page, Section, Tile, listing, text
 from vis.report import write_report
 from vis.robot.answer import answer_tiles
+from vis.tumble.answer import answer_tiles as tumble_tiles
 
 ON_GRAINS = {"experiment": "penetrate", "ground": "bed"}
 
@@ -102,7 +106,8 @@ def test_a_flight_that_the_run_cuts_off_heads_the_answer_with_its_apex():
 
 def test_the_terminal_of_a_robot_has_the_rows_of_its_report():
     result = robot_result(ground="rft")
-    shown, (numbers, _) = robot_headline(result), answer(answer_tiles(result), result)
+    shown = headline_of_tiles(answer_tiles(result), result)
+    numbers, _ = answer(answer_tiles(result), result)
     assert len(shown.rows) == MOST_ROWS
     assert [row[:2] for row in shown.rows] == [
         tuple(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row[:2]) for row in numbers.rows
@@ -113,3 +118,71 @@ def test_the_terminal_of_a_robot_has_the_rows_of_its_report():
 def test_sentences_of_a_page_have_units_as_figures_have_them():
     block = listing(["at 9.81 m/s2", "gravity [m/s2]", "runs/m/s2"])
     assert block.entries == ("at 9.81 m/s²", "gravity [m/s2]", "runs/m/s2")
+
+
+def tumble_result(**more):
+    """The numbers of a tumble's result on a law that its answer shows: 10 ± 9 degrees."""
+    values = {
+        "trajectory_angle": (math.radians(10.3), math.radians(9.1), "rad"), "max_speed": (0.159, 0.007, "m/s"),
+        "transition_angle_slip": (0.0, 0.0, "rad"), "transition_angle_hop": (0.8, None, "rad"),
+        "sinkage_largest": (None, None, "m"),
+    }  # fmt: skip
+    numbers = {name: {"value": value, "std": std, "unit": unit} for name, (value, std, unit) in values.items()}
+    trial = {"torque": {"value": 0.22}, "gravity_sim": {"value": 0.0833565}}
+    law = {"surface": "sand", "ground": "spring-damper", "actuator": "motor", "law_spread": {"parameters": ["damping"]}}
+    return {"experiment": "tumble", "quantities": numbers, "trial": trial, **law, **more}
+
+
+def rows_of(result):
+    """Label, value and three errors of each row."""
+    return {row[0]: row[1:-1] for row in answer(tumble_tiles(result), result)[0].rows}
+
+
+def test_a_tumble_on_a_law_states_chance_the_parameters_of_the_law_and_the_known_bias():
+    rows = rows_of(tumble_result())
+    assert rows["Trajectory angle"] == ("10°", "none", "9°", "+28° (grains)")
+    assert [cell.replace("\N{NO-BREAK SPACE}", " ") for cell in rows["Largest speed"]] == [
+        "0.159 m/s", "none", "0.007 m/s", "not validated",
+    ]  # fmt: skip
+    assert rows["Slips from"][2] == "0°", "no parameter changes it"
+    assert rows["Hops from"][2] == "not known", "on some of the moved laws it does not hop"
+    assert rows["Largest sinkage"] == ("none", "–", "–", "–")
+
+
+def test_a_law_whose_parameters_have_no_error_says_that_it_is_not_known():
+    result = tumble_result(law_spread={"parameters": []})
+    result["quantities"]["transition_angle_hop"]["std"] = 0.0
+    rows = rows_of(result)
+    assert rows["Slips from"][2] == rows["Hops from"][2] == "not known"
+
+
+@pytest.mark.parametrize(
+    ("more", "cell"),
+    [
+        ({"surface": "steel"}, "+20 to +40° (paper)"),
+        ({"surface": "steel", "effects": [{"id": "torque-rise"}]}, "not validated"),
+        ({"surface": "steel", "actuator": "brake"}, "+16° (paper)"),
+        ({"surface": "brick"}, "not validated"),
+        ({"trial": {"torque": {"value": 0.125}, "gravity_sim": {"value": 0.0833565}}}, "not validated"),
+        ({"ground": "rft"}, "not validated"),
+    ],
+)
+def test_a_bias_is_stated_of_the_trials_that_it_was_found_in(more, cell):
+    assert rows_of(tumble_result(**more))["Trajectory angle"][3] == cell
+
+
+def test_the_terminal_of_a_tumble_has_the_rows_and_the_note_of_its_report():
+    result = tumble_result(departures={"sentences": ["a", "b", "c"]}, tables=[{"title": "t", "head": [], "rows": []}])
+    shown = headline_of(EXPERIMENTS["tumble"], result)
+    numbers, note = answer(tumble_tiles(result), result)
+    assert [len(row) for row in shown.rows] == [5] * len(numbers.rows) and shown.head == numbers.head[:-1]
+    assert [row[:2] for row in shown.rows] == [
+        tuple(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row[:2]) for row in numbers.rows
+    ]
+    assert shown.notes == (note.text,) and shown.sentences == ("a", "b", "c") and len(shown.tables) == 1
+
+
+@pytest.mark.parametrize("name", [name for name, one in EXPERIMENTS.items() if one.answer])
+def test_every_answer_in_the_registry_is_there(name):
+    module, _, function = EXPERIMENTS[name].answer.partition(":")
+    assert callable(getattr(import_module(module), function)) and not EXPERIMENTS[name].headline

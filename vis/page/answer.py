@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from vis.page.limits import kind_of
+from vis.page.numbers import split_spread
 from vis.page.page import Block, Page, Section, Tile, listing, table, text, write_template
 from vis.page.sentences import Sentences
 
@@ -18,7 +18,7 @@ say = Sentences(__package__)
 MOST_ROWS = 6
 _FINDINGS = 3
 _ERRORS = ("± chance", "± grain size", "± bed, softness, speed")
-_SPREAD = re.compile(r"^(?P<mean>[^±]+?)\s±\s(?P<error>\S+)(?P<unit>\s.*)?$")
+_ON_ONE_LAW = ("tumble", "tumble spatial", "hop")
 _ON_GRAINS = ("spike on grains", "platform on grains", "robot on grains", "bed")
 
 
@@ -44,32 +44,45 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
         raise ValueError(f"{len(tiles)} numbers at the top of a report: at most {MOST_ROWS} are one answer")
     rows = [_row(tile) for tile in tiles]
     on_grains = kind_of(result) in _ON_GRAINS
-    errors = (say("of_the_law"), *_ERRORS[1:]) if "ground_file" in result else _ERRORS
-    if errors is _ERRORS and (result.get("experiment") == "penetrate" or "beds" in result):
-        errors = (say("of_95"), *errors[1:])
-    elif errors is _ERRORS and not on_grains and ("sure" in result or result.get("experiment") == "mujoco"):
-        errors = (say("left_open"), errors[1], say("form_of_law"))
+    errors, keys = _errors(result, on_grains)
     shown = [k for k in range(3) if on_grains or any(row[2 + k] for row in rows)]
     head = ("", "value", *(errors[k] for k in shown), "")
     cells = [(*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), row[5]) for row in rows]
-    notes = []
-    if result.get("experiment") == "mujoco":
-        keys = {
-            "one_bed": on_grains and "beds" not in result, "range_of_law": 0 in shown and not on_grains,
-            "laws_of_sand": "forms" in result, "no_error": True,
-        }  # fmt: skip
-        notes = [text(" ".join(say(key) for key, told in keys.items() if told), small=True)]
-    elif on_grains and any("\N{EN DASH}" in row for row in cells):
-        notes = [text(say("empty_cells"), small=True)]
-    return [table(head, cells, words=True), *notes]
+    if result.get("experiment") == "mujoco" and not on_grains and 0 in shown:
+        keys = ["range_of_law", *keys]
+    if "empty_cells" in keys and not any("\N{EN DASH}" in row for row in cells):
+        keys.remove("empty_cells")
+    if not shown:
+        keys = []
+    return [table(head, cells, words=True), *([text(" ".join(map(say, keys)), small=True)] if keys else [])]
+
+
+def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], list[str]]:
+    """The heads of the three errors of this result, and the keys of the sentences below the table."""
+    experiment = result.get("experiment")
+    if kind_of(result) == "planar model" and experiment in _ON_ONE_LAW:
+        return (_ERRORS[0], say("of_one_law"), say("bias")), ["one_law"]
+    if experiment == "mujoco":
+        told = {"one_bed": on_grains and "beds" not in result, "laws_of_sand": "forms" in result, "no_error": True}
+        keys = [key for key, so in told.items() if so]
+    else:
+        keys = ["empty_cells"] if on_grains else []
+    if experiment == "ground":
+        return (say("of_std"), *_ERRORS[1:]), keys
+    if "ground_file" in result:
+        return (say("of_the_law"), *_ERRORS[1:]), keys
+    if experiment == "penetrate" or "beds" in result:
+        return (say("of_95"), *_ERRORS[1:]), keys
+    if not on_grains and ("sure" in result or experiment == "mujoco"):
+        return (say("left_open"), _ERRORS[1], say("form_of_law")), keys
+    return _ERRORS, keys
 
 
 def _row(tile: Tile) -> tuple[str, ...]:
-    found = _SPREAD.match(tile.value)
-    if tile.errors[0] or not found:
+    value, error = ("", "") if tile.errors[0] else split_spread(tile.value)
+    if not error:
         return (tile.label, tile.value, *tile.errors, tile.note)
-    unit = found["unit"] or ""
-    return (tile.label, found["mean"] + unit, found["error"] + unit, *tile.errors[1:], tile.note)
+    return (tile.label, value, error, *tile.errors[1:], tile.note)
 
 
 def write_page(path: Path, page: Page, result: Mapping[str, Any]) -> Path:

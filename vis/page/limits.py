@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -15,7 +16,7 @@ from typing import Any
 
 from .marks import insert
 
-__all__ = ["KINDS", "Limit", "all_limits", "kind_of", "limits_lines", "limits_words", "put_lines"]
+__all__ = ["KINDS", "Bias", "Limit", "all_limits", "bias_of", "kind_of", "limits_lines", "limits_words", "put_lines"]
 
 KINDS = (
     "spike on grains", "platform on grains", "robot on grains", "robot on a law", "bed", "planar model", "diagnosis",
@@ -29,6 +30,30 @@ _GROUPS = {
 
 
 @dataclass(frozen=True, kw_only=True)
+class Bias:
+    """A limit's size for one number of a trial on a law, as the table of a report has it."""
+
+    number: str  # Of result.json
+    cell: str  # How far the law is off, and from what
+    surface: str
+    actuator: str
+    torque: float | None = None  # [N m]; None: of any
+    gravity_sim: float | None = None  # [m/s2]; None: of any
+
+    def concerns(self, result: Mapping[str, Any], number: str) -> bool:
+        """Whether it is of this `number` of this result, whose model has no further terms."""
+        trial = result.get("trial") or {}
+        for name, wanted in (("torque", self.torque), ("gravity_sim", self.gravity_sim)):
+            found = (trial.get(name) or {}).get("value")
+            if wanted is not None and (found is None or not math.isclose(found, wanted, rel_tol=0.01)):
+                return False
+        names = (number, result.get("surface"), result.get("actuator"), result.get("ground"))
+        return not result.get("effects") and names == (
+            self.number, self.surface, self.actuator, "spring-damper"
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
 class Limit:
     """One bias."""
 
@@ -39,6 +64,7 @@ class Limit:
     fails: bool = False  # Whether something measured or published is missed
     case: tuple[str, ...] = ()  # Rows of docs/validation.md that fail by it
     said: str = ""  # What reports say of it, size and direction included; "": nothing
+    bias: Bias | None = None  # Its size in the table of a report
 
 
 @cache
@@ -51,6 +77,7 @@ def all_limits() -> tuple[Limit, ...]:
             "source": entry["from"],
             "runs": tuple(entry["runs"]),
             "case": tuple(entry.get("case", ())),
+            "bias": Bias(**entry["bias"]) if "bias" in entry else None,
         }
         del given["from"]
         limit = Limit(**given)
@@ -84,6 +111,13 @@ def limits_words(result: Mapping[str, Any]) -> list[str]:
     """What the report of this result says of the limits of its kind of run, size and direction included."""
     kind = kind_of(result)
     return [limit.said for limit in all_limits() if kind in limit.runs and limit.said]
+
+
+def bias_of(result: Mapping[str, Any], number: str) -> str:
+    """The known bias of a number of a trial on a law, as a cell of a table; "" where none is known."""
+    kind = kind_of(result)
+    known = [limit.bias for limit in all_limits() if kind in limit.runs and limit.bias is not None]
+    return next((bias.cell for bias in known if bias.concerns(result, number)), "")
 
 
 def limits_lines(limits: Sequence[Limit]) -> list[str]:

@@ -25,6 +25,7 @@ __all__ = [
     "quantity",
     "quote",
     "short",
+    "split_spread",
     "typeset",
     "with_squares",
     "within",
@@ -36,6 +37,7 @@ _AS_THEY_ARE = {
     "1": (1.0, ""), "%": (0.01, "%"), "m/s2": (1.0, "m/s²"), "m/s^2": (1.0, "m/s²"), "kg/m3": (1.0, "kg/m³"),
     "N s/m": (1.0, "N\N{NO-BREAK SPACE}s/m"),
 }  # fmt: skip
+_SPREAD = re.compile(r"^(?P<mean>[^±]+?)\s±\s(?P<error>\S+)(?P<unit>\s.*)?$")
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _POWER = re.compile(r"(?<=[/\[])(m|s)([23])\b|\^(\d)")
 _MINUS, _SPACE = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
@@ -131,6 +133,15 @@ def between(low: float, high: float, unit: str) -> str:
 def within(low: float, high: float, unit: str) -> str:
     """Two ends as `between`, or "below 7.3 mm" where the lower one is 0, the least that such a number can be."""
     return f"below {quote(high, None, unit, significant=2)}" if low == 0 else between(low, high, unit)
+
+
+def split_spread(text: str) -> tuple[str, str]:
+    """The number of "66 ± 13 N/m" and its spread, both with the unit; an empty spread where there is none."""
+    found = _SPREAD.match(text)
+    if not found:
+        return text, ""
+    unit = found["unit"] or ""
+    return found["mean"] + unit, found["error"] + unit
 
 
 def foldable(text: str) -> str:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from vis.page.folder import read_columns
-from vis.page.numbers import short
-from vis.page.page import Block, Section, Tile, listing
+from vis.page.page import Block, Section, listing
 from vis.page.plots import BED, DASHED, GREY, MODEL, handle
-from vis.page.report import Report, Result, given, report_of
+from vis.page.report import Report, given, report_of
 from vis.page.states import by_state, legend_of_states, panels
+
+from .answer import answer_tiles
 
 __all__ = ["write_hop_report"]
 
@@ -34,7 +35,8 @@ def write_hop_report(report: Report) -> Path:
         report.numbers(),
         report.again("hedgebed hop run.toml", "result"),
     ]
-    return report.write(sections, lead=["hop", str(result["actuator"]), str(result["surface"])], tiles=_tiles(result))
+    lead = ["hop", str(result["actuator"]), str(result["surface"])]
+    return report.write(sections, lead=lead, tiles=answer_tiles(result))
 
 
 def _flights(report: Report) -> Block:
@@ -80,28 +82,3 @@ def _launch(report: Report) -> Block:
     path.set_aspect("equal", adjustable="datalim")
     legend_of_states(drawing, states, (handle("launch on rigid ground", **dashed),), columns=6)
     return report.draw("launch", drawing, surface=report.result["surface"])
-
-
-def _show(result: Result, name: str, scale: float = 1.0, unit: str | None = None) -> str:
-    entry = result["quantities"][name]
-    if entry["value"] is None:
-        return "none"
-    words = short(scale * entry["value"], 3)
-    shown = entry["unit"] if unit is None else unit
-    return f"{words}{shown}" if shown in ("°", "") else f"{words} {shown}"
-
-
-def _tiles(result: Result) -> list[Tile]:
-    ground, degrees = result["surface"], math.degrees(1.0)
-    at, at_model = (_show(result, f"{which}launch_angle", degrees, "°") for which in ("", "model_"))
-    tiles = [
-        Tile("Wheel speed", _show(result, "wheel_speed"), result["quantities"]["wheel_speed"]["note"]),
-        Tile("Launch, rigid ground", _show(result, "launch_speed"), f"at {at}"),
-        Tile("Distance, rigid ground", _show(result, "distance"), f"in {_show(result, 'flight_time')}"),
-        Tile(f"Launch from {ground}", _show(result, "model_launch_speed"), f"at {at_model}, planar model"),
-        Tile(f"Distance from {ground}", _show(result, "model_distance"), "the same wheel"),
-    ]
-    if result["quantities"]["model_wheel_speed"]["value"] is not None:  # sought on ground that gives, and found
-        speed = _show(result, "model_wheel_speed")
-        tiles.insert(1, Tile(f"Wheel speed, {ground}", speed, "for that distance, planar model"))
-    return tiles

@@ -4,24 +4,35 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vis.page.numbers import in_two_digits
+from vis.page.numbers import in_two_digits, quantity
 from vis.page.page import Section, Tile, text
-from vis.page.report import Report, report_of
+from vis.page.report import Report, Result, report_of
 
-__all__ = ["write_ground_report"]
+__all__ = ["answer_tiles", "write_ground_report"]
+
+_OF_THE_BED = {
+    "speed": "Up to a speed of", "packing_fraction": "Packing fraction", "grain_ratio": "Grain over tip diameter",
+}  # fmt: skip
 
 
 @report_of(named=True)
 def write_ground_report(report: Report) -> Path:
     """Make report.html of the folder of a look-up, and return it."""
-    numbers, source = report.result["quantities"], report.result["map"]["source"]
-    tiles = [
-        Tile(name, in_two_digits(numbers[key]), "one standard deviation")
-        for name, key in (("K", "stiffness"), ("C", "damping"), ("Sinkage", "sinkage"))
-    ]
+    source = report.result["map"]["source"]
     sections = [
         Section("", [text(f"Looked up, not computed, in a map of {source}. ground.toml beside this page is the law.")]),
         report.numbers(std=True),
         report.again("hedgebed ground run.toml", "numbers"),
     ]
-    return report.write(sections, lead=["ground"], tiles=tiles)
+    return report.write(sections, lead=["ground"], tiles=answer_tiles(report.result))
+
+
+def answer_tiles(result: Result) -> list[Tile]:
+    """Rows of the table at the top of the report: K, C and sinkage, and the bed that they are of."""
+    numbers = result["quantities"]
+    under = f"Sinkage under {quantity(numbers['load'])}"
+    rows = [
+        Tile(name, in_two_digits(numbers[key]), "one standard deviation")
+        for name, key in (("Stiffness K", "stiffness"), ("Damping C", "damping"), (under, "sinkage"))
+    ]
+    return [*rows, *(Tile(words, quantity(numbers[key])) for key, words in _OF_THE_BED.items() if key in numbers)]

@@ -13,7 +13,7 @@ from vis.page.page import Block, Section, Tile, listing, table
 from vis.page.plots import BED, GREY, INK, Array, handle, legend_above, line_styles, new_panels, sheet
 from vis.page.report import Report, Result, report_of, tables
 
-__all__ = ["write_lawfit_report"]
+__all__ = ["answer_tiles", "write_lawfit_report"]
 
 _MOST = 4
 """Speeds that have a panel of their own at most: the slowest, the fastest and those between."""
@@ -37,17 +37,23 @@ def write_lawfit_report(report: Report) -> Path:
         report.numbers(std=True),
         report.again("hedgebed calibrate run.toml", "numbers"),
     ]
+    runs = [one for cell in cells for one in cell["contributions"]]
+    counted = f"{len(runs)} runs in beds of {len({one['bed'] for one in runs})} seeds"
+    return report.write(sections, lead=["calibrate", counted], tiles=answer_tiles(result))
+
+
+def answer_tiles(result: Result) -> list[Tile]:
+    """Rows of the table at the top of the report: K, C and the error of the spring-damper in other beds."""
+    cells: list[Result] = result.get("cells", [result])
     tiles, numbers = [], result["quantities"]
-    for name, key, unit in (("K", "stiffness", None), ("C", "damping", None),
+    for name, key, unit in (("Stiffness K", "stiffness", None), ("Damping C", "damping", None),
                             ("Error of the force, other beds", "held_out_error", "%")):  # fmt: skip
         own = numbers[key] if key in numbers else numbers[f"{key}@{cells[0]['name']}"]
         words = "one standard deviation" if unit is None else "rms of the spring-damper, std over beds"
         words += f", {cells[0]['name']}" if len(cells) > 1 else ""
         shown = quote(own["value"], own["std"], unit or own["unit"])
         tiles.append(Tile(name, shown, words))
-    runs = [one for cell in cells for one in cell["contributions"]]
-    counted = f"{len(runs)} runs in beds of {len({one['bed'] for one in runs})} seeds"
-    return report.write(sections, lead=["calibrate", counted], tiles=tiles)
+    return tiles
 
 
 def _of_cell(report: Report, cell: Result, name: str) -> list[Block]:

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from vis.film.film import ARROWS, draw_runs, shown
 from vis.film.reel import SpaceReel
 from vis.page.folder import read_columns
-from vis.page.numbers import quantity
-from vis.page.page import Block, Section, Tile, listing, text
+from vis.page.page import Block, Section, listing, text
 from vis.page.plots import (
     AXIS_LINES,
     BED,
@@ -32,6 +31,8 @@ from vis.page.states import States, draw_bands, draw_states, passages
 from vis.pictures.canvas import COLOURS
 from vis.pictures.frames import frames_of
 from vis.view.page import report_scene
+
+from .answer import answer_tiles
 
 __all__ = ["draw_energy", "pair", "say_grains", "write_spatial_report"]
 
@@ -78,15 +79,8 @@ def write_spatial_report(
         report.numbers(beside=(result.get("grains") or {}).get("beside") or {}),
         report.again("hedgebed tumble spatial run.toml"),
     ]
-    quantities = result["quantities"]
-    tiles = [
-        Tile("Largest speed", quantity(quantities["max_speed"]), "of the centre of mass"),
-        Tile("Largest angular velocity", quantity(quantities["max_angular_velocity"]), ""),
-        Tile("Sinkage", quantity(quantities["sinkage_largest"]), "largest of any spike"),
-        Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was"),
-    ]
     lead = ["tumble spatial", f"{result['duration']:g} s", f"{len(path['t_s'])} rows"]
-    return report.write(sections, lead=lead, tiles=tiles)
+    return report.write(sections, lead=lead, tiles=answer_tiles(result))
 
 
 def say_grains(result: Result) -> list[Block]:

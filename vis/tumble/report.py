@@ -17,14 +17,15 @@ from PIL import Image, ImageDraw
 from vis.film.film import draw_runs, shown
 from vis.film.reel import Reel
 from vis.page.folder import read_columns
-from vis.page.numbers import quantity, quote, short
-from vis.page.page import Block, Section, Tile, figure, listing, table, text
+from vis.page.numbers import quantity, short
+from vis.page.page import Block, Section, figure, listing, table, text
 from vis.page.plots import BED, DASHED, DOTTED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result, given, report_of, tables, terms_text
 from vis.page.sentences import Sentences
 from vis.page.states import States, by_state, draw_states, legend_of_states, panels, passages
 from vis.pictures.canvas import COLOURS, nice_above
 from vis.pictures.pictures import Picture
+from vis.tumble.answer import answer_tiles
 from vis.tumble.beside import HEAD
 from vis.tumble.grains import grains_section
 from vis.view.page import report_scene
@@ -61,11 +62,11 @@ def write_tumble_report(
     moving = figure(movie, title=title, caption=caption, half=True, show_file=True)
     settled = f"Ground: {result['ground']}. Actuator: {result['actuator']}. Integrator: {result['method']}."
     sections = [
-        Section("", [path, turned, moving]),
+        Section("", [listing(result["departures"]["sentences"]), path, turned, moving]),
         Section("Transitions", passages(result["transitions"], angle="theta", label="θ [degrees]")),
         Section("Energy", [energy]),
         Section("The trial", [given(result["trial"]), text(f"{settled} {terms_text(result)}")]),
-        report.numbers(std="ground_file" in result),
+        report.numbers(std="ground_file" in result or "law_spread" in result),
         report.again("hedgebed tumble run.toml", "trajectory.csv"),
     ]
     if "sweep" in result:
@@ -79,7 +80,7 @@ def write_tumble_report(
     if pictures if pictures is not None else "grains" in result and (home / "frames" / "tumble.pvd").exists():
         sections.insert(1, _seen(report, colour, film))
     lead = ["tumble", f"{result['duration']:g} s", f"{len(numbers['t_s'])} rows"]
-    return report.write(sections, lead=lead, tiles=_tiles(result))
+    return report.write(sections, lead=lead, tiles=answer_tiles(result))
 
 
 def _seen(report: Report, colour: str, film: bool) -> Section:
@@ -94,27 +95,8 @@ def _seen(report: Report, colour: str, film: bool) -> Section:
     return Section("Close-up", [*report_scene(report.folder), *shown(drawn), *notes])
 
 
-def _tiles(result: Result) -> list[Tile]:
-    quantities = result["quantities"]
-    return [
-        Tile("Trajectory angle", _degrees(result, "trajectory_angle"), "of the first 10 mm"),
-        Tile("Largest speed", quantity(quantities["max_speed"]), "of the centre"),
-        Tile("Largest angular velocity", quantity(quantities["max_angular_velocity"]), ""),
-        Tile("Slips from", _degrees(result, "transition_angle_slip"), "θ at the first slip"),
-        Tile("Hops from", _degrees(result, "transition_angle_hop"), "θ at the first hop"),
-    ]
-
-
 def _value(result: Result, name: str) -> float | None:
     return (result.get("quantities") or {}).get(name, {}).get("value")
-
-
-def _degrees(result: Result, name: str) -> str:
-    value = _value(result, name)
-    std = result["quantities"].get(name, {}).get("std")
-    if value is None or not std:
-        return "none" if value is None else f"{short(math.degrees(value), 3)}°"
-    return " ± ".join(f"{part.strip()}°" for part in quote(math.degrees(value), math.degrees(std)).split("±"))
 
 
 def _trajectory(report: Report, numbers: Columns, states: States) -> Block:

@@ -209,7 +209,8 @@ def test_c_is_called_not_identified_where_its_interval_contains_zero_and_only_th
 def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_the_tip_is_a_ball(tmp_path, capsys):
     assert main(["ground", "--threads", "1", "--out", str(tmp_path / "run")]) == DONE
     told = capsys.readouterr()
-    assert "ball tip" in told.out and "0.16 ± 1.1" in told.out and "4.9 ± 5.2" in told.out
+    shown = " ".join(told.out.split())
+    assert "ball tip" in shown and "0.16 N s/m 1.1 N s/m" in shown and "4.9 mm 5.2 mm" in shown
     assert "threads = 1" in told.err
     page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert "D / D" not in page and "0.16" in page
@@ -221,7 +222,7 @@ def test_the_report_of_a_tumble_on_a_file_has_the_deviation_of_its_angle_and_of_
     assert main([*tumble, "--out", str(tmp_path / "tumble"), "--quiet"]) == DONE
     angle = json.loads((tmp_path / "tumble" / "result.json").read_text(encoding="utf-8"))["quantities"]
     value, std = (math.degrees(angle["trajectory_angle"][key]) for key in ("value", "std"))
-    assert re.search(rf"rad +{value:.0f} ± {std:.0f} degrees", capsys.readouterr().out)
+    assert re.search(rf"Trajectory angle +{value:.0f}° +none +{std:.0f}°", capsys.readouterr().out)
     page = (tmp_path / "tumble" / "report.html").read_text(encoding="utf-8")
     assert f">{value:.0f}°<" in page and f">{std:.0f}°<" in page
-    assert "± law" in page and "± chance" not in page and ">std<" in page
+    assert "± law" in page and "one law, no scatter" in page and ">std<" in page

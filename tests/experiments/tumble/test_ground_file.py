@@ -7,8 +7,11 @@ from experiments import hop, paper, penetrate, tumble
 from experiments.hop.numbers import plan_hop
 from experiments.paper.experiment import plan_jobs
 from experiments.platform.ground_file import reached
-from experiments.platform.law_spread import moved, spread_of_law
+from experiments.platform.law_spread import Uncertain, moved, spread_of_law, spread_of_surface, uncertain_of
+from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import read_series
+from experiments.spatial.settings import SpatialSettings
+from experiments.spatial.trial import plan_spatial
 from experiments.tumble.trial import plan_tumble
 from rigid.ground_file import GroundFile, read_ground
 from rigid.planar.simulate import simulate
@@ -157,6 +160,44 @@ def test_a_parameter_at_the_end_of_what_its_law_allows_moves_one_way(written):
     assert higher.values["damping"] == pytest.approx(0.4)
     stds = spread_of_law(fitted, lambda file: {"force": 5 * file.values["damping"]}, {"force": 0.5})
     assert stds["force"] == pytest.approx(1.5)
+
+
+def test_a_tumble_on_a_surface_whose_k_has_an_error_states_that_of_its_numbers(tmp_path, monkeypatch):
+    """z = W / 2K at K - s and K + s: a slope of W / 2 (K^2 - s^2), so a share of K s / (K^2 - s^2); C changes none."""
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    found = {
+        name: tumble.run(tumble.Settings(surface=name, torque=0.0, duration=0.05), tmp_path / name)
+        for name in ("sand", "brick")
+    }
+    start, sand = found["sand"]["quantities"]["sinkage_start"], find_surface("sand")
+    share = sand.stiffness * sand.stiffness_std / (sand.stiffness**2 - sand.stiffness_std**2)
+    assert start["std"] == pytest.approx(start["value"] * share, rel=5e-3)
+    assert found["sand"]["law_spread"] == {"parameters": ["stiffness", "damping"]}
+    assert found["brick"]["law_spread"] == {"parameters": []}
+    assert found["brick"]["quantities"]["sinkage_start"]["std"] == 0.0
+    assert "K and C of sand" in found["sand"]["departures"]["sentences"][-1]
+
+
+def test_numbers_that_are_given_are_not_moved_and_those_of_one_spike_have_half_the_deviation():
+    sand = find_surface("sand")
+    numbers = plan_tumble(tumble.Settings(surface="sand", stiffness=50.0)).numbers
+    (damping,) = uncertain_of(numbers, sand)
+    assert (damping.name, damping.std) == ("damping", sand.damping_std)
+    assert uncertain_of(plan_tumble(tumble.Settings()).numbers, find_surface("brick")) == []
+    halved = plan_spatial(SpatialSettings(surface="sand")).numbers
+    assert [one.std for one in uncertain_of(halved, sand)] == [0.5 * sand.stiffness_std, 0.5 * sand.damping_std]
+
+
+def test_a_surface_on_which_the_platform_cannot_stand_leaves_the_deviation_unknown():
+    def answer(name, value):
+        if value < 1.0:
+            raise ValueError("sinks away")
+        return {"force": 3 * value}
+
+    (one,) = (Uncertain(name="stiffness", value=2.0, std=0.5),)
+    assert spread_of_surface([one], answer, {"force": 6.0}) == {"force": pytest.approx(1.5)}
+    wide = Uncertain(name="stiffness", value=2.0, std=1.5)
+    assert spread_of_surface([wide], answer, {"force": 6.0}) == {"force": None}
 
 
 @pytest.mark.long

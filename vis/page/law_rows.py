@@ -1,0 +1,57 @@
+"""Rows of an answer that a law gives: no chance, what its parameters leave open, what it was compared with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from vis.page.limits import bias_of
+from vis.page.numbers import quote, short, split_spread
+from vis.page.page import Tile
+from vis.page.sentences import Sentences
+
+__all__ = ["cell_of", "law_row"]
+
+say = Sentences(__package__)
+
+
+def law_row(
+    result: Mapping[str, Any], name: str, label: str, note: str = "", *, beside: str = "", law: bool = True
+) -> Tile:
+    """The row of a number of result.json with its errors in words; "none" for a number that there is not.
+
+    `beside` names another number of the same row, such as the angle of a speed. `law`: whether the parameters of the
+    law change the number.
+    """
+    entry = result["quantities"][name]
+    if entry["value"] is None:
+        return Tile(label, "none", note)
+    names = [one for one in (name, beside) if one and result["quantities"][one]["value"] is not None]
+    values, errors = zip(*(_with_error(result, one, law) for one in names), strict=True)
+    value, error = (" at ".join(values), " at ".join(errors) if len(set(errors)) > 1 else errors[0])
+    return Tile(label, value, note, errors=(say("no_chance"), error, bias_of(result, name) or say("not_validated")))
+
+
+def cell_of(value: float | None, std: float | None, unit: str) -> str:
+    """A number with its spread, where it has one; an angle in degrees, "none" for None."""
+    if value is None:
+        return "none"
+    if unit != "rad":
+        return quote(value, std, unit, significant=3)
+    if not std:
+        return f"{short(math.degrees(value), 3)}°"
+    return " ± ".join(f"{part.strip()}°" for part in quote(math.degrees(value), math.degrees(std)).split("±"))
+
+
+def _with_error(result: Mapping[str, Any], name: str, law: bool) -> tuple[str, str]:
+    """The value of a number, and what the parameters of the law change of it."""
+    entry = result["quantities"][name]
+    std = entry.get("std") if law else None
+    if std:
+        value, error = split_spread(cell_of(entry["value"], std, entry["unit"]))
+        if error:
+            return value, error
+    if std is not None and (result.get("law_spread") or {}).get("parameters"):
+        return cell_of(entry["value"], None, entry["unit"]), cell_of(0.0, None, entry["unit"])
+    return cell_of(entry["value"], None, entry["unit"]), say("not_known" if law else "no_chance")

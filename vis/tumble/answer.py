@@ -1,0 +1,35 @@
+"""The answer of a tumble: at most six numbers with their errors, in the words of report and terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from vis.page.law_rows import cell_of, law_row
+from vis.page.limits import kind_of
+from vis.page.page import Tile
+
+__all__ = ["answer_tiles"]
+
+_ROWS = {
+    "trajectory_angle": ("Trajectory angle", "of the first 10 mm"),
+    "max_speed": ("Largest speed", "of the centre"),
+    "max_angular_velocity": ("Largest angular velocity", ""),
+    "transition_angle_slip": ("Slips from", "θ at the first slip"),
+    "transition_angle_hop": ("Hops from", "θ at the first hop"),
+    "sinkage_largest": ("Largest sinkage", "of any row"),
+}
+"""Number of the result -> its label and note."""
+
+
+def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
+    """Rows of the table at the top of a report."""
+    quantities, on_law = result["quantities"], kind_of(result) == "planar model"
+    rows = []
+    for name, (label, note) in _ROWS.items():
+        if name not in quantities:  # a folder of an older hedgebed
+            continue
+        entry = quantities[name]
+        shown = cell_of(entry["value"], entry.get("std"), entry["unit"])
+        rows.append(law_row(result, name, label, note) if on_law else Tile(label, shown, note))
+    return rows
