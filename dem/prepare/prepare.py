@@ -14,6 +14,7 @@ from dem.grains.materials import Material
 from dem.grains.sizes import Json, Uniform
 
 from .bedfile import load_prepared, save_prepared
+from .code import cache_folder, fingerprint
 from .laboratory import Laboratory
 from .recipe import DENSEST_UNIFORM, Stage, check_packing, check_stages, parse_stage
 from .report import B, Prepared
@@ -21,9 +22,7 @@ from .specification import (
     BedOptions,
     Specification,
     bound_of_mean,
-    cache_folder,
     check_options,
-    fingerprint,
     kept_in_cache,
     soft_enough,
 )

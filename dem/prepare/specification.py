@@ -3,11 +3,9 @@
 The cache is keyed by everything that shapes a bed, the code included, so that nobody waits for the same rain twice.
 """
 
-import functools
 import hashlib
 import json
 import math
-import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -23,8 +21,8 @@ from dem.grains.materials import material as find_material
 from dem.grains.packing import RAIN_COLUMN, draw_radii, rain_column, rain_positions
 from dem.grains.sizes import Json, Sizes, describe, sizes_of
 from dem.measure.grading import measure_grading, surface_under
-from hedgebed_taichi import version
 
+from .code import cache_folder, fingerprint
 from .report import B
 
 __all__ = ["BEARING", "BedOptions", "Specification", "kept_in_cache"]
@@ -39,12 +37,6 @@ _RAIN_OVERLAP = 0.05
 _NUMBERS = ("gravity", "seed", "young", "max_overlap", "time_step")
 # Smallest over mean diameter of the sizes with which ``CHAIN`` was measured.
 _NARROW = 0.85
-
-
-def cache_folder() -> Path:
-    """Where prepared beds are kept: ``HEDGEBED_CACHE``, or ~/.cache/hedgebed."""
-    given = os.environ.get("HEDGEBED_CACHE")
-    return Path(given).expanduser() if given else Path.home() / ".cache" / "hedgebed"
 
 
 class BedOptions(TypedDict, total=False):
@@ -200,15 +192,6 @@ class Specification:
         bed.max_overlap = 0.0
         bed.steps = 0
         return bed
-
-
-@functools.cache
-def fingerprint() -> str:
-    """A short digest of the code that computes beds and of Taichi: with another one, bits may differ."""
-    digest = hashlib.sha256(version().encode())
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def kept_in_cache(recipe: Json) -> tuple[Path, Path]:
