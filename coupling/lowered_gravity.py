@@ -78,7 +78,7 @@ class LoweredGravity:
         self.ground.drag_time = DRAG * math.sqrt(self.grain / self.first) if acts else math.inf
 
     def fall(self, time: float) -> bool:
-        """Lower it as far as it is by `time` [s]; whether it has changed."""
+        """Lower gravity to its value at `time` [s]; return whether it has changed."""
         assert self.begun is not None
         due = min(self.steps, int((time - self.begun) / self.every))
         if due <= self.done:

@@ -9,7 +9,7 @@ ground answers with its mean force F, so that F H and F (velocity) H are exact. 
 
 which is of second order in H, and exact in free fall. Time is 0 where the tip meets the undisturbed surface, depth 0;
 before that the spike is carried at its speed (phase "free"), from just clear of the grains that stick out. `state` and
-`restore` work between any two macro steps: a run goes on to the same bits.
+`restore` work between any two macro steps: a continued run is bitwise equal to an unbroken one.
 """
 
 import math
@@ -253,7 +253,7 @@ class Drive(Run):
 
     @property
     def at_bottom(self) -> bool:
-        """Whether the step just done ended the way in."""
+        """Whether the last step ended the loading."""
         return self.count - self._approach == self._in
 
     def settings(self) -> Facts:
@@ -435,7 +435,7 @@ def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetratio
     """Drop `spike` `into` a ground (or a bed): at the surface it has `speed` [m/s], and then it is free.
 
     Options: mass [kg] (the spike's), load [N] (mass * gravity), gravity [m/s2] (9.80665), rest_time [s],
-    rest_tolerance [1], max_depth [m], max_time [s], and those of `drive` that are not about the way out.
+    rest_tolerance [1], max_depth [m], max_time [s], and those of `drive` that do not concern the withdrawal.
 
     >>> from rigid import SpringDamper
     >>> run = drop(Spike(mass=0.5), into=SpringDamper(stiffness=1875, damping=7.5), speed=0.1)

@@ -47,7 +47,7 @@ class MujocoRobot:
     feet : names of geoms, or of sites, or patterns of them (``spike_*``).
     keyframe : name of the keyframe where it starts; None: where the model has it.
     controller : called with model and data once per time step of the model as given; sets ``data.ctrl``. What it
-        remembers must be in ``data.userdata``, for a stopped run to go on to the same bits. None: the keyframe's ctrl.
+        remembers must be in ``data.userdata``, so that a continued run is bitwise equal. None: the keyframe's ctrl.
     height : height of its lowest foot over the surface at the start [m]; None: as the model has it.
 
     Its world has z upwards and the undisturbed surface at z = 0. Planes and height fields of MuJoCo's world no longer

@@ -287,7 +287,7 @@ def _apart(points: Vector, most: int) -> NDArray[np.int64]:
 
 
 def _closed(name: str, vertices: Vector, faces: Faces) -> tuple[Vector, Faces, str]:
-    """A mesh as grains can meet it: as it is where it is closed, else its convex hull, which is said in the third.
+    """A closed mesh for grains to touch: this one, or its convex hull where it is open, and a note of that.
 
     Raises ValueError where not even a hull encloses anything.
     """

@@ -261,7 +261,7 @@ def _seven(state: Mapping[str, Any], prefix: str) -> Array:
 
 
 def _compare_histories(bed: CheckedBed, before: Histories, after: Histories) -> None:
-    """What is listed now remembers what it did, and nothing else does."""
+    """Raise BedFailure unless the new lists hold exactly the contact histories of the old ones."""
     most = bed.grain_count + 64
 
     def name(number: int) -> str:
@@ -273,7 +273,7 @@ def _compare_histories(bed: CheckedBed, before: Histories, after: Histories) -> 
     was = np.where(known[:, None], before[1][place] if len(before[0]) else 0.0, 0.0)
     wrong = [f"the history of {name(after[0][k])} is another" for k in np.flatnonzero((was != after[1]).any(axis=1))]
     bodiless = after[0] % most < bed.grain_count
-    wrong += [f"{name(after[0][k])} are said to have touched" for k in np.flatnonzero(~known & bodiless)]
+    wrong += [f"{name(after[0][k])} have a history but never touched" for k in np.flatnonzero(~known & bodiless)]
     # Each contact that was is there still, from one side at least: nothing parts by a whole skin in a step.
     a, b = np.divmod(before[0], most)
     there = np.isin(before[0], after[0]) | np.isin(b * most + a, after[0]) | (b >= bed.grain_count)

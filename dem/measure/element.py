@@ -205,8 +205,8 @@ def _rest(bed: BedCore, wall: _Wall, grain: float) -> None:
         held = held + _STEPS * bed.time_step if near and energy < _CALM else 0.0
         if bed.time - began > _LONGEST * wall.unit:
             raise BedFailure(
-                f"the sample did not come to rest under its lid: of {wall.pressure:.4g} Pa {100 * missing:.3g} % lack, "
-                f"{energy:.1e} p d^3 of kinetic energy a grain ({_CALM:g} was wanted)"
+                f"the sample did not come to rest under its lid: of {wall.pressure:.4g} Pa {100 * missing:.3g} % were "
+                f"missing, {energy:.1e} p d^3 of kinetic energy a grain ({_CALM:g} was wanted)"
             )
 
 

@@ -89,9 +89,9 @@ def prepare_bed(
 ) -> B:
     """A bed rained in, levelled and settled under gravity, or the same one from the cache.
 
-    It is the recipe ``rain, level`` of ``prepare_as``, with ``packing:...`` behind it where a packing is asked for, but
-    for two things that keep beds bitwise as they have always been: less is rained in, and the rain is cut level as soon
-    as it is nearly at rest (mean kinetic energy of a grain below 1e-2 m g d). There are no reports.
+    It is the recipe ``rain, level`` of ``prepare_as``, followed by ``packing:...`` where a packing is given. Two things
+    differ, so that beds stay bitwise equal to those of earlier versions. Fewer grains rain in, and the rain is cut
+    level when it is nearly at rest (mean kinetic energy of a grain below 1e-2 m g d). There are no reports.
 
     Args:
         material: a name, the file of a material or a Material; its surface energy is taken for these grains, where it
@@ -171,7 +171,7 @@ def _prepared(
         if not plain:
             raise
         kept = work.bed.save(cache_folder() / "failed" / shelf.name)
-        raise BedFailure(f"{failure.reason}; the bed as it was is in {kept}") from None
+        raise BedFailure(f"{failure.reason}; the bed at that time is in {kept}") from None
     prepared = Prepared(wanted.finish(bed, recipe), recipe, work.reports)
     if cache:
         try:

@@ -239,5 +239,5 @@ def check_options(size, grain, gravity, seed, max_overlap) -> None:
     for name, length, least in (("x", size[0], 6), ("y", size[1], 6), ("z", size[2], 4)):
         if length < least * grain * (1 - 1e-9):  # 6 * 0.006 is more than 0.036 to a computer
             raise ValueError(
-                f"size: {name} = {length} m is less than {least} grains of {grain} m; {least * grain:.4g} m would do"
+                f"size: {name} = {length} m is less than {least} grains of {grain} m; give {least * grain:.4g} m"
             )

@@ -49,7 +49,7 @@ class Shape:
         raise NotImplementedError
 
     def place(self) -> list[float]:
-        """Position, rotation (quaternion, scalar first) and one number that its row has no room for, eight in all."""
+        """Position, rotation (quaternion, scalar first) and one number that does not fit into its row; eight in all."""
         return [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
 
     def extent(self) -> float:

@@ -139,7 +139,7 @@ def _read_cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
 
 
 def write_recording(path: Path, recording: Recording) -> None:
-    """Write `recording` to `path`; the numbers read back to the same bits."""
+    """Write `recording` to `path` with all digits, so that reading returns equal values."""
     numbers = {name: np.asarray(values, dtype=float) for name, values in recording.columns.items()}
     write_series(path, numbers | dict(recording.extra))
 

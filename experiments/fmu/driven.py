@@ -65,7 +65,7 @@ def ground_of(trial: Trial) -> LawGround:
 
 
 class DrivenPlatform:
-    """The platform of `trial` on its surface law, stepped by any time; its torque and actuator are not looked at.
+    """The platform of `trial` on its surface law, stepped by any time; the torque and actuator of `trial` are ignored.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The paper's text as measured data: what the model lacks on hard ground, weighed against its rivals.
+"""The paper's text as measured data: what the model omits on hard ground, weighed against its rivals.
 
 Eight statements of the text are about the twelve experiments on steel and brick. Each has a probability, the model's
 angles being off by `ERROR` (one standard deviation, the paper's own measure of agreement) and one reading in twenty

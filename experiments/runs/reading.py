@@ -1,7 +1,7 @@
 """Settings from a case file and from the command line, checked; what is wrong with them in one sentence each.
 
 A layer is what one source gives: name -> value. Later layers win: the defaults of the settings class, a case file,
-the command line. Every fault is a ValueError whose text names the key, the value and what would do.
+the command line. Every fault is a ValueError whose text names the key, the value and the remedy.
 """
 
 import tomllib

@@ -2,8 +2,8 @@
 
 Dry rigid grains far smaller than the tip have one scale of length, its diameter D, and one of time, sqrt(D / g). So
 F / (rho g D^3) is a function of z / D and of v / sqrt(g D) for tips of one shape. A term c z^n (dz/dt)^q of the force
-therefore has c in proportion to g^(1 - q/2) D^(3 - n - q/2): K z goes with the area, C dz/dt with D^2.5, b (dz/dt)^2
-with the area, and 1 / alpha of Hunt and Crossley's rate with sqrt(g D). D is that of the circle of the foot's area.
+therefore has c in proportion to g^(1 - q/2) D^(3 - n - q/2). So K z and b (dz/dt)^2 are proportional to the area,
+C dz/dt to D^2.5, and 1 / alpha of Hunt and Crossley's rate to sqrt(g D). D is that of the circle of the foot's area.
 Kang et al., Nature Communications 9 (2018), 1101, measure F in proportion to the displaced volume: for a flat foot to
 A z. Roth, Han and Jaeger, arXiv 1910.10358, find that parts of the depth and of the rate do not add up: a limit of
 every law here, whatever its size.

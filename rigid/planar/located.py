@@ -335,7 +335,7 @@ def _lift(system: System, z: list[float], modes: Modes, n: int) -> None:
 
 
 def _set_by_speeds(system: System, z: list[float], modes: Modes) -> None:
-    """After a forced step: who touches and which way they slide, read from the state as it is."""
+    """Find from the present state, after a forced step, which contacts touch and in which direction they slide."""
     for n in range(system.trial.spike_count):
         slip, inside = system.depth_and_slip(n, z)[1], system.inside(n, z, modes)
         if inside and n not in modes.touching:

@@ -13,7 +13,7 @@ __all__ = ["write_ground_report"]
 
 @report_of(named=True)
 def write_ground_report(report: Report) -> Path:
-    """Make report.html of the folder of a look-up, and return it."""
+    """Make report.html of the folder of `hedgebed ground`, and return it."""
     numbers, source = report.result["quantities"], report.result["map"]["source"]
     tiles = [
         Tile(name, in_two_digits(numbers[key]), "one standard deviation")

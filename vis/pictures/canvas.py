@@ -79,7 +79,7 @@ def colour_values(grains: dict[str, NDArray[Any]], by: str) -> NDArray[np.float6
 def moved_since(grains: dict[str, NDArray[Any]], first: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """The fields of a frame's grains, their displacement [m] counted from the `first` frame on, not from before it.
 
-    A bed under a platform has been pressed by the setting down when time begins. Left as it is where a frame has none.
+    The placement presses a bed under a platform before time begins. Fields without displacements stay unchanged.
     """
     if "displacement" not in grains or "displacement" not in first:
         return grains

@@ -5,7 +5,7 @@ where that one has bent it. So pairs are looked for from the base model's fit: t
 several amplitudes, with what the base parameters could take up projected out, and for every two of them the sizes a, b
 for which |r + a c1 + b c2| is least, r being what is left. From the pairs that promise most, fits begin, the base
 parameters moved as the projection says. Changes add up only as far as the model is linear; of motions that bounce only
-the beginning is looked at (`Model.until`).
+the beginning is used (`Model.until`).
 """
 
 from collections.abc import Sequence

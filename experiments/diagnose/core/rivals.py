@@ -11,7 +11,7 @@ nuisances refitted within their priors; a base parameter of which the others say
 trials have it. What a prediction leaves is scored as a fit is (`evidence.tempered`): the form is never nature's. Where
 motions are smooth in the parameters (pushes and drops), what was learned counts with its standard errors, as in any
 predictive likelihood (Gelman et al., Bayesian Data Analysis, 3rd ed., section 7.2, to first order in the errors): a
-drop that is sensitive to a number that the others determine badly tells nothing against a model.
+drop that is sensitive to a number that the others determine badly is no evidence against a model.
 """
 
 import math
@@ -124,7 +124,7 @@ def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Riva
 
 
 def marked(rivals: Sequence[Rival], best: Hypothesis) -> tuple[Rival, ...]:
-    """With those marked that mean the same as the best, as it is fitted at last, and leave too little to matter."""
+    """Mark the rivals that mean the same as the best hypothesis in its last fit, and leave too little to matter."""
     names = _becomes(best) if best.effects else set()
     fits = [rival.hypothesis.fit for rival in rivals]
     return tuple(

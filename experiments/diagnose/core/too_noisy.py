@@ -1,8 +1,8 @@
 """Readings noisier than campaign.toml states: a model that explains them with that noise alone is no `none`.
 
-The format asks for a gap of at most 1.2 with the stated noise. The gate counts the noise as it is found, so a base
-model can pass it with any gap: a std that is 1,000 times too small leaves a gap of a million. Then these trials do not
-show whether an effect smaller than that noise is missing.
+The format requires a gap of at most 1.2 with the stated noise. The gate uses the noise that it finds, so a base model
+can pass it with any gap: a std that is 1,000 times too small leaves a gap of a million. Then these trials do not show
+whether an effect smaller than that noise is missing.
 """
 
 import math

@@ -269,8 +269,8 @@ def scanned(found: Fit, *, passes: int = _PASSES) -> Fit:
     """The best of fits that begin where a trial's own numbers lie elsewhere within their priors.
 
     Where a trial sticks or slips otherwise, its likelihood has many narrow valleys. Each of its numbers is moved over
-    three standard deviations of its prior, its others with it as the fit says that they must; what is shared stays, so
-    that all trials are looked at together, and each takes its best.
+    three standard deviations of its prior, and its other numbers follow the fit. Shared parameters stay unchanged, so
+    all trials are tried together, and each takes its best.
     """
     for _ in range(passes):
         ((values, gain),) = _together([_scan(found.model, found.values, found.hessian(), least=1.0)])

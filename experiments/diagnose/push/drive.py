@@ -87,7 +87,7 @@ class Drive:
         return self.start + spent @ self.levels, shares @ self.levels
 
     def softened(self, u: Array, weigh: Weights) -> Drive:
-        """With as wide ramps as the noise may hide, and no level at rest for certain."""
+        """The drive with the widest ramps that the noise may hide, and no level that is certainly at rest."""
         widths = self.widths.copy()
         for k, jump in enumerate(np.diff(self.levels)):
             for width in np.geomspace(2.0 / len(u), 0.5, 24):

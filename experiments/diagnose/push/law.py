@@ -61,8 +61,7 @@ SLOTS = (
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
 direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
-depth of each row alone, all that came before it as it was); `given_way`: what a bed has given way beforehand [m], which
-stays."""
+depth of each row alone, with its history unchanged); `given_way`: permanent sinkage of the bed before the push [m]."""
 PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}

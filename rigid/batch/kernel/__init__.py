@@ -6,8 +6,8 @@ in which the wheel or the torque stops, is cut at that moment (found to the seco
 rest of the step follows: so events cost no order. Sticking is the same constraint as in `rigid.planar.dynamics`, its
 speed taken out exactly at the end of every step.
 
-Of the spikes only the lowest and its two neighbours are looked at; a trial that sinks so deep that a fourth would touch
-is marked (`status`), and left to the accurate integrator.
+Only the lowest spike and its two neighbours are checked for contact. A trial that sinks so deep that a fourth could
+touch is marked (`status`), and left to the accurate integrator.
 
 Imports `rigid.model`, `rigid.terms`.
 """
