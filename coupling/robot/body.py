@@ -11,9 +11,9 @@ so that the impulse is exactly H F. MuJoCo steps q' = q + h v' with the new velo
 h / 2 before its positions. Those of the feet that are given here belong to s / 2 after the positions (s: the ground's
 lag), w = v + h / 2 a + s / 2 M^-1 J^T F, a all accelerations. The given start velocity counts as w.
 
-Under a Coulomb bound the points of a foot that stick share what holds them in proportion to their loads, so that their
-mean slip and their turning about the vertical are zero at the step's end, as in `coupling.spatial_body`; here for all
-feet at once, by J M^-1 J^T.
+Under a Coulomb bound the sticking points of a foot share the holding force in proportion to their loads. So their mean
+slip and their turning about the vertical are zero at the step's end, as in `coupling.spatial_body`; here for all feet
+at once, by J M^-1 J^T.
 """
 
 import copy
@@ -51,9 +51,9 @@ class MujocoRobot:
     height : height of its lowest foot over the surface at the start [m]; None: as the model has it.
 
     Its world has z upwards and the undisturbed surface at z = 0. Planes and height fields of MuJoCo's world no longer
-    touch anything (`floors`): the ground here takes their place. Raises ValueError, naming what is wrong, for a missing
-    foot, gravity that is not straight down, the integrator RK4, and a height where the robot has neither a free joint
-    nor an upright rail.
+    touch anything (`floors`): the ground here takes their place. Raises ValueError, naming what is wrong: a missing
+    foot; gravity that is not straight down; the integrator RK4; a height where the robot has neither a free joint nor
+    an upright rail.
     """
 
     def __init__(

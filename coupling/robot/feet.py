@@ -119,8 +119,8 @@ def find_feet(model: Any, data: Any, names: Sequence[str]) -> list[Foot]:
     """The feet that `names` mean: geoms or sites of the model, by name or pattern (``spike_*``).
 
     ``data`` has the robot where it starts: a cylinder or capsule whose axis is within 45 degrees of the vertical there
-    stands on its end, and lies otherwise. Raises ValueError, naming the geom, for none of that name, one that does not
-    move, one of a kind that no foot can be, and a name given twice.
+    stands on its end, and lies otherwise. Raises ValueError, naming the geom: there is none of that name; it does not
+    move; its kind cannot be a foot; its name is given twice.
     """
     mujoco = refuse_missing()
     kinds = {"geom": mujoco.mjtObj.mjOBJ_GEOM, "site": mujoco.mjtObj.mjOBJ_SITE}

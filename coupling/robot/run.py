@@ -42,8 +42,8 @@ class RobotRun(EnergyBalance, Stepper):
     checked : whether a start in the ground, and an exchange that would be unstable (`check_exchange`), are refused.
     options : those of `Master`: substeps, iterations, extrapolation, tolerance.
 
-    Raises ValueError for a robot that another run has, and, naming the foot or geom, for a start in the ground and for
-    an unstable exchange. On the way `load` may go above `most_load`: that is for the caller to say.
+    Raises ValueError for a robot that another run has. It also raises it, naming the foot or geom, for a start in the
+    ground and for an unstable exchange. On the way `load` may go above `most_load`: that is for the caller to say.
     """
 
     COLUMNS = COLUMNS

@@ -20,12 +20,11 @@ tangential spring at the rolling radius):
     A grain at rest is held by the spring alone, so it does not creep.
 Twisting, where there is rolling resistance: the same form about the normal, with Marshall's 2009 stiffness S_t a^2 / 2
 (J. Comput. Phys. 228:1541) and the torque of a fully sliding Hertzian contact as bound, 3 pi / 16 mu a F_n (Johnson
-1985, section 7.4), so that a grain does not spin on one contact for ever.
-Cohesion (``dem.contact.cohesion``): DMT takes 2 pi w R* off the normal force, JKR has a force and a contact radius
-of its own.
-Damping never makes a pair pull more than its pull-off force; without cohesion that is the cut at zero. In the bounds of
-friction, rolling and twisting the load that presses the surfaces together stands for F_n: F_n + 2 pi w R* with DMT, F_n
-+ 2 (3/2 pi w R*) with JKR (Thornton 1991, J. Phys. D 24:1942; Marshall 2009).
+1985, section 7.4), which stops a grain from spinning on one contact for ever. Cohesion (``dem.contact.cohesion``): DMT
+takes 2 pi w R* off the normal force, JKR has a force and a contact radius of its own. Damping never makes a pair pull
+more than its pull-off force; without cohesion that is the cut at zero. In the bounds of friction, rolling and twisting
+the load that presses the surfaces together stands for F_n: F_n + 2 pi w R* with DMT, F_n + 2 (3/2 pi w R*) with JKR
+(Thornton 1991, J. Phys. D 24:1942; Marshall 2009).
 
 A spring that makes no energy. The normal force does not know of the tangential spring; so whatever that comes to hold,
 U = S_t u^2 / 2, has to be done as work along the slip. As a changes without slip there is no work. With u kept

@@ -73,8 +73,8 @@ class BedCore(BedState):
             tensile: whether the damping may pull at the end of a contact (as LIGGGHTS does by default).
             precision: "float64" or "float32". arch: "cpu" or "cuda". threads: of the CPU; all when None.
 
-        Raises ValueError: arrays of wrong shape, numbers that are not finite, a negative size, a step too long, a bed
-        narrower than three grains, grains that overlap one another or the floor by more than ``max_overlap``, grains
+        Raises ValueError: arrays of wrong shape; numbers that are not finite; a negative size; a step too long; a bed
+        narrower than three grains; grains that overlap one another or the floor by more than ``max_overlap``; grains
         outside the box.
         """
         stuff = find_material(material)

@@ -6,8 +6,8 @@ over it is minus the mean of the part before and after, times that velocity, tim
 before. Three parts: the normal dashpot, the tangential force (its spring included), the rolling and twisting torque
 (likewise). What the springs hold, ``dem.engine.energy`` reads off; less that, the last two are friction.
 
-Friction is kept contact by contact as well: what a contact's part took over a step, less what its spring came to hold
-over it, is *lost* where it is positive and *made* where it is negative. A law without a fault makes nothing.
+Friction is kept contact by contact as well: take the work of a contact's part over a step, less the energy that its
+spring gained. It is *lost* where it is positive and *made* where it is negative. A law without a fault makes nothing.
 
 Beside it stands the balance of angular momentum about the bed's origin: what the bodies took, and what reaches grains
 from outside, which is weight, contacts across the periodic sides (the torques on a pair whose neighbour is an image do

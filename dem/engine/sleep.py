@@ -12,14 +12,14 @@ The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g g
   sqrt(g d) at every check for ``calm`` sqrt(d / g) (at the start of a bed ``settling`` times as long). No fast grain
   that it touches moves faster. No body but the floor is within ``reach`` d. No other grain overlaps it by more than a
   long step allows (``Sleeper.firm``).
-* A slow grain becomes fast again when a body comes within ``reach`` d, when another grain overlaps it by more than
-  that, when it moves faster than ``own`` sqrt(g d), or when the force on it is out of balance. The last means: more
-  than ``unbalanced`` of the mean force of its contacts, or of m g where that is more. The slow grains that it touches
-  become fast with it.
-* A slow grain falls asleep when it has moved below ``still`` sqrt(g d) for as long, and so have the grains that it
-  touches, none of them fast. Only every fourth check applies this rule.
-* A sleeper wakes, and is slow, when the sum of the forces on it has changed by ``change`` of its contacts' mean force
-  (or of m g) since it fell asleep. It also wakes when a grain awake that is listed with it moves faster than
+* A slow grain becomes fast again when a body comes within ``reach`` d, or when another grain overlaps it by more than
+  that. It also becomes fast when it moves faster than ``own`` sqrt(g d), or when the force on it is out of balance. The
+  last means: more than ``unbalanced`` of the mean force of its contacts, or of m g where that is more. The slow grains
+  that it touches become fast with it.
+* A slow grain falls asleep when it has moved below ``still`` sqrt(g d) for as long. The grains that it touches must
+  have done so too, and none of them may be fast. Only every fourth check applies this rule.
+* A sleeper wakes, and is slow, when the sum of the forces on it has changed since it fell asleep: by ``change`` of its
+  contacts' mean force (or of m g). It also wakes when a grain awake that is listed with it moves faster than
   ``waking_speed`` sqrt(g d). All sleepers in its cell of the grid and the 26 around it wake with it. So do the sleepers
   near a body.
 

@@ -2,11 +2,10 @@
 
 The mean diameter is a field over the bed's length x and height z, the same across y: ``fine`` under the footprints,
 down to a depth, and from there on ``growth`` metres more for each metre away, up to ``coarse``. Small grains fall
-through large ones where they fit between them. Three spheres of diameter D that touch leave a throat of
-2 / sqrt(3) - 1 = 0.155 D, which is D / 6.46, below which a grain falls through a dense packing by its own weight
-(Savage & Lun 1988, J. Fluid Mech. 189:311); four in a square leave sqrt(2) - 1 = 0.414 D. So that no grain passes even
-those, the field rises no faster than ``steepest``. Rings of five and more leave wider ones; docs/bed.md has how much
-goes through.
+through large ones where they fit between them. Three spheres of diameter D that touch leave a throat of 2 / sqrt(3) - 1
+= 0.155 D, which is D / 6.46. A smaller grain falls through a dense packing by its own weight (Savage & Lun 1988, J.
+Fluid Mech. 189:311); four in a square leave sqrt(2) - 1 = 0.414 D. So that no grain passes even those, the field rises
+no faster than ``steepest``. Rings of five and more leave wider ones; docs/bed.md has how much goes through.
 """
 
 import math
@@ -37,9 +36,9 @@ _BLOCK = 100_000  # grains looked at in one go, for memory's sake
 def steepest(spread: float) -> float:
     """The largest growth of the mean diameter with distance at which no grain drains [1].
 
-    At a growth g a grain d and one of the mean diameter D that lies ``DRIFT`` D away differ by d = D (1 - DRIFT g), and
-    with the spread s the smallest of the one kind and the largest of the other by (1 - s) / (1 + s) more. The ratio
-    stays at ``THROAT`` or above.
+    At a growth g a grain d and one of the mean diameter D that lies ``DRIFT`` D away differ by d = D (1 - DRIFT g).
+    With the spread s the smallest of the one kind and the largest of the other differ by (1 - s) / (1 + s) more. The
+    ratio stays at ``THROAT`` or above.
 
     ``spread``: of the diameters about their mean, over it [1]. Raises ValueError: one so wide that grains of one place
     would drain through one another.

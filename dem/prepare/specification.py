@@ -117,8 +117,8 @@ class Specification:
         """The same of grains that stick neither to one another nor to the floor.
 
         With this friction and no rolling friction, or their own where it is None [1]. Enlarged grains that keep a
-        powder's strength rain into a gauze far looser than the powder ever is, and neither taps nor a lid bring them
-        together (docs/bed.md). So they are poured like this, and stick once the bed lies as it should
+        powder's strength rain into a gauze far looser than the powder. Neither taps nor a lid bring them together
+        (docs/bed.md). So they are poured like this, and stick once the bed lies as it should
         (``dem.prepare.laboratory.touching_as``). ``dem.measure.element`` presses its samples in the same way.
         """
         stuff = replace(self.material, cohesion="none", surface_energy=0.0)

@@ -8,8 +8,8 @@ Kang et al., Nature Communications 9 (2018), 1101, measure F in proportion to th
 A z. Roth, Han and Jaeger, arXiv 1910.10358, find that parts of the depth and of the rate do not add up: a limit of
 every law here, whatever its size.
 
-Two laws have a scale of their own. Bekker's pressure (k_c / b + k_phi) z^n takes the smaller side b of a plate, or the
-radius of a round one (Bekker 1969), and acts on the foot's area. 3D-RFT is integrated over the foot's underside
+Two laws have a scale of their own. In Bekker's pressure (k_c / b + k_phi) z^n, b is the smaller side of a plate, or the
+radius of a round one (Bekker 1969). It acts on the foot's area. 3D-RFT is integrated over the foot's underside
 (`rigid.ground.rft_foot`).
 
 None of this holds on hard ground, where the spike gives way and not the ground, nor with cohesion.
@@ -99,8 +99,8 @@ def sized_law(
     """`law` of a tip of diameter `of` [m] as a foot with this `sole` has it.
 
     ``parameters``: of the tip. ``given``: names of those that are of this foot already and stay. With bekker and rft
-    a given radius means that the foot is the law's own ball or plate. Raises ValueError for a law or parameter there is
-    not, and for a diameter, area, width, height or perimeter that is not a finite number in its range.
+    a given radius means that the foot is the law's own ball or plate. Raises ValueError for an unknown law or
+    parameter. It also refuses a diameter, area, width, height or perimeter that is not a finite number in its range.
     """
     _refuse_sizes(sole, of)
     values = find_law(law).values(parameters)

@@ -1,8 +1,8 @@
 """The page around a picture of the bed: title, colour bar, depth scale. The same with OpenGL and without.
 
 A picture is 4:3. The three-dimensional image, or the cross-section that stands in for it, fills the page to the left of
-the colour bar; `place` gives where a point of the bed lies on it, a function (n, 3) [m] -> (n, 2) in fractions of
-the page from its lower left corner.
+the colour bar; `place` maps points of the bed onto it, (n, 3) [m] -> (n, 2), in fractions of the page from its lower
+left corner.
 """
 
 from __future__ import annotations

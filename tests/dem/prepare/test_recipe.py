@@ -42,7 +42,7 @@ def test_words_that_are_no_stage_are_refused(words, said):
 @pytest.mark.parametrize(
     ("stages", "said"),
     [
-        ([], "stages is empty: 'rain'"),
+        ([], "stages is empty: give 'rain'"),
         (["level"], "begins with 'level'"),
         (["rain", "level", "rain"], "'rain' comes once"),
         (["rain", "tilt:10", "compact:0.6"], "'compact:0.6' after 'tilt:10' would undo it"),
