@@ -76,9 +76,9 @@ class Campaign:
 
 
 def read_campaign(folder: str | Path) -> Campaign:
-    """Read the campaign in `folder`. Raises ValueError, one sentence a line, naming the file, the line or key, what was
-    found and what was expected, for all that is wrong, in the tables and in every file that can be found, at once; and
-    each file that differs from its digest, where the folder has digests."""
+    """Read the campaign in `folder`. Raises ValueError with all faults of the tables and of every file that can be
+    found, a sentence on a line each. A sentence names the file, the line or key, what was found and what was expected.
+    It also names each file that differs from its digest, where the folder has digests."""
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"{str(folder)!r} is no folder: one with campaign.toml was expected")

@@ -69,8 +69,8 @@ def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     """Read the CSV file `path`, which must hold the quantities `wanted`: (name, unit), the time first.
 
     Raises ValueError, one fault a line, naming file, line and column, what was found and what was expected: for a
-    missing file or column, a quantity given twice, text in a number, an infinite number, a row of another length, a
-    time that runs backwards or is missing in a row with numbers, and a file without rows.
+    missing file or column; a quantity given twice; text in a number; an infinite number; a row of another length; a
+    time that runs backwards or is missing in a row with numbers; and a file without rows.
     """
     header, rows = _read_cells(path)
     faults = _other_csv(path, header, rows) or _header_faults(path, header)

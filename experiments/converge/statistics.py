@@ -1,7 +1,7 @@
 """Errors of a number that several beds give: chance over beds, and what finer grains would change.
 
-Chance. A mean over n beds lies within t s / sqrt(n) of what ever more beds would give, t Student's at 95 % and n - 1
-degrees of freedom. Two cases are compared bed by bed: the interval is that of the differences.
+Chance. A mean over n beds lies within t s / sqrt(n) of the mean of infinitely many. Here t is Student's at 95 % and n -
+1 degrees of freedom. Two cases are compared bed by bed: the interval is that of the differences.
 
 Grain size. A straight line in x = d / D through the means over beds, of the weights n_i / x_i^2 (the scatter of beds
 goes about as d, and weights that were taken from the scatter of a few beds would make the intervals too narrow). At

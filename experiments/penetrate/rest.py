@@ -2,8 +2,8 @@
 
 Grains without cohesion bear in proportion to gravity and to depth (Kang et al. 2018, Nat. Commun. 9:1101): a load W
 rests at W / K, which in low gravity may be far below any foot. That is an answer: the runs that would only go to the
-floor are left out, and the depth is reckoned from the bed's own force, as W / K with the fitted K, beside that of a
-flat plate in 3D-RFT (`experiments.grains.softening`). Both extrapolate far beyond the drive, hence both are reported. A
+floor are left out. The depth is computed from the bed's own force, as W / K with the fitted K, beside that of a flat
+plate in 3D-RFT (`experiments.grains.softening`). Both extrapolate far beyond the drive, hence both are reported. A
 power law fitted to a drive is no alternative. A flat tip is carried at depth 0 already, which lowers its exponent (to
 0.54 in a test) and turns metres into hundreds of metres.
 """

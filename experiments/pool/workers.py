@@ -49,8 +49,8 @@ def carry_out_all(
     """Carry out all tasks; `on_outcome` is called in this thread as each ends, in whatever order.
 
     `cores`: how many a process here takes for a task whose settings do not state its threads. Raises KeyboardInterrupt
-    where this process receives a signal to stop, RuntimeError where the cluster is lost, and ValueError where it cannot
-    be reached or dask is missing. Finished work is in the run folders.
+    where this process receives a signal to stop; RuntimeError where the cluster is lost; ValueError where it cannot be
+    reached or dask is missing. Finished work is in the run folders.
     """
     if scheduler is None and workers == 1:
         for task in tasks:

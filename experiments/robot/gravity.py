@@ -4,9 +4,9 @@ Forces in slow motion among rigid grains without cohesion are proportional to th
 gravity g, and C, a force over a speed, to sqrt(g), as speeds in similar motions (`experiments.groundmap.maps`). The map
 adds the ranges within which this is used, and the standard deviations.
 
-Where grains stick, cohesion carries a part of K that is independent of gravity, and proportional to the diameter of a
-foot instead of its area (`experiments.groundmap.cohesive`). There every foot has the K and C of the map for a ball tip
-of its area.
+Where grains stick, cohesion carries a part of K that is independent of gravity. This part is proportional to the
+diameter of a foot instead of its area (`experiments.groundmap.cohesive`). There every foot has the K and C of the map
+for a ball tip of its area.
 """
 
 from collections.abc import Mapping

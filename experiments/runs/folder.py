@@ -1,7 +1,7 @@
 """A run is a folder: what it holds, who is writing it, and how far it has come.
 
-Everything that is written goes to a temporary file first and is moved into place, so that a reader (or a run that
-was killed) finds either the whole of a file or none of it.
+Everything that is written goes to a temporary file first and is moved into place. So a reader (or a killed run) finds
+either the whole of a file or none of it.
 
 ```
 run.toml                  the settings, each with its meaning and unit in a comment; reads back to the same settings

@@ -33,8 +33,8 @@ its effect. In synthetic campaigns of penetration two dozen right effects left 0
 things outside the library effects left 0.08 and more, but for one shock, which a crust explained on those it was fitted
 to. Of trials held out twice that: few as they are, one that is sensitive (a slow drop) leaves more by itself."""
 _NO_EFFECT = 0.5
-"""Share of what the base model leaves, of trials fitted or held out, from which on an effect explains too little to be
-named, where the gate fails. In five counts of tumbles right effects left 0.47 at most of these."""
+"""Share of the base model's residual, of trials fitted or held out. An effect that leaves more explains too little to
+be named where the gate fails. In five counts of tumbles right effects left 0.47 at most of these."""
 _SURE = 3.0  # standard deviations of chi-square beyond which what an effect leaves is not chance
 _LATE = 0.5  # share of a held-out trial's time up to which a model that explains all fitted ones must follow it
 _CERTAIN = 0.1
@@ -198,8 +198,8 @@ def well_known(found: Fit) -> bool:
 
 
 def closes(base: Fit, best: Fit, held_out: tuple[str, ...]) -> bool:
-    """Whether nearly all that the base model leaves of trials held out is removed, and what is left does not exceed the
-    noise of the sensors and the scatter of replicates; true where none are held out."""
+    """Whether nearly all of the base model's residual of held-out trials is removed. The rest must not exceed the noise
+    of the sensors and the scatter of replicates; true where none are held out."""
     if not held_out:
         return True
     before, after = (_left_of(found, held_out) for found in (base, best))

@@ -24,8 +24,8 @@ __all__ = ["MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by", 
 
 MOST = SMALL  # the gap up to which what is left is too small to matter
 _CLOSED = 0.99
-"""Share of what the base model leaves beyond the noise, on fitted and held-out trials, that a name must close where
-more than `MOST` is left beside it: 97.6 % of a magnet was closed by a pendulum."""
+"""Share of the base model's residual beyond the noise, on fitted and held-out trials. A name must close it where more
+than `MOST` remains beside it: 97.6 % of a magnet was closed by a pendulum."""
 _ERRORS = 3.0
 _COMPARED = 3  # other names that are compared with one that is taken alone
 _WITHIN = 3.0  # standard deviations from what was stated within which a number is as stated
@@ -72,8 +72,8 @@ def takes_below(before: Gap, best: Fit, held_out: tuple[str, ...], scatter: Scat
 
 
 def explains(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> bool:
-    """Whether the best model's first name leads every rival by `LEAD`, and what is left of held-out trials is too
-    small to matter, or nearly all is closed. What is left is then reported as residue."""
+    """Whether the best model's first name leads every rival by `LEAD`. Also the residual of held-out trials must be too
+    small to matter, or nearly all closed. What is left is then reported as residue."""
     if not choice.best.effects or undecided(choice):
         return False
     after, weighed = _gaps(choice.best.fit, held_out, scatter)

@@ -1,9 +1,10 @@
 """Which effects a campaign cannot separate: signatures of fitted effects, and cross-validation over conditions.
 
-The signature of an effect is what it changes in the predicted data where it is fitted, over the noise, less what the
-other parameters could take up. The angle between two signatures says whether the design sees them as one, whatever the
-noise was in these trials; their distance, how many standard deviations of noise lie between the two predictions. Half
-its square is the evidence that can be expected [nats], less where the misfit of form exceeds the noise.
+The signature of an effect is the change that it makes in the predicted data where it is fitted, over the noise. The
+part that the other parameters could take up is subtracted. The angle between two signatures says whether the design
+sees them as one, whatever the noise was in these trials; their distance, how many standard deviations of noise lie
+between the two predictions. Half its square is the evidence that can be expected [nats], less where the misfit of form
+exceeds the noise.
 
 In the cross-validation every condition (torque and gravity of a tumble; kind, speed and diameter of a penetration) is
 left out in turn, the model refitted to the others, and the trials left out are predicted with nothing but their own

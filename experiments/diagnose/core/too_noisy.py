@@ -23,7 +23,7 @@ _TWICE = 2.0  # times the stated noise from which on even the scatter of replica
 @dataclass(frozen=True)
 class Noise:
     """Of one channel, one standard deviation in its SI unit: as campaign.toml states it, and as the fast modes of the
-    residuals have it, or, where no other noise was found in these, the root mean square of the residuals."""
+    residuals show it. Where these show no other noise, it is the root mean square of the residuals."""
 
     stated: float
     found: float

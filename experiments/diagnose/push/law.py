@@ -7,7 +7,7 @@ depends on the rate; the effects' own files say how (`rigid.terms.candidate.Push
 as text. At amplitude 0 an effect changes nothing. `SLOTS` names the numbers of a lane; D is `reference`, a depth
 typical of the campaign, so that amplitudes of one effect's forms compare.
 
-A drop is integrated by the classical Runge-Kutta method, each step cut where the spike turns, leaves or comes back
+A drop is integrated by the classical Runge-Kutta method. Each step is cut where the spike turns, leaves or comes back
 (found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
 where neither moves the spike, it rests for good.
 

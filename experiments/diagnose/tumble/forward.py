@@ -2,8 +2,8 @@
 
 Method: one lane of the batched integrator (`rigid.batch.kernel`) for every (trial, set of parameters), all effects of
 the library compiled in with values that change nothing where they are off, so one kernel serves every candidate. The
-motion is sampled at the measured times themselves, and at both ends and the middle of every window of the IMU, whose
-mean specific force is taken by parts as in `rigid.sensors`.
+motion is sampled at the measured times, and at both ends and the middle of every window of the IMU. Its mean specific
+force is taken by parts as in `rigid.sensors`.
 """
 
 import math
