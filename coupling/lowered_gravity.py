@@ -4,8 +4,8 @@ Grains without cohesion are the same problem under any gravity g, lengths in gra
 in rho g d: a bed that was set down under a larger g1 lies as it would under the small one, and is there sooner. Only
 overlaps remember, as (g / E)^(2/3). They relax while g falls by a factor of e every `EFOLD` sqrt(d / g1). This begins
 when the grains are calm, under a drag of time `DRAG` sqrt(d / g1). At rest the drag ends, and at rest without it the
-placement ends: by their speeds and the weight that is missing, neither platform nor grains would go further than `NEAR`
-d in the shorter of sqrt(d / g) and the run's duration. docs/coupling.md says more.
+placement ends. Rest means: with the present speeds and missing weight, platform and grains would move less than `NEAR`
+d. The time for this is the shorter of sqrt(d / g) and the run's duration. docs/coupling.md says more.
 """
 
 import math

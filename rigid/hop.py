@@ -1,8 +1,8 @@
 """Hop theory: how a platform leaves the ground under its flywheel, and how far it flies.
 
-Launch. The platform turns about the row of tips ahead of it, on rigid ground: beta is the angle of the line from there
-to the centre from the vertical (pi/8 at rest), omega the clockwise turning rate, x forward, y up; M is the inertia in y
-(m free, m + m_b in a rig); s = sin beta, c = cos beta. While the tips stick
+Launch. The platform turns about the row of tips ahead of it, on rigid ground: beta is the angle between the vertical
+and the line from there to the centre (pi/8 at rest); omega the clockwise turning rate; x forward, y up; M is the
+inertia in y (m free, m + m_b in a rig); s = sin beta, c = cos beta. While the tips stick
 
     (J + m l^2 c^2 + M l^2 s^2) omega' = tau - W l s + (M - m) l^2 s c omega^2
 

@@ -4,8 +4,8 @@ A bed of 20 million grains must fit into the memory of one card, so no grain get
 Rows are counted, the counts added up, and the rows filled in. The same code runs on a CPU, for tests. Sums have one
 order, so every run on one kind of card is bitwise reproducible.
 
-Those of a grain lie together. (Interleaved by 32 grains, so that the threads of a warp read neighbouring addresses, a
-step was 9 % slower on an H100 and the rows half as many again: docs/performance.md.)
+Those of a grain lie together. (Rows interleaved by 32 grains let the threads of a warp read neighbouring addresses.
+Then a step was 9 % slower on an H100, and the rows half as many again: docs/performance.md.)
 """
 
 from typing import Any

@@ -47,8 +47,9 @@ class VerticalCut:
             0 and None where it never stood or never fell.
         height: of the face [m]. unit_weight: bulk density times the bed's own gravity [N/m3].
         trials: gravity over the bed's own, and the share of the wedges' grains that had moved by a diameter, in order.
-        before, after: thickness against distance from the cut's middle [m]: of the faces that still stood last (None
-            where none did), and at rest at the bed's own gravity, after one fell or stood to the end; (x, thickness).
+        before, after: thickness against distance from the cut's middle [m]: ``before`` of the last standing faces (None
+            where none stood); ``after`` at rest at the bed's own gravity, when a face fell or stood to the end; (x,
+            thickness).
         flanks: fitted slopes of what it slumped to; None where it stood or they are too short.
         width: of the cut [m]. bed: as it lies now.
     """

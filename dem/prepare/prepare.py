@@ -106,8 +106,8 @@ def prepare_bed(
     The grains fall as a loose column from rest. They come to rest in a drag, which replaces the long ringing of a soft
     bed. Then the grains above the level are removed, and the others settle again, at the end without drag. Settled
     means: mean kinetic energy of a grain below 1e-5 m g d, and floor force within 1 % of the weight. Raises ValueError:
-    an unknown material, a size or grain that is not positive, grains too large for the bed, a spread outside 0 to 0.5
-    or beside a distribution, a packing that cannot be reached, a time step too long. BedFailure: the bed did not come
+    an unknown material; a size or grain that is not positive; grains too large for the bed; a spread outside 0 to 0.5
+    or beside a distribution; a packing that cannot be reached; a time step too long. BedFailure: the bed did not come
     to rest.
     """
     wanted = Specification.of(material, **options)

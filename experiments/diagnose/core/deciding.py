@@ -116,9 +116,9 @@ def bends_to_anything(choice: Choice, *, set_aside: bool) -> bool:
 
 
 def explains_nothing(choice: Choice, held_out: tuple[str, ...]) -> bool:
-    """Whether an effect improves neither the trials fitted nor those held out, where the base model leaves no more
-    than chance, all by the noise as stated: then it has found another of the many narrow valleys that a likelihood of
-    long tumbles has, which the noise's colour makes deep, and no effect."""
+    """Whether an effect improves neither the fitted nor the held-out trials, where the base model leaves no more than
+    chance, all by the stated noise. Then it is no effect, but one of the many narrow valleys that the likelihood of
+    long tumbles has. Coloured noise makes them deep."""
     before, after = gap_of(choice.base.fit, held_out), gap_of(choice.best.fit, held_out)
     if before.fit - 1 > _SURE * math.sqrt(2 / choice.base.fit.count) or (before.held_out or 0.0) > SMALL:
         return False
@@ -159,9 +159,9 @@ def _left_of(found: Fit, trials: tuple[str, ...]) -> float:
 
 
 def certain(base: Fit, choice: Choice) -> bool:
-    """Whether the effects found are certain although something else is there too: they remove most of what the base
-    model leaves, of what was fitted and in cross-validation, without a number that the campaign excludes or a scale
-    at the end of the library's range: such an effect may only imitate something else."""
+    """Whether the effects found are certain although something else is there too. They must remove most of the base
+    model's residual, in the fit and in cross-validation. No number may be one that the campaign excludes, no scale at
+    the end of the library's range: such an effect may only imitate something else."""
     best, amplitudes = choice.best.fit, {form.amplitude for form in choice.best.forms}
     ends = any(not met.strains and met.parameter not in amplitudes for met in bounds_met(best))
     if ends or is_strained(best) or bends_little_away(best, base) or excess(best) >= _CERTAIN * excess(base):
@@ -238,8 +238,8 @@ def held_out_divergences(found: Fit, held_out: tuple[str, ...], seed: int) -> li
 def diverging_beside(
     base: Fit, choice: Choice, verdict: str, ask: Callable[[Fit], tuple[Finding, ...]]
 ) -> tuple[Finding, ...]:
-    """Trials that diverge, where the base model explains all others and an effect nothing but them, or where an effect
-    explains all others and nothing is named so far. `ask`: the diverging trials of a fit."""
+    """Trials that diverge, where the base model explains all others and an effect only these. Also those that diverge
+    where an effect explains all others and nothing is named so far. `ask`: the diverging trials of a fit."""
     gone = ask(base)
     if verdict == "unknown":
         for other in () if gone else _likeliest(choice):

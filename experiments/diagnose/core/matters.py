@@ -58,9 +58,9 @@ def is_small(left: Gap, fitted: int, held_out: int) -> bool:
 
 
 def takes_below(before: Gap, best: Fit, held_out: tuple[str, ...], scatter: Scatter) -> bool:
-    """Whether the best model takes the gap of held-out trials (of all, where none are held out) below that of the base
-    model, `before`, by more than the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise. A form
-    with a number at the end of its range only imitates something small."""
+    """Whether the best model reduces the base model's gap of held-out trials, `before` (of all, where none are held
+    out). The reduction must exceed the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise. A
+    form with a number at the end of its range only imitates something small."""
     if any(not bound.strains for bound in bounds_met(best)):
         return False
     after, model = left_by(best, held_out, scatter), best.model

@@ -7,12 +7,12 @@ between the two predictions. Half its square is the evidence that can be expecte
 exceeds the noise.
 
 In the cross-validation every condition (torque and gravity of a tumble; kind, speed and diameter of a penetration) is
-left out in turn, the model refitted to the others, and the trials left out are predicted with nothing but their own
-nuisances refitted within their priors; a base parameter of which the others say nothing (K of a diameter) stays as all
+left out in turn, and the model refitted to the others. The trials left out are then predicted; only their own nuisances
+are refitted, within their priors; a base parameter of which the others say nothing (K of a diameter) stays as all
 trials have it. What a prediction leaves is scored as a fit is (`evidence.tempered`): the form is never nature's. Where
-motions are smooth in the parameters (pushes and drops), what was learned counts with its standard errors, as in any
-predictive likelihood (Gelman et al., Bayesian Data Analysis, 3rd ed., section 7.2, to first order in the errors): a
-drop that is sensitive to a number that the others determine badly is no evidence against a model.
+motions are smooth in the parameters (pushes and drops), the fitted numbers count with their standard errors. This is a
+predictive likelihood to first order in the errors (Gelman et al., Bayesian Data Analysis, 3rd ed., section 7.2): a drop
+that is sensitive to a number that the others determine badly is no evidence against a model.
 """
 
 import math

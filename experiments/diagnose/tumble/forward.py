@@ -1,7 +1,7 @@
 """What the sensors of a tumble campaign should have read, for many sets of parameters at once.
 
-Method: one lane of the batched integrator (`rigid.batch.kernel`) for every (trial, set of parameters), all effects of
-the library compiled in with values that change nothing where they are off, so one kernel serves every candidate. The
+Method: every (trial, set of parameters) has one lane of the batched integrator (`rigid.batch.kernel`). All effects of
+the library are compiled in; where one is off its values change nothing. So one kernel serves every candidate. The
 motion is sampled at the measured times, and at both ends and the middle of every window of the IMU. Its mean specific
 force is taken by parts as in `rigid.sensors`.
 """
