@@ -100,8 +100,8 @@ def come_to_rest(bed: Any, *, unit: float, progress: Progress | None = None) -> 
     """Let grains that have sprung apart come to rest, in a drag first; `unit`: sqrt(d / g) [s]. Then time is 0 again.
 
     At rest as a bed is when it is prepared: their mean kinetic energy is below 1e-5 m g d, in the drag and then without
-    it. Without drag a bed that sticks rings as one spring. Its energy falls ten times in 1.6 s only (5,702 grains of
-    3.2 mm at 1e-3 g, docs/notes/penetrate.md). Raises RuntimeError where they do not come to rest.
+    it. Without drag alone a bed that sticks rings as one spring, and its energy falls ten times in 1.6 s only (5,702
+    grains of 3.2 mm at 1e-3 g, docs/notes/penetrate.md). Raises RuntimeError where they do not come to rest.
     """
     steps, drag = math.ceil(_SPELL * unit / bed.time_step), max(_DRAG * unit, 4 * bed.time_step)
     still, dragged, first = _STILL * bed.weight * bed.mean_diameter, True, 0.0
