@@ -259,9 +259,8 @@ _NAMES = {
     "dem.measure": {"dem.grains.packing": "bulk_packing packing_profile surface_height"},
     "dem.prepare": {
         "dem.prepare.prepare": "prepare_bed",
-        "dem.prepare.specification": (
-            "BEARING Specification bound_of_mean cache_folder check_options fingerprint soft_enough"
-        ),
+        "dem.prepare.code": "cache_folder fingerprint",
+        "dem.prepare.specification": "BEARING Specification bound_of_mean check_options soft_enough",
     },
     "dem.prepare.laboratory": {
         "dem.prepare.prepare": "prepare_as",

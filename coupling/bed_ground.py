@@ -210,7 +210,7 @@ class BedGround:
         return high + 0.02 * float(grains.radius.mean())
 
     def place(self, pose: Pose) -> None:
-        """A body is to start at `pose`. Raises ValueError where it overlaps grains, with the height that would do."""
+        """Start a body at `pose`. Raises ValueError, with the height that it needs, where it overlaps grains."""
         overlap, row = self._deepest_overlap(self.bed.grains(), pose)
         if overlap > 0:
             raise ValueError(

@@ -1,9 +1,10 @@
 """Pivot, slip or hop, read off the forces of grains by stated rules, so that it compares with the planar model's.
 
 Of each row the normal force N, the horizontal force F and the horizontal velocity u of its lowest material point are
-averaged over 5 ms: F and u have one component in the plane, where a row is one of spikes side by side, two in space,
-where it is a single spike. A row *touches* while N and F together are above 1 % of the weight. It *slides* while |F| is
-at least mu_d N, F is against u (F . u < 0) and |u| is above 2 mm/s; what touches and does not slide sticks.
+averaged over 5 ms: F and u have one component in the plane, where a row has spikes side by side. They have two in
+space, where a row is a single spike. A row *touches* while N and F together are above 1 % of the weight. It *slides*
+while |F| is at least mu_d N, F is against u (F . u < 0) and |u| is above 2 mm/s; what touches and does not slide
+sticks.
 
 Then as in the planar model: hop (none touches), slip (all that touch slide), pivot (one sticks), stand (more do). In
 space it is a pivot while those that stick lie in one line. docs/coupling.md says why. Changes come late by 2.5 ms.

@@ -52,8 +52,8 @@ class Ground(Protocol):
     def lag(self) -> float:
         """By how much its forces stand for a time later than the mean of the step's [s], twice over.
 
-        0 where the mean is exact. A bed's impulse over a step is that of the forces at the *ends* of its own steps dt,
-        so it belongs to a time dt / 2 later: its lag is dt.
+        0 where the mean is exact. A bed's impulse over a step is that of the forces at the *ends* of its own steps dt.
+        So it belongs to a time dt / 2 later: its lag is dt.
         """
 
     def step(

@@ -2,10 +2,10 @@
 
 Grains without cohesion are the same problem under any gravity g, lengths in grains d, times in sqrt(d / g) and moduli
 in rho g d: a bed that was set down under a larger g1 lies as it would under the small one, and is there sooner. Only
-overlaps remember, as (g / E)^(2/3). They are let out while g falls by a factor of e every `EFOLD` sqrt(d / g1), from
+overlaps remember, as (g / E)^(2/3). They relax while g falls by a factor of e every `EFOLD` sqrt(d / g1). This begins
 when the grains are calm, under a drag of time `DRAG` sqrt(d / g1). At rest the drag ends, and at rest without it the
-placement ends: by their speeds and the weight that is missing, neither platform nor grains would go further than `NEAR`
-d in the shorter of sqrt(d / g) and the run's duration. docs/coupling.md says more.
+placement ends. Rest means: with the present speeds and missing weight, platform and grains would move less than `NEAR`
+d. The time for this is the shorter of sqrt(d / g) and the run's duration. docs/coupling.md says more.
 """
 
 import math
@@ -78,7 +78,7 @@ class LoweredGravity:
         self.ground.drag_time = DRAG * math.sqrt(self.grain / self.first) if acts else math.inf
 
     def fall(self, time: float) -> bool:
-        """Lower it as far as it is by `time` [s]; whether it has changed."""
+        """Lower gravity to its value at `time` [s]; return whether it has changed."""
         assert self.begun is not None
         due = min(self.steps, int((time - self.begun) / self.every))
         if due <= self.done:

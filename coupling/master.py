@@ -9,9 +9,9 @@ interface quasi-Newton with an inverse Jacobian from least squares (Degroote et 
 Either side may take several steps within H: the ground `substeps`, the body `body_steps`. The wrench is exchanged once
 all the same: the body goes through its steps with the guess, then again along the same twists with what was answered.
 
-The difference between the ground's work (its wrench times the held twist) and the body's (times the mean of its rates
-before and after) is the error of the exchange, of second order in H (Sadjina et al. 2016, Eng. Comput. 33:607: the
-residual of a power bond). docs/coupling.md has the equations and the energy balance.
+The ground's work is its wrench times the held twist. The body's work is this wrench times the mean of its rates before
+and after. Their difference is the error of the exchange, of second order in H (Sadjina et al. 2016, Eng. Comput.
+33:607: the residual of a power bond). docs/coupling.md has the equations and the energy balance.
 """
 
 from collections import deque

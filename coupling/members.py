@@ -1,7 +1,7 @@
 """The pieces of a body that grains can touch: balls and rods of a platform, the sections of a spike.
 
-A row of spikes of a planar platform is one spike in the bed, which is periodic across (y) and as wide as a spike has
-for itself. Rows that face each other share one body of the bed (`slot`), since only the lower can be near the sand.
+A row of spikes of a planar platform is one spike in the bed. The bed is periodic across (y) and as wide as the spacing
+of the spikes. Rows that face each other share one body of the bed (`slot`), since only the lower can be near the sand.
 """
 
 import math
@@ -81,7 +81,7 @@ def platform_members(
 ) -> list[Member]:
     """`count` rows of spikes that end `spike_length` [m] from the centre, and a hull that rolls inside the octagon.
 
-    A spike is a rod of this `diameter` [m] with a ball at its end, `clear` [m] long, and lies in the plane of motion
+    A spike is a rod of this `diameter` [m] with a ball at its end, `clear` [m] long. It lies in the plane of motion
     (the Hedgehog's own lean sideways by 21 degrees). The hull is a cylinder about the axis of rotation, `hull_radius`
     [m] thick and as wide as the bed, `width` [m]; 0: none. Rods go on into it, however long `clear` is, so that no
     grain gets between shaft and hull. Raises ValueError for a spike thicker than long.

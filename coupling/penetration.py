@@ -1,7 +1,7 @@
 """A spike that goes straight down into a ground: driven, dropped or set down.
 
 One macro step H is a whole number of the ground's own steps. Over it the spike moves at a constant velocity and the
-ground answers with its mean force F, so that F H and F (velocity) H are exact. A free spike of mass m under the load W:
+ground answers with its mean force F. So F H and F (velocity) H are exact. A free spike of mass m under the load W:
 
     u     = v + (W - F_before) H / (2 m)       the velocity held during the step, a guess at its middle
     z'    = z + u H
@@ -9,7 +9,7 @@ ground answers with its mean force F, so that F H and F (velocity) H are exact. 
 
 which is of second order in H, and exact in free fall. Time is 0 where the tip meets the undisturbed surface, depth 0;
 before that the spike is carried at its speed (phase "free"), from just clear of the grains that stick out. `state` and
-`restore` work between any two macro steps: a run goes on to the same bits.
+`restore` work between any two macro steps: a continued run is bitwise equal to an unbroken one.
 """
 
 import math
@@ -253,7 +253,7 @@ class Drive(Run):
 
     @property
     def at_bottom(self) -> bool:
-        """Whether the step just done ended the way in."""
+        """Whether the last step ended the loading."""
         return self.count - self._approach == self._in
 
     def settings(self) -> Facts:
@@ -281,8 +281,9 @@ class Drop(Run):
     """Let go at the surface with `speed` downwards, under the constant `load`, until it has come to rest.
 
     A bed of soft grains lets a spike that has stopped bob for long: the run ends `after_stop` [s] after the first stop
-    where that comes sooner. It rests when over the last `rest_time` the depth stayed within `rest_tolerance` of the
-    largest depth and the mean force within 5 % of the load. The rows of that time get the phase "rest".
+    where that comes sooner. It rests when two conditions held over the last `rest_time`: the depth within
+    `rest_tolerance` of the largest depth, and the mean force within 5 % of the load. The rows of that time get the
+    phase "rest".
     """
 
     kind = "drop"
@@ -358,12 +359,12 @@ class SetDown(Drop):
     """Placed against a drag: m dv/dt = W - F - c v with c = W / lowering_speed.
 
     The placement begins where the spike first touches, which grains that stick out of a bed make sooner than depth 0:
-    time counts from there. Free of the ground it sinks at `lowering_speed`; the drag carries whatever the ground does
-    not, so the ground's force rises to the load from below and the spike comes to rest where the bed first carries it.
-    `mass` is by default c times 2 ms, so light that the motion is damped beyond critical on any ground softer than
-    W / (8 ms lowering_speed) (`overdamped_below`) and cannot overshoot. It ends when over the last `rest_time` the mean
-    speed is below 0.3 % of the lowering speed and the mean force within 0.3 % of the load: on a spring the sinkage is
-    too small by what is missing of the force, 0.3 % at most.
+    time counts from there. Free of the ground it sinks at `lowering_speed`; the drag carries the rest of the load. So
+    the ground's force rises to the load from below, and the spike comes to rest where the bed first carries it. `mass`
+    is by default c times 2 ms. That is so light that the motion is overdamped on any ground softer than W / (8 ms
+    lowering_speed) (`overdamped_below`), and cannot overshoot. It ends when two means over the last `rest_time` are
+    met: a speed below 0.3 % of the lowering speed, and a force within 0.3 % of the load. On a spring the sinkage is too
+    small by the missing force, 0.3 % at most.
     """
 
     kind = "set_down"
@@ -417,8 +418,8 @@ def overdamped_below(load: float, lowering_speed: float) -> float:
 def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any) -> Penetration:
     """Drive `spike` straight down `into` a ground (or a bed) at `speed` [m/s] to `depth` [m], hold it, pull it out.
 
-    Options: hold [s] (0.02), retreat (True), retreat_speed [m/s] (as speed), substeps of the ground in a macro step
-    (10), start_depth [m, negative] (just clear of the grains), and `on_step`, `on_frame`, `frame_interval`, `progress`
+    Options: hold [s] (0.02); retreat (True); retreat_speed [m/s] (as speed); substeps of the ground in a macro step
+    (10); start_depth [m, negative] (just clear of the grains); and `on_step`, `on_frame`, `frame_interval`, `progress`
     of `Stepper.follow`. Raises ValueError, naming key and value, for what cannot be; and what the ground raises.
 
     On the spring-damper, the force is K z + C v while the spike goes in:
@@ -434,8 +435,8 @@ def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any
 def drop(spike: Spike, *, into: Any, speed: float, **options: Any) -> Penetration:
     """Drop `spike` `into` a ground (or a bed): at the surface it has `speed` [m/s], and then it is free.
 
-    Options: mass [kg] (the spike's), load [N] (mass * gravity), gravity [m/s2] (9.80665), rest_time [s],
-    rest_tolerance [1], max_depth [m], max_time [s], and those of `drive` that are not about the way out.
+    Options: mass [kg] (the spike's), load [N] (mass * gravity), gravity [m/s2] (9.80665), rest_time [s], rest_tolerance
+    [1], max_depth [m] and max_time [s]. Further options are those of `drive` that do not concern the withdrawal.
 
     >>> from rigid import SpringDamper
     >>> run = drop(Spike(mass=0.5), into=SpringDamper(stiffness=1875, damping=7.5), speed=0.1)

@@ -10,8 +10,8 @@ A macro step of length H from the velocity v, s the ground's lag (0 for a law, i
     v' = v + H M^-1 (G + F)                      F: the mean force of the step just done
 
 v belongs to a time s / 2 later than q. Where the ground gives Coulomb bounds, sticking rows share the horizontal force
-in proportion to their loads, and their mean slip is zero at the step's end; beyond mu_s N they slide with mu_d N until
-the slip passes through zero. Events of friction are found to the step, so they are of first order in H.
+in proportion to their loads. Their mean slip is zero at the step's end; beyond mu_s N they slide with mu_d N until the
+slip passes through zero. Events of friction are found to the step, so they are of first order in H.
 """
 
 import math
@@ -272,8 +272,8 @@ class PlanarBody(PlacedBody):
 
 
 def placement_time(step: float, pace: float = 1.0) -> float:
-    """Mass over drag of a body during placement [s] whose forces are exchanged every `step` [s], where all is `pace`
-    times slower than at 1 g."""
+    """Mass over drag of a body during placement [s]. Forces are exchanged every `step` [s], and all is `pace` times
+    slower than at 1 g."""
     return pace * PLACEMENT_TIME * max(1.0, step / (pace * PLACEMENT_STEP)) ** 2
 
 

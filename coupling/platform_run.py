@@ -118,7 +118,7 @@ class PlatformRun(EnergyBalance, Stepper):
 
     @property
     def fraction(self) -> float:
-        """How far it is along, 0 to 1, the placement, as long as it was expected to take, included."""
+        """Share of the run that is done, 0 to 1; the placement counts with its expected duration."""
         placing = self._placement_time
         done = placing + self.body.time if self.placed else min(placing, self.body.time)
         return float(min(1.0, done / (placing + self.duration)))

@@ -73,9 +73,9 @@ def moved(pose: Pose, twist: Twist, dt: float) -> Pose:
 def chord_share(twist: Twist, dt: float) -> float:
     """sin(phi / 2) / (phi / 2), phi the angle turned in `dt` [1].
 
-    A point with the arm r_m at the step's middle goes along a chord at u + w x r_m times this. Forces on it taken with
-    the arm r_m times this therefore have, as force and torque about the origin, exactly the power that they have on the
-    point.
+    A point with the arm r_m at the step's middle goes along a chord at u + w x r_m times this. Forces on it are taken
+    with the arm r_m times this. As force and torque about the origin they then have exactly the power that they have on
+    the point.
     """
     half = 0.5 * dt * math.sqrt(float(twist.spin @ twist.spin))
     return math.sin(half) / half if half > 1e-8 else 1.0

@@ -8,9 +8,9 @@ length H, s the ground's lag (0 for a law, its own step for a bed):
     r' = r + H u,   q' = exp(H w) q
     P' = P + H (W + F),   L' = L + H T,   h_i' = h_i - H tau_i
 
-P and L belong to a time s / 2 later than r and q. Under a Coulomb bound the tips that stick share what holds them in
-proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)), so that at the step's end their mean slip, and
-turning about the vertical, are zero; one beyond mu_s N_k slides with mu_d N_k until its slip turns back
+P and L belong to a time s / 2 later than r and q. Under a Coulomb bound the sticking tips share the holding force in
+proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)). So at the step's end their mean slip and their
+turning about the vertical are zero; one beyond mu_s N_k slides with mu_d N_k until its slip turns back
 (docs/platform.md). Events of friction are of first order in H.
 """
 

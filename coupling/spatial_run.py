@@ -27,9 +27,9 @@ COLUMNS = (
     "time", "x", "y", "z", "q0", "q1", "q2", "q3", "vx", "vy", "vz", "wx", "wy", "wz", "wheel_x", "wheel_y", "wheel_z",
     "kinetic_energy", "potential_energy", "torque_work", "given", "taken", "fx", "fy", "fz", "touching", "sinkage",
 )  # fmt: skip
-"""Of a row: centre of mass [m], quaternion, velocity [m/s] and spin [rad/s] in world axes, absolute speeds of the
-wheels about the platform's x, y and z [rad/s], energies and works [J] as the planar rows have them, the ground's force
-[N], how many members touch, the deepest spike's depth [m]."""
+"""Of a row: centre of mass [m], quaternion, velocity [m/s] and spin [rad/s] in world axes; absolute speeds of the
+wheels about the platform's x, y and z [rad/s]; energies and works [J] as in the planar rows; the ground's force [N];
+number of touching members; the deepest spike's depth [m]."""
 FEET = 6  # Numbers of a spike (`contact_state.feet_of`); of those that have none a step keeps nothing
 
 

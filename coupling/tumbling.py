@@ -1,7 +1,7 @@
 """A tumble of the planar platform on any ground: placed, released, turned over by its flywheel.
 
-On a bed the platform is first lowered until the sand carries it, under a larger gravity if asked to, which then falls
-to the run's (`coupling.lowered_gravity`); then time is 0, the torque begins and the energy balance starts.
+On a bed the platform is first lowered until the sand carries it. On request this is under a larger gravity, which then
+falls to the run's (`coupling.lowered_gravity`); then time is 0, the torque begins and the energy balance starts.
 """
 
 import math
@@ -53,8 +53,8 @@ class CoupledTumble(PlatformRun):
     energy_interval : between measurements of what the ground holds [s].
     options : those of `Master`.
 
-    Raises ValueError for a start in overlap with grains, a gravity to be lowered where there is no placement, no bed or
-    a rig, and for what `Master`, `PlanarBody` and `LoweredGravity` refuse.
+    Raises ValueError for a start in overlap with grains, and for a gravity to be lowered where there is no placement,
+    no bed or a rig. It also raises the errors of `Master`, `PlanarBody` and `LoweredGravity`.
     """
 
     COLUMNS, _prefix = COLUMNS, "tumble"

@@ -45,9 +45,9 @@ def _kept(folder: Path) -> Iterator[tuple[str, str, str]]:
 
 
 def check_digests(folder: Path, *names: str) -> None:
-    """Raise ValueError, naming the file, for one of a run that is not as the run wrote it; all of them if no `names`.
+    """Raise ValueError, naming the file, for a file that has changed since the run wrote it; all files if no `names`.
 
-    Runs of earlier versions have fewer digests or none, and a file that is not there is not looked at.
+    Runs of earlier versions have fewer digests or none. A missing file is not checked.
     """
     for name, (digest, keeper) in kept_digests(folder).items():
         path = Path(folder) / name
@@ -56,9 +56,9 @@ def check_digests(folder: Path, *names: str) -> None:
 
 
 def check_as_written(path: Path) -> None:
-    """Raise ValueError, naming the file, for one in a run folder that is not as the run wrote it.
+    """Raise ValueError, naming the file, for a file of a run folder that has changed since the run wrote it.
 
-    A file that is in no run folder, or has no digest there, is taken as it is.
+    A file that is in no run folder, or has no digest there, is not checked.
     """
     whole = Path(path).resolve()
     for folder in list(whole.parents)[:_ABOVE]:

@@ -1,8 +1,8 @@
 """Hop theory: how a platform leaves the ground under its flywheel, and how far it flies.
 
-Launch. The platform turns about the row of tips ahead of it, on rigid ground: beta is the angle of the line from there
-to the centre from the vertical (pi/8 at rest), omega the clockwise turning rate, x forward, y up; M is the inertia in y
-(m free, m + m_b in a rig); s = sin beta, c = cos beta. While the tips stick
+Launch. The platform turns about the row of tips ahead of it, on rigid ground: beta is the angle between the vertical
+and the line from there to the centre (pi/8 at rest); omega the clockwise turning rate; x forward, y up; M is the
+inertia in y (m free, m + m_b in a rig); s = sin beta, c = cos beta. While the tips stick
 
     (J + m l^2 c^2 + M l^2 s^2) omega' = tau - W l s + (M - m) l^2 s c omega^2
 
@@ -14,9 +14,9 @@ with N = W + M y'', y'' = l (s omega' - c omega^2). The platform leaves where N 
 (Reid et al., i-SAIRAS 2014, from its energies) for K to infinity; a ground that gives launches more steeply where tips
 hold, and faster where they slide.
 
-Angles. What the ground gives in a sudden launch is one impulse within its cone of friction, so a launch whose tips do
-not slide cannot be flatter than pi/2 - atan(mu_s). This friction-cone condition is ours; it is not compared with the
-hop angles of Koenig, Pavone, Castillo-Rogez and Nesnas (ICRA 2014), whose formulas we have not read (docs/platform.md).
+Angles. In a sudden launch the ground gives one impulse within its cone of friction. So a launch whose tips do not slide
+cannot be flatter than pi/2 - atan(mu_s). This friction-cone condition is ours; it is not compared with the hop angles
+of Koenig, Pavone, Castillo-Rogez and Nesnas (ICRA 2014), whose formulas we have not read (docs/platform.md).
 
 Flight. On a flat ground a parabola, on a round body of radius R and surface gravity g an ellipse about its centre.
 """
@@ -124,8 +124,8 @@ def launch(tumbler: Tumbler, torque: float, until: float = math.inf) -> Launch |
     """Launch under a constant `torque` [N m] on the platform from rest up to `until` [s] and none after.
 
     None where it does not leave the ground before the next tips come down: it tumbles, falls back, or does not tip at
-    all. Raises ValueError for a torque or a time of 0 or less, RuntimeError where friction is so high (above 2 or so,
-    in a rig) that sliding on rigid ground has no solution.
+    all. Raises ValueError for a torque or a time of 0 or less. Raises RuntimeError where sliding on rigid ground has no
+    solution because friction is too high (above about 2, in a rig).
     """
     check_above_zero(torque=torque, **({"until": until} if until != math.inf else {}))
     if torque <= tumbler.tipping_torque:

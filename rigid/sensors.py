@@ -5,8 +5,8 @@ are those of a measured trial:
 
 - camera: x, y, theta of the geometric centre; x from the start, y from the undisturbed surface; its zero may be off.
 - IMU at the geometric centre: gyro d theta/dt, clockwise positive, instantaneous; specific force, the acceleration of
-  the centre + g_loc upwards, in body axes, its mean over a window centred on the row's time (the value itself where the
-  window is 0). Body x in the world is (cos theta, -sin theta), body y (sin theta, cos theta).
+  the centre + g_loc upwards, in body axes. It is the mean over a window centred on the row's time (the value itself
+  where the window is 0). Body x in the world is (cos theta, -sin theta), body y (sin theta, cos theta).
 - wheel: |omega_w|.
 
 The mean over the window is exact through jumps of the force: with R the turn from body to world axes, the mean of

@@ -82,8 +82,8 @@ class Series:
 def write_series(path: str | Path, columns: Mapping[str, Any], *, line_end: str = "\n") -> None:
     """Write `columns` (name -> array of shape [n]) to the CSV file `path`, all of it or nothing.
 
-    A name carries its unit: ``depth_m``, ``force_N``. Numbers are written so that they read back to the same bits;
-    arrays of text (``phase``) are written as they are. Raises ValueError where lengths differ.
+    A name carries its unit: ``depth_m``, ``force_N``. Numbers are written with all digits, so that reading returns
+    equal values. Arrays of text (``phase``) are written unchanged. Raises ValueError where lengths differ.
     """
     path = Path(path)
     arrays = {name: np.asarray(values) for name, values in columns.items()}

@@ -113,7 +113,7 @@ class LammpsBed:
         ]  # fmt: skip
 
     def _interactions(self) -> list[str]:
-        """What a restart file does not have, or not for certain: law, floor, gravity, integrator, lists."""
+        """Commands for what a restart file does not hold reliably: law, floor, gravity, integrator, lists."""
         g = math.hypot(*self.gravity)
         floor = self._wall_words(self._rows[FLOOR], bodies=bool(self._bodies))
         return [
@@ -289,10 +289,10 @@ class LammpsBed:
         return self._reactions[body][:3], self._reactions[body][3:]
 
     def settle(self, tell: Callable[[float, float], None] | None = None) -> float:
-        """Let the grains come to rest, with all bodies where they are; how long it took [s]. Time is 0 again.
+        """Let the grains come to rest with all bodies fixed; return the time that it took [s]. Time is 0 again.
 
-        At rest as a prepared bed is: mean kinetic energy below 1e-5 m g d. ``tell``: called now and then with the time
-        so far [s] and the kinetic energy over that of rest [1]. Raises RuntimeError where they do not come to rest.
+        Rest is that of a prepared bed: mean kinetic energy below 1e-5 m g d. ``tell``: called from time to time with
+        the time so far [s] and the kinetic energy over that of rest [1]. Raises RuntimeError where they do not rest.
         """
         unit = math.sqrt(self.mean_diameter / math.hypot(*self.gravity))
         spell, began = math.ceil(_SPELL * unit / self.time_step), self.steps
@@ -371,7 +371,7 @@ class LammpsBed:
         return sum((np.bincount(side, half, self.grain_count) for side in (first, second)), floor)
 
     def _look(self, position: Vector) -> tuple[Vector, Vector, Vector]:
-        """`_touching`, with the largest overlap kept. Raises BedFailure past its bound, which only a look can see."""
+        """`_touching`, with the largest overlap kept. Raises BedFailure where an overlap is past the bound."""
         first, second, overlap = self._touching(position)
         largest = float((overlap / (self.radius[first] + self.radius[second])).max(initial=0.0))
         self._seen = max(self._seen, largest)

@@ -1,4 +1,4 @@
-"""Grains in LAMMPS as a ground: `BedGround` with what LAMMPS tells of energies."""
+"""Grains in LAMMPS as a ground: `BedGround` with the energies that LAMMPS reports."""
 
 import math
 from typing import Any
@@ -18,9 +18,10 @@ __all__ = ["LammpsGround"]
 class LammpsGround(BedGround):
     """A `LammpsBed` under a body; parameters as of `BedGround`.
 
-    Explicit coupling alone: a step cannot be taken back. Of the energies LAMMPS tells the kinetic one; height and
-    normal springs, with DMT's cohesion, follow from the grains' places. What friction's springs hold, and what was lost
-    where, is not told; with JKR nor are the normal springs, since stretched contacts hold or not by their history.
+    Only explicit coupling is possible, because a step cannot be taken back. LAMMPS reports the kinetic energy. The
+    energies of height and of the normal springs, with DMT's cohesion, follow from the grains' places. The energy of
+    friction's springs and the losses are not reported. With JKR neither are the normal springs: whether a stretched
+    contact holds depends on its history.
     """
 
     bed: LammpsBed
@@ -78,5 +79,5 @@ class LammpsGround(BedGround):
         return np.concatenate(points) - self.origin, np.concatenate(forces)
 
     def angular_momentum(self) -> Vector:
-        """Not a number: LAMMPS does not tell what crosses the periodic sides."""
+        """Not a number: LAMMPS does not report what crosses the periodic sides."""
         return np.full(3, math.nan)

@@ -1,7 +1,7 @@
 """A convex polyhedron as pieces that LAMMPS has regions for: planes for its faces, thin prisms for edges and corners.
 
 LAMMPS has no region that is a general polyhedron. Its `intersect` of planes keeps a contact only where the nearest
-point of one plane lies within all others, so that edges and corners push nothing. Its `union`, as a moving wall, has no
+point of one plane lies within all others. So edges and corners exert no force. Its `union`, as a moving wall, has no
 velocity. So each face is a plane (`Facet`), each edge a prism as thin as `THIN` (`Sheet`), which has the edge and both
 corners. A face that is a parallelogram is one such prism together with its edges and corners.
 

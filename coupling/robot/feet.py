@@ -119,8 +119,8 @@ def find_feet(model: Any, data: Any, names: Sequence[str]) -> list[Foot]:
     """The feet that `names` mean: geoms or sites of the model, by name or pattern (``spike_*``).
 
     ``data`` has the robot where it starts: a cylinder or capsule whose axis is within 45 degrees of the vertical there
-    stands on its end, and lies otherwise. Raises ValueError, naming the geom, for none of that name, one that does not
-    move, one of a kind that no foot can be, and a name given twice.
+    stands on its end, and lies otherwise. Raises ValueError, naming the geom: there is none of that name; it does not
+    move; its kind cannot be a foot; its name is given twice.
     """
     mujoco = refuse_missing()
     kinds = {"geom": mujoco.mjtObj.mjOBJ_GEOM, "site": mujoco.mjtObj.mjOBJ_SITE}
@@ -287,7 +287,7 @@ def _apart(points: Vector, most: int) -> NDArray[np.int64]:
 
 
 def _closed(name: str, vertices: Vector, faces: Faces) -> tuple[Vector, Faces, str]:
-    """A mesh as grains can meet it: as it is where it is closed, else its convex hull, which is said in the third.
+    """A closed mesh for grains to touch: this one, or its convex hull where it is open, and a note of that.
 
     Raises ValueError where not even a hull encloses anything.
     """

@@ -57,19 +57,21 @@ class FootForces(AbstractContextManager["FootForces"]):
     model, data : of MuJoCo. Calls with any other model do nothing; the stability is checked where `data` is.
     feet : as `find_feet` gives them.
     law, parameters, scales, under : as `LawFeet` has them; rebound and loss are the same in all parts. With neither
-        `scales` nor `under`, a law of grains takes what `parameters` does not have from its defaults for sand, in the
-        gravity of `model` and with shape and size of each foot in the posture of `data`, as `hedgebed mujoco` does.
-    depths, speeds : name of a part -> depth to which its parameters hold [m], and speed into the ground to which its
-        law was compared with grains [m/s]; the first part that is deeper, and the first that is faster, warns, once.
+        `scales` nor `under`, a law of grains takes its defaults for sand where `parameters` has no value. These hold
+        for the gravity of `model` and the shape and size of each foot in the posture of `data`, as in `hedgebed
+        mujoco`.
+    depths, speeds : name of a part -> largest depth of its parameters [m], and largest speed into the ground at which
+        its law was compared with grains [m/s]; the first part that is deeper, and the first that is faster, warns,
+        once.
     mu_d : friction of sliding [1].
     slip_speed : below which friction falls with the slip [m/s]; a step of dt needs mu_d g dt at least.
 
     Several may be entered at once, one for each model; they take the place of any other ``mjcb_passive``. `points`
     counts the points evaluated. Each MjData of the model has its own deepest depths. They are forgotten where its time
     goes back or jumps by more than a step (``mj_resetData``, another state); a second call at the same time does not
-    count. Raises ValueError for a law there is not, for numbers that cannot be, and for those of one foot
-    or gravity that are neither given nor known, such as K of spring-damper; on entry also for a step at which the
-    exchange of a run would be unstable.
+    count. Raises ValueError for an unknown law and for impossible numbers. It also does so for numbers of one foot or
+    gravity that are neither given nor known, such as K of spring-damper; on entry also for a step at which the exchange
+    of a run would be unstable.
     """
 
     def __init__(

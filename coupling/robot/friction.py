@@ -1,7 +1,7 @@
 """Friction of the points of feet under Coulomb bounds in one step: who sticks, who slides, and the forces.
 
-As in `coupling.spatial_body`, for several feet that the robot's joints connect: of each foot the points that stick have
-f_k = N_k (c + b z x (rho_k - mean rho)), and their mean slip and turning about the vertical are zero at the step's end.
+As in `coupling.spatial_body`, for several feet that the robot's joints connect: the sticking points of each foot have
+f_k = N_k (c + b z x (rho_k - mean rho)). Their mean slip and turning about the vertical are zero at the step's end.
 """
 
 from typing import Any

@@ -29,8 +29,8 @@ class LawFeet(LawPoints):
     time_step : [s], of which a macro step has `substeps`.
     scales : name of a part -> how many times the law it has, such as its area over that the law is of [1].
     under : name of a part -> its own parameters, in place of `parameters`.
-    depths, speeds : name of a part -> depth to which its parameters hold [m], and speed to which its law was compared
-        with grains [m/s], for those who report a run. All five are those of `law_under_feet` and `law_of_run`.
+    depths, speeds : name of a part -> largest depth of its parameters [m], and largest speed at which its law was
+        compared with grains [m/s]. Reports of a run use it. All five are those of `law_under_feet` and `law_of_run`.
 
     Parameters that are of one foot or of one gravity, such as K, a radius or a gravity, have no defaults here. Raises
     ValueError for one of them that is not given, and for a law or parameter there is not.

@@ -18,7 +18,7 @@ SOFTER = "use a smaller time step of the model, or softer gains"
 
 
 class LostRobotError(UnfitSettingsError):
-    """A robot cannot go on: its state or control is no number, or its controller fails. `remedy`: what would do."""
+    """A robot cannot go on: its state or control is no number, or its controller fails. `remedy`: what to change."""
 
     def __init__(self, message: str, *, remedy: str) -> None:
         super().__init__(message)

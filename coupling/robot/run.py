@@ -23,9 +23,9 @@ COLUMNS = (
     "time", "x", "y", "z", "kinetic_energy", "potential_energy", "torque_work", "actuator_work", "given", "taken",
     "fx", "fy", "fz", "touching", "sinkage",
 )  # fmt: skip
-"""Of a row: centre of mass [m], energies [J] (potential: gravity and springs), work of what else is in the robot and of
-its actuators alone [J], work on the ground by robot and ground [J], force of the ground on all feet [N], how many feet
-touch, the deepest depth [m]."""
+"""Of a row: centre of mass [m], energies [J] (potential: gravity and springs), work of the robot's other parts and of
+its actuators alone [J]; work on the ground by robot and ground [J]; force of the ground on all feet [N]; number of
+touching feet; the deepest depth [m]."""
 BELOW = 1e-3  # What is no foot may start as deep as that [m]
 FOOT = 14
 """Numbers of a foot in a row: position, quaternion, force [N], torque [N m], depth of its lowest point [m]."""
@@ -42,8 +42,8 @@ class RobotRun(EnergyBalance, Stepper):
     checked : whether a start in the ground, and an exchange that would be unstable (`check_exchange`), are refused.
     options : those of `Master`: substeps, iterations, extrapolation, tolerance.
 
-    Raises ValueError for a robot that another run has, and, naming the foot or geom, for a start in the ground and for
-    an unstable exchange. On the way `load` may go above `most_load`: that is for the caller to say.
+    Raises ValueError for a robot that another run has. It also raises it, naming the foot or geom, for a start in the
+    ground and for an unstable exchange. On the way `load` may go above `most_load`: that is for the caller to say.
     """
 
     COLUMNS = COLUMNS

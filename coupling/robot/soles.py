@@ -63,8 +63,8 @@ def sole_of(part: Part, matrix: Vector, *, of: float) -> Sole:
 
     A box, an upright cylinder and a mesh are flat: the points on which they stand share the law. A sphere, an ellipsoid
     and the end of an upright capsule are round; a cylinder or capsule that lies is a lying cylinder. The width is the
-    radius of an upright cylinder, sphere, capsule or ellipsoid (of the circle of the same area), else the smallest
-    width from above.
+    radius of an upright cylinder, sphere, capsule or ellipsoid (of the circle of the same area). For other shapes it is
+    the smallest width from above.
     """
     if part.kind == "site":
         return Sole.of_spike(of)
@@ -95,11 +95,11 @@ def law_under_feet(
 ) -> FeetLaw:
     """A law of a tip of diameter `of` [m] as each part of `feet` has it: arguments of `LawFeet` and `FootForces`.
 
-    ``matrices``: rotation of each foot from its own axes to the world's in the posture in which its size counts, shape
-    (foot, 3, 3), as `foot_matrices` returns them. ``parameters``, ``given``: as `rigid.ground.soles.sized_law` has
+    ``matrices``: rotation of each foot from its own axes to the world's, shape (foot, 3, 3), as `foot_matrices` returns
+    them. The size of a foot is taken in this posture. ``parameters``, ``given``: as `rigid.ground.soles.sized_law` has
     them. ``depth``: to which the parameters hold under the tip [m], such as ``range["depth"][1]`` of a ground file; of
-    a foot it is as many of its diameters. Raises ValueError as `sized_law`, and where the law takes a
-    gravity that is not in ``parameters``.
+    a foot it is as many of its diameters. Raises ValueError as `sized_law`, and where the law takes a gravity that is
+    not in ``parameters``.
 
     A law of a fitted tip under a round plate of 60 mm, which has 25 times the area of the tip:
 

@@ -50,8 +50,8 @@ class Load:
     def growth(self, macro_step: float, duration: float) -> float:
         """Times that a swing on the contacts grows in `duration` [s] by explicit exchanges [1]; below 1 it dies out.
 
-        The feet stay in the ground: an upper bound for feet that leave it. The damping acts in half of a swing, as
-        the spring-damper has it: on its way in.
+        The feet stay in the ground: an upper bound for feet that leave it. As in the spring-damper, the damping acts
+        in half of a swing: while the foot sinks.
         """
         k, c = self.stiffness * macro_step**2 / self.mass, self.damping * macro_step / self.mass
         rate = 0.5 * (math.log(_amplified(k, c)) + math.log(_amplified(k, 0.0)))
@@ -60,7 +60,7 @@ class Load:
 
 @dataclass(frozen=True)
 class ExpectedBed:
-    """What the exchange with a bed depends on, as far as it is known before the bed is made."""
+    """Numbers that the exchange with a bed depends on and that are known before the bed is made."""
 
     radius: float  # of a grain, mean [m]
     overlap_limit: float  # [of a diameter]

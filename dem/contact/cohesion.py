@@ -12,9 +12,9 @@ JKR (Johnson, Kendall & Roberts 1971, Proc. R. Soc. A 324:301), for large and so
 With a_1^3 = 2 pi w R*^2 / E* and s = sqrt(a / a_1), JKR's law is one curve for all pairs:
     d R* / a_1^2 = s^4 - s,  F = pi w R* (8/3 s^6 - 4 s^3),
 which is solved for s by Ferrari's formula. It ends at s^3 = 1/4, where the overlap is least: the pair's *range* below
-zero, 3/4 4^(-1/3) a_1^2 / R*. The force is taken as this function of the overlap on the way in as on the way out:
-separation needs no history, and pairs attract one another from the range on, before they touch. What real surfaces lose
-by jumping into contact is left out (docs/bed.md).
+zero, 3/4 4^(-1/3) a_1^2 / R*. Approach and separation follow the same function of the overlap. So separation needs no
+history, and pairs attract one another from the range on, before they touch. The energy that real surfaces lose by
+jumping into contact is left out (docs/bed.md).
 """
 
 import math

@@ -20,12 +20,11 @@ tangential spring at the rolling radius):
     A grain at rest is held by the spring alone, so it does not creep.
 Twisting, where there is rolling resistance: the same form about the normal, with Marshall's 2009 stiffness S_t a^2 / 2
 (J. Comput. Phys. 228:1541) and the torque of a fully sliding Hertzian contact as bound, 3 pi / 16 mu a F_n (Johnson
-1985, section 7.4), so that a grain does not spin on one contact for ever.
-Cohesion (``dem.contact.cohesion``): DMT takes 2 pi w R* off the normal force, JKR has a force and a contact radius
-of its own.
-Damping never makes a pair pull more than its pull-off force; without cohesion that is the cut at zero. In the bounds of
-friction, rolling and twisting the load that presses the surfaces together stands for F_n: F_n + 2 pi w R* with DMT, F_n
-+ 2 (3/2 pi w R*) with JKR (Thornton 1991, J. Phys. D 24:1942; Marshall 2009).
+1985, section 7.4), which stops a grain from spinning on one contact for ever.
+Cohesion (``dem.contact.cohesion``): DMT takes 2 pi w R* off the normal force, JKR has a force and a contact radius of
+its own. Damping never makes a pair pull more than its pull-off force; without cohesion that is the cut at zero. In the
+bounds of friction, rolling and twisting the load that presses the surfaces together stands for F_n: F_n + 2 pi w R*
+with DMT, F_n + 2 (3/2 pi w R*) with JKR (Thornton 1991, J. Phys. D 24:1942; Marshall 2009).
 
 A spring that makes no energy. The normal force does not know of the tangential spring; so whatever that comes to hold,
 U = S_t u^2 / 2, has to be done as work along the slip. As a changes without slip there is no work. With u kept
@@ -36,8 +35,8 @@ radius of the step before is that of the overlap less what has closed since, kno
 no memory.
 A rescaled spring also turns with its pair, at its full length: by the least turn that brings the normal of the step
 before to n, then about n by the mean of both spins. With m the middle of both normals, the first is u - (u n) m for a
-vector across the normal, and two reflections, across m and across n, for any. The displacement spring is projected onto
-the plane of n, and does not turn about n.
+vector across the normal. For any vector it is two reflections, across m and across n. The displacement spring is
+projected onto the plane of n, and does not turn about n.
 
 In time. Velocities live half a step behind positions.
 - The normal dashpot wants d' at the time of the force. A contact remembers ``past`` = (m* v + dt F) / 2 of the step
@@ -47,10 +46,10 @@ In time. Velocities live half a step behind positions.
 - The force of the step in which a pair came to touch stands for the time from the touch to half a step later. Hertz's
   dashpot starts as d^(1/4), so its mean over that time is 4/5 (f + 1/2)^(5/4) / f^(1/4) of what it is at the step's
   end, f the share of the step for which the pair has touched.
-- The slip of a step is taken across the normal m at the step's middle, where the velocity is, with the arms of then,
-  and laid into the plane of n. With m = n - h v_t, h = dt / 2 |x_i - x_j| and v_t what of v = v_i - v_j is across n, it
-  is (1 + h v n) v_t - W x n - h (W n) v_t x n, W the spins times their arms, but for terms of second order in h. The
-  last is left out where the spring does not turn about n either ("displacement").
+- The slip of a step is taken across the normal m at the step's middle, the time of the velocity, with the arms of that
+  time. It is then laid into the plane of n. With m = n - h v_t, h = dt / 2 |x_i - x_j| and v_t what of v = v_i - v_j is
+  across n, it is (1 + h v n) v_t - W x n - h (W n) v_t x n, W the spins times their arms, but for terms of second order
+  in h. The last is left out where the spring does not turn about n either ("displacement").
 - A rescaled spring is turned and rescaled with half of the step's slip in it, the other half comes after: right to
   second order, and of no more energy than the work, as F_t changes by the mean S_t of the step while a grows.
 The dashpots of friction, rolling and twisting see the half-step velocity.
@@ -182,8 +181,8 @@ def contact_force(
     for a new contact.
     For a ``rescaled`` spring: what the overlap has gained over the step, ``closed`` [m]; the middle of both normals,
     ``middle``, whose part along n is 1; and how far the pair has turned about it, ``angle`` [rad].
-    Returns (normal force [N], what of it is the dashpot's [N], tangential force vector [N], tangential stiffness [N/m],
-    contact radius [m], sqrt(m* S_n), load that presses the surfaces together [N], contact radius of the step before
+    Returns (normal force [N]; the dashpot's part of it [N]; tangential force vector [N]; tangential stiffness [N/m];
+    contact radius [m]; sqrt(m* S_n); load that presses the surfaces together [N]; contact radius of the step before
     over that of now, at most 1).
     """
     # Single precision on a GPU has a root that is no better than its last digit, and an overlap that may be below 0.

@@ -282,7 +282,7 @@ class BedBase:
             sleeper.settle()
 
     def make_room(self, pairs: int, near: int) -> None:
-        """See that lists have room for so many rows of pairs, and of grains near bodies, in each chunk.
+        """Enlarge the lists where needed: so many rows of pairs, and of grains near bodies, in each chunk.
 
         ``engine`` may be another one then. Raises BedFailure: there is no memory for such lists.
         """
@@ -291,8 +291,8 @@ class BedBase:
         except MemoryError as problem:
             e = self.engine
             raise BedFailure(
-                f"the lists have room for {e.chunk_room} pairs and {e.near_room} grains near bodies a chunk, {pairs} "
-                f"and {near} are needed, and to go on with that {problem}; take fewer grains, or larger ones"
+                f"the lists hold {e.chunk_room} pairs and {e.near_room} grains near bodies a chunk, {pairs} and {near} "
+                f"are needed, and a larger engine {problem}; take fewer grains, or larger ones"
             ) from None
 
     def _explain(self, some: int) -> str:

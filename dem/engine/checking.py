@@ -1,9 +1,9 @@
 """The lists of a bed against brute force: what ``BedBase.debug`` does at every step and whenever lists are made.
 
-Every pair of grains within reach is found anew on the host, by a tree over all of them in the periodic box, and every
-distance to a body by trying all grains with all bodies. A list with a pair too few, too many, twice or through a wrong
-image, one that is out of date, or a contact whose history did not come over, is a mistake of the program: BedFailure
-says which grains, at which step. Of two sleepers nothing is listed, and nothing is looked for.
+Every pair of grains within reach is found anew on the host, by a tree over all grains in the periodic box. Every
+distance to a body is found by trying all grains with all bodies. Three faults are mistakes of the program: a list with
+a pair too few, too many, twice or through a wrong image; a list that is out of date; a contact whose history was lost.
+Then BedFailure says which grains, at which step. Of two sleepers nothing is listed, and nothing is looked for.
 
 Costs many times what the step itself does: for tests, and for a bed that is not believed.
 """
@@ -261,7 +261,7 @@ def _seven(state: Mapping[str, Any], prefix: str) -> Array:
 
 
 def _compare_histories(bed: CheckedBed, before: Histories, after: Histories) -> None:
-    """What is listed now remembers what it did, and nothing else does."""
+    """Raise BedFailure unless the new lists hold exactly the contact histories of the old ones."""
     most = bed.grain_count + 64
 
     def name(number: int) -> str:
@@ -273,7 +273,7 @@ def _compare_histories(bed: CheckedBed, before: Histories, after: Histories) -> 
     was = np.where(known[:, None], before[1][place] if len(before[0]) else 0.0, 0.0)
     wrong = [f"the history of {name(after[0][k])} is another" for k in np.flatnonzero((was != after[1]).any(axis=1))]
     bodiless = after[0] % most < bed.grain_count
-    wrong += [f"{name(after[0][k])} are said to have touched" for k in np.flatnonzero(~known & bodiless)]
+    wrong += [f"{name(after[0][k])} have a history but never touched" for k in np.flatnonzero(~known & bodiless)]
     # Each contact that was is there still, from one side at least: nothing parts by a whole skin in a step.
     a, b = np.divmod(before[0], most)
     there = np.isin(before[0], after[0]) | np.isin(b * most + a, after[0]) | (b >= bed.grain_count)

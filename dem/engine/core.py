@@ -73,8 +73,8 @@ class BedCore(BedState):
             tensile: whether the damping may pull at the end of a contact (as LIGGGHTS does by default).
             precision: "float64" or "float32". arch: "cpu" or "cuda". threads: of the CPU; all when None.
 
-        Raises ValueError: arrays of wrong shape, numbers that are not finite, a negative size, a step too long, a bed
-        narrower than three grains, grains that overlap one another or the floor by more than ``max_overlap``, grains
+        Raises ValueError: arrays of wrong shape; numbers that are not finite; a negative size; a step too long; a bed
+        narrower than three grains; grains that overlap one another or the floor by more than ``max_overlap``; grains
         outside the box.
         """
         stuff = find_material(material)
@@ -276,8 +276,8 @@ class BedCore(BedState):
     def momentum(self) -> np.ndarray:
         """Momentum of the grains [N s], shape [3], with the velocities half a step ahead, as the forces bring them.
 
-        Of slow grains (``dem.engine.sleep``) with the mass that they move with, with what the fast ones have done to
-        them, and without the impulse of gravity, floor and sleepers that they have had before its time.
+        Slow grains (``dem.engine.sleep``) count with the mass that they move with, and with the impulse of the fast
+        grains. The impulse of gravity, floor and sleepers that they received ahead of time is left out.
         """
         v, f = self.awake_rows("velocity", "force")
         many, heavy = self.paces()[:, None], self.heaviness()[0][:, None]
@@ -290,11 +290,11 @@ class BedCore(BedState):
         """Angular momentum about the bed's origin, and changes since ``track_contact_work`` [N m s], shape [3] each.
 
         Returns:
-            grains: sum of x x m v and of their spins' with the velocities half a step ahead, to which the forces so far
-            have brought them. outside: what came of gravity, across the periodic sides, of grains put back into the
-            box, and to and from sleepers. first_body, bodies: what body 0, which is the floor where there is one, and
-            the others took. grains = grains then + outside - first_body - bodies, to round-off; not with a drag, and
-            not through ``set_gravity``, which shifts the velocities.
+            grains: sum of x x m v and of their spins. The velocities are those half a step ahead, which the forces so
+            far have reached. outside: what came of gravity, across the periodic sides, of grains put back into the box,
+            and to and from sleepers. first_body, bodies: what body 0, which is the floor where there is one, and the
+            others took. grains = grains then + outside - first_body - bodies, to round-off; not with a drag, and not
+            through ``set_gravity``, which shifts the velocities.
 
         Raises ValueError: it is not tracked.
         """

@@ -6,13 +6,14 @@ over it is minus the mean of the part before and after, times that velocity, tim
 before. Three parts: the normal dashpot, the tangential force (its spring included), the rolling and twisting torque
 (likewise). What the springs hold, ``dem.engine.energy`` reads off; less that, the last two are friction.
 
-Friction is kept contact by contact as well: what a contact's part took over a step, less what its spring came to hold
-over it, is *lost* where it is positive and *made* where it is negative. A law without a fault makes nothing.
+Friction is kept contact by contact as well: take the work of a contact's part over a step, less the energy that its
+spring gained. It is *lost* where it is positive and *made* where it is negative. A law without a fault makes nothing.
 
-Beside it stands the balance of angular momentum about the bed's origin: what the bodies took, and what reaches grains
-from outside, which is weight, contacts across the periodic sides (the torques on a pair whose neighbour is an image do
-not cancel but leave the period x F), grains put back into the box at its other side, and sleepers (what those awake do
-to them, and what falling asleep takes). Leapfrog's x_n x m v_(n+1/2) changes by exactly the sum of these each step.
+Beside it stands the balance of angular momentum about the bed's origin: the part that the bodies took, and the part
+that reaches grains from outside. The latter has four sources: weight; contacts across the periodic sides (the torques
+on a pair whose neighbour is an image do not cancel but leave the period x F); grains put back into the box at its other
+side; and sleepers (the forces of others on them, and the loss of falling asleep). Leapfrog's x_n x m v_(n+1/2) changes
+by exactly the sum of these each step.
 
 A bed without a balance has ``ABSENT`` for a table, and its kernels are compiled without all this.
 """

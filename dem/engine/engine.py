@@ -5,16 +5,16 @@ Layout (measured reasons in docs/performance.md):
 * Grains lie in memory in the order of a space-filling curve through the cells, so that neighbours are near.
 * They are cut into a fixed number of contiguous chunks, whatever the number of threads. A pair inside a chunk is
   computed once, by the chunk's own serial loop, and added to both; a pair across chunks is computed by both sides. So
-  no two threads write to one grain, and every sum has one order: the same bits on any number of threads. On a GPU every
-  grain has a thread and a full list of its own (``dem.gpu``).
+  no two threads write to one grain, and every sum has one order: results are bitwise equal on any number of threads. On
+  a GPU every grain has a thread and a full list of its own (``dem.gpu``).
 * A step has two phases. ``move`` kicks and drifts (leapfrog: velocities live half a step behind positions); ``push``
   computes forces. Moving also finds out whether a grain has come further than half the skin; if so the launch ends
   there, and the host makes new lists and goes on. On a CPU all steps of a launch are one parallel loop (``run``).
 * Sums into a field are written as x = x + y, because Taichi's x += y is an atomic operation.
 
 An engine is compiled for a capacity, not for a number of grains, and is used again by the next bed that fits:
-``take_engine`` keeps those that no bed holds any more. Lists begin with room for the rows that a settled bed needs;
-where more are needed the bed goes on in another engine, with more room (``Engine.with_room``), to the same bits.
+``take_engine`` keeps those that no bed holds any more. Lists begin with the rows that a settled bed needs. Where more
+are needed the bed continues in an engine with longer lists (``Engine.with_room``); the results are bitwise equal.
 """
 
 import math
@@ -68,7 +68,7 @@ class Build:
     """What an engine is compiled for.
 
     Attributes:
-        capacity: grains that there is room for, at most 2^26. cell_capacity, chunk_capacity: likewise.
+        capacity: most grains that fit, at most 2^26. cell_capacity, chunk_capacity: likewise.
         neighbours_per_grain: rows of the pair lists for each. near_per_grain: of the lists of grains near bodies.
         rolling: whether contacts carry a rolling spring. tensile: whether a contact's damping may pull at its end.
         rescaled: whether a contact's springs are (``dem.contact.law``).
@@ -170,9 +170,9 @@ def capacities(grain_count: int, cell_count: int, chunk_count: int, *, gpu: bool
 
 
 def _roomy(count: int, *, least: int) -> int:
-    """The next of 1 and 1.5 times a power of two: few shapes to compile, and little room wasted.
+    """The next of 1 and 1.5 times a power of two: few shapes to compile, and little memory wasted.
 
-    Of large beds a sixteenth of a power of two more at most, as memory is what they are short of.
+    Large beds take at most a sixteenth of a power of two more, because memory limits them.
     """
     power = least
     while power < count:
@@ -252,7 +252,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.id = self.store.scalar(ti.i32, n)
 
     def _make_sort_fields(self, n: int, cell_capacity: int) -> None:
-        """Room for sorting."""
+        """Fields for sorting."""
         self.buffer_id, self.came_from, self.key = (self.store.scalar(ti.i32, n) for _ in range(3))
         self.rank = self.store.scalar(ti.i32, cell_capacity)
         self.cell_start = self.store.scalar(ti.i32, 3 * cell_capacity + 1)
@@ -262,9 +262,9 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
     def _make_list_fields(self, n: int, chunk_capacity: int, rows: int, near: int) -> None:
         """Pair lists and lists of grains near bodies.
 
-        Chunk c owns the rows from c times its room, those of a grain lie together. ``first`` is the grain a row belongs
-        to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step, ``slide`` the contact's
-        history: x y z of the tangential spring, and what the normal dashpot remembers.
+        Chunk c owns the rows from c times its capacity. The rows of a grain lie together. ``first`` is the grain a row
+        belongs to, ``pair`` its neighbour's code, ``touching`` the rows in contact in this step. ``slide`` is the
+        contact's history: x y z of the tangential spring, and the state of the normal dashpot.
         """
         F, real = self.store.vector, self.real
         self.pair_start, self.pair_end, self.old_start, self.old_end = (self.store.scalar(ti.i32, n) for _ in range(4))
@@ -339,14 +339,14 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
 
     @property
     def _shares(self) -> int:
-        """Among so many the rows of lists are shared out: a GPU's are packed."""
+        """Number of parts that the rows of lists are divided into; one on a GPU, where rows are packed."""
         return 1 if self.gpu else self.chunk_count
 
     def with_room(self, owner: Any, pairs: int, near: int) -> "Engine":
-        """An engine in the same state whose lists have room for so many rows a chunk: this one, or one to go on with.
+        """An engine in the same state whose lists hold so many rows a chunk: this one, or a new one.
 
-        Then this one is empty, and its memory is given back. Lists put aside stay valid, new ones are to be made.
-        Raises MemoryError: there is no room for such lists.
+        After a new one this engine is empty and its memory free. Lists put aside stay valid; the caller makes new ones.
+        Raises MemoryError: such lists do not fit.
         """
         rooms = self._most_rooms()
         if pairs <= rooms[0] and near <= rooms[1]:
@@ -385,7 +385,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         return new
 
     def _share_for(self, room: int) -> float:
-        """Rows for a grain with which each chunk has room for so many, and some more."""
+        """Rows for each grain, so that a chunk holds so many rows and some more."""
         needed = (_SPARE * room + 1) * self._shares - self.build.spare
         return math.ceil(4 * needed / self.build.capacity) / 4
 
@@ -397,7 +397,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         return end - start, row_numbers(start, end - start)
 
     def lay_pairs(self, counts: np.ndarray, *layout: int) -> np.ndarray:
-        """Make room for so many pairs of each grain, in chunks as ``rows.chunk_starts`` has them; their rows."""
+        """Reserve rows for so many pairs of each grain, in the chunks of ``rows.chunk_starts``; return the rows."""
         chunk = chunk_starts(*layout)
         awake, chunks = chunk[-1], len(chunk) - 1
         before = np.concatenate(([0], np.cumsum(counts)))
@@ -418,7 +418,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         return most[0], most[1]
 
     def lay_history(self, counts: np.ndarray) -> np.ndarray:
-        """Make room for so many pairs of each grain, one behind the other, which ``make_lists`` takes for history."""
+        """Reserve rows for so many pairs of each grain, in sequence, which ``make_lists`` reads as the history."""
         start = np.cumsum(counts) - counts
         self.write("pair_start", start)
         self.write("pair_end", start + counts)
@@ -431,7 +431,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         return counts, row_numbers(start, counts)
 
     def lay_near(self, grains: np.ndarray, *layout: int) -> np.ndarray:
-        """Make room for these grains near bodies, in the order of memory, in chunks likewise; their rows."""
+        """Reserve rows for these grains near bodies, in the order of memory, in the same chunks; return the rows."""
         chunk = np.searchsorted(chunk_starts(*layout), grains, side="right") - 1
         counts = np.bincount(chunk, minlength=self.chunk_count)
         start = np.arange(self.chunk_count) * self.near_room

@@ -1,9 +1,9 @@
 """Forces between grains that touch: which rows of the pair lists touch, the force of a pair, and its sums.
 
-On a CPU the forces of LANES pairs are computed at a time: their numbers are gathered into local arrays, one loop
-without a branch computes them all, and the results are added to the grains in the order of the rows. LLVM turns that
-loop into vector instructions, each for two to eight pairs. It cannot do so where fields are read or written in the
-loop, since for all it knows they overlap.
+On a CPU the forces of LANES pairs are computed at a time: their numbers are gathered into local arrays, and one loop
+without a branch computes them all. The results are added to the grains in the order of the rows. LLVM turns that loop
+into vector instructions, each for two to eight pairs. It cannot do so where fields are read or written in the loop,
+since for all it knows they overlap.
 
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """
@@ -96,8 +96,8 @@ class Pairs(EnginePart):
 
         ``p`` the pair's parameters; ``d`` from the second to the first [m]; radii [m], masses [kg]; ``v`` the first's
         velocity less the second's [m/s]; spins [rad/s]; ``onset`` from ``onset_of``; ``u`` and ``q`` the history,
-        updated in place. Returns (unit normal, normal force [N], what of it is the dashpot's [N], tangential force [N],
-        rolling and twisting torque [N m], arm of the first and of the second [m], overlap over diameter).
+        updated in place. Returns (unit normal; normal force [N]; the dashpot's part of it [N]; tangential force [N];
+        rolling and twisting torque [N m]; arm of the first and of the second [m]; overlap over diameter).
         """
         length = d.norm()
         sum_r = r_i + r_j

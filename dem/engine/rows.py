@@ -1,4 +1,4 @@
-"""Some rows of a field as a numpy array: fields have room for many times the rows in use, and copying room costs."""
+"""Some rows of a field as a numpy array. A field has many times the rows in use, and copying unused rows costs time."""
 
 import math
 from collections.abc import Mapping
@@ -50,10 +50,10 @@ _SCRATCH = ("old_", "cell_", "block_", "buffer", "came_from", "key", "near_first
 
 
 class FieldStore:
-    """Makes fields that lie in memory together, and are given back together; ``planned``: counts their memory only.
+    """Makes fields that share one block of memory, and frees them together; ``planned``: counts their memory only.
 
     Attributes:
-        bytes: that they take.
+        bytes: memory that they take.
     """
 
     def __init__(self, *, planned: bool = False) -> None:

@@ -119,7 +119,7 @@ def usable_cores() -> list[int]:
 
 
 def _own_threads() -> set[int]:
-    """Ids of this process's threads; none where the system does not tell."""
+    """Ids of this process's threads; none where the system does not list them."""
     try:
         return {int(path.name) for path in Path("/proc/self/task").iterdir()}
     except OSError:

@@ -253,7 +253,7 @@ class Shapes(EnginePart):
         self._meshes = []
 
     def _make_table(self) -> None:
-        """A table with room for the meshes there are, and their trees in it."""
+        """A table that holds the present meshes, and their trees in it."""
         needed = sum(len(m.triangles) for m in self._meshes)
         before = self.shapes
         if self._kept is None or self._kept.triangle_capacity < needed:

@@ -1,39 +1,41 @@
-"""Grains that are slow, and grains that sleep: what is quiet is computed less often, what rests not at all.
+"""Slow grains and sleeping grains: quiet grains are computed less often, resting grains not at all.
 
-A **slow** grain takes a step every ``pace`` steps of the bed, of that many times the length. Its weight, its contacts
-and, with the defaults, its mass are its own: quiet contacts are soft enough for so long a step. What spins is nearer
-to the limit of stability, so its moment of inertia counts (pace / spin_stretch)^2 times; its mass (pace / stretch)^2
-times, where that is more than once. A **sleeper** stands still, an unmovable grain to those awake; its contacts with
-other sleepers keep their springs. All others are **fast**.
+A **slow** grain takes one long step every ``pace`` steps of the bed. Its weight, its contacts and, with the defaults,
+its mass stay unchanged: quiet contacts are soft enough for so long a step. Rotation is nearer to the limit of
+stability, so the moment of inertia is multiplied by (pace / spin_stretch)^2. The mass is multiplied by
+(pace / stretch)^2 where that is more than 1. A **sleeper** stands still: to the others it is a fixed grain. Its
+contacts with other sleepers keep their springs. All other grains are **fast**.
 
 The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g gravity, all of the bed:
 
-* A fast grain becomes slow when its speed and its surface's turning have been below ``speed`` sqrt(g d) at every look
-  for ``calm`` sqrt(d / g) (to begin with after ``settling`` times that), no fast grain that it touches moves faster, no
-  body but the floor is within ``reach`` d, and no other grain overlaps it by more than a long step bears
-  (``Sleeper.firm``).
-* A slow grain is fast again when a body comes within ``reach`` d, when another overlaps it by more than that, when it
-  moves faster than ``own`` sqrt(g d), or when the force on it is out of balance: more than ``unbalanced`` of the mean
-  force of its contacts, or of m g where that is more. Those that it touches come with it.
-* A slow grain falls asleep when it has moved below ``still`` sqrt(g d) for as long, and so have those that it touches,
-  none of them fast; at every fourth of these looks only.
-* A sleeper wakes, and is slow, when the sum of the forces on it has changed by ``change`` of its contacts' mean force
-  (or of m g) since it fell asleep, or when a grain awake that is listed with it moves faster than ``waking_speed``
-  sqrt(g d). All sleepers in its cell of the grid and the 26 around it wake with it. So do those near a body.
+* A fast grain becomes slow when four conditions hold. Its speed and its surface's turning have been below ``speed``
+  sqrt(g d) at every check for ``calm`` sqrt(d / g) (at the start of a bed ``settling`` times as long). No fast grain
+  that it touches moves faster. No body but the floor is within ``reach`` d. No other grain overlaps it by more than a
+  long step allows (``Sleeper.firm``).
+* A slow grain becomes fast again when a body comes within ``reach`` d, or when another grain overlaps it by more than
+  that. It also becomes fast when it moves faster than ``own`` sqrt(g d), or when the force on it is out of balance. The
+  last means: more than ``unbalanced`` of the mean force of its contacts, or of m g where that is more. The slow grains
+  that it touches become fast with it.
+* A slow grain falls asleep when it has moved below ``still`` sqrt(g d) for as long. The grains that it touches must
+  have done so too, and none of them may be fast. Only every fourth check applies this rule.
+* A sleeper wakes, and is slow, when the sum of the forces on it has changed since it fell asleep: by ``change`` of its
+  contacts' mean force (or of m g). It also wakes when a grain awake that is listed with it moves faster than
+  ``waking_speed`` sqrt(g d). All sleepers in its cell of the grid and the 26 around it wake with it. So do the sleepers
+  near a body.
 
-Looked at every ``every`` steps, a multiple of ``pace``: then slow and fast grains are at the same time. A bed of one
-chunk has no slow grains, and its fast ones fall asleep by the first rule with the speed of the third.
+The rules are checked every ``every`` steps, a multiple of ``pace``: then slow and fast grains are at the same time. A
+bed of one chunk has no slow grains, and its fast ones fall asleep by the first rule with the speed of the third.
 
-What fast grains do to a slow one over its step is summed and given to it whole, so that action is reaction. What is
-left is the floor's: ``Bed.reaction`` of the floor has the sleepers' weight, the force of those awake on them, and the
-momentum that a change of pace takes or gives; ``Bed.momentum`` counts slow grains with the mass that they move with.
-Who changes its pace keeps its speed; what energy that takes or gives, and what falling asleep takes, is booked with
-the dashpots' (``Bed.contact_work``).
+The forces of fast grains on a slow one are summed over its step and applied as a whole, so action equals reaction. The
+remainder acts on the floor. ``Bed.reaction`` of the floor contains the sleepers' weight, the force of the others on
+them, and the momentum of changes of pace. ``Bed.momentum`` counts slow grains with the mass that they move with. A
+grain that changes its pace keeps its speed. The energy of this change, and of falling asleep, is counted with the
+dashpots' (``Bed.contact_work``).
 
-In memory the fast come first, then the slow, then the sleepers, the first two in chunks of their own; that is all that
-the step knows of them. Who is what changes when lists are made, on steps that do not depend on how a run is cut, by
-flags that are raised and never lowered within a check, and by sums in whole numbers: the same bits on any number of
-threads.
+In memory the fast grains come first, then the slow, then the sleepers, the first two in chunks of their own. The step
+knows nothing else of them. A grain changes its class when lists are made, on steps that do not depend on how a run is
+cut. Flags are raised and never lowered within a check, and sums are of whole numbers, so results are bitwise equal on
+any number of threads.
 """
 
 import math
@@ -160,7 +162,7 @@ class Sleeper:
             e.store_contacts(rest)
             needed = int(rest.news[FULL])
             if needed:
-                raise BedFailure(f"there is room for {rest.who.shape[1]} contacts of sleepers and {needed} are needed")
+                raise BedFailure(f"{rest.who.shape[1]} contacts of sleepers fit and {needed} are needed")
         self.leaving = 0
 
     def recount(self) -> None:

@@ -44,7 +44,7 @@ _SLEEP_NUMBERS = ("awake", "fast", "mass", "slept", "leaving", "begun_ahead")
 
 @dataclass(eq=False)
 class Checkpoint:
-    """What ``Bed.checkpoint`` returned; a bed has room for one, so the next one ends it.
+    """What ``Bed.checkpoint`` returned. A bed keeps one; the next one replaces it.
 
     Attributes:
         tables: whose fields were copied: the engine, the sleepers, the balance. Others where lists have grown since.
@@ -242,7 +242,7 @@ def read_file(path: Path) -> tuple[BedSettings, State, str]:
         stored["tangential"] = np.array("displacement")
     missing = [key for key in (*ABOUT, *(f"state.{name}" for name in NAMES)) if key not in stored]
     if missing:
-        raise ValueError(f"{path} is not a whole bed saved by hedgebed: it lacks {', '.join(missing)}")
+        raise ValueError(f"{path} is not a whole bed saved by hedgebed: {', '.join(missing)} are missing")
     numbers: Any = dict(zip(MATERIAL_NUMBERS, map(float, stored["material_numbers"]), strict=True))
     state = {name[6:]: value for name, value in stored.items() if name.startswith("state.")}
     if found in STATE_FORMATS[:2]:

@@ -1,8 +1,8 @@
 """The time step: kick and drift, forces between grains and on bodies, and the loops over chunks of grains.
 
 With sleep (``dem.engine.sleep``) a slow grain has the row of its pair with another slow grain or a sleeper, but not
-with a fast one: that is the fast grain's. What the fast grain's steps did to it is summed in that row (``keep_push``)
-and taken out of it where the slow grain moves, or where lists are made (``gather_pushes``).
+with a fast one: that is the fast grain's. The impulse of the fast grain's steps is summed in that row (``keep_push``).
+It is taken out where the slow grain moves, or where lists are made (``gather_pushes``).
 
 The kernels belong to ``dem.engine.engine.Engine``, whose fields they use.
 """

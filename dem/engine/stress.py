@@ -128,8 +128,8 @@ def stress_profile(
 ) -> np.ndarray:
     """Mean stress between horizontal planes [Pa], pressure positive: sum of f l over the volume (Love, Weber).
 
-    A contact counts in a layer with the share of its branch that lies there, so that the vertical stress on a level bed
-    is the weight above over the area.
+    A contact counts in a layer with the share of its branch that lies there. So the vertical stress on a level bed is
+    the weight above over the area.
 
     Args:
         edges: heights of the planes [m], ascending, shape [layer_count + 1].

@@ -147,8 +147,8 @@ class Sleep:
 def refuse_sleep(*, arch: str, cohesion: str, floor: bool = True, gravity: float = math.inf) -> None:
     """Raise ValueError, naming what it is, for a bed whose grains cannot sleep."""
     if arch != "cpu":
-        raise ValueError(f"sleep with arch = {arch!r}: grains sleep on a CPU only so far, arch = 'cpu' would do")
+        raise ValueError(f"sleep with arch = {arch!r}: grains sleep on a CPU only so far; give arch = 'cpu'")
     if not floor or not gravity:
         raise ValueError("grains sleep in a bed with a floor and gravity only: they must lie on something")
     if cohesion == "jkr":
-        raise ValueError("sleep with cohesion = 'jkr': what wakes such grains is not measured; dmt or none would do")
+        raise ValueError("sleep with cohesion = 'jkr': what wakes such grains is not measured; give dmt or none")

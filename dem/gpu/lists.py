@@ -1,11 +1,11 @@
-"""Neighbour lists as a GPU wants them: a full list with a thread for each grain, and rows packed without gaps.
+"""Neighbour lists for a GPU: a full list with a thread for each grain, and rows packed without gaps.
 
-A bed of 20 million grains has to fit into the memory of one card, so that nothing has room for the worst grain: rows
-are counted, the counts added up, and the rows filled in. The same code runs on a CPU, for tests. Sums have one order,
-so that a bed has the same bits in every run on one kind of card.
+A bed of 20 million grains must fit into the memory of one card, so no grain gets the rows that the worst grain needs.
+Rows are counted, the counts added up, and the rows filled in. The same code runs on a CPU, for tests. Sums have one
+order, so every run on one kind of card is bitwise reproducible.
 
-Those of a grain lie together. (Interleaved by 32 grains, so that the threads of a warp read neighbouring addresses, a
-step was 9 % slower on an H100 and the rows half as many again: docs/performance.md.)
+Those of a grain lie together. (Rows interleaved by 32 grains let the threads of a warp read neighbouring addresses.
+Then a step was 9 % slower on an H100, and the rows half as many again: docs/performance.md.)
 """
 
 from typing import Any
@@ -34,7 +34,7 @@ class GpuLists(Part):
     BY_CHUNK = ("overlap",)
 
     def _make_sort_fields(self, n: int, cell_capacity: int) -> None:
-        """Room for sorting; one grain field after the other goes through the buffers."""
+        """Fields for sorting; one grain field after the other passes through the buffers."""
         real = self.real
         self.capacity, self.cell_capacity = n, cell_capacity
         self.buffer4, self.buffer3 = self.store.vector(4, real, n), self.store.vector(3, real, n)
@@ -81,10 +81,10 @@ class GpuLists(Part):
         return np.diff(starts), np.arange(starts[-1])
 
     def lay_pairs(self, counts: np.ndarray, *chunks: int) -> np.ndarray:
-        """Make room for so many pairs of each grain; their rows. Raises ValueError where there is not enough."""
+        """Reserve rows for so many pairs of each grain; return the rows. Raises ValueError where they do not fit."""
         start = np.concatenate(([0], np.cumsum(counts)))
         if start[-1] > self.row_capacity:
-            raise ValueError(f"the lists have room for {self.row_capacity} pairs, this state has {start[-1]}")
+            raise ValueError(f"the lists hold {self.row_capacity} pairs, this state has {start[-1]}")
         self.write("pair_start", start)
         self.total[PAIRS] = int(start[-1])
         return np.arange(start[-1])
@@ -92,7 +92,7 @@ class GpuLists(Part):
     lay_history = lay_pairs
 
     def lay_near(self, grains: np.ndarray, *chunks: int) -> np.ndarray:
-        """Make room for these grains near bodies, in the order of memory; their rows."""
+        """Reserve rows for these grains near bodies, in the order of memory; return the rows."""
         start = np.searchsorted(grains, np.arange(self.grain_count + 1))
         self.write("near_start", start)
         self.near_push.fill(0)
@@ -276,7 +276,7 @@ class GpuLists(Part):
 
     @ti.func
     def fits(self):
-        """Whether there is room for all rows."""
+        """Whether all rows fit."""
         return self.total[PAIRS] <= self.row_capacity and self.total[NEAR] <= self.near_capacity
 
     @ti.func

@@ -1,9 +1,9 @@
 """The time step on a GPU: a thread for each grain, which computes all its contacts by itself.
 
-A step is three loops: move; the forces between grains, each pair computed by both; the forces on bodies. A thread first
-looks which of its rows touch and keeps them as bits of a number, so that the threads of a warp then compute contacts
-side by side. No sum is made by atomic operations: on one kind of card a bed has the same bits in every run. The same
-code runs on a CPU, for tests.
+A step has three loops: move; the forces between grains, each pair computed by both; the forces on bodies. A thread
+first finds which of its rows touch and keeps them as bits of a number. The threads of a warp then compute contacts side
+by side. No sum uses atomic operations, so every run on one kind of card is bitwise reproducible. The same code runs on
+a CPU, for tests.
 """
 
 import numpy as np

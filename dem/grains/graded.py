@@ -2,11 +2,10 @@
 
 The mean diameter is a field over the bed's length x and height z, the same across y: ``fine`` under the footprints,
 down to a depth, and from there on ``growth`` metres more for each metre away, up to ``coarse``. Small grains fall
-through large ones where they fit between them. Three spheres of diameter D that touch leave a throat of
-2 / sqrt(3) - 1 = 0.155 D, which is D / 6.46, below which a grain falls through a dense packing by its own weight
-(Savage & Lun 1988, J. Fluid Mech. 189:311); four in a square leave sqrt(2) - 1 = 0.414 D. So that no grain passes even
-those, the field rises no faster than ``steepest``. Rings of five and more leave wider ones; docs/bed.md has how much
-goes through.
+through large ones where they fit between them. Three spheres of diameter D that touch leave a throat of 2 / sqrt(3) - 1
+= 0.155 D, which is D / 6.46. A smaller grain falls through a dense packing by its own weight (Savage & Lun 1988, J.
+Fluid Mech. 189:311); four in a square leave sqrt(2) - 1 = 0.414 D. So that no grain passes even those, the field rises
+no faster than ``steepest``. Rings of five and more leave wider ones; docs/bed.md has how much goes through.
 """
 
 import math
@@ -37,9 +36,9 @@ _BLOCK = 100_000  # grains looked at in one go, for memory's sake
 def steepest(spread: float) -> float:
     """The largest growth of the mean diameter with distance at which no grain drains [1].
 
-    At a growth g a grain d and one of the mean diameter D that lies ``DRIFT`` D away differ by d = D (1 - DRIFT g), and
-    with the spread s the smallest of the one kind and the largest of the other by (1 - s) / (1 + s) more. The ratio
-    stays at ``THROAT`` or above.
+    At a growth g a grain d and one of the mean diameter D that lies ``DRIFT`` D away differ by d = D (1 - DRIFT g).
+    With the spread s the smallest of the one kind and the largest of the other differ by (1 - s) / (1 + s) more. The
+    ratio stays at ``THROAT`` or above.
 
     ``spread``: of the diameters about their mean, over it [1]. Raises ValueError: one so wide that grains of one place
     would drain through one another.
@@ -80,7 +79,7 @@ class Graded:
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
                 raise ValueError(f"Graded: {key} = {value!r} must be a positive length [m]")
         if self.coarse < self.fine:
-            raise ValueError(f"Graded: coarse = {self.coarse} m is below fine = {self.fine} m: that or more would do")
+            raise ValueError(f"Graded: coarse = {self.coarse} m is below fine = {self.fine} m: give that or more")
         most = steepest(self.spread)
         if not 0 < self.growth <= most:
             raise ValueError(
@@ -121,7 +120,7 @@ class Graded:
             if low < 0 or high > size[0]:
                 raise ValueError(
                     f"Graded: the footprint from {low:g} to {high:g} m is outside the bed, which reaches from 0 to "
-                    f"{size[0]:g} m along x: a longer bed or a footprint within it would do"
+                    f"{size[0]:g} m along x: give a longer bed or a footprint within it"
                 )
         if self.depth is not None and self.depth > size[2]:
             raise ValueError(
@@ -133,8 +132,8 @@ class Graded:
             if length < least * largest * (1 - 1e-9):
                 raise ValueError(
                     f"Graded: coarse = {self.coarse:g} m makes grains of {largest:.4g} m, and size: {name} = {length} "
-                    f"m is less than {least} of them; coarse = {math.floor(1e5 * length / least + 1e-6) / 1e5:g} m "
-                    f"would do"
+                    f"m is less than {least} of them; give at most coarse = "
+                    f"{math.floor(1e5 * length / least + 1e-6) / 1e5:g} m"
                 )
 
     def distance(self, x: np.ndarray, z: np.ndarray, size: Sequence[float]) -> np.ndarray:
@@ -172,7 +171,7 @@ class Graded:
         grains that overlap there are pushed apart.
 
         Returns centres [m], shape [grain_count, 3], and radii [m], shape [grain_count], in the order of a curve through
-        space. Raises RuntimeError: no room found, which a bed that passes ``check`` does not come to.
+        space. Raises RuntimeError: the grains do not fit into the column; a bed that passes ``check`` never raises it.
         """
         top = volume / (_START * size[0] * size[1])
         count = round(volume / (math.pi / 6 * self.fine**3 * (1 + self.spread**2)))
@@ -223,7 +222,7 @@ def _moved_apart(places: np.ndarray, radii: np.ndarray, period: tuple[float, flo
             places[:, axis] += np.bincount(one, (share * push)[:, axis], len(places))
             places[:, axis] -= np.bincount(other, ((1 - share) * push)[:, axis], len(places))
         places = _within(places, radii, period)
-    raise RuntimeError(f"the {len(places)} grains of a graded bed found no room in their column")
+    raise RuntimeError(f"the {len(places)} grains of a graded bed do not fit into their column")
 
 
 def _between(places: np.ndarray, one: np.ndarray, other: np.ndarray, period: tuple[float, float]) -> np.ndarray:

@@ -121,8 +121,8 @@ class Material:
     def for_grain(self, diameter: float) -> Material:
         """The same material in grains of another mean diameter [m], with the strength that it has in its own.
 
-        Cohesion, a stress, goes as surface energy over diameter, so that the surface energy is taken in proportion. A
-        material that does not say for which grains its surface energy holds stays as it is.
+        Cohesion, a stress, is proportional to surface energy over diameter, so the surface energy changes with the
+        diameter. A material that does not state the grains of its surface energy stays unchanged.
         """
         if self.grain is None or self.cohesion == "none":
             return self
@@ -168,7 +168,7 @@ class Facing:
         if self.rolling_friction and not material.rolling_friction:
             raise ValueError(
                 f"rolling_friction = {self.rolling_friction} needs rolling, which a bed of {material.name!r} leaves "
-                f"out, as its grains have no rolling friction; {LEAST_ROLLING:g} for theirs would do"
+                f"out, as its grains have no rolling friction; give the grains {LEAST_ROLLING:g}"
             )
         if self.surface_energy and material.cohesion == "none":
             raise ValueError(
@@ -183,14 +183,14 @@ PRESETS = Path(__file__).parents[1] / "presets"
 def read_material(path: str | Path) -> Material:
     """The material in a file of the form that this module's docstring gives.
 
-    Raises ValueError: a file that cannot be read or is not of this form, an unknown or a missing key, a value
-    of the wrong kind or that no material can have, the name of a material that ships with other numbers.
+    Raises ValueError: a file that cannot be read or is not of this form; an unknown or a missing key; a value of the
+    wrong kind or that no material can have; the name of a material that ships with other numbers.
     """
     stuff = _read(Path(path))
     known = MATERIALS.get(stuff.name)
     if known is not None and (known != stuff or known.grain != stuff.grain):
         raise ValueError(
-            f"{path}: name = {stuff.name!r} is that of a material that ships, with other numbers; another name would do"
+            f"{path}: name = {stuff.name!r} is that of a material that ships, with other numbers; give another name"
         )
     return stuff
 
@@ -262,7 +262,7 @@ def material(name: str | Path | Material, *, grain: float | None = None) -> Mate
             of one that ships is taken too, with a FutureWarning.
         grain: mean diameter of its grains [m], see ``Material.for_grain``.
 
-    Raises ValueError: no material of that name, with those there are; a file that will not do (``read_material``).
+    Raises ValueError: no material has that name (the message lists the names); the file is wrong (``read_material``).
     """
     word = str(name)
     if isinstance(name, Material):

@@ -39,8 +39,8 @@ def rain_column(sizes: Sizes) -> float:
     """Upper bound of the rain's column over the depth of the levelled bed [1].
 
     ``RAIN_COLUMN`` as long as sizes are alike. The lattice has a site of the largest grain's size for every grain, so a
-    wide distribution makes a column that is higher by the ratio of the largest to the mean cube over that of a uniform
-    one (spread 0.15).
+    wide distribution makes a higher column. The factor is the ratio of the largest to the mean cube, over that of a
+    uniform one (spread 0.15).
     """
     if isinstance(sizes, Uniform):
         return RAIN_COLUMN

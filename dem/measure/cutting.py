@@ -47,8 +47,9 @@ class VerticalCut:
             0 and None where it never stood or never fell.
         height: of the face [m]. unit_weight: bulk density times the bed's own gravity [N/m3].
         trials: gravity over the bed's own, and the share of the wedges' grains that had moved by a diameter, in order.
-        before, after: thickness against distance from the cut's middle [m]: of the faces that still stood last (None
-            where none did), and at rest at the bed's own gravity, after one fell or stood to the end; (x, thickness).
+        before, after: thickness against distance from the cut's middle [m]: ``before`` of the last standing faces (None
+            where none stood); ``after`` at rest at the bed's own gravity, when a face fell or stood to the end; (x,
+            thickness).
         flanks: fitted slopes of what it slumped to; None where it stood or they are too short.
         width: of the cut [m]. bed: as it lies now.
     """
@@ -87,8 +88,8 @@ def cut_and_load(
 
     Args:
         bed: level; used up by it. width: of the strip [m]; the bed's height when None.
-        most: gravity to which a face is tried, over the bed's own [1]: the step of 1.41 next to it.
-        tell: called with the share done, 0 to 1; a guess.
+        most: largest gravity that is tried, over the bed's own [1]; rounded to the nearest power of 1.41.
+        tell: called with the estimated share done, 0 to 1.
 
     Raises ValueError: a tilted bed; a strip that leaves too little for two faces; a ``most`` that is not above
     ``LEAST``. BedFailure: the bed did not come to rest, or its own reasons.
@@ -96,7 +97,7 @@ def cut_and_load(
     grain = 2 * float(bed.grains().radius.mean())
     refuse_tilted(bed)
     if not LEAST < most < math.inf:
-        raise ValueError(f"most = {most}: a gravity above {LEAST:g} of the bed's own would do")
+        raise ValueError(f"most = {most}: give a gravity above {LEAST:g} of the bed's own")
     check_width(width, width=bed.size[0], height=bed.surface, grain=grain)
     width = bed.surface if width is None else width
     own, height, packing = -bed.gravity[2], bed.surface, bed.packing_fraction
@@ -156,12 +157,12 @@ def check_width(cut: float | None, *, width: float, height: float, grain: float)
     cut = height if cut is None else cut
     most = width - 2 * (_WEDGE * height + 3 * grain)
     if not 2 * grain <= cut <= most:
-        would_do = f"and a bed {width + 2 * grain - most:.4g} m wide would do"
+        remedy = f"give a bed {width + 2 * grain - most:.4g} m wide, and a cut of at least"
         if most >= 2 * grain:
-            would_do = f"to {most:.4g} m would do"
+            remedy = f"give at most {most:.4g} m and at least"
         raise ValueError(
-            f"width = {cut:.4g} m of the cut: two wedges and three grains beside each must be left; from two grains, "
-            f"{2 * grain:.4g} m, {would_do}"
+            f"width = {cut:.4g} m of the cut: two wedges and three grains beside each must be left; {remedy} two "
+            f"grains, {2 * grain:.4g} m"
         )
 
 

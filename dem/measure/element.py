@@ -5,9 +5,9 @@ sample is periodic sideways, floor and lid are planes on which grains neither sl
 ``dem.measure.shearing``. Nothing in it has a length but the grains: stresses scale with the pressure, and with cohesion
 the strength depends on surface energy over pressure times diameter.
 
-1. Grains of a loose jittered column are pressed together by the lid under servo control, in a drag and without
-   adhesion, which comes back once the sample rests (sticking grains would stay apart in a gauze of chains, at a packing
-   of a third, that no soil is). They have their own friction and rolling friction meanwhile, or, for denser samples, a
+1. The lid presses grains of a loose jittered column together under servo control, in a drag and without adhesion.
+   Adhesion acts again once the sample rests. Sticking grains would stay apart in a gauze of chains, at a packing of a
+   third, unlike any soil. They have their own friction and rolling friction meanwhile, or, for denser samples, a
    friction of choice and no rolling friction.
 2. The lid moves sideways, the pressure held. Rates are given as inertial numbers, rate d sqrt(density / pressure);
    below some 5e-3 strength hardly depends on them (GDR MiDi 2004, Eur. Phys. J. E 14:341).
@@ -205,8 +205,8 @@ def _rest(bed: BedCore, wall: _Wall, grain: float) -> None:
         held = held + _STEPS * bed.time_step if near and energy < _CALM else 0.0
         if bed.time - began > _LONGEST * wall.unit:
             raise BedFailure(
-                f"the sample did not come to rest under its lid: of {wall.pressure:.4g} Pa {100 * missing:.3g} % lack, "
-                f"{energy:.1e} p d^3 of kinetic energy a grain ({_CALM:g} was wanted)"
+                f"the sample did not come to rest under its lid: of {wall.pressure:.4g} Pa {100 * missing:.3g} % were "
+                f"missing, {energy:.1e} p d^3 of kinetic energy a grain ({_CALM:g} was wanted)"
             )
 
 

@@ -61,8 +61,8 @@ class Grading:
 
     Attributes:
         zones: by distance from the fine grains. layers: by height, from the floor up.
-        drained_share: share of the solid volume in grains that would fit through the widest throat (``THROAT``) between
-            the largest grains of the place where they lie [1].
+        drained_share: share of the solid volume in grains that could drain [1]: they fit through the widest throat
+            (``THROAT``) between the largest grains nearby.
         strayed_share: in grains farther out than any of their size belongs, by more than a mean diameter there [1].
         farthest: the farthest of these, in such diameters [1]; 0: none is beyond where it belongs.
         touching_ratio: the largest ratio of the diameters of two grains that touch [1]; a grain falls through three

@@ -150,13 +150,13 @@ def check_cone(
     if not least <= diameter <= most:
         narrow = f"; the bed is too narrow for any, a width of {LEAST_WIDTH * least:.4g} m is needed"
         raise ValueError(
-            f"diameter = {diameter:g} m: from three grains, {least:.4g} m, to a third of the bed's width, "
-            f"{most:.4g} m, would do{narrow if most < least else ''}"
+            f"diameter = {diameter:g} m: give three grains, {least:.4g} m, to a third of the bed's width, "
+            f"{most:.4g} m{narrow if most < least else ''}"
         )
     if not 10 <= angle <= 150:
-        raise ValueError(f"angle = {angle:g} degrees: a full angle of 10 to 150 would do")
+        raise ValueError(f"angle = {angle:g} degrees: give a full angle of 10 to 150")
     if not grain <= shaft <= diameter:
-        raise ValueError(f"shaft = {shaft:g} m: from a grain, {grain:.4g} m, to the cone's {diameter:g} m would do")
+        raise ValueError(f"shaft = {shaft:g} m: give a grain, {grain:.4g} m, to the cone's {diameter:g} m")
     length = cone_length(diameter, angle)
     least, most = _LEAST_DEPTH * length, surface - _FLOOR * diameter
     if not least <= depth <= most:

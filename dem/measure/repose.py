@@ -2,8 +2,8 @@
 
 This is the drained angle of repose, of the material at rest above an outlet (Brown & Richards 1970, Principles of
 Powder Mechanics; set up as a bed over side outlets by Zhou et al. 2001, Phys. Rev. E 64:021301). The slot runs along y,
-where the bed is periodic: the slopes on its two sides have no side walls. What falls through the slot lies in a pit
-below, so that no foot runs out, and the plate is rough, so that the slope is the material's own and not the plate's.
+where the bed is periodic: the slopes on its two sides have no side walls. Grains that fall through the slot lie in a
+pit below, so that no foot runs out. The plate is rough, so that the slope is that of the material and not of the plate.
 """
 
 import math
@@ -88,10 +88,10 @@ def angle_of_repose(
     All grains are lifted with the contacts among them, onto a plate that has the slot.
 
     Args:
-        bed: level; its width in x should hold both slopes: for a bed of height h and slopes of 25 degrees 4 h + slot.
+        bed: level. Its width in x should hold both slopes: 4 h + slot for a height h and slopes of 25 degrees.
         slot: width [m]; six mean diameters when None.
         rough: whether grains neither slide nor roll on the plate; else they do as on one another.
-        tell: called with the share done, 0 to 1; a guess.
+        tell: called with the estimated share done, 0 to 1.
 
     Raises ValueError: a tilted bed, a slot narrower than three diameters, a bed too narrow for two slopes. BedFailure:
     it did not come to rest, or what stays is too short to have a slope.
@@ -137,8 +137,8 @@ def check_width(width: float, *, slot: float | None, grain: float, depth: float)
     least = slot + 2 * LEAST_FLANK * grain
     if width < least:
         raise ValueError(
-            f"size: x = {width:g} m is too narrow for a slot of {slot:.4g} m and two slopes: {least:.4g} m at least "
-            f"would do, for slopes of 25 degrees over all of the depth {slot + 4.3 * depth:.3g} m"
+            f"size: x = {width:g} m is too narrow for a slot of {slot:.4g} m and two slopes: give at least "
+            f"{least:.4g} m; slopes of 25 degrees over all of the depth need {slot + 4.3 * depth:.3g} m"
         )
 
 

@@ -65,7 +65,7 @@ def shear_bed(
     if pressure > MOST_PRESSURE * floor * (1 + 1e-9):
         raise ValueError(
             f"pressure = {pressure:g} Pa is more than {MOST_PRESSURE:g} times what lies on the bed's floor, for which "
-            f"its grains are too soft: at most {MOST_PRESSURE * floor:.4g} Pa would do, or a deeper bed"
+            f"its grains are too soft: give at most {MOST_PRESSURE * floor:.4g} Pa, or a deeper bed"
         )
     bed.set_facing(FLOOR, Facing(friction=ROUGH, rolling_friction=ROUGH))
     packing, area = bed.packing_fraction, bed.size[0] * bed.size[1]

@@ -56,11 +56,11 @@ class Laboratory(Preparation[B]):
 
         Args:
             grain: mean diameter [m]. progress: as ``prepare_as`` takes it.
-            path: where it is kept now and then (.npz, and .json beside it); None: nowhere.
-            recipe: what was kept at ``path`` is continued only for the same recipe.
-            graded: where sizes belong; every stage's report then contains how they lie.
-            sticking: the material, and the floor, as which grains touch from the stage 'stick' on.
-            labels: what progress calls a stage where not as it is written; with labels stages have no reports.
+            path: where it is saved from time to time (.npz, and .json beside it); None: nowhere.
+            recipe: a preparation saved at ``path`` is continued only for the same recipe.
+            graded: sizes by place; every stage's report then states where the sizes lie.
+            sticking: contact properties of grains and floor from the stage 'stick' on.
+            labels: names of stages in the progress, for each name in the recipe; with labels stages have no reports.
         """
         super().__init__(bed, grain=grain)
         self.stages = list(stages)
@@ -75,7 +75,7 @@ class Laboratory(Preparation[B]):
         return self.bed.packing_fraction if self._graded is None else packing_under(self.bed, self._graded)
 
     def keep(self) -> None:
-        """Write it down as it is."""
+        """Save the preparation in its present state."""
         if self._path is not None:
             self.bed.save(self._path)
             if self._densest:
@@ -286,8 +286,7 @@ class Laboratory(Preparation[B]):
                 self._settle(ENERGY_RATIO, notes["settle"], longest=_FLOWS)
             except BedFailure:
                 raise ValueError(
-                    f"stages: {str(stage)!r} cannot be held: the bed flows at {angle:g} degrees; "
-                    f"{notes['held']:g} would do"
+                    f"stages: {str(stage)!r} cannot be held: the bed flows at {angle:g} degrees; give {notes['held']:g}"
                 ) from None
             notes |= {"held": angle, "settle": None}
             self._pause(min(1.0, angle / stage.value))
@@ -312,8 +311,8 @@ def touching_as(bed: B, material: Material, floor: Facing | None = None) -> B:
     if material.density != own.density or (material.rolling_friction > 0) != (own.rolling_friction > 0):
         raise ValueError(
             f"material = {material.name!r}: density {material.density:g} kg/m3, rolling friction "
-            f"{material.rolling_friction:g}, where the grains have {own.density:g} and {own.rolling_friction:g}: the "
-            f"same density, and rolling friction in both or in none, would do"
+            f"{material.rolling_friction:g}, where the grains have {own.density:g} and {own.rolling_friction:g}: give "
+            f"the same density, and rolling friction in both or in none"
         )
     bed.wake()
     values = bed.state()

@@ -14,6 +14,7 @@ from dem.grains.materials import Material
 from dem.grains.sizes import Json, Uniform
 
 from .bedfile import load_prepared, save_prepared
+from .code import cache_folder, fingerprint
 from .laboratory import Laboratory
 from .recipe import DENSEST_UNIFORM, Stage, check_packing, check_stages, parse_stage
 from .report import B, Prepared
@@ -21,9 +22,7 @@ from .specification import (
     BedOptions,
     Specification,
     bound_of_mean,
-    cache_folder,
     check_options,
-    fingerprint,
     kept_in_cache,
     soft_enough,
 )
@@ -90,9 +89,9 @@ def prepare_bed(
 ) -> B:
     """A bed rained in, levelled and settled under gravity, or the same one from the cache.
 
-    It is the recipe ``rain, level`` of ``prepare_as``, with ``packing:...`` behind it where a packing is asked for, but
-    for two things that keep beds bitwise as they have always been: less is rained in, and the rain is cut level as soon
-    as it is nearly at rest (mean kinetic energy of a grain below 1e-2 m g d). There are no reports.
+    It is the recipe ``rain, level`` of ``prepare_as``, followed by ``packing:...`` where a packing is given. Two things
+    differ, so that beds stay bitwise equal to those of earlier versions. Fewer grains rain in. The rain is cut level
+    when it is nearly at rest (mean kinetic energy of a grain below 1e-2 m g d). There are no reports.
 
     Args:
         material: a name, the file of a material or a Material; its surface energy is taken for these grains, where it
@@ -104,11 +103,12 @@ def prepare_bed(
             and the next call continues from it.
         progress, options: as for ``prepare_as``.
 
-    The grains fall as a loose column from rest, come to rest in a drag that stands in for the long ringing of a soft
-    bed, lose what lies above the level, and settle again, at the end without drag. Settled means: mean kinetic energy
-    of a grain below 1e-5 m g d, and floor force within 1 % of the weight. Raises ValueError: an unknown material, a
-    size or grain that is not positive, grains too large for the bed, a spread outside 0 to 0.5 or beside a
-    distribution, a packing that cannot be reached, a time step too long. BedFailure: the bed did not come to rest.
+    The grains fall as a loose column from rest. They come to rest in a drag, which replaces the long ringing of a soft
+    bed. Then the grains above the level are removed, and the others settle again, at the end without drag. Settled
+    means: mean kinetic energy of a grain below 1e-5 m g d, and floor force within 1 % of the weight. Raises ValueError:
+    an unknown material; a size or grain that is not positive; grains too large for the bed; a spread outside 0 to 0.5
+    or beside a distribution; a packing that cannot be reached; a time step too long. BedFailure: the bed did not come
+    to rest.
     """
     wanted = Specification.of(material, **options)
     sizes, (x, y, z) = wanted.sizes, wanted.size
@@ -172,7 +172,7 @@ def _prepared(
         if not plain:
             raise
         kept = work.bed.save(cache_folder() / "failed" / shelf.name)
-        raise BedFailure(f"{failure.reason}; the bed as it was is in {kept}") from None
+        raise BedFailure(f"{failure.reason}; the bed at that time is in {kept}") from None
     prepared = Prepared(wanted.finish(bed, recipe), recipe, work.reports)
     if cache:
         try:

@@ -72,7 +72,7 @@ def parse_stage(words: str) -> Stage:
         raise ValueError(f"stages: {words!r}: 'stick' takes no number")
     example = {"compact": "compact:0.6", "packing": "packing:0.58", "cut": "cut:0.02", "tilt": "tilt:20"}.get(name)
     if example and not rest:
-        raise ValueError(f"stages: {words!r} lacks its number: {example} would do ({STAGES[name]})")
+        raise ValueError(f"stages: {words!r} needs a number, for example {example} ({STAGES[name]})")
     if name == "compact" and rest == "densest":
         if by == "lid":
             raise ValueError(f"stages: {words!r}: the densest bed is tapped; a lid takes a packing fraction")
@@ -97,15 +97,15 @@ def check_packing(packing: float, sizes: Sizes, *, cohesive: bool, key: str = "p
         return
     why = "" if cohesive else "; grains that stick (cohesion) make looser beds"
     raise ValueError(
-        f"{key} = {packing:g} is no packing fraction of {'such ' if cohesive else ''}spheres at rest: above {low:g} "
-        f"and at most {high:g} would do{why if packing <= low else ''}"
+        f"{key} = {packing:g} is no packing fraction of {'such ' if cohesive else ''}spheres at rest: give more than "
+        f"{low:g} and at most {high:g}{why if packing <= low else ''}"
     )
 
 
 def check_stages(stages: Sequence[Stage], *, size: Sequence[float], grain: float, sizes: Sizes, cohesive: bool) -> None:
     """Raise ValueError for an order or a number that cannot be; ``size`` of the bed, ``grain`` mean diameter [m]."""
     if not stages:
-        raise ValueError("stages is empty: 'rain' at least would do")
+        raise ValueError("stages is empty: give 'rain' at least")
     if stages[0].name != "rain":
         raise ValueError(f"stages begins with {str(stages[0])!r}: a bed begins with 'rain'")
     _check_sticking(stages, cohesive=cohesive)
@@ -122,18 +122,18 @@ def check_stages(stages: Sequence[Stage], *, size: Sequence[float], grain: float
             check_packing(value, sizes, cohesive=cohesive, key=key)
         elif stage.name == "level" and value is not None and not _within(value, 4 * grain, size[2]):
             raise ValueError(
-                f"stages: {str(stage)!r} [m]: a height from {4 * grain:.4g} m, four grains, to the bed's depth "
-                f"{size[2]:g} m would do"
+                f"stages: {str(stage)!r} [m]: give a height from {4 * grain:.4g} m, four grains, to the bed's depth "
+                f"{size[2]:g} m"
             )
         elif stage.name == "fluff" and value is not None and not 1.02 <= value <= 2.0:
-            raise ValueError(f"stages: {str(stage)!r}: 1.02 to 2 times the height of the bed would do")
+            raise ValueError(f"stages: {str(stage)!r}: give 1.02 to 2 times the height of the bed")
         elif stage.name == "cut" and value is not None and not _within(value, 2 * grain, size[0] - 6 * grain):
             raise ValueError(
-                f"stages: {str(stage)!r} [m]: at least two grains, {2 * grain:.4g} m, would do, and at most the bed's "
+                f"stages: {str(stage)!r} [m]: give at least two grains, {2 * grain:.4g} m, and at most the bed's "
                 f"width less six grains, {size[0] - 6 * grain:.4g} m"
             )
         elif stage.name == "tilt" and value is not None and not value < 90:
-            raise ValueError(f"stages: {str(stage)!r} [degrees]: below 90 would do")
+            raise ValueError(f"stages: {str(stage)!r} [degrees]: give less than 90")
 
 
 def _within(value: float, low: float, high: float) -> bool:
@@ -142,14 +142,14 @@ def _within(value: float, low: float, high: float) -> bool:
 
 
 def _check_sticking(stages: Sequence[Stage], *, cohesive: bool) -> None:
-    """What is poured without adhesion, or with less friction, has 'stick' once behind it, and nothing else has."""
+    """Raise ValueError unless 'stick' comes once after grains poured without adhesion or with less friction."""
     rain, times = stages[0], [stage.name for stage in stages].count("stick")
     if rain.dry and rain.value is None and not cohesive:
-        raise ValueError(f"stages: {str(rain)!r}: these grains do not stick anyway; 'rain' would do")
+        raise ValueError(f"stages: {str(rain)!r}: these grains do not stick anyway; give 'rain'")
     if rain.dry and times != 1:
         raise ValueError(
             f"stages: {str(rain)!r} needs 'stick' once behind it ({times} found), where the grains get back what "
             f"their material has"
         )
     if times and not rain.dry:
-        raise ValueError("stages: 'stick' is for what was poured without: 'rain:dry' at the beginning would do")
+        raise ValueError("stages: 'stick' is for what was poured without: give 'rain:dry' at the beginning")

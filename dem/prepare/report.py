@@ -1,4 +1,4 @@
-"""What a stage of a preparation left: its report, and a bed with the reports of all its stages."""
+"""The result of a stage of a preparation: its report, and a bed with the reports of all its stages."""
 
 import math
 from dataclasses import dataclass, field
@@ -22,10 +22,10 @@ B = TypeVar("B", bound=BedCore)
 
 @runtime_checkable
 class ShowsBed(Protocol):
-    """What may be told a bed in preparation, before each ``update`` of the share done."""
+    """A progress display that also accepts the bed in preparation, before each ``update`` of the share done."""
 
     def show_bed(self, bed: BedCore) -> None:
-        """The bed as it is."""
+        """Show the bed in its present state."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class StageReport:
     """The bed at the end of a stage. SI units, ratios without; profiles from the floor up, a value for each layer.
 
     Attributes:
-        stage: as it is written.
+        stage: its text in the recipe.
         packing_fraction, coordination_number, surface: of the bed; ``surface`` its height [m].
         kinetic_energy: mean of a grain over m g d [1]. floor_share: what the floor carries over the weight [1].
         criterion: of settling, in words, with what was found.
@@ -79,7 +79,7 @@ class Prepared(Generic[B]):
 def measure_stage(
     bed: BedCore, stage: str, *, grain: float, across: tuple[float, float] | None = None, notes: Json | None = None
 ) -> StageReport:
-    """The report of a bed as it is now; ``across``: profiles of this part of its width in x only [m]."""
+    """The report of the present bed; ``across``: profiles of this part of its width in x only [m]."""
     grains = bed.grains()
     position, radius, width = grains.position, grains.radius, bed.size[0]
     if across is not None:

@@ -3,11 +3,9 @@
 The cache is keyed by everything that shapes a bed, the code included, so that nobody waits for the same rain twice.
 """
 
-import functools
 import hashlib
 import json
 import math
-import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -23,8 +21,8 @@ from dem.grains.materials import material as find_material
 from dem.grains.packing import RAIN_COLUMN, draw_radii, rain_column, rain_positions
 from dem.grains.sizes import Json, Sizes, describe, sizes_of
 from dem.measure.grading import measure_grading, surface_under
-from hedgebed_taichi import version
 
+from .code import cache_folder, fingerprint
 from .report import B
 
 __all__ = ["BEARING", "BedOptions", "Specification", "kept_in_cache"]
@@ -39,12 +37,6 @@ _RAIN_OVERLAP = 0.05
 _NUMBERS = ("gravity", "seed", "young", "max_overlap", "time_step")
 # Smallest over mean diameter of the sizes with which ``CHAIN`` was measured.
 _NARROW = 0.85
-
-
-def cache_folder() -> Path:
-    """Where prepared beds are kept: ``HEDGEBED_CACHE``, or ~/.cache/hedgebed."""
-    given = os.environ.get("HEDGEBED_CACHE")
-    return Path(given).expanduser() if given else Path.home() / ".cache" / "hedgebed"
 
 
 class BedOptions(TypedDict, total=False):
@@ -125,8 +117,8 @@ class Specification:
         """The same of grains that stick neither to one another nor to the floor.
 
         With this friction and no rolling friction, or their own where it is None [1]. Enlarged grains that keep a
-        powder's strength rain into a gauze far looser than the powder ever is, and neither taps nor a lid bring them
-        together (docs/bed.md). So they are poured like this, and stick once the bed lies as it should
+        powder's strength rain into a gauze far looser than the powder. Neither taps nor a lid bring them together
+        (docs/bed.md). So they are poured like this, and stick once the bed lies as it should
         (``dem.prepare.laboratory.touching_as``). ``dem.measure.element`` presses its samples in the same way.
         """
         stuff = replace(self.material, cohesion="none", surface_energy=0.0)
@@ -202,15 +194,6 @@ class Specification:
         return bed
 
 
-@functools.cache
-def fingerprint() -> str:
-    """A short digest of the code that computes beds and of Taichi: with another one, bits may differ."""
-    digest = hashlib.sha256(version().encode())
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 def kept_in_cache(recipe: Json) -> tuple[Path, Path]:
     """Where the cache keeps the bed of a recipe (which names its material), and where it while it is under way."""
     key = hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest()[:24]
@@ -256,5 +239,5 @@ def check_options(size, grain, gravity, seed, max_overlap) -> None:
     for name, length, least in (("x", size[0], 6), ("y", size[1], 6), ("z", size[2], 4)):
         if length < least * grain * (1 - 1e-9):  # 6 * 0.006 is more than 0.036 to a computer
             raise ValueError(
-                f"size: {name} = {length} m is less than {least} grains of {grain} m; {least * grain:.4g} m would do"
+                f"size: {name} = {length} m is less than {least} grains of {grain} m; give {least * grain:.4g} m"
             )

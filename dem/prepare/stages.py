@@ -159,8 +159,8 @@ class Preparation(Generic[B]):
 
         The surface sinks meanwhile and stays nearly level. A tap is half a sine of acceleration of the bed's frame, 3 g
         high, as long as a grain falls for its diameter; one that goes too far is taken back and made half as high.
-        With None the bed is left as it was densest. Taps of 3 g throw it up, and what sticks may come down in looser
-        lumps: such grains are tapped half as hard from there, and again, until that gains nothing either.
+        With None the densest state remains. Taps of 3 g throw the bed up, and grains that stick may come down in looser
+        lumps. From there they are tapped half as hard, and again, until that gains nothing either.
         """
         bed = self.bed
         if "taps" not in notes:

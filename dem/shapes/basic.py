@@ -4,8 +4,8 @@ A body is a union of primitives in its own frame. A grain touches a body at most
 nearest to the grain's centre. Lengths in metres.
 
 Each primitive is stored as one row (kind, body, six numbers); ``nearest`` returns, for a point outside, the exact
-distance to the union, the outward unit normal there, and the curvature 1/R of a ball's surface (0 for the others,
-which meet a grain as a plane does). Further shapes are in ``dem.shapes.solids`` and ``dem.shapes.mesh``.
+distance to the union, the outward unit normal there, and the curvature 1/R of a ball's surface. The curvature of the
+others is 0: they meet a grain as a plane does. Further shapes are in ``dem.shapes.solids`` and ``dem.shapes.mesh``.
 """
 
 import math
@@ -49,7 +49,7 @@ class Shape:
         raise NotImplementedError
 
     def place(self) -> list[float]:
-        """Position, rotation (quaternion, scalar first) and one number that its row has no room for, eight in all."""
+        """Position, rotation (quaternion, scalar first) and one number that does not fit into its row; eight in all."""
         return [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
 
     def extent(self) -> float:

@@ -1,7 +1,7 @@
 """Bodies given by their surface: closed triangle meshes, convex polyhedra, and the files they come from.
 
-A mesh is refused unless a grain can tell its inside from its outside: every edge belongs to two triangles that run
-along it in opposite directions, and the normals point outwards. Whether the surface runs through itself is not checked.
+A mesh must separate inside from outside, else it is refused. Every edge belongs to two triangles that run along it in
+opposite directions, and the normals point outwards. Whether the surface intersects itself is not checked.
 """
 
 import contextlib

@@ -1,9 +1,9 @@
 """`hedgebed bed test plates`: the stress that a bed opposes to plates, over their angle and their direction of motion.
 
-A square plate whose leading face has the outward normal n = (sin beta, 0, -cos beta) moves along
-v = (cos gamma, 0, -sin gamma), z up. beta = 0 faces down, beta = 90 degrees faces forward, gamma = 90 degrees is
-straight down. Each plate goes into a fresh copy of the bed. With gamma above 0 it begins above the surface and moves
-along v. With gamma = 0 it first goes in edgewise, and is then dragged level at the full depth.
+A square plate moves along v = (cos gamma, 0, -sin gamma), z up. Its leading face has the outward normal n = (sin beta,
+0, -cos beta). beta = 0 faces down, beta = 90 degrees faces forward, gamma = 90 degrees is straight down. Each plate
+goes into a fresh copy of the bed. With gamma above 0 it begins above the surface and moves along v. With gamma = 0 it
+first goes in edgewise, and is then dragged level at the full depth.
 
 From the forces follow the factors of 3D-RFT in these grains (`experiments.bed.plates_fit`). Bodies of other shapes are
 pushed into the same beds and compared with what that table predicts for them.

@@ -3,7 +3,7 @@
 Peak: the largest shear stress, smoothed over half a diameter of the lid's way. Critical: the mean over the second half
 of the way, with the standard error of five parts of it. Mohr-Coulomb: a straight line through the runs' stresses.
 
-Normal stress is the lid's. Shear stress is the same at every height and the normal one grows downwards with the bed's
+Normal stress is the lid's. Shear stress is the same at every height. The normal stress grows downwards with the bed's
 own weight, so that the bed shears under the lid; what lies between imitates a cohesion, reported beside it.
 """
 

@@ -1,4 +1,4 @@
-"""Campaigns: measured or made-up trials in a folder, and the models fitted to them.
+"""Campaigns: measured or synthetic trials in a folder, and the models fitted to them.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed campaign`; calling one imports what computes,
 and `Settings` is imported when it is first used.

@@ -1,7 +1,7 @@
-"""Digests of a campaign that hedgebed wrote: whether its files are as they were written.
+"""Digests of a campaign that hedgebed wrote: they show whether a file has changed since.
 
-In recordings and tables a changed digit is a number as good as another, which nothing else can tell. A folder without
-digests.json, as a person makes one, is taken as it is.
+A changed digit in a recording or a table is a valid number, so no other check finds it. A folder without digests.json,
+such as one that a person makes, is not checked.
 """
 
 import json
@@ -23,9 +23,9 @@ def write_digests(folder: Path, names: Iterable[str]) -> None:
 
 
 def changed_files(folder: Path, names: Iterable[str]) -> list[str]:
-    """Which of these files of a campaign differ from their digests, a sentence each; none without digests.json.
+    """A sentence for each of these files of a campaign that differs from its digest; none without digests.json.
 
-    A file that is not there, or has no digest, is not looked at.
+    A file that is missing, or has no digest, is not checked.
     """
     keeper = folder / DIGESTS
     if not keeper.exists():

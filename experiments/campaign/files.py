@@ -4,7 +4,7 @@
 campaign = read_campaign("brick")                 # a folder with campaign.toml and one CSV file per sensor and trial
 campaign.tables.platform.mass                     # the tables, by their names in the file
 campaign.recording("001", "pose")["theta_rad"]    # arrays, in the format's units
-write_campaign("copy", campaign)                  # reads back to the same bits
+write_campaign("copy", campaign)                  # reading it returns equal values
 model = read_model("model.toml")                  # the same tables with [[effect]]
 ```
 """
@@ -76,9 +76,9 @@ class Campaign:
 
 
 def read_campaign(folder: str | Path) -> Campaign:
-    """Read the campaign in `folder`. Raises ValueError, one sentence a line, naming the file, the line or key, what was
-    found and what was expected, for all that is wrong, in the tables and in every file that can be found, at once; and
-    each file that differs from its digest, where the folder has digests."""
+    """Read the campaign in `folder`. Raises ValueError with all faults of the tables and of every file that can be
+    found, a sentence on a line each. A sentence names the file, the line or key, what was found and what was expected.
+    It also names each file that differs from its digest, where the folder has digests."""
     folder = Path(folder)
     if not folder.is_dir():
         raise ValueError(f"{str(folder)!r} is no folder: one with campaign.toml was expected")
@@ -138,8 +138,8 @@ def _refuse_used(folder: Path) -> None:
 def new_campaign(folder: str | Path, *, kind: Literal["tumble", "penetration"]) -> Path:
     """Write the template of a campaign of this kind into `folder`, and return it: annotated tables, short recordings.
 
-    These are synthetic, from the base model, so that it can be checked and diagnosed as it is. Raises ValueError for an
-    unknown kind, and where the folder is in use or cannot be written.
+    The recordings are synthetic, from the base model, so that the template can be checked and diagnosed unchanged.
+    Raises ValueError for an unknown kind, and where the folder is in use or cannot be written.
     """
     folder = Path(folder)
     if kind not in _CAMPAIGNS:

@@ -70,8 +70,8 @@ def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     """Read the CSV file `path`, which must hold the quantities `wanted`: (name, unit), the time first.
 
     Raises ValueError, one fault a line, naming file, line and column, what was found and what was expected: for a
-    missing file or column, a quantity given twice, text in a number, an infinite number, a row of another length, a
-    time that runs backwards or is missing in a row with numbers, and a file without rows.
+    missing file or column; a quantity given twice; text in a number; an infinite number; a row of another length; a
+    time that runs backwards or is missing in a row with numbers; and a file without rows.
     """
     header, rows = _read_cells(path)
     faults = _other_csv(path, header, rows) or _header_faults(path, header)
@@ -140,7 +140,7 @@ def _read_cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
 
 
 def write_recording(path: Path, recording: Recording) -> None:
-    """Write `recording` to `path`; the numbers read back to the same bits."""
+    """Write `recording` to `path` with all digits, so that reading returns equal values."""
     numbers = {name: np.asarray(values, dtype=float) for name, values in recording.columns.items()}
     write_series(path, numbers | dict(recording.extra))
 

@@ -46,9 +46,9 @@ FORMAT = "hedgehog-campaign/1"
 BASE_NOTE = "fitted_without_effects"
 """Note of model.toml: K and C by diameter of the spring-damper that was fitted without the effects."""
 RANGE_NOTE = "fitted_range"
-"""A note of model.toml: what the trials that it was fitted to cover, `depth_m` and `speed_m_s` (slowest and fastest, on
-the way in) of the pushes, `withdrawal`, whether one of them came out again, and `frame_stiffness_N_m` where the bending
-of a frame was subtracted."""
+"""A note of model.toml: the range of the trials that it was fitted to. `depth_m` and `speed_m_s` (slowest and fastest
+loading) are those of the pushes. `withdrawal`: whether one of them was withdrawn. `frame_stiffness_N_m`: where the
+bending of a frame was subtracted."""
 ERRORS_NOTE = "fitted_errors"
 """A note of model.toml: `names` of the fitted numbers (``stiffness``, ``effect.parameter``), their standard errors
 `std` and `correlation`, rows in the order of `names`; `undetermined`: names of those without a standard error."""

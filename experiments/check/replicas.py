@@ -70,8 +70,9 @@ def odd_replicates(campaign: Campaign) -> list[Finding]:
     """Trials at odds with two or more replicates that agree with one another, in the channel where they are most so.
 
     Compared over the time that all of them have: cameras from the mean of their first tenth, driven forces downwards by
-    depth. In mean square a trial at odds lies `_AT_ODDS` times as far from its nearest replicate as the others from one
-    another (median), `_NOISE` times what noise makes of it, and `_SIZEABLE` of the channel's own size."""
+    depth. An odd trial lies far from its nearest replicate, by three bounds on the mean square. They are `_AT_ODDS`
+    times the distance of the others from one another (median), `_NOISE` times the noise, and `_SIZEABLE` of the
+    channel's own size."""
     tables = campaign.tables
     std = tables.uncertainty.gravity_sim if isinstance(tables, TumbleCampaign) else 0.0
     also = say("own_gravity", percent=100 * std) if std else ""  # each trial's gravity may be behind it

@@ -36,7 +36,7 @@ def shifted_depths(campaign: Campaign) -> Iterator[tuple[str, str]]:
     """(trial, sentence) of pushes that are their replicates' curve once their depth is moved.
 
     Of at least `_FEWEST` pushes of one condition all but one agree. The mean square distance of that one from the mean
-    of the others is compared with what these differ by among themselves, as it was recorded and with the shift of its
+    of the others is compared with the differences among these. It is compared as recorded, and with the shift of its
     depth that fits best (least squares), the one parameter of the comparison."""
     groups: dict[Condition, list[tuple[str, Curve]]] = {}
     force_std = depth_std = 0.0

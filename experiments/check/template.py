@@ -11,9 +11,9 @@ __all__ = ["template_warning"]
 
 
 def template_warning(campaign: Campaign) -> str | None:
-    """The warning that trials have recordings of the template, which are made up; None where all are others.
+    """The warning that trials have the synthetic recordings of the template; None where none has.
 
-    A recording is known by its numbers, whatever its file or trial is called.
+    A recording is recognised by its numbers, whatever its file or trial is called.
     """
     template = read_campaign(TEMPLATES / f"template-{campaign.tables.kind}").recordings.values()
     of_template = {trial.id: list[bool]() for trial in campaign.tables.trial}

@@ -1,5 +1,5 @@
-"""Units that the readings themselves show, where no stated stiffness tells them: by a sensor's noise, by the other
-trials, by what any bed of grains can bear."""
+"""Wrong units found from the readings where no stiffness is stated: by a sensor's noise, by the other trials, and by
+the load that a bed of grains can carry."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -35,9 +35,9 @@ _LIKE = 1.5  # factor within which the scatter of a sensor is that of another un
 _THOUSAND = 1e3
 _BEDS = 3.0  # factor by which pushes into one bed may differ: other depths, other feet
 _STIFFEST, _SOFTEST = 5e8, 3e3
-"""N/m3: pressure over depth that no bed of grains reaches at depths of some diameters, or falls short of at _HEAVY.
-Of sand at 1 g it is 3e5 (loose, fine grains) to 2e6 (plates of 60 to 100 mm: the CMU recordings), of our own made-up
-beds up to 7e7."""
+"""Bounds of pressure over depth [N/m3]: no bed of grains reaches the first at depths of some diameters, or falls below
+the second at _HEAVY. Sand at 1 g has 3e5 (loose, fine grains) to 2e6 (plates of 60 to 100 mm: the CMU recordings), our
+simulated beds up to 7e7."""
 _HEAVY = 5.0  # m/s2
 _MILLI = "mN (force_mN would say so)"
 

@@ -59,7 +59,7 @@ def _speeds(campaign: Campaign) -> str:
 
 
 def _steady_speed(data: Recording) -> float | None:
-    """Speed of a push on the way in [m/s]; None where it is not constant, or too few rows show it."""
+    """Speed of a push during loading [m/s]; None where it is not constant, or too few rows show it."""
     found = down(data, fewest=_FEWEST)
     if found is None:
         return None

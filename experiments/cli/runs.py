@@ -76,7 +76,7 @@ def carry_out(
             say(f"what was finished is kept in {folder.path}, and where it failed in traceback.txt there")
             return BAD_INPUT if unfit else FAILED
         except OSError as error:
-            from dem.prepare.specification import cache_folder
+            from dem.prepare.code import cache_folder
 
             say(f"failed: {file_words(error, f'a file below {folder.path} or {cache_folder()}')}")
             say(f"what was finished is kept; when the fault is mended, `hedgebed resume {folder.path}` goes on")

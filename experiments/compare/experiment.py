@@ -1,8 +1,8 @@
 """`hedgebed compare`: two finished runs in one report, their numbers with differences, what they did over time.
 
-Differences are the second less the first. Of tumbles, two in the plane or two in space, on any ground and by any
-integrator, and of two runs of one robot, series/compared.csv holds both on one grid of time. Where one lasts longer,
-numbers that depend on that are compared over the time that both last; those of each whole run are beside. Of
+Differences are the second less the first. series/compared.csv holds two tumbles, or two runs of one robot, on one grid
+of time. Both tumbles must be in the plane, or both in space; grounds and integrators may differ. Where one lasts
+longer, numbers that depend on that are compared over the time that both last; those of each whole run are beside. Of
 penetrations numbers are compared.
 """
 

@@ -99,7 +99,7 @@ class Difference:
 
     @property
     def reach(self) -> float | None:
-        """The end of its interval that is farther from 0; None where one bed tells nothing of chance."""
+        """The end of its interval that is farther from 0; None for one bed, which has no scatter."""
         return None if self.interval.half is None else abs(self.interval.mean) + self.interval.half
 
 

@@ -52,8 +52,9 @@ def inertial_number(settings: PenetrateSettings, speed: float) -> float:
 
 
 SIZES_TELL = 4.0
-"""What grain size tells, over what width, depth, overlap or speed does [1]: from three to ten grains across, K of the
-shipped spike fell by 40 %; with the width by nothing that beds did not differ by (docs/notes/results.md)."""
+"""Information from another grain size, over that from another width, depth, overlap or speed [1]. From three to ten
+grains across, K of the shipped spike fell by 40 %. With the width it changed less than between beds
+(docs/notes/results.md)."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ class Member:
 
     @property
     def tells(self) -> float:
-        """What it tells, over what another width or depth does [1]."""
+        """Its information, over that of another width or depth [1]."""
         return SIZES_TELL if self.variant.what in (BASE, "grain") else 1.0
 
     @cached_property
@@ -133,10 +134,10 @@ def variants_of(settings: ConvergeSettings) -> list[Variant]:
 
 
 def members_of(settings: ConvergeSettings, variants: Sequence[Variant]) -> list[Member]:
-    """All members, in the order in which they are made: by cost times the place of the seed, over what they tell.
+    """All members, in the order in which they are made: by cost times the place of the seed, over their information.
 
-    The k-th bed of a variant tells about a k-th as much as the first, and grain size `SIZES_TELL` times as much as the
-    rest, so that this has the cheapest news first.
+    The k-th bed of a variant gives about a k-th of the information of the first, and grain size `SIZES_TELL` times that
+    of the rest. So the cheapest information comes first.
     """
     places = list(enumerate(settings.seeds, 1))
     found = [Member(variant, seed, place) for variant in variants for place, seed in places]

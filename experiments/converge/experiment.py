@@ -1,9 +1,9 @@
 """`hedgebed converge`: a penetration case on finer grains, in wider and deeper beds, stiffer, at other speeds.
 
-Every member is an ordinary `penetrate` run in a folder of its own, found again by its settings and code. After each the
-result is written anew from those that are there, so that a sweep that is stopped has one. A member that fails is told,
-and the others are made; the result then has a warning, the run ends in RuntimeError (exit status 1), and `hedgebed
-resume` tries the member again.
+Every member is an ordinary `penetrate` run in a folder of its own, found again by its settings and code. After each
+member the result is written anew from the finished ones, so that a stopped sweep has a result. Where a member fails,
+this is reported and the others are made. The result then has a warning, and the run ends in RuntimeError (exit status
+1). `hedgebed resume` tries the member again.
 """
 
 import json

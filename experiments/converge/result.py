@@ -1,4 +1,4 @@
-"""The result of a sweep in numbers, tables and sentences; and what is told before its work."""
+"""The result of a sweep in numbers, tables and sentences; and the advice that is printed before its work."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean
@@ -40,7 +40,7 @@ def plan_told(settings: ConvergeSettings, members: Sequence[Member], left_out: S
 
 
 def doubts(settings: ConvergeSettings) -> Iterator[str]:
-    """What the sweep as it is set will leave open, with what is sufficient and what that costs."""
+    """Questions that the sweep with these settings cannot answer, with what is sufficient and what that costs."""
     finest, seeds = max(settings.ratio, *settings.ratios), len(settings.seeds)
     sizes = {round(settings.ratio, 6), *(round(ratio, 6) for ratio in settings.ratios)}
 

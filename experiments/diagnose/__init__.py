@@ -1,4 +1,4 @@
-"""Diagnosis: where a model fails on measured trials, which effect it lacks, and how sure that is.
+"""Diagnosis: where a model fails on measured trials, which effect it omits, and how sure that is.
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed diagnose`; calling one imports what computes.
 

@@ -85,8 +85,8 @@ def _make_problem(
 def make_problem(
     campaign: Campaign, *, own: Sequence[OwnEffect] = (), frame_stiffness: float | None = None
 ) -> Problem:  # fmt: skip
-    """The problem of a campaign of either kind, `own` among its candidates, the depth of its pushes that of the tip
-    behind a frame of `frame_stiffness` [N/m]. Raises ValueError where there is none."""
+    """The problem of a campaign of either kind, with `own` among its candidates. The depth of its pushes is that of the
+    tip behind a frame of `frame_stiffness` [N/m]. Raises ValueError where there is none."""
     package = {"penetration": "push", "tumble": "tumble"}[campaign.tables.kind]
     corrected = at_the_tip(campaign, frame_stiffness)
     frame = {} if frame_stiffness is None else {"frame": frame_stiffness}

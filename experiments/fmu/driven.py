@@ -65,7 +65,7 @@ def ground_of(trial: Trial) -> LawGround:
 
 
 class DrivenPlatform:
-    """The platform of `trial` on its surface law, stepped by any time; its torque and actuator are not looked at.
+    """The platform of `trial` on its surface law, stepped by any time; the torque and actuator of `trial` are ignored.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class DrivenPlatform:
     def advance(self, time: float, *, motor: float = 0.0, brake: float = 0.0) -> None:
         """Go on by `time` [s] with the torque of the motor and the largest torque of the brake [N m].
 
-        Raises ValueError for a time that is not above 0, a torque that is no finite number and a negative brake, and
+        Raises ValueError for a time that is not above 0, a torque that is no finite number and a negative brake. Raises
         RuntimeError where the state is lost (no finite number).
         """
         if not (math.isfinite(time) and time > 0):

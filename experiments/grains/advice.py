@@ -45,7 +45,7 @@ def resolution_advice(
     seconds: float | None = None,
     across: float = ENOUGH_ACROSS,
 ) -> Iterator[str]:
-    """One sentence for each way in which a bed is too small or too coarse; none for a good bed. Lengths in m.
+    """One sentence for each reason why a bed is too small or too coarse; none for a good bed. Lengths in m.
 
     `tip`: its diameter; `size`: both widths and the depth of the bed; `depth`: how deep the tip is driven; `seconds`:
     expected time of the runs; `across`: grains across the tip from which on there is no advice on them.

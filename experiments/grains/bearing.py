@@ -1,9 +1,9 @@
 """Expected strength of a bed before it is made: friction angle and cohesion of its grains, and the depth of a load.
 
 The force on a tip of area A at the depth z is taken as F = K z + A q. K, of the weight of the grains, is 3D-RFT's for a
-flat plate (`softening.bearing_gradient`), which stands for grains of any rolling friction, times 0.41 as fitted to
-`sand-weak` (38 of 92 N/m, docs/results/penetrate) and times `strength`. q is what grains that stick add; it is known by
-measurement for the materials of recipes.toml, and for others `RESISTANCE` times their cohesion.
+flat plate (`softening.bearing_gradient`), times 0.41 and times `strength`. The plate's stands for grains of any rolling
+friction; 0.41 is fitted to `sand-weak` (38 of 92 N/m, docs/results/penetrate). q is what grains that stick add; it is
+known by measurement for the materials of recipes.toml, and for others `RESISTANCE` times their cohesion.
 
 The effect of another cohesion is Terzaghi's bearing capacity of a circular foot (1943, general shear),
 q = 1.3 c N_c, with N_c = (N_q - 1) cot phi and N_q = exp(pi tan phi) tan^2(45 + phi / 2) (Prandtl 1921, Reissner 1924),

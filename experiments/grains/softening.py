@@ -9,16 +9,17 @@ enough, the run is refused.
    rho_b the bulk density, lambda = 1.1, plus the weight of the bed itself, rho_b g H, and at least load / area,
    which in flight is what the torque presses with (`PUSHED`).
 2. Mean contact force from the stress of an assembly (Rothenburg), F = pi d^2 p / (Z phi), which is d^2 p within 5 % at
-   Z = 5, phi = 0.6. Forces in a loaded bed fall off exponentially from the mean, so that the largest of n loaded
-   contacts would be ln n times the mean. Soft grains share the load: `chain` is 1.4 times what was
-   measured, 2.8 among some 400 contacts at 3.9 % of a diameter (ln 400 = 6; docs/results/penetrate; 3.4 in another
-   drive) and 5.2 among some 1600 at 1.02 % (ln 1600 = 7.4; ten grains across the tip, at 0.2 m/s).
+   Z = 5, phi = 0.6. The distribution of forces in a loaded bed is exponential above the mean. So the largest of n
+   loaded contacts is ln n times the mean. Soft grains share the load: `chain` is 1.4 times what was measured, 2.8 among
+   some 400 contacts at 3.9 % of a diameter (ln 400 = 6; docs/results/penetrate; 3.4 in another drive) and 5.2 among
+   some 1600 at 1.02 % (ln 1600 = 7.4; ten grains across the tip, at 0.2 m/s).
 3. Hertz between two grains, F = (2/3) E* d^2 (delta/d)^1.5, E* = E / (2 (1 - nu^2)), so
        delta/d = (1.5 chain p / E*)^(2/3).
 4. Apart from that, a grain of mass m that hits something rigid at speed v: delta = (5 m v^2 / 4 k)^(2/5),
    k = (4/3) E* sqrt(R), E* = E / (1 - nu^2). It is the spike at its speed, within `max_overlap`; and the floor after
-   the fall in which the bed was rained in, v^2 = 2 g h, within `RAIN_OVERLAP` if that is more: what a grain does to the
-   floor before there is a bed leaves no trace in it, and would make the grains of a fine run three times as stiff.
+   the fall in which the bed was rained in, v^2 = 2 g h, within `RAIN_OVERLAP` if that is more: the impact of a grain on
+   the floor before there is a bed leaves no trace in it. Counting it would make the grains of a fine run three times as
+   stiff.
 5. Cohesion presses a grain onto a plane with its pull-off force as well, at most 4 pi gamma R (DMT): as a pressure 2 pi
    gamma / d, which no chain of grains makes larger: it is added in 3 without `chain`.
 

@@ -2,8 +2,8 @@
 
 The settings describe the runs of the first tip under the first gravity. A cell of another tip or gravity has similar
 runs: lengths go with the diameter D of the tip, speeds with sqrt(g D), times with sqrt(D / g), loads with g D^3 and
-masses with D^3. So depth over D and Froude number v / sqrt(g D) are the same in all cells, and so is the force over
-rho g D^3 if it depends on these two alone. Grain and bed stay as they are: D over the grain differs between tips.
+masses with D^3. So depth over D and Froude number v / sqrt(g D) are the same in all cells. So is the force over rho g
+D^3 if it depends on these two alone. Grain and bed stay as they are: D over the grain differs between tips.
 """
 
 import math

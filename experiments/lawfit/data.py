@@ -1,8 +1,8 @@
 """What a fit of surface laws is made from: runs of a spike in beds, averaged over depth, and placements at rest.
 
 A run is the first loading of a drive or of a drop. Its rows are averaged over intervals of depth that are the same for
-all runs, so that a slow run has no more weight than a fast one, and bin k is one depth in every run. A placement is a
-spike set down that has come to rest under its load.
+all runs. So a slow run has no more weight than a fast one, and bin k is one depth in every run. A placement is a spike
+set down that has come to rest under its load.
 """
 
 from collections.abc import Callable

@@ -134,9 +134,9 @@ def check_design(settings: LawFitSettings) -> None:
 def with_chosen(settings: LawFitSettings) -> tuple[LawFitSettings, str]:
     """`settings` with the further runs that the design chooses, and the sentence that states them; "" for none.
 
-    It chooses only if none are given: unloading at half the depth, then half the load, then a drag at half the depth,
-    each if `LEAST_BEDS` beds with it cost at most `FOR_FURTHER` of the budget. Half the load leaves the modulus of the
-    grains as it is, which follows from the largest load.
+    It chooses only if none are given: unloading at half the depth, then half the load, then a drag at half the depth.
+    Each is chosen if `LEAST_BEDS` beds with it cost at most `FOR_FURTHER` of the budget. Half the load does not change
+    the modulus of the grains, which follows from the largest load.
     """
     if not settings.choose_further or settings.loads or settings.unload_depths or settings.drag_depths:
         return settings, ""

@@ -10,7 +10,7 @@ Parts of the rate: c Fr ("damper"), b Fr^2 ("square"), b Fr^2 exp(-x / (T Fr)) (
 ("inertial", I the inertial number of `experiments.grains.similarity`). With "area", b Fr^2 is times A / D^2.
 
 "early" follows Roth, Han and Jaeger (arXiv 1910.10358): at a characteristic time after the impact the dependence on
-speed becomes one on depth, so the force is not a sum of a depth term and a rate term. The form is ours, the simplest
+speed becomes one on depth. So the force is not a sum of a depth term and a rate term. The form is ours, the simplest
 with this property: the time since the impact, z / v, is compared with T sqrt(D / g). "one-pair" is the rival without
 scaling: one K and C in N/m and N s/m for all tips and gravities.
 

@@ -1,8 +1,8 @@
 """`hedgebed calibrate RUN ...`: laws fitted to finished runs, compared, and written as ground files.
 
-result.json has the numbers, series/bins.csv the fitted rows with the force of each law, ground.toml the spring-damper,
-and laws/NAME.toml every law that can be a ground. With several tips or gravities these are of the first, and cells/NAME
-has the same of each.
+result.json has the numbers, and series/bins.csv the fitted rows with the force of each law. ground.toml has the
+spring-damper, and laws/NAME.toml every law that can be a ground. With several tips or gravities these are of the first,
+and cells/NAME has the same of each.
 """
 
 from dataclasses import asdict

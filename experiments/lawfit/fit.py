@@ -7,9 +7,9 @@ steps alternate until nothing changes: lambda by maximum likelihood at the prese
 squares at the present lambda and f.
 
 Bins of one run are not independent, because grains are larger than bins. So standard deviations do not come from that
-likelihood but from a jackknife over beds, with the largest of the usual three forms of the variance,
-(G - 1) / G sum (theta_(-g) - theta)^2. Intervals have Student's t with G - 1 degrees of freedom for G beds (MacKinnon,
-Nielsen and Webb, J. Applied Econometrics 38 (2023), 671). `experiments.lawfit.synthetic` measures their coverage.
+likelihood but from a jackknife over beds. It uses the largest of the usual three forms of the variance, (G - 1) / G sum
+(theta_(-g) - theta)^2. Intervals have Student's t with G - 1 degrees of freedom for G beds (MacKinnon, Nielsen and
+Webb, J. Applied Econometrics 38 (2023), 671). `experiments.lawfit.synthetic` measures their coverage.
 """
 
 import math

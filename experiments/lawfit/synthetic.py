@@ -1,8 +1,8 @@
 """Synthetic runs of a known law, which measure the bias of the fit and the coverage of its intervals.
 
-Each bed multiplies the force by a factor 1 + u with u normal of standard deviation `bed_spread`. The force of a run
-fluctuates besides by `noise` times its mean, normal and correlated over a length of a grain in depth, as forces in
-grains are. So the bins of a run are not independent, although the likelihood of a fit assumes it.
+Each bed multiplies the force by a factor 1 + u with u normal of standard deviation `bed_spread`. In addition the force
+of a run fluctuates by `noise` times its mean. The noise is normal and correlated over the depth of a grain, as forces
+in grains are. So the bins of a run are not independent, although the likelihood of a fit assumes it.
 
 `python -m experiments.lawfit.synthetic OUT.json` measures the coverage of docs/results/calibrate-coverage: of fits to
 so many beds, and of the whole procedure of `design`, which adds beds until the tolerance is reached.

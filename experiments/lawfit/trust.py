@@ -80,8 +80,8 @@ def within(found: ErrorMap, most: float) -> list[Within]:
 def sinkage_range(fitted: LawFit[Candidate], found: ErrorMap, most: float) -> tuple[float, float] | None:
     """Range of loads [N] for which the depth predicted by the law is within `most` (relative) of that of the beds.
 
-    The depth of the beds is where the mean force of the slowest drive first reaches the load, and the law is taken at
-    that speed. None where no load is.
+    The depth of the beds is where the mean force of the slowest drive first reaches the load. The law is taken at that
+    speed. None where no load is.
     """
     rising = np.maximum.accumulate(found.force[0])
     deepest = float(found.depth[-1])

@@ -1,7 +1,7 @@
 """What the text of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) states, in its own words, beside our numbers.
 
 A claim is a dict: the words (`quote`), what is compared, what is stated, ours, the difference, what it is judged by,
-and whether it is met (None where nothing can be compared, or nothing is to be judged). It is told twice: for the
+and whether it is met (None where nothing can be compared, or nothing is to be judged). It appears twice: for the
 paper's torque, a step, and for one that rises (`risen`). The paper prints no table, so that a stated number is a round
 one; an angle is judged by the five degrees within which the paper calls model and measurement in agreement.
 """
@@ -338,7 +338,7 @@ def _of_grounds(trials: Trials, places: Sequence[Place]) -> str:
 
 
 def _hops(trials: Trials) -> Iterator[Claim]:
-    """Hops in the cases of Figure 6; their lengths are told, since the text gives none."""
+    """Hops in the cases of Figure 6; their lengths are listed, since the text gives none."""
     places = list(product(trials.hard, [trials.rig], trials.torques))
     cases = [trials.case(place) for place in places]
     count, surfaces = sum(case["transition_angle_hop"] is not None for case in cases), " and ".join(trials.hard)

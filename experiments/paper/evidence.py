@@ -1,4 +1,4 @@
-"""The paper's text as measured data: what the model lacks on hard ground, weighed against its rivals.
+"""The paper's text as measured data: what the model omits on hard ground, weighed against its rivals.
 
 Eight statements of the text are about the twelve experiments on steel and brick. Each has a probability, the model's
 angles being off by `ERROR` (one standard deviation, the paper's own measure of agreement) and one reading in twenty
@@ -92,8 +92,8 @@ RIVALS = (
     Rival("inertia", (0.5, 2.0), _times("inertia")),
     Rival("stiffness", (0.1, 10.0), _times("stiffness")),
 )
-"""What the paper suspects (a wheel that shakes, the pendulum, a centre of mass off the shaft, ball tips), what it does
-not give, and how the torque and the start may differ from a step on a platform at rest."""
+"""Three kinds of explanation: suspicions of the paper (a wheel that shakes, the pendulum, a centre of mass off the
+shaft, ball tips); numbers that it does not give; and a torque and a start other than a step on a platform at rest."""
 
 
 def rival_trials(trial: Trial) -> Iterator[tuple[str, Trial, Mapping[str, Any]]]:

@@ -1,7 +1,7 @@
 """`hedgebed paper`: the trials of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) with our model.
 
-Every gravity, torque and surface, with friction as it is and at both ends of its band, by the located integrator and by
-the paper's fixed step; then `variants`: a torque that rises, rivals to it, and what the paper does not give.
+Every gravity, torque and surface is computed with the stated friction and both ends of its band. The located integrator
+and the paper's fixed step are used. Then come `variants`: a rising torque, rivals to it, and unstated numbers.
 `experiments.paper.claims` compares them with what the paper's text states, `experiments.paper.evidence` weighs the
 rivals.
 """

@@ -23,7 +23,7 @@ TRANSITIONS = ("slip", "hop")
 def slip_before_hop(case: Mapping[str, Any]) -> float | None:
     """Theta [rad] where the slip begins that ends in the first hop; None without a hop or without such a slip.
 
-    A step of the torque shakes the spikes loose for some 50 ms before a pivot holds, so the first slip of all, that of
+    A step of the torque shakes the spikes loose for some 50 ms before a pivot holds. So the first slip of all, that of
     `transition_angle_slip`, can be another one.
     """
     states = case["transitions"]

@@ -6,7 +6,7 @@ are those of the model's diameter: on another one forces on a section scale with
 those of the spring with the K that the model gives.
 
 With a bed, every run of it is made on the law as well. Without one (``--ground spring-damper``), the runs of one seed
-are made on the base model as it was fitted without effects, and on the law.
+are made on the base model fitted without effects, and on the law.
 """
 
 import math
@@ -164,8 +164,8 @@ class AmendedLaw:
 
     @cached_property
     def pair_without_effects(self) -> tuple[float, float]:
-        """K [N/m] and C [N s/m] of the base model as it was fitted without the effects, by the rule of `pair`. Of a
-        file that does not have them, `pair`: the spring of the effects' model, which is no fit by itself."""
+        """K [N/m] and C [N s/m] of the base model fitted without the effects, by the rule of `pair`. Of a file that
+        does not have them, `pair`: the spring of the effects' model, which is no fit by itself."""
         fitted = self._noted(BASE_NOTE)
         return self._pair_of(fitted, next(iter(fitted.values()), self.pair))
 
@@ -245,7 +245,7 @@ class AmendedLaw:
         return [speed for speed in driven if speed], dropped, None in driven or 0.0 in driven
 
     def plain(self, time_step: float) -> SpringDamper:
-        """The spring-damper as it was fitted without the effects, as a ground."""
+        """The spring-damper fitted without the effects, as a ground."""
         stiffness, damping = self.pair_without_effects
         return SpringDamper(stiffness=stiffness, damping=damping, time_step=time_step)
 

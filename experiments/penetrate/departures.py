@@ -1,7 +1,7 @@
 """Where the spring-damper departs from the bed: by depth and by speed, in numbers and in words.
 
 All from the loading of driven runs, in bands of depth; runs of one speed on several beds are averaged, and their
-standard deviation between beds is reported, which separates an error of the law from differences of beds.
+standard deviation between beds is reported. This separates an error of the law from differences of beds.
 """
 
 from collections.abc import Mapping, Sequence

@@ -188,7 +188,7 @@ class _Work:
         return BedGround(bed, make_spike(self.settings))
 
     def _prepared(self, seed: int) -> Any:
-        """The bed of a seed as it is prepared, of stiffer grains where it overlapped too far in its preparation.
+        """The prepared bed of a seed, with stiffer grains where the first ones overlapped too far in the preparation.
 
         Raises RuntimeError where it cannot be prepared.
         """
@@ -208,7 +208,7 @@ class _Work:
         return list(self.folder.noted(f"stiffer-{seed}", []))
 
     def _young(self, seed: int, *, prepared: bool = False) -> float:
-        """The modulus of the grains of a seed as it is now [Pa], or the one its bed is `prepared` with."""
+        """The present modulus of the grains of a seed [Pa], or the one its bed is `prepared` with."""
         made = [note["young"] for note in self._notes(seed) if not (prepared and note["unit"])]
         return float(made[-1]) if made else self.softening.young
 

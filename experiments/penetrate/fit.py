@@ -1,8 +1,8 @@
 """Fits the spring-damper to runs in a bed: F = K z + C max(0, dz/dt) for z > 0, with K and C not below zero.
 
 Least squares on the measured force at the measured depth and speed. Driven runs count while loading, drops up to
-their first stop; set-downs, rests and pull-outs do not count. Inside a run every macro step weighs the same (equal
-times, which at constant speed is equal depths), and every run weighs the same whatever its length:
+their first stop; set-downs, rests and pull-outs do not count. Inside a run every macro step has the same weight (equal
+times, which at constant speed is equal depths). Every run has the same weight whatever its length:
     minimise  sum over runs of  mean over its rows of  (F - K z - C max(0, dz/dt))^2.
 Standard errors come from leaving out one run at a time (jackknife): var = (n - 1)/n sum (theta_i - mean theta)^2. Rows
 of one run are far from independent, so that the scatter of rows would claim much too small an error.

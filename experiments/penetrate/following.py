@@ -1,7 +1,7 @@
 """What follows gravity where it is not given: speeds go with sqrt(g), times with 1 / sqrt(g), and there is no rig.
 
 So the Froude number v / sqrt(g D) and the inertial number of a run are those of the defaults at 1 g
-(`experiments.grains.similarity`), and a run under any gravity takes as many steps of the grains. Grains that stick are
+(`experiments.grains.similarity`). A run under any gravity takes as many steps of the grains. Grains that stick are
 held together by their cohesion c as well: for them g + c / (rho_b D) takes the place of g, here and on Earth, which
 keeps the inertial number. The modulus follows by itself: it is chosen for the pressures and speeds of the run. A rig
 makes a platform light on Earth: under another gravity than Earth's there is none, unless it is given.

@@ -149,8 +149,8 @@ def settings_of_model(given: Json) -> Json:
 
 
 def _asked(given: Json, model: PenetrationModel) -> Json:
-    """The runs on a model's law that nobody asked for, left out: no drops where pushes are given or the model has none,
-    and a way out at the fastest of the given speeds."""
+    """Settings without runs that nobody asked for: no drops where pushes are given or the model has none, and a
+    withdrawal at the fastest of the given speeds."""
     found: Json = {}
     pushes, drops = given.get("speeds"), [trial for trial in model.trial if trial.mode == "drop"]
     if "drop_speeds" not in given and (pushes or not drops):

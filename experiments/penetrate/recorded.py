@@ -2,7 +2,7 @@
 
 Every run of the folder is a trial, and beds of other seeds are replicates. Driven runs and set-downs, which have no
 nominal speed, are ``driven``: the depth column says how the spike moved. A drop moves `mass` under the constant load W,
-m z'' = W - F, so that its gravity is W / m while the grains keep theirs; the format's drops begin at depth 0.
+m z'' = W - F. So its gravity is W / m while the grains keep theirs; the format's drops begin at depth 0.
 
 A sample is taken every whole number of the run's macro steps. Force and acceleration are means over the interval
 between samples, as a sensor's filter gives them; the depth is that of the moment. White noise is added to each.

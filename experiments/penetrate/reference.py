@@ -1,7 +1,7 @@
 """By how much the numbers of a run moved from those of another result: a finer bed, stiffer grains, another spike.
 
-K, C and what follows from them are fitted anew on both sides, to the runs whose kind and speed both have, so that runs
-at other speeds do not pass for a change of grain. Each condition weighs on both sides what it weighs in the reference.
+K, C and what follows from them are fitted anew on both sides, to the runs whose kind and speed both have. So runs at
+other speeds do not look like a change of grain. Each condition weighs on both sides what it weighs in the reference.
 """
 
 from collections import Counter

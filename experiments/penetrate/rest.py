@@ -2,10 +2,10 @@
 
 Grains without cohesion bear in proportion to gravity and to depth (Kang et al. 2018, Nat. Commun. 9:1101): a load W
 rests at W / K, which in low gravity may be far below any foot. That is an answer: the runs that would only go to the
-floor are left out, and the depth is reckoned from the bed's own force, as W / K with the fitted K, beside that of a
-flat plate in 3D-RFT (`experiments.grains.softening`). Both go far beyond what was driven, hence both are told. A power
-law fitted to a drive does not serve: a flat tip is carried at depth 0 already, which lowers its exponent (0.54 was
-found) and made metres hundreds of metres.
+floor are left out. The depth is computed from the bed's own force, as W / K with the fitted K, beside that of a flat
+plate in 3D-RFT (`experiments.grains.softening`). Both extrapolate far beyond the drive, hence both are reported. A
+power law fitted to a drive is no alternative. A flat tip is carried at depth 0 already, which lowers its exponent (to
+0.54 in a test) and turns metres into hundreds of metres.
 """
 
 import math
@@ -81,10 +81,10 @@ def answer(findings: Findings, material: Any) -> Json | None:
 
 
 def _beside(settings: PenetrateSettings, material: Any, stiffness: float) -> Json:
-    """What `_BESIDE` would do: the cohesion that it needs by either of its angles, and how deep the foot would rest.
+    """The foot on `_BESIDE`: the cohesion that carries it by either angle, and the depth at which it would rest.
 
-    Its friction angle is its own, not that of these grains: N_c grows from 32 at 31 degrees to 55 at 37. K is the one
-    of this bed times the expected ratio of the two materials.
+    The friction angle is that of `_BESIDE`, not of these grains: N_c grows from 32 at 31 degrees to 55 at 37. K is the
+    one of this bed times the expected ratio of the two materials.
     """
     other, area = MATERIALS[_BESIDE], math.pi * settings.tip_diameter**2 / 4
     facts = {"grain": settings.grain, "gravity": settings.gravity, "area": area}
@@ -200,7 +200,7 @@ def _why_unknown(findings: Findings, stiffness: Interval | None, *, cohesive: bo
 
 
 def _in_a_sentence(findings: Findings, name: str, interval: Interval, unit: str) -> str:
-    """What is known of a number, and what would tell the rest."""
+    """What is known of a number, and which runs would reduce its error."""
     count = sum(value is not None for value in findings.sinkages(findings.beds))
     count = len(findings.seeds) if name == "stiffness" else count
     what = "the sinkage at rest" if name == "sinkage_dem" else "K"

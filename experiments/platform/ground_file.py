@@ -109,7 +109,7 @@ def _other_gravity(fitted: GroundFile, gravity: float, *, in_rig: bool) -> str:
 
 
 def law_warnings(fitted: GroundFile | None) -> list[str]:
-    """What no law under a platform can tell of grains, and whether the answer has an uncertainty."""
+    """Warnings: what a law under a platform cannot predict for grains, and whether the answer has an uncertainty."""
     if fitted is None:
         return []
     sure = [name for name, estimate in fitted.parameters.items() if estimate.std == 0]

@@ -48,7 +48,7 @@ def _with(fitted: GroundFile, name: str, value: float) -> GroundFile:
 
 
 def spread_of_law(fitted: GroundFile, answer: Callable[[GroundFile], Answer], best: Answer) -> dict[str, float | None]:
-    """Standard deviation of each number of `best`, the answer of the file as it is.
+    """Standard deviation of each number of `best`, the answer of the unchanged file.
 
     None for a number that some of the moved files do not have, or that does not change although it has no value.
     """

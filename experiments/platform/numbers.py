@@ -102,8 +102,8 @@ def torque_within_limit(
 ) -> tuple[Trial, float | None]:
     """`trial` with its torque ended where a motor's wheel comes to `max_wheel_speed` [rad/s], and when that is [s].
 
-    None, and the trial as it is, where the wheel does not come to it within `duration` [s]. The wheel only gains speed:
-    to end the torque then equals a motor that has none left.
+    None, and the unchanged trial, where the wheel does not reach it within `duration` [s]. The wheel only gains speed,
+    so ending the torque then equals a motor without torque.
     """
     gain = trial.torque / trial.wheel_inertia
     if trial.actuator != "motor" or trial.wheel_speed_0 + gain * min(duration, trial.torque_until) <= max_wheel_speed:

@@ -193,7 +193,7 @@ def _with_after(task: Task, tell: Tell, shown: Progress | None) -> Outcome:
 
 
 def _folder_of(task: Task) -> RunFolder:
-    """The folder of the task, made where it is not there, with its run.toml as it was; this process holds it."""
+    """The folder of the task, held by this process: the existing one with its run.toml, or a new one."""
     if (task.path / "run.toml").is_file():
         with suppress(ValueError):  # damaged: the task knows what it held
             return RunFolder.open(task.path)
@@ -203,7 +203,7 @@ def _folder_of(task: Task) -> RunFolder:
 
 
 def _unsaid(_: str) -> None:
-    """All runs are told of together: a worker that waits says nothing."""
+    """Print nothing while a worker waits: one display shows all runs together."""
 
 
 def _compute(task: Task, folder: RunFolder, progress: Progress) -> Outcome:
@@ -318,7 +318,7 @@ def _add(digest: "hashlib._Hash", name: str, content: bytes) -> None:
 
 
 class _Told(Progress):
-    """Silent, but for the share of the whole, which it tells, and the grains, which `shown` shows."""
+    """Progress that prints nothing: it reports the share of the whole, and `shown` shows the grains."""
 
     def __init__(self, tell: Tell, shown: Progress | None) -> None:
         super().__init__()

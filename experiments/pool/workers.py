@@ -48,9 +48,9 @@ def carry_out_all(
 ) -> None:
     """Carry out all tasks; `on_outcome` is called in this thread as each ends, in whatever order.
 
-    `cores`: how many a process here takes for a task whose settings do not say how many threads it has. Raises
-    KeyboardInterrupt where this process is told to stop; RuntimeError where the cluster goes away, ValueError where it
-    cannot be reached or dask is not there. What was done is in the run folders.
+    `cores`: how many a process here takes for a task whose settings do not state its threads. Raises KeyboardInterrupt
+    where this process receives a signal to stop; RuntimeError where the cluster is lost; ValueError where it cannot be
+    reached or dask is missing. Finished work is in the run folders.
     """
     if scheduler is None and workers == 1:
         for task in tasks:
@@ -146,7 +146,7 @@ def dask_setup(worker: Any) -> None:
 
 
 def _on_worker(task: Task, cores: int | None) -> Outcome:
-    """The task on a worker, which tells its share, 0 as it begins, to whoever listens; on so many `cores`, if given."""
+    """Carry out the task on a worker, on so many `cores`, if given. The worker reports the share done, 0 at first."""
     worker, told = required("distributed", "a worker").get_worker(), [-math.inf]
 
     def tell(share: float) -> None:

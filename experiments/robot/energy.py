@@ -21,9 +21,9 @@ in the ground for a part of the time: at 1.5 in 1 s a robot of 2.6 kg that falls
 
 
 def growth_warning(settings: RobotSettings, run: RobotRun) -> str | None:
-    """Before a run on a law: the warning that a swing on the ground would grow, and what would do; None if not.
+    """Before a run on a law: the warning that a swing on the ground would grow, and how to avoid it; None if not.
 
-    Laws with memory are left out: they take up most of the energy of a swing.
+    Laws with memory are left out: they absorb most of the energy of a swing.
     """
     ground, iterations = run.ground, settings.iterations
     if iterations > 1 or not isinstance(ground, LawFeet) or ground.has_memory:

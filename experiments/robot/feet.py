@@ -55,7 +55,7 @@ def crater_losses(run: RobotRun, heights: Array, *, apart: float) -> dict[str, l
     """Name of a foot -> rise [m] in each time that it loses and regains contact below the undisturbed surface.
 
     ``heights``: as of `heights_of`; times shorter than ``apart`` [s] do not count. Feet without any are left out. A law
-    with inertia of the grains has a force again where a foot begins to fall back, so such a time may be half a bounce.
+    with inertia of the grains has a force again where a foot begins to fall back. So such a time may be half a bounce.
     """
     pushed = np.abs(run.feet[:, :, 7:10]).max(axis=2) > 0
     found = {}
@@ -115,7 +115,7 @@ def too_fast(plan: RobotPlan, run: RobotRun, heights: Array) -> list[str]:
     """A sentence where a foot goes into sand faster than its law was compared with grains, of the fastest foot.
 
     ``heights``: as of `heights_of`. At v above sqrt(g D) the inertia of the grains, rho v^2 D^2, exceeds their weight,
-    rho g D^3, which is the scale of the static force.
+    rho g D^3. This weight is the scale of the static force.
     """
     gravity, time = plan.numbers["gravity"].value, run.columns["time"]
     if plan.fitted is not None or not plan.surface.granular or not gravity > 0 or len(time) < 2:
@@ -135,7 +135,7 @@ def too_fast(plan: RobotPlan, run: RobotRun, heights: Array) -> list[str]:
 def feet_quantities(reached: dict[str, dict[str, float]]) -> dict[str, tuple[float, str, str]]:
     """Name of a quantity -> value, unit and note, for the table of a run.
 
-    A robot of one foot has its clearance, one of up to `FEW` feet clearance and sinkage of each, others the largest
+    A robot of one foot has its clearance; one of up to `FEW` feet clearance and sinkage of each; others the largest
     clearance of any foot.
     """
     best = max(reached, key=lambda name: reached[name]["clearance_largest"])

@@ -126,7 +126,7 @@ def _fall(height: float, speed: float, gravity: float) -> float:
 
 
 def _upwards(run: RobotRun) -> Array:
-    """Speed of the centre of mass upwards at every row [m/s]; in a flight without an error, as it is a parabola."""
+    """Speed of the centre of mass upwards at every row [m/s]; exact in a flight, which is a parabola."""
     z, time = run.columns["z"], run.columns["time"]
     if len(time) < 3:
         return np.zeros(len(time))

@@ -1,12 +1,12 @@
 """How K and C of a surface follow gravity: by the map of `hedgebed ground` where it covers the robot's feet.
 
-Forces in slow motion among rigid grains without cohesion are in proportion to their weight. So K goes with gravity g,
-and C, a force over a speed, with sqrt(g), as speeds do in similar motions (`experiments.groundmap.maps`). The map adds
-the ranges within which this is used, and the standard deviations.
+Forces in slow motion among rigid grains without cohesion are proportional to their weight. So K is proportional to
+gravity g, and C, a force over a speed, to sqrt(g), as speeds in similar motions (`experiments.groundmap.maps`). The map
+adds the ranges within which this is used, and the standard deviations.
 
-Where grains stick, cohesion carries a part of K that does not go with gravity, and goes with the diameter of a foot in
-place of its area (`experiments.groundmap.cohesive`). There every foot has the K and C of the map for a ball tip of its
-area.
+Where grains stick, cohesion carries a part of K that is independent of gravity. This part is proportional to the
+diameter of a foot instead of its area (`experiments.groundmap.cohesive`). There every foot has the K and C of the map
+for a ball tip of its area.
 """
 
 from collections.abc import Mapping

@@ -155,8 +155,8 @@ def settle_other_law(
     """Settle the parameters of a law other than the spring-damper, and warn of those that are the law's defaults.
 
     The spike that the defaults are of is the tip of ``largest``. Raises ValueError for a
-    parameter there is not, or out of bounds. Unless they are accepted, it raises it also for one that no foot on grains
-    has, for a law of grains on hard ground, and for defaults of 1 g that follow no other gravity.
+    parameter there is not, or out of bounds. Unless they are accepted, three more raise it: a law that no foot on
+    grains has; a law of grains on hard ground; and defaults of 1 g that follow no other gravity.
     """
     law, given = find_law(settings.ground), given_parameters(settings)
     ill = ill_sized(law.name, given)

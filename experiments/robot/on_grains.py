@@ -235,7 +235,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         return time_step_for(grains, diameter=s.grain * (1 - s.spread), max_overlap=s.max_overlap)
 
     def check_exchange(self) -> float:
-        """The load of the exchange at the start over what is stable [1], on the bed as it is expected.
+        """The load of the exchange at the start over the largest stable one [1], on the expected bed.
 
         Raises ValueError where it would not be stable.
         """

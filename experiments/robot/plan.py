@@ -1,4 +1,4 @@
-"""A robot as it is settled: its model, where its numbers come from, and the surface law under its feet."""
+"""The plan of a robot's run: its model, where its numbers come from, and the surface law under its feet."""
 
 import copy
 import importlib.util

@@ -1,7 +1,7 @@
 """A run is a folder: what it holds, who is writing it, and how far it has come.
 
-Everything that is written goes to a temporary file first and is moved into place, so that a reader (or a run that
-was killed) finds either the whole of a file or none of it.
+Everything that is written goes to a temporary file first and is moved into place. So a reader (or a killed run) finds
+either the whole of a file or none of it.
 
 ```
 run.toml                  the settings, each with its meaning and unit in a comment; reads back to the same settings
@@ -114,7 +114,7 @@ def _of_today(table: Mapping[str, Any], written_as: str) -> dict[str, Any]:
 
 
 def _what_else(path: Path) -> str:
-    """What may be done with the run that a folder holds, after what else would do."""
+    """The end of a sentence: what else the user can do with the run in a folder."""
     try:
         done = RunFolder.open(path).status == "done"
     except ValueError:
@@ -418,7 +418,7 @@ class RunFolder:
     def load_checkpoint(self, name: str) -> dict[str, np.ndarray] | None:
         """The arrays of checkpoint/<name>.npz; None where there is none.
 
-        One that is damaged is told on stderr, and the one before it is taken; None where that one is too.
+        A damaged one is reported on stderr, and the one before it is taken; None where that one is damaged too.
         """
         for path in (self._checkpoint(name), self._checkpoint(name, _BEFORE)):
             if not path.exists():
@@ -454,7 +454,7 @@ class RunFolder:
     def is_done(self, name: str) -> bool:
         """Whether `mark_done(name)` has been called, in this process or an earlier one.
 
-        Where the mark or its series is damaged, that is told on stderr, and the piece of work is not done.
+        A damaged mark or series is reported on stderr, and the piece of work counts as not done.
         """
         if not self._mark(name).exists():
             return False

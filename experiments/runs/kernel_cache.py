@@ -1,7 +1,7 @@
 """Taichi's cache of compiled kernels, which one killed process would switch off for good.
 
 Taichi 1.7, like its fork quadrants, locks the cache by making a file and unlocks it by removing that file
-(`taichi/util/file_lock.h`), for the moments in which it reads or writes the cache's table. Whoever is killed in such a
+(`taichi/util/file_lock.h`). It does so while it reads or writes the cache's table. Whoever is killed in such a
 moment leaves the lock behind: every later process then finds the cache locked, compiles everything anew and keeps
 nothing. The kernel that was being written stays an empty file, which would never be written again either.
 """

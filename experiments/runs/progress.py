@@ -48,12 +48,12 @@ def duration(seconds: float | None) -> str:
 
 
 def _to_go(seconds: float) -> str:
-    """The time to go as it is shown; never nothing, for then it would be over."""
+    """The remaining time as text; never zero, which would mean that the work is done."""
     return f"{duration(max(seconds, 1.0))} to go"
 
 
 def _percent(share: float) -> str:
-    """A share as it is shown; 100 % is said of the whole only."""
+    """A share as text; only the whole is 100 %."""
     return f"{math.floor(100 * share + 1e-6)} %"
 
 
@@ -137,11 +137,11 @@ class Progress(AbstractContextManager["Progress"]):
     def plan(
         self, costs: Mapping[str, float], *, seconds: Mapping[str, float] | None = None, unit: float | None = None
     ) -> None:
-        """Say which stages are to come and what each costs, in any one unit: the time of the whole follows from it.
+        """Announce the stages and the cost of each, in any one unit: the time of the whole follows from it.
 
-        Stages in `seconds` come after those and are known by the time they take. `unit` is a first guess at what one
-        unit of cost takes [s]; without, nothing is said until there is a pace. Calling it again starts the reckoning
-        afresh: do so once the bed is there and only the runs remain.
+        Stages in `seconds` come after those and are known by the time they take. `unit` is the first estimate of the
+        time of one unit of cost [s]. Without it no time is shown until there is a pace. A second call starts the
+        estimate anew: make it when the bed is ready and only the runs remain.
         """
         every = dict(costs) | dict(seconds or {})
         if any(not cost >= 0 for cost in every.values()):
@@ -193,7 +193,7 @@ class Progress(AbstractContextManager["Progress"]):
 
     @property
     def bed_words(self) -> list[str]:
-        """The bed of the stage as it is shown: grains, shares awake and slow, grain-steps a second; empty without."""
+        """Text on the bed of the stage: grains, shares awake and slow, grain-steps a second; empty without a bed."""
         if self._bed is None:
             return []
         grains, awake, slow = self._bed
@@ -205,7 +205,7 @@ class Progress(AbstractContextManager["Progress"]):
         return words
 
     def message(self, text: str) -> None:
-        """Tell the person something: a warning, a finding."""
+        """Show the user a message: a warning, a finding."""
 
     def close(self) -> None:
         """End the last stage and tidy up. Called by `with`."""
@@ -249,14 +249,14 @@ class Progress(AbstractContextManager["Progress"]):
         return self._reached
 
     def stage_remaining(self) -> float | None:
-        """How long the stage has to go [s]; None as long as nothing can be said."""
+        """Remaining time of the stage [s]; None while it is unknown."""
         if self._open and self.stage_name == self._open:
             return self._left_of(self._expected(self._open, self._rate()))
         whole = self._pace.work() or self._pace.so_far()
         return None if whole is None else (1.0 - self._pace.share) * whole
 
     def remaining(self) -> float | None:
-        """How long the whole plan has to go [s]; None as long as nothing can be said."""
+        """Remaining time of the whole plan [s]; None while it is unknown."""
         rate, rest = self._rate(), 0.0
         for name in (*self._costs, *self._seconds):
             if name in self._over:

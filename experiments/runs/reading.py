@@ -1,7 +1,7 @@
 """Settings from a case file and from the command line, checked; what is wrong with them in one sentence each.
 
 A layer is what one source gives: name -> value. Later layers win: the defaults of the settings class, a case file,
-the command line. Every fault is a ValueError whose text names the key, the value and what would do.
+the command line. Every fault is a ValueError whose text names the key, the value and the remedy.
 """
 
 import tomllib
@@ -86,9 +86,9 @@ def read_case(path: Path) -> Layer:
 def settings_from(settings_class: type[Settings], layers: Iterable[Layer]) -> Settings:
     """The settings that the `layers` give, later ones over earlier ones, over the defaults.
 
-    A number may be text with a unit (`experiments.runs.units`). Raises ValueError, one sentence a line, for a name
-    there is not (with the nearest there is) and for a value that
-    is not accepted (with what is). TOML has no null: "none" unsets a setting that need not be set.
+    A number may be text with a unit (`experiments.runs.units`). Raises ValueError, one sentence a line, for an unknown
+    name (with the nearest known one) and for a value that is not accepted (with the accepted ones). TOML has no null:
+    "none" unsets a setting that need not be set.
     """
     names = list(settings_class.model_fields)
     faults = []

@@ -56,7 +56,7 @@ def findings_shown(warnings: Sequence[str]) -> int:
 
 @dataclass(frozen=True)
 class Headline:
-    """The short form of a result that the terminal shows when a run ends: a table and what is said below it."""
+    """The short form of a result that the terminal shows when a run ends: a table and the sentences below it."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]

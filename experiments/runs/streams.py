@@ -36,7 +36,7 @@ def say(text: str) -> None:
 
 
 def fault_words(error: Exception) -> str:
-    """What was wrong with the words typed, and what would do."""
+    """What was wrong with the typed words, and what to type."""
     text = str(error)
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         count, got = error.argument.token_count()[0], len(error.tokens_so_far)

@@ -87,7 +87,7 @@ class PictureCosts:
         return min(_MOST_FRAMES, next(iter(self.frames.values()), 0))
 
     def _parts(self) -> list[tuple[float, float]]:
-        """Parts of the work in their order: the share that the report tells at the end of each, and its time [s]."""
+        """Parts of the work in their order: the share of the whole at the end of each, and its time [s]."""
         if not self.frames:
             return [(_SHARE_PLOTS, _PLOTS), (1.0, _WRITTEN)]
         still, moving = _STILL + _STILL_GRAIN * self.grains, _FILM + _FILM_GRAIN * self.grains
@@ -117,7 +117,7 @@ class PictureCosts:
 
 
 def write_report(folder: Path, progress: Progress, costs: PictureCosts | None = None) -> None:
-    """Figures, pictures and report.html of a run folder; `costs` tell what share of the time each is."""
+    """Make figures, pictures and report.html of a run folder; `costs`: the share of the time of each."""
     from vis.report import write_report as write
 
     write(folder, progress=progress.update if costs is None else lambda share: progress.update(costs.share(share)))

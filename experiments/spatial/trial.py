@@ -33,8 +33,8 @@ class SpatialPlan(settled.Plan):
 def plan_spatial(settings: SpatialSettings, *, platform_file: Path | None = None) -> SpatialPlan:
     """The trial that `settings` describe. `platform_file` stands in for ``settings.platform``, where that was copied.
 
-    Raises ValueError, naming the setting, for a surface or platform there is not, an axis without a wheel, and what
-    motor, brake, wheel or rig cannot be.
+    Raises ValueError, naming the setting, for an unknown surface or platform, an axis without a wheel, and impossible
+    numbers of motor, brake, wheel or rig.
     """
     platform = find_platform(settings.platform if platform_file is None else platform_file)
     whose = f"platform {settings.platform}"

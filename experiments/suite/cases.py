@@ -53,8 +53,8 @@ POURED, DENSEST = 0.534, 0.62
 """Where they began, and, roughly, where ``compact:densest`` ends."""
 
 PACED, PACED_LOWERING = 1.16, 1.30
-"""Grains computed by today's rules of sleep over those by the rules before 2026-11-26: after the hand lets go (40.5 %
-of the bed over 35.1) and while it lowers (58.2 over 44.8); five beds, docs/results/sleep-whole/runs.jsonl."""
+"""Grains computed by the present rules of sleep over those by the rules before 2026-11-26. First after the placement
+(40.5 % of the bed over 35.1), then during it (58.2 over 44.8); five beds, docs/results/sleep-whole/runs.jsonl."""
 AWAKE = PACED * 20260 * 2.4e-3**3 / 0.036
 """Grains that a motor's tumble computes a step, times their diameter cubed, over the bed's width [m2]:
 grains1-sand-0.0085-0.22, 20.1 % of 100,753 over 2 s, by the rules before 2026-11-26. The motors in sand that are kept

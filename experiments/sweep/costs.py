@@ -30,7 +30,7 @@ def core_seconds(command: str, settings: BaseModel) -> float | None:
 
 
 def cost_words(command: str, points: Sequence[Point], cores: int) -> tuple[list[float], str]:
-    """The cost of each run, 1 where nothing is known, and what is said of the whole on so many cores."""
+    """The cost of each run, 1 where it is unknown, and a sentence on the whole cost on so many cores."""
     known = [core_seconds(command, point.settings) for point in points]
     costs = [1.0 if cost is None else cost for cost in known]
     if None in known:

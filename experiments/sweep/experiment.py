@@ -1,7 +1,7 @@
 """`hedgebed sweep`: the runs of a design, each a run folder, then one table, sensitivities and a page.
 
-What is done is found again by its folder, so that a sweep that was killed goes on: `hedgebed resume` plans the same
-runs, reads those that are done and gives the others to the workers. A run that fails is told, and the others are made.
+Finished runs are found again by their folders, so a killed sweep can continue. `hedgebed resume` plans the same runs,
+reads the finished ones and gives the others to the workers. A run that fails is reported, and the others are made.
 """
 
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ def check(settings: SweepSettings) -> None:
 
 
 def _where(settings: SweepSettings) -> Where:
-    """Where the runs are computed: on all cores if nothing is said, since runs of unknown cost may be long."""
+    """Where the runs are computed: by default on all cores, since runs of unknown cost may be long."""
     where = Where.of(settings)
     return where if where.scheduler is not None else Where(None, where.workers or cores_there())
 

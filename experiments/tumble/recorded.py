@@ -1,9 +1,9 @@
 """Finished tumbles as a campaign of measured trials: simulated recordings of camera, IMU and wheel.
 
 Each run folder is a trial; runs of one condition on beds of other seeds are its replicates. The campaign states what a
-laboratory knows: the platform, the rig, and a surface of K and C per row, fitted to the same bed if a run of penetrate
-is named (`fitted`, twice a spike's), else those of the run. No file has true numbers, because the ground is grains.
-The start is that of the run: on grains theta and x are near 0 at t = 0, not exactly 0.
+laboratory knows: the platform, the rig, and a surface of K and C per row. These are fitted to the same bed if a run of
+penetrate is named (`fitted`, twice a spike's), else those of the run. No file has true numbers, because the ground is
+grains. The start is that of the run: on grains theta and x are near 0 at t = 0, not exactly 0.
 """
 
 import math
@@ -62,8 +62,8 @@ def write_tumbles_campaign(
 def campaign_of_tumbles(run: str | Path, *, recording: TumbleRecording | None = None, seed: int = 1) -> Campaign:
     """The finished tumble in the folder `run`, with those of ``recording.also``, as a campaign; `seed` fixes the noise.
 
-    Raises ValueError, naming the folder and what is accepted, for runs that are not finished, of something else, too
-    short, or of another platform, rig or surface than the first.
+    Raises ValueError, naming the folder and what is accepted, for runs that are unfinished, too short or of another
+    experiment. The platform, rig and surface must be those of the first run.
     """
     recording = recording if recording is not None else TumbleRecording()
     first, *others = tumbles = [_Tumble(Path(folder)) for folder in (run, *recording.also)]

@@ -1,7 +1,7 @@
 """Settings of `hedgebed tumble`: one trial of the platform, options by the names of the campaign format.
 
-A number that is not given comes from `model` if there is one, else from the surface or from the defaults in
-`experiments.tumble.trial`, which every run prints.
+A number that is not given comes from `model` if there is one. Otherwise it comes from the surface or from the defaults
+in `experiments.tumble.trial`, which every run prints.
 """
 
 from typing import Any, Literal, Self

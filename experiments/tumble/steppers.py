@@ -49,7 +49,7 @@ def words(settings: TumbleSettings, title: str) -> str:
 def row_feet(run: CoupledTumble) -> tuple[np.ndarray, np.ndarray]:
     """Depth of each row's tip [m], 0 above the surface, and its load [N], shape [step, row] both.
 
-    The load is the mean over the previous step. On a law, at the start, it is the force of the spring at rest, and the
+    The load is the mean over the previous step. On a law, at the start, it is the force of the spring at rest. The
     depth is the present one of the row's tip.
     """
     sinkage, load = run.feet[:, 3], run.feet[:, 0].copy()

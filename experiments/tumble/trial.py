@@ -73,12 +73,12 @@ def plan_tumble(
     spikes: Spikes | None = None,
     fitted: GroundFile | None = None,
 ) -> TumblePlan:
-    """The trial that `settings` describe. `model_file` stands in for ``settings.model``, where that was copied,
-    `platform` for ``settings.platform``, where that was read, `spikes` for the platform's, and `fitted` for the ground
-    file of ``settings.ground``.
+    """The trial that `settings` describe. `model_file` replaces ``settings.model``, where that was copied; `platform`
+    replaces ``settings.platform``, where that was read; `spikes` those of the platform; and `fitted` the ground file of
+    ``settings.ground``.
 
-    Raises ValueError, naming the setting, for a surface, law, effect or parameter there is not, a model that cannot be
-    read, and numbers that no platform or rig can have.
+    Raises ValueError, naming the setting, for an unknown surface, law, effect or parameter; a model that cannot be
+    read; and numbers that no platform or rig can have.
     """
     source = model_file if model_file is not None else Path(settings.model) if settings.model is not None else None
     model = _read(source) if source is not None else None

@@ -53,7 +53,7 @@ def resume(folder: str | Path, *, progress: Progress | None = None) -> Result:
 
 
 def check(settings: ValidateSettings) -> None:
-    """Raise ValueError, naming key, value and what would do, for an unknown case or a file that cannot be written."""
+    """Raise ValueError, naming key, value and remedy, for an unknown case or a file that cannot be written."""
     _wanted(settings)
     Where.of(settings).check()
     if settings.document is not None and not Path(settings.document).resolve().parent.is_dir():
@@ -150,7 +150,7 @@ def _record_of(case: Case, result: Json) -> Json:
 
 
 def _told(case: Case, record: Json, progress: Progress) -> Json:
-    """The record, of which the progress tells a line."""
+    """Return the record after showing a line of it."""
     progress.message(": ".join(filter(None, (f"{record['status']:>7}  {case.id}", _line(record)))))
     return record
 
@@ -247,9 +247,10 @@ def _is_checkout() -> bool:
 def keep(cases: Sequence[Json]) -> None:
     """Put the cases that were run into the checkout's table, docs/validation.md, and the result that it is made of.
 
-    A row for each case of the suite: as run now, or as it was before, or what is known of one that was not run. A row
-    has the command that runs its case alone: with others it comes to the same. Titles, sources and reasons are those
-    of cases.toml today; without `cases` nothing else changes (``python -m experiments.validate.experiment``).
+    Each case of the suite has a row: the new one, the earlier one, or what is known of a case that was not run. A row
+    has the command that runs its case alone; run with others the case gives equal numbers. Titles, sources and reasons
+    are those of the present cases.toml. Without `cases` nothing else changes
+    (``python -m experiments.validate.experiment``).
     """
     path = _ROOT / KEPT
     before = dict(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None

@@ -1,7 +1,7 @@
 """Thousands of planar trials at once, compiled by Taichi: `simulate_batch`.
 
-The terms are those of the accurate integrator. Parameters differ from trial to trial; which effects are on, the law of
-the ground and the number of spikes are the same for all, since the kernel is compiled for them (once; it is kept).
+The terms are those of the accurate integrator. Parameters differ from trial to trial; all have the same effects, law of
+the ground and number of spikes, since the kernel is compiled for these (once; it is kept).
 """
 
 import math

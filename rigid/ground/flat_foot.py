@@ -1,6 +1,6 @@
 """How much harder grains push a flat foot than laws and a ball tip: measured factors.
 
-Of a tip of 12 mm in `sand` that goes down at 0.1 m/s at 1 g, in one bed of 1.5 mm grains, eight across the tip
+The tip of 12 mm goes down in `sand` at 0.1 m/s and 1 g. The one bed has grains of 1.5 mm, eight across the tip
 (docs/results/mujoco-laws/flat-foot.json). Five grains across push harder, finer grains less: for real sand these are
 upper bounds.
 """

@@ -21,8 +21,8 @@ from .reaction import Contact, Facts, Reaction, State, Turned
 __all__ = ["SpringDamper", "SurfaceGround"]
 
 SHORT = 1e-3
-"""Below this share of the depth a path is integrated by Simpson's rule, exact to round-off there, and not as a
-difference of works, which would lose digits."""
+"""Below this share of the depth a path is integrated by Simpson's rule, exact to round-off there. A difference of works
+would lose digits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,7 +192,7 @@ class SurfaceGround(_LawGround):
 class SpringDamper(_LawGround):
     """Spring with V = K z^2 / 2 in the surface, damper with D = C (dz/dt)^2 / 2 while going in only.
 
-    The force on the body is K z + C max(0, dz/dt) for z > 0 and 0 above, so it never pulls (Reid et al., i-SAIRAS 2014,
+    The force on the body is K z + C max(0, dz/dt) for z > 0 and 0 above. It never pulls (Reid et al., i-SAIRAS 2014,
     eqs 5 and 6). It keeps no memory. Raises ValueError for a negative stiffness or damping, or mu_d above mu_s.
     """
 

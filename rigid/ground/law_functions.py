@@ -1,8 +1,8 @@
 """The functions of the surface laws: plain arithmetic that is Python and Taichi at once.
 
-Each is without loops, arrays, early returns or calls of another, so that the very same source runs on numbers and,
-compiled by whoever wants it (`ti.func`), on thousands of trials at once. What they mean, and how a force is put
-together from them, is in `rigid.ground.laws`; p holds a law's numbers.
+Each has no loops, arrays, early returns or calls of another. So the same source runs on numbers and, compiled by the
+caller (`ti.func`), on thousands of trials at once. What they mean, and how a force is put together from them, is in
+`rigid.ground.laws`; p holds a law's numbers.
 """
 
 __all__ = [

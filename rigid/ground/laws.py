@@ -1,18 +1,18 @@
 """Surface laws: the force on a spike by its depth, its rate of sinking and, for grains, its deepest depth.
 
-Each law is a few plain functions of numbers (`rigid.ground.law_functions`), whose very source runs as Python and,
-compiled by whoever wants it (`ti.func`), on thousands of trials at once. Depth z is positive downwards from the
-surface, rate is dz/dt. With `p` the law's numbers (a tuple, or a vector, in the order of `SurfaceLaw.slots`), the
-force, never negative, is
+Each law is a few plain functions of numbers (`rigid.ground.law_functions`). Their source runs as Python and, compiled
+by the caller (`ti.func`), on thousands of trials at once. Depth z is positive downwards from the surface, rate is
+dz/dt. With `p` the law's numbers (a tuple, or a vector, in the order of `SurfaceLaw.slots`), the force, never negative,
+is
 
     force = loading(top, p) * springback(z, top, rebound) * retreat_share(rate, *loss) + rate_force(z, rate, p)
 
 - `loading` is the force of loading, at new depths, and `loading_work` its integral from 0.
 - A law without memory springs back whole: there top = z, and springback(z, z, .) = 1. Grains do not: for them top is
-  the deepest depth that this spike has reached here (top >= z; 0 again once it has left the surface), and the force
-  falls in a straight line to 0 while the share `rebound` of that depth is undone. On retreat it is smaller by the
-  factor 1 - loss u / (u + loss_speed), u the speed of retreat, so that a cycle of unloading and loading again at u
-  loses that share of its work. It is continuous at u = 0; `loss` = 0 is a springback without loss.
+  the deepest depth that this spike has reached here (top >= z; 0 again once it has left the surface). The force falls
+  in a straight line to 0 while the share `rebound` of that depth is undone. On retreat it is smaller by the factor 1 -
+  loss u / (u + loss_speed), u the speed of retreat. So a cycle of unloading and loading again at u loses that share of
+  its work. It is continuous at u = 0; `loss` = 0 is a springback without loss.
 - `rate_force` is what depends on the rate (it may be negative, never below -loading). `rate_work` is its integral over
   depth at a constant rate.
 

@@ -2,9 +2,9 @@
 
 Agarwal, Goldman and Kamrin, PNAS 120 (2023), e2214017120 (arXiv 2205.14920). A piece of surface at depth d with outward
 normal n, moving along v with n.v >= 0, bears the traction xi_n d alpha(n, v): alpha is a polynomial of third degree in
-x1 = -z.v, x2 = -z.n, x3 = n.v (z up), whose part along the surface is bounded by the friction of surface and grains,
-and xi_n = rho_c g (894 mu^3 - 386 mu^2 + 89 mu) [N/m3] is the one number of the grains. The inertia of the grains adds
-lambda rho (n.v)^2 along -n (Agarwal et al., Science Advances 7 (2021), eabe0631).
+x1 = -z.v, x2 = -z.n, x3 = n.v (z up). The friction of surface and grains bounds its part along the surface. The one
+number of the grains is xi_n = rho_c g (894 mu^3 - 386 mu^2 + 89 mu) [N/m3]. The inertia of the grains adds lambda rho
+(n.v)^2 along -n (Agarwal et al., Science Advances 7 (2021), eabe0631).
 
 The 60 coefficients below are the paper's Table S1 as two public transcriptions have it. They differ in one, that of
 x3 x2^2 in f2: 0.18589 in github.com/KKKobefeng/3D-RFT, 0.18519 in the other. With the latter a flat plate that goes
@@ -112,8 +112,8 @@ def flat_plate() -> float:
 def ball_profile(surface_friction: float, *, degree: int = 7, samples: int = 400) -> tuple[NDArray[np.float64], float]:
     """Upward traction on the lower half of a ball going straight down, and on the shaft above it.
 
-    Returns the coefficients g of sum g_k u^k, shape [degree + 1], the least squares fit to alpha_z at u = 1 - cos of
-    the angle between normal and downward, and alpha_z at u = 1, a vertical wall, exactly.
+    Returns the coefficients g of sum g_k u^k, shape [degree + 1]. It is the least squares fit to alpha_z at u = 1 - cos
+    of the angle between normal and downward. At u = 1, a vertical wall, it is exact.
     """
     u = 0.5 * (1.0 - np.cos(np.pi * (np.arange(samples) + 0.5) / samples))  # crowded at the ends, where it bends most
     cosine = 1.0 - u

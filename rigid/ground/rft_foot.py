@@ -1,12 +1,12 @@
 """3D-RFT of a foot that goes straight down: the surface integral over its underside as a short series in its depth.
 
-A piece of the underside at the height y over its lowest point is at the depth z - y and carries xi_n (z - y) alpha_z
+A piece of the underside at the height y over its lowest point is at the depth z - y. It carries xi_n (z - y) alpha_z
 (`rigid.ground.rft`). So F(z) / xi_n is the integral of M(y) from 0 to z, where M(y) is alpha_z summed over the pieces
-below y. Near the lowest point M goes with y^(roundness / 2): a flat foot has all of its area at once (0), a cylinder
-that lies has a strip whose width is as the root of y (1), a ball has a cap whose area is as y (2). Hence
-F = A h xi_n s^e (sum of c_k s^k) with s = z / h and e = 1 + roundness / 2. The c_k are fitted to the integral, within
-0.5 % of it. The inertia of the grains is lambda rho v^2 times the integral of cos^3 over the submerged pieces, cos
-being that of the angle between normal and downward, and goes with s^(e - 1).
+below y. Near the lowest point M is proportional to y^(roundness / 2). A flat foot has all of its area at once (0). A
+lying cylinder has a strip whose width grows as the root of y (1), a ball a cap whose area grows as y (2). Hence F = A h
+xi_n s^e (sum of c_k s^k) with s = z / h and e = 1 + roundness / 2. The c_k are fitted to the integral, within 0.5 % of
+it. The inertia of the grains is lambda rho v^2 times the integral of cos^3 over the submerged pieces, which is
+proportional to s^(e - 1). The angle is that between normal and downward.
 """
 
 from dataclasses import dataclass

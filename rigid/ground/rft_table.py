@@ -6,8 +6,8 @@ with outward normal n and unit direction of motion v, is
     d (1 + b max(x1, 0) max(x2, 0)) (xi_1 f1 n + xi_2 f2 v - xi_3 f3 z),  bounded by friction along the surface,
 
 with the functions f1, f2, f3 of Agarwal, Goldman and Kamrin (`rigid.ground.rft`), x1 = -v_z and x2 = -n_z. There b = 0
-and xi_1 = xi_2 = xi_3 = xi_n, the one number of the grains. Here each may have its own value [N/m3]. b is ours: in beds
-of coarse grains a surface that faces down and moves down bears more than 3D-RFT says, beside one that faces forward.
+and xi_1 = xi_2 = xi_3 = xi_n, the one number of the grains. Here each may have its own value [N/m3]. b is our addition.
+In beds of coarse grains, surfaces that face and move down carry more than 3D-RFT predicts from those that face forward.
 """
 
 import json

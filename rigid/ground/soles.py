@@ -2,14 +2,14 @@
 
 Dry rigid grains far smaller than the tip have one scale of length, its diameter D, and one of time, sqrt(D / g). So
 F / (rho g D^3) is a function of z / D and of v / sqrt(g D) for tips of one shape. A term c z^n (dz/dt)^q of the force
-therefore has c in proportion to g^(1 - q/2) D^(3 - n - q/2): K z goes with the area, C dz/dt with D^2.5, b (dz/dt)^2
-with the area, and 1 / alpha of Hunt and Crossley's rate with sqrt(g D). D is that of the circle of the foot's area.
+therefore has c in proportion to g^(1 - q/2) D^(3 - n - q/2). So K z and b (dz/dt)^2 are proportional to the area,
+C dz/dt to D^2.5, and 1 / alpha of Hunt and Crossley's rate to sqrt(g D). D is that of the circle of the foot's area.
 Kang et al., Nature Communications 9 (2018), 1101, measure F in proportion to the displaced volume: for a flat foot to
 A z. Roth, Han and Jaeger, arXiv 1910.10358, find that parts of the depth and of the rate do not add up: a limit of
 every law here, whatever its size.
 
-Two laws have a scale of their own. Bekker's pressure (k_c / b + k_phi) z^n takes the smaller side b of a plate, or the
-radius of a round one (Bekker 1969), and acts on the foot's area. 3D-RFT is integrated over the foot's underside
+Two laws have a scale of their own. In Bekker's pressure (k_c / b + k_phi) z^n, b is the smaller side of a plate, or the
+radius of a round one (Bekker 1969). It acts on the foot's area. 3D-RFT is integrated over the foot's underside
 (`rigid.ground.rft_foot`).
 
 None of this holds on hard ground, where the spike gives way and not the ground, nor with cohesion.
@@ -99,8 +99,8 @@ def sized_law(
     """`law` of a tip of diameter `of` [m] as a foot with this `sole` has it.
 
     ``parameters``: of the tip. ``given``: names of those that are of this foot already and stay. With bekker and rft
-    a given radius means that the foot is the law's own ball or plate. Raises ValueError for a law or parameter there is
-    not, and for a diameter, area, width, height or perimeter that is not a finite number in its range.
+    a given radius means that the foot is the law's own ball or plate. Raises ValueError for an unknown law or
+    parameter. It also refuses a diameter, area, width, height or perimeter that is not a finite number in its range.
     """
     _refuse_sizes(sole, of)
     values = find_law(law).values(parameters)

@@ -1,8 +1,8 @@
 """The functions of a surface law with its numbers written into their source: the same arithmetic in less time.
 
 For loops that evaluate one law under one foot very often (`coupling.robot.FootForces`). Each function of
-`rigid.ground.law_functions` is a list of statements that ends with the only `return`, so that its source can be copied
-with p[k] replaced by a constant. A term that is then multiplied by 0 is left out, as is a factor or exponent of 1: for
+`rigid.ground.law_functions` is a list of statements that ends with the only `return`. So its source can be copied with
+p[k] replaced by a constant. A term that is then multiplied by 0 is left out, as is a factor or exponent of 1: for
 finite numbers that changes no bit, but for the sign of a zero. Half of the terms of 3D-RFT under a flat foot are such.
 """
 

@@ -1,8 +1,8 @@
 """Puts the terms of a model together into a handful of functions, for Python or for Taichi.
 
 The sum over terms is written out as text, once for every set of terms: a line a hook. The hooks themselves are
-ordinary functions (`rigid.terms`); for Python they are used as they are, for Taichi each is rebuilt from the same code
-with Taichi's functions in the place of those of `math`.
+ordinary functions (`rigid.terms`); Python uses them unchanged. For Taichi each is rebuilt from the same code, with
+Taichi's functions in place of those of `math`.
 
 The functions, with `s` the state (`STATE_FIELDS`), `p` the parameters of the effects (`<effect>_<parameter>`) and `q`
 the numbers of the ground's law:

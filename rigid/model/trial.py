@@ -96,8 +96,8 @@ class Trial(Coulomb):
     """One tumble. The names are those of a measured trial; SI units; stiffness and damping are a row's.
 
     Raises ValueError, naming the key, the value found and what was expected: for mass or inertia that no body can have
-    (above m l^2, or not above J_w), a counterweight that is not lighter than the platform, friction with mu_d above
-    mu_s, and a brake without a spinning wheel.
+    (above m l^2, or not above J_w); a counterweight that is not lighter than the platform; friction with mu_d above
+    mu_s; and a brake without a spinning wheel.
     """
 
     mass: float = 5.3  # m [kg], wheels included
@@ -217,8 +217,8 @@ class Trial(Coulomb):
     def slip_torque(self) -> float:
         """Least torque that makes the base model slip at rest [N m] where it is there at once.
 
-        The springs have not moved yet: the platform turns about the line of its feet, h below the centre, and holding
-        them takes m h tau / (J + m h^2) of mu_s W. So mu_s W (J + m h^2) / (m h), in the rig too, where x has no more
+        The springs have not moved yet: the platform turns about the line of its feet, h below the centre. Holding them
+        takes m h tau / (J + m h^2) of mu_s W. So mu_s W (J + m h^2) / (m h), in the rig too, where x has no more
         inertia than m.
         """
         h = self.height

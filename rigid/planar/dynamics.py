@@ -1,12 +1,13 @@
 """The equations of motion of one trial in one set of modes: what both integrators for single trials evaluate.
 
-A *mode* says which spikes touch, which of them stick, which way the others slide, whether the dry frictions of rig and
-bearing hold, whether the torque acts. Within a mode the right-hand side is smooth; modes change at events only.
+A *mode* states which spikes touch, which of them stick, and in which direction the others slide. It also states whether
+the dry frictions of rig and bearing hold, and whether the torque acts. Within a mode the right-hand side is smooth;
+modes change at events only.
 
 Sticking is a constraint, its force comes from the equations of motion. One spike that sticks: its slip speed is zero.
-Several share the horizontal force F in proportion to their loads N_n (docs/planar.md), so the virtual work of F is
-that of sum N_n slip_n / sum N_n, and this mean is what stays zero: sticking takes no energy, and when all load but one
-spike's is gone the constraint has become that spike's own.
+Several share the horizontal force F in proportion to their loads N_n (docs/planar.md). So the virtual work of F is that
+of sum N_n slip_n / sum N_n, and this mean stays zero: sticking takes no energy, and when all load but one spike's is
+gone the constraint has become that spike's own.
 """
 
 import math

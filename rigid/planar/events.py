@@ -1,9 +1,9 @@
 """Events: what is watched for them, and which modes follow.
 
 `monitors` are quantities that are positive as long as the modes hold. After an event `resolve` lets stick what the
-force to hold, within the static bound, permits; the rest slides the consistent way. Normal forces depend on where the
-tips are and how fast they go in, never on accelerations, so for one direction of friction there is always one answer
-(no Painleve paradox): the force that would hold is either within its bound, or the contact starts to slide against it.
+force to hold, within the static bound, permits; the rest slides the consistent way. Normal forces depend on the depths
+of the tips and their speeds, never on accelerations. So one direction of friction always has one answer (no Painleve
+paradox): the force that would hold is either within its bound, or the contact starts to slide against it.
 """
 
 import math

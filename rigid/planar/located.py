@@ -1,8 +1,8 @@
 """The accurate integrator: every event is located in time, and the motion between events is smooth.
 
 Between events Dormand and Prince's pair of orders 5 and 4 with its own interpolant; the step adapts to `tolerance`.
-Events (touch-down, lift-off, the static bound, slip through zero, the damper's switch, new ground under a spike with
-memory, end of the torque, the wheel's stop) are roots of a function of the state. A root is found by repeating the step
+Events are roots of a function of the state: touch-down, lift-off, the static bound, slip through zero, the damper's
+switch, new ground under a spike with memory, end of the torque, the wheel's stop. A root is found by repeating the step
 itself with other lengths, so the state at an event has the step's own accuracy. Grazing is looked for between the ends
 of a step. Events at one moment are taken one after the other without a step between them. More than `_CROWD` within a
 microsecond are answered with a step of a microsecond in the present modes, which is counted (`forced_steps`).
@@ -335,7 +335,7 @@ def _lift(system: System, z: list[float], modes: Modes, n: int) -> None:
 
 
 def _set_by_speeds(system: System, z: list[float], modes: Modes) -> None:
-    """After a forced step: who touches and which way they slide, read from the state as it is."""
+    """Find from the present state, after a forced step, which contacts touch and in which direction they slide."""
     for n in range(system.trial.spike_count):
         slip, inside = system.depth_and_slip(n, z)[1], system.inside(n, z, modes)
         if inside and n not in modes.touching:

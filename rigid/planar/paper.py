@@ -1,8 +1,8 @@
 """The paper's integrator: a fixed step of 1 ms, modes that change at the next step.
 
 The paper gives the step and not the method. This is the plainest that holds: semi-implicit Euler (speeds first, then
-the pose with the new speeds), of order 1, with touch-down, lift-off, stick and slip read from the state at the start of
-a step. It is here to show what that step does; the located integrator is the one to trust.
+the pose with the new speeds), of order 1. Touch-down, lift-off, stick and slip follow from the state at the start of a
+step. It is here to show what that step does; the located integrator is the one to trust.
 """
 
 import math

@@ -1,9 +1,9 @@
 """How a platform stands before the torque starts, and when it rests later.
 
-Standing is static equilibrium on spikes 0 and n - 1, x = 0. On level ground with the mass on the shaft theta = 0 and
-each row carries W / 2 (for the spring-damper at a depth of W / 2K). Elsewhere the rows carry different loads, so the
-platform leans by their difference in depth, and y and theta are found by Newton's method from the balance of forces
-along the normal and of moments.
+Standing is static equilibrium on spikes 0 and n - 1, x = 0. On level ground with the mass on the shaft theta is 0. Each
+row then carries W / 2 (for the spring-damper at a depth of W / 2K). Elsewhere the rows carry different loads, so the
+platform leans by their difference in depth. Newton's method then finds y and theta from the balance of forces along the
+normal and of moments.
 
 At rest nothing moves and nothing will before the torque changes. `at_rest`: no speed at all, and no force left but
 rounding. `comes_to_rest`: what still moves is less than the integrator's own error, and would not gather speed, since

@@ -28,8 +28,8 @@ def counterweight_for(
     """The counterweight [kg] that offloads a platform of `mass` [kg] to `gravity_stated` [m/s2].
 
     Read as ``pair``, m_b = m (g - g_sim) / (g + g_sim); as ``weight``, m_b = m (1 - g_stated / g). Raises ValueError,
-    naming the argument, for a mass, gravity or reading that cannot be, and for a stated gravity that is not below the
-    local one, `gravity` [m/s2]: a counterweight can only take weight away.
+    naming the argument, for an impossible mass, gravity or reading. It also refuses a stated gravity that is not below
+    the local one, `gravity` [m/s2]: a counterweight can only take weight away.
     """
     if reading not in get_args(Reading):
         raise ValueError(f"reading = {reading!r} is neither 'pair' nor 'weight'")
@@ -45,8 +45,8 @@ def counterweight_for(
 class Rig:
     """A platform in the rig. `gravity_sim` rules the weight, whatever (m - m_b) g would give.
 
-    Raises ValueError, naming the key, its value and what is allowed, for a counterweight that is not lighter than the
-    platform (it would pull it off the ground), and for a simulated gravity that is not below the local one.
+    Raises ValueError, naming the key, its value and the allowed range. A counterweight must be lighter than the
+    platform (else it pulls it off the ground), a simulated gravity below the local one.
     """
 
     mass: float  # Of the platform [kg]

@@ -9,10 +9,10 @@ angular momentum are states themselves, so that in flight they are kept to round
 with tau_i the torque of wheel i on the platform about its axis a_i. P = (m v_x, m v_y, (m + m_b) v_z).
 
 Friction. A tip slides, with mu_d N against its slip u_k, or sticks. Those that stick share the force that holds them in
-proportion to their loads, as the planar model has it: f_k = N_k (c + b z x (rho_k - mean rho)), so that what is held at
-rest is the load-weighted mean of their slips and, if they are several, that of their turning about the vertical. The
-force is that of these constraints, from the equations of motion: no spring, and nothing that creeps. Within a step the
-weights are those of its beginning.
+proportion to their loads, as the planar model has it: f_k = N_k (c + b z x (rho_k - mean rho)). So the load-weighted
+mean of their slips is held at rest and, if they are several, that of their turning about the vertical. The force is
+that of these constraints, from the equations of motion: no spring, and nothing that creeps. Within a step the weights
+are those of its beginning.
 """
 
 import math

@@ -1,12 +1,12 @@
 """Steps and events of `rigid.spatial.spatial`: what changes the modes, when, and into which.
 
-Events are looked for at the end of each step and located by repeating it, so the state at an event has the step's own
+Events are detected at the end of each step and located by repeating it. So the state at an event has the step's own
 accuracy. Events at one moment are taken together. Two things could make it crawl, and both are counted, not hidden:
 - More than `CROWD` events within a microsecond: a step of `FORCED` is made in the present modes, which are then set
   anew from the state (`forced_steps`).
-- A slip that is driven along hardly faster than nothing turns its direction ever faster, and never passes through 0 as
-  it does in the plane. Where steps fall below `STALL`, tips slower than `SLOW` are made to stick (`stalls`). Those that
-  the static bound lets go start against the force that held them, and keep that direction until they are faster.
+- A driven slip that is almost zero turns its direction ever faster. It never passes through 0 as it does in the plane.
+  Where steps fall below `STALL`, tips slower than `SLOW` are made to stick (`stalls`). Those that the static bound lets
+  go start against the force that held them, and keep that direction until they are faster.
 """
 
 import math

@@ -71,8 +71,8 @@ def sensor_terms(hook: str, own: Iterable[Term] = ()) -> tuple[Term, ...]:
 def load_effect(file: str | Path) -> Term:
     """The term that the Python file `file` calls TERM.
 
-    Raises ValueError, naming the file, where there is none, where its id is one of ours, and where a hook calls another
-    function of the file.
+    Raises ValueError, naming the file: it does not exist; its id is one of ours; a hook calls another function of the
+    file.
     """
     path = Path(file).resolve()
     if not path.is_file():

@@ -212,7 +212,7 @@ def between(slot: str, how: str, low: float, high: float, *, value: float | None
 
 
 def times(factor: str, *clauses: str, instead: str = "") -> Callable[[str], str]:
-    """What makes of a form's equation one with another factor, and the clauses that define it, `instead` of one."""
+    """A function that adds a factor, and the clauses that define it, to a form's equation, `instead` of one clause."""
 
     def made(text: str) -> str:
         first, *rest = text.replace(instead, "").split(", ") if instead else text.split(", ")

@@ -1,10 +1,10 @@
 """What a term of the model is: named, with parameters in units, and a few plain functions ("hooks").
 
-A hook is plain arithmetic on numbers, without loops or early returns, so that the very same source runs as Python in
-the accurate integrator and, compiled by Taichi, in the batch. Mathematical functions are those of `math`, imported by
-name (`from math import exp`); a hook may call plain functions of another module (`rigid.terms.curves`), none of its own
-file. What its arguments are called says what it gets: first the fixed ones listed below, then the term's own
-parameters, by name, in any number.
+A hook is plain arithmetic on numbers, without loops or early returns. So the same source runs as Python in the accurate
+integrator and, compiled by Taichi, in the batch. Mathematical functions are those of `math`, imported by name (`from
+math import exp`); a hook may call plain functions of another module (`rigid.terms.curves`), none of its own file. What
+its arguments are called says what it gets: first the fixed ones listed below, then the term's own parameters, by name,
+in any number.
 
 | hook                 | fixed arguments           | gives                                                        |
 |----------------------|---------------------------|--------------------------------------------------------------|

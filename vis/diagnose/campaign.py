@@ -1,4 +1,4 @@
-"""Reports of a campaign that was made up, with its recordings under campaign/, and of `hedgebed campaign check`."""
+"""Reports of a synthetic campaign, with its recordings under campaign/, and of `hedgebed campaign check`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _TUMBLE = (
 
 @report_of(dpi=130, named=True)
 def write_campaign_report(report: Report) -> Path:
-    """Make figures/ and report.html of the folder of a made-up campaign, and return the report."""
+    """Make figures/ and report.html of the folder of a synthetic campaign, and return the report."""
     result, quantities = report.result, report.result["quantities"]
     drawn = report.draw("recordings", _draw(report.folder / result["campaign"], result["trials"]))
     rows = [

@@ -54,7 +54,7 @@ _NARROW = 3.0
 """Range of chi-square up to which its axis is linear."""
 _BINS = 20
 _OUT, _HELD = 0.05, 0.5
-"""Shares of the rows of a push on the way out and at rest up to which it only goes in."""
+"""Largest shares of the rows in withdrawal and at rest for which a push counts as loading only."""
 _APART = 0.005
 """Share of the range within which bins lie at one place."""
 

@@ -221,7 +221,7 @@ def _parted(diagnosis: Result) -> list[Block]:
 
 
 def _settings(settings: Mapping[str, float], *, but: Mapping[str, float] | None = None) -> str:
-    """torque_N_m = 0.22 as "torque 0.22 N m"; `but`: what need not be said, for all have it."""
+    """torque_N_m = 0.22 as "torque 0.22 N m"; `but`: settings left out because all trials share them."""
     left = {name: value for name, value in settings.items() if name not in (but or {})}
     settings = left or settings
     units = {"N_m": "N m", "m_s2": "m/s²", "m_s": "m/s", "m": "m", "kg": "kg", "rad_s": "rad/s"}
@@ -340,7 +340,7 @@ def _findings(diagnosis: Result) -> list[Block]:
 
 
 def _distinguished(diagnosis: Result) -> list[Block]:
-    """The first effect against the nearest other names, and what would tell them apart."""
+    """The first effect against the nearest other names, and the trials that would separate them."""
     rows = diagnosis.get("equivalence", [])
     if len(rows) < 2:
         return []

@@ -1,8 +1,8 @@
 """Still pictures and the film of one run or two: cameras that follow the platform, a colour scale that stays put.
 
-A sheet shows each run through the cameras of its kind (`vis.film.cameras`), two runs side by side, and below them their
-states over time with a cursor. `python -m vis.film.film <job.json>` draws a job with OpenGL in a process of its own, as
-`vis.pictures.render` does for spikes.
+A sheet shows each run through the cameras of its kind (`vis.film.cameras`). Two runs stand side by side, and below them
+their states over time with a cursor. `python -m vis.film.film <job.json>` draws a job with OpenGL in a process of its
+own, as `vis.pictures.render` does for spikes.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ _OF_THE_BED = {
 
 @report_of(named=True)
 def write_ground_report(report: Report) -> Path:
-    """Make report.html of the folder of a look-up, and return it."""
+    """Make report.html of the folder of `hedgebed ground`, and return it."""
     source = report.result["map"]["source"]
     sections = [
         Section("", [text(f"Looked up, not computed, in a map of {source}. ground.toml beside this page is the law.")]),

@@ -209,7 +209,7 @@ _BARE_UNITS = {"1", "m", "m/s", "m/s2", "s", "kg", "N", "N/m", "N s/m", "Pa", "d
 
 
 def rest_part(result: Mapping[str, Any]) -> dict[str, Any] | None:
-    """What is said where the foot does not come to rest, and a table: depth at rest with some cohesion; else None."""
+    """Text and table for a foot that does not come to rest: its depth at rest with some cohesion; else None."""
     rest = mapping_of(result.get("rest"))
     rows = [mapping_of(row) for row in list_of(rest.get("cohesions"))]
     if rest.get("comes_to_rest") is not False or not rows:

@@ -1,8 +1,8 @@
 """The page around a picture of the bed: title, colour bar, depth scale. The same with OpenGL and without.
 
 A picture is 4:3. The three-dimensional image, or the cross-section that stands in for it, fills the page to the left of
-the colour bar; `place` gives where a point of the bed lies on it, a function (n, 3) [m] -> (n, 2) in fractions of
-the page from its lower left corner.
+the colour bar; `place` maps points of the bed onto it, (n, 3) [m] -> (n, 2), in fractions of the page from its lower
+left corner.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def colour_values(grains: dict[str, NDArray[Any]], by: str) -> NDArray[np.float6
 def moved_since(grains: dict[str, NDArray[Any]], first: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """The fields of a frame's grains, their displacement [m] counted from the `first` frame on, not from before it.
 
-    A bed under a platform has been pressed by the setting down when time begins. Left as it is where a frame has none.
+    The placement presses a bed under a platform before time begins. Fields without displacements stay unchanged.
     """
     if "displacement" not in grains or "displacement" not in first:
         return grains

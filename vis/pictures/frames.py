@@ -173,7 +173,7 @@ class FrameWriter:
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame of a run as it was written.
+    """One written frame of a run.
 
     ``time``: Time [s]. ``grains``: `position` [m], shape (n, 3), and the fields of `GRAIN_FIELDS` that were written.
     The others as `FrameWriter.write` takes them.
@@ -232,13 +232,13 @@ class Frames(Sequence[Frame]):
         return Frame(time, grains, bodies, values, clouds, maps)
 
     def check(self) -> None:
-        """Raise ValueError, naming the file, for one that is not as it was written."""
+        """Raise ValueError, naming the file, for a file that has changed since it was written."""
         for entries in self._by_time.values():
             for entry in entries:
                 self._whole(entry)
 
     def _whole(self, entry: _Entry) -> Path:
-        """The file of an entry. Raises ValueError where it is not as it was written."""
+        """The file of an entry. Raises ValueError where it has changed since it was written."""
         path = self.folder / entry.file
         if entry.digest and path.is_file() and digest_of(path) != entry.digest:
             raise ValueError(f"{path}: is not as the run wrote it: its digest differs from that in {self.name}.pvd")

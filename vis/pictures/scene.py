@@ -218,9 +218,9 @@ class Scene(Rendered):
 class Eye:
     """Where a point lies on a picture of `width` [m] across whose middle is at the focus.
 
-    ``size``: Of the picture [pixels]. ``width``: What it shows across [m]. ``cut``: y of the plane that is looked at
-    [m]. ``pitch``: How far the view goes downwards [radians]. Its `reach` is how far from the focus there is something
-    to be seen [m].
+    ``size``: Of the picture [pixels]. ``width``: Visible width [m]. ``cut``: y of the plane in view [m]. ``pitch``:
+    Angle of the view below the horizontal [radians]. Its `reach` is the largest distance of visible things from the
+    focus [m].
     """
 
     def __init__(self, size: tuple[int, int], *, width: float, cut: float, pitch: float = 0.0) -> None:

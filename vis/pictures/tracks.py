@@ -22,8 +22,8 @@ def lying(position: ArrayLike, radius: ArrayLike) -> NDArray[np.bool_]:
     """Which grains belong to the bed, and not to what flies over it or hangs on a spike.
 
     The lower three quarters of the grains do; above them those that a chain of neighbours, a tenth of a diameter apart
-    at most, joins to these. So a string of grains up a spike that stands in the sand is joined to the bed too, and
-    remains a tower in the height map.
+    at most, joins to these. So a string of grains up a standing spike is joined to the bed too. It remains a tower in
+    the height map.
 
     ``position``: Centres of the grains [m], shape (n, 3). radius: Their radii [m], shape (n,). Returns shape (n,).
     """
@@ -52,9 +52,11 @@ def height_map(
     """Height of the grains' tops over a grid on a bed that is periodic along x and y.
 
     ``position``: Centres of the grains [m], shape (n, 3). ``radius``: Their radii [m], shape (n,). ``size``: Length of
-    the bed along x and y [m]; the grid covers it once. ``spacing``: Wanted between the points [m]; as near to it as
-    divides the bed. ``lies``: Which of them count, shape (n,), as `lying` tells; all when None. Returns a map with
-    `height` [m]: z of the highest point of a sphere over each point of the grid, 0 (the floor) where there is none.
+    the bed along x and y [m]; the grid covers it once. ``spacing``: Wanted between the points [m]; the nearest one
+    that divides the bed is used. ``lies``: Which grains count, shape (n,), from `lying`; all when None.
+
+    Returns a map with `height` [m]: z of the highest point of a sphere over each point of the grid, 0 (the floor) where
+    there is none.
     Raises ValueError: a spacing that is not above 0.
     """
     if not spacing > 0:

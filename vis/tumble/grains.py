@@ -52,7 +52,7 @@ def grains_section(report: Report) -> Section:
 
 
 def _balance(motion: Columns, feet: Columns, bed: Columns) -> Columns:
-    """The books at the times of ``bed`` [mJ]."""
+    """The energy balance at the times of ``bed`` [mJ]."""
     time = bed["t_s"]
 
     def at(columns: Columns, name: str) -> Array:

@@ -15,7 +15,7 @@ __all__ = ["View"]
 
 
 class View:
-    """What a notebook shows of a run, or of a bed as it is now, as the last line of a cell.
+    """The view of a run, or of the present bed, that a notebook shows for the last line of a cell.
 
     ``what``: A run folder, or a `dem.Bed` (anything with `time` and `grains()` as a bed has them). ``size``: Most
     bytes of the data. ``height``: Of the frame in the notebook [pixels]. Raises FileNotFoundError or ValueError as

@@ -71,7 +71,7 @@ def report_scene(folder: str | Path, progress: Progress | None = None) -> list[B
 
 
 def _nothing(home: Path) -> str:
-    """Why a folder has nothing to show, and what would do: one of the runs in it, frames, or nothing."""
+    """Why a folder has nothing to show, and what to open instead: one of the runs in it, frames, or nothing."""
     run = read_folder(home)
     settings = {setting.key: setting.value.strip("\"'") for setting in run.settings}
     homes = [home, home / settings.get("members", "none")]

@@ -252,7 +252,7 @@ def _order(frame: Frame) -> NDArray[np.int64]:
 
 
 def _corners(source: Source, first: Frame) -> tuple[Array, Array]:
-    """Corners of the space that positions are rounded in: the bed, with room above it for grains that fly."""
+    """Corners of the space in which positions are rounded: the bed, and space above it for flying grains."""
     position = first.grains["position"]
     if not len(position):
         return source.low, source.high

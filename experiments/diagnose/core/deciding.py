@@ -33,8 +33,8 @@ its effect. In synthetic campaigns of penetration two dozen right effects left 0
 things outside the library effects left 0.08 and more, but for one shock, which a crust explained on those it was fitted
 to. Of trials held out twice that: few as they are, one that is sensitive (a slow drop) leaves more by itself."""
 _NO_EFFECT = 0.5
-"""Share of what the base model leaves, of trials fitted or held out, from which on an effect explains too little to be
-named, where the gate fails. In five counts of tumbles right effects left 0.47 at most of these."""
+"""Share of the base model's residual, of trials fitted or held out. An effect that leaves more explains too little to
+be named where the gate fails. In five counts of tumbles right effects left 0.47 at most of these."""
 _SURE = 3.0  # standard deviations of chi-square beyond which what an effect leaves is not chance
 _LATE = 0.5  # share of a held-out trial's time up to which a model that explains all fitted ones must follow it
 _CERTAIN = 0.1
@@ -116,9 +116,9 @@ def bends_to_anything(choice: Choice, *, set_aside: bool) -> bool:
 
 
 def explains_nothing(choice: Choice, held_out: tuple[str, ...]) -> bool:
-    """Whether an effect improves neither the trials fitted nor those held out, where the base model leaves no more
-    than chance, all by the noise as stated: then it has found another of the many narrow valleys that a likelihood of
-    long tumbles has, which the noise's colour makes deep, and no effect."""
+    """Whether an effect improves neither the fitted nor the held-out trials, where the base model leaves no more than
+    chance, all by the stated noise. Then it is no effect, but one of the many narrow valleys that the likelihood of
+    long tumbles has. Coloured noise makes them deep."""
     before, after = gap_of(choice.base.fit, held_out), gap_of(choice.best.fit, held_out)
     if before.fit - 1 > _SURE * math.sqrt(2 / choice.base.fit.count) or (before.held_out or 0.0) > SMALL:
         return False
@@ -159,9 +159,9 @@ def _left_of(found: Fit, trials: tuple[str, ...]) -> float:
 
 
 def certain(base: Fit, choice: Choice) -> bool:
-    """Whether the effects found are certain although something else is there too: they remove most of what the base
-    model leaves, of what was fitted and in cross-validation, without a number that the campaign excludes or a scale
-    at the end of the library's range: such an effect may only imitate something else."""
+    """Whether the effects found are certain although something else is there too. They must remove most of the base
+    model's residual, in the fit and in cross-validation. No number may be one that the campaign excludes, no scale at
+    the end of the library's range: such an effect may only imitate something else."""
     best, amplitudes = choice.best.fit, {form.amplitude for form in choice.best.forms}
     ends = any(not met.strains and met.parameter not in amplitudes for met in bounds_met(best))
     if ends or is_strained(best) or bends_little_away(best, base) or excess(best) >= _CERTAIN * excess(base):
@@ -198,8 +198,8 @@ def well_known(found: Fit) -> bool:
 
 
 def closes(base: Fit, best: Fit, held_out: tuple[str, ...]) -> bool:
-    """Whether nearly all that the base model leaves of trials held out is removed, and what is left does not exceed the
-    noise of the sensors and the scatter of replicates; true where none are held out."""
+    """Whether nearly all of the base model's residual of held-out trials is removed. The rest must not exceed the noise
+    of the sensors and the scatter of replicates; true where none are held out."""
     if not held_out:
         return True
     before, after = (_left_of(found, held_out) for found in (base, best))
@@ -238,8 +238,8 @@ def held_out_divergences(found: Fit, held_out: tuple[str, ...], seed: int) -> li
 def diverging_beside(
     base: Fit, choice: Choice, verdict: str, ask: Callable[[Fit], tuple[Finding, ...]]
 ) -> tuple[Finding, ...]:
-    """Trials that diverge, where the base model explains all others and an effect nothing but them, or where an effect
-    explains all others and nothing is named so far. `ask`: the diverging trials of a fit."""
+    """Trials that diverge, where the base model explains all others and an effect only these. Also those that diverge
+    where an effect explains all others and nothing is named so far. `ask`: the diverging trials of a fit."""
     gone = ask(base)
     if verdict == "unknown":
         for other in () if gone else _likeliest(choice):

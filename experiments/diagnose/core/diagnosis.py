@@ -333,7 +333,7 @@ class _Course:
         return held is None or held.passed
 
     def _timed(self, choice: Choice) -> Choice:
-        """Times that jitter, at the slopes of the motion as it is now known."""
+        """The error of jittering times, from the slopes of the motion in the present fit."""
         if not choice.best.effects:
             return choice
         best, jitters = renoised.jittered(choice.best.fit, self.held_out, self.jitters)

@@ -24,8 +24,8 @@ __all__ = ["MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by", 
 
 MOST = SMALL  # the gap up to which what is left is too small to matter
 _CLOSED = 0.99
-"""Share of what the base model leaves beyond the noise, on fitted and held-out trials, that a name must close where
-more than `MOST` is left beside it: 97.6 % of a magnet was closed by a pendulum."""
+"""Share of the base model's residual beyond the noise, on fitted and held-out trials. A name must close it where more
+than `MOST` remains beside it: 97.6 % of a magnet was closed by a pendulum."""
 _ERRORS = 3.0
 _COMPARED = 3  # other names that are compared with one that is taken alone
 _WITHIN = 3.0  # standard deviations from what was stated within which a number is as stated
@@ -58,9 +58,9 @@ def is_small(left: Gap, fitted: int, held_out: int) -> bool:
 
 
 def takes_below(before: Gap, best: Fit, held_out: tuple[str, ...], scatter: Scatter) -> bool:
-    """Whether the best model takes the gap of held-out trials (of all, where none are held out) below that of the base
-    model, `before`, by more than the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise. A form
-    with a number at the end of its range only imitates something small."""
+    """Whether the best model reduces the base model's gap of held-out trials, `before` (of all, where none are held
+    out). The reduction must exceed the gap's own uncertainty: `_ERRORS` standard errors of a mean square of noise. A
+    form with a number at the end of its range only imitates something small."""
     if any(not bound.strains for bound in bounds_met(best)):
         return False
     after, model = left_by(best, held_out, scatter), best.model
@@ -72,8 +72,8 @@ def takes_below(before: Gap, best: Fit, held_out: tuple[str, ...], scatter: Scat
 
 
 def explains(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> bool:
-    """Whether the best model's first name leads every rival by `LEAD`, and what is left of held-out trials is too
-    small to matter, or nearly all is closed. What is left is then reported as residue."""
+    """Whether the best model's first name leads every rival by `LEAD`. Also the residual of held-out trials must be too
+    small to matter, or nearly all closed. What is left is then reported as residue."""
     if not choice.best.effects or undecided(choice):
         return False
     after, weighed = _gaps(choice.best.fit, held_out, scatter)

@@ -75,9 +75,9 @@ def _follow(worst: Sequence[Place], shares: Mapping[str, float]) -> str:
 
 
 def common_share(problem: Problem, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> float:
-    """Share of what a model leaves of replicates, beyond the sensors, that all of them have in common (0 to 1): by the
-    residuals over the noise, channel by channel at the same shares of the trials' time, the mean of the products of two
-    different trials over the mean of the squares."""
+    """Share of a model's residual, beyond the sensors, that all replicates have in common (0 to 1). Residuals over the
+    noise are compared channel by channel at equal shares of the trials' time. The share is the mean of the products of
+    two different trials over the mean of the squares."""
     curves: dict[str, list[Array]] = {}
     for trial in trials:
         samples = problem.samples(trial)

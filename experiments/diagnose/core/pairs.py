@@ -1,11 +1,11 @@
 """Where fits of two effects at once should begin.
 
-Where two effects are hidden, the best single name may be neither of them, and a fit that begins from one alone stays
-where that one has bent it. So pairs are looked for from the base model's fit: the change c that every form makes at
-several amplitudes, with what the base parameters could take up projected out, and for every two of them the sizes a, b
-for which |r + a c1 + b c2| is least, r being what is left. From the pairs that promise most, fits begin, the base
-parameters moved as the projection says. Changes add up only as far as the model is linear; of motions that bounce only
-the beginning is looked at (`Model.until`).
+Where two effects are hidden, the best single name may be neither of them. A fit that begins from one alone stays in the
+minimum of that one. So the search for pairs begins at the base model's fit, with its residual r. Every form makes a
+change c at several amplitudes, without the part that the base parameters could take up. For every two of them the sizes
+a, b are found for which |r + a c1 + b c2| is least. Fits begin from the best pairs, with the base parameters moved by
+the projection. Changes add up only as far as the model is linear; of motions that bounce only the beginning is used
+(`Model.until`).
 """
 
 from collections.abc import Sequence

@@ -1,17 +1,18 @@
 """Which effects a campaign cannot separate: signatures of fitted effects, and cross-validation over conditions.
 
-The signature of an effect is what it changes in the predicted data where it is fitted, over the noise, less what the
-other parameters could take up. The angle between two signatures says whether the design sees them as one, whatever the
-noise was in these trials; their distance, how many standard deviations of noise lie between the two predictions. Half
-its square is the evidence that can be expected [nats], less where the misfit of form exceeds the noise.
+The signature of an effect is the change that it makes in the predicted data where it is fitted, over the noise. The
+part that the other parameters could take up is subtracted. The angle between two signatures says whether the design
+sees them as one, whatever the noise was in these trials; their distance, how many standard deviations of noise lie
+between the two predictions. Half its square is the evidence that can be expected [nats], less where the misfit of form
+exceeds the noise.
 
 In the cross-validation every condition (torque and gravity of a tumble; kind, speed and diameter of a penetration) is
-left out in turn, the model refitted to the others, and the trials left out are predicted with nothing but their own
-nuisances refitted within their priors; a base parameter of which the others say nothing (K of a diameter) stays as all
+left out in turn, and the model refitted to the others. The trials left out are then predicted; only their own nuisances
+are refitted, within their priors; a base parameter of which the others say nothing (K of a diameter) stays as all
 trials have it. What a prediction leaves is scored as a fit is (`evidence.tempered`): the form is never nature's. Where
-motions are smooth in the parameters (pushes and drops), what was learned counts with its standard errors, as in any
-predictive likelihood (Gelman et al., Bayesian Data Analysis, 3rd ed., section 7.2, to first order in the errors): a
-drop that is sensitive to a number that the others determine badly tells nothing against a model.
+motions are smooth in the parameters (pushes and drops), the fitted numbers count with their standard errors. This is a
+predictive likelihood to first order in the errors (Gelman et al., Bayesian Data Analysis, 3rd ed., section 7.2): a drop
+that is sensitive to a number that the others determine badly is no evidence against a model.
 """
 
 import math
@@ -124,7 +125,7 @@ def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Riva
 
 
 def marked(rivals: Sequence[Rival], best: Hypothesis) -> tuple[Rival, ...]:
-    """With those marked that mean the same as the best, as it is fitted at last, and leave too little to matter."""
+    """Mark the rivals that mean the same as the best hypothesis in its last fit, and leave too little to matter."""
     names = _becomes(best) if best.effects else set()
     fits = [rival.hypothesis.fit for rival in rivals]
     return tuple(

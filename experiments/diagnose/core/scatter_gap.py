@@ -30,8 +30,8 @@ Stds = Mapping[str, float]
 
 @dataclass(frozen=True)
 class ScatterGap:
-    """Chi-square per valid sample against the sensors' noise and the scatter of replicates, each of the fitted trials
-    and of those held out (None where there are none)."""
+    """Chi-square per valid sample against the sensors' noise and the scatter of replicates. Each is a pair: of the
+    fitted trials and of those held out (None where there are none)."""
 
     before: Pair  # of the base model
     after: Pair  # of the best model

@@ -1,8 +1,8 @@
 """Readings noisier than campaign.toml states: a model that explains them with that noise alone is no `none`.
 
-The format asks for a gap of at most 1.2 with the stated noise. The gate counts the noise as it is found, so a base
-model can pass it with any gap: a std that is 1,000 times too small leaves a gap of a million. Then these trials do not
-show whether an effect smaller than that noise is missing.
+The format requires a gap of at most 1.2 with the stated noise. The gate uses the noise that it finds, so a base model
+can pass it with any gap: a std that is 1,000 times too small leaves a gap of a million. Then these trials do not show
+whether an effect smaller than that noise is missing.
 """
 
 import math
@@ -23,7 +23,7 @@ _TWICE = 2.0  # times the stated noise from which on even the scatter of replica
 @dataclass(frozen=True)
 class Noise:
     """Of one channel, one standard deviation in its SI unit: as campaign.toml states it, and as the fast modes of the
-    residuals have it, or, where no other noise was found in these, the root mean square of the residuals."""
+    residuals show it. Where these show no other noise, it is the root mean square of the residuals."""
 
     stated: float
     found: float

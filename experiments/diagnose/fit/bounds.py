@@ -14,8 +14,8 @@ __all__ = ["Bound", "bends_little_away", "bounds_met", "is_strained", "strained_
 
 _FAR = 5.0  # standard deviations from the stated value that no true number has (chance 6e-7)
 _FAR_FOR_LITTLE, _LITTLE = 3.5, 0.5
-"""The same (chance 5e-4) where the base model leaves so little a sample beyond the noise that a form that is not quite
-nature's has nothing to bend numbers with. Of a reviewer's tumbles one such name was false and needed a mass 4.4
+"""The same (chance 5e-4) where the base model leaves very little beyond the noise per sample. Then a form that is not
+quite nature's cannot distort the numbers. Of a reviewer's tumbles one such name was false and needed a mass 4.4
 standard deviations off; right names that explained as little needed 2.5 at most."""
 
 

@@ -2,10 +2,10 @@
 
 Steps are found from the normal equations, several dampings and lengths are tried at once, and the best is taken; a
 `Rule` says which, and when a fit ends. `SEARCH` is the rule for motions with contacts, whose likelihood jumps where a
-trial changes its branch (sticks or slips, touches or misses): such a fit may look at growing shares of the trials'
-time, and scans each trial's own numbers over their priors for the branch that was measured. A fit is a generator that
-asks for modes at a list of points, so that many fits are carried out together (`fits`): what all of them ask for is
-answered by one call of the batched model.
+trial changes its branch (sticks or slips, touches or misses): such a fit may use growing shares of the trials' time. It
+scans each trial's own numbers over their priors for the measured branch. A fit is a generator that asks for modes at a
+list of points, so that many fits are carried out together (`fits`): what all of them ask for is answered by one call of
+the batched model.
 """
 
 from __future__ import annotations
@@ -269,8 +269,8 @@ def scanned(found: Fit, *, passes: int = _PASSES) -> Fit:
     """The best of fits that begin where a trial's own numbers lie elsewhere within their priors.
 
     Where a trial sticks or slips otherwise, its likelihood has many narrow valleys. Each of its numbers is moved over
-    three standard deviations of its prior, its others with it as the fit says that they must; what is shared stays, so
-    that all trials are looked at together, and each takes its best.
+    three standard deviations of its prior, and its other numbers follow the fit. Shared parameters stay unchanged, so
+    all trials are tried together, and each takes its best.
     """
     for _ in range(passes):
         ((values, gain),) = _together([_scan(found.model, found.values, found.hessian(), least=1.0)])
@@ -376,8 +376,8 @@ def settled_slopes(model: Model, values: Values) -> tuple[Array, Array]:
     """As `Linear` has them, over steps that are worth a standard deviation of the data, both ways.
 
     A fit's own steps are hundredths of what was stated or of a typical size. Where data determine a number a thousand
-    times better, such a step reaches over the next branch of sticking and slipping, and a jump is taken for a slope:
-    standard errors would come out far too small.
+    times better, such a step reaches over the next branch of sticking and slipping. Then a jump is taken for a slope,
+    and standard errors are far too small.
     """
     parameters = model.parameters
     names = [p.name for p in parameters]

@@ -97,8 +97,9 @@ def latent_table(problem: Problem, values: Values, forms: Sequence[Form]) -> dic
 def depends_on(table: Mapping[str, NDArray[np.generic]]) -> tuple[str, dict[str, float]]:
     """A sentence on what the latent columns depend on, and the share of their variance that each column explains.
 
-    The share is that of a mean in twenty bins of equal count, judged on every second sample after being made on the
-    others, so that noise explains nothing. A column that only identifies the trial counts as the trial.
+    The share is that of a mean in twenty bins of equal count. It is computed from half of the samples and judged on the
+    others (every second one), so that noise explains nothing. A column that only identifies the trial counts as the
+    trial.
     """
     shares: dict[str, float] = {}
     if not len(table["trial"]):

@@ -3,7 +3,7 @@
 The core (`fitting`, `gate`, `evidence`, `search`) knows nothing of spikes, platforms or sensors. A `Problem` holds the
 measured data of one campaign and a model with named parameters, and answers with *whitened residuals*:
 (measured - model) / std, one number per valid sample, unit variance and no correlation where the model is right. Data
-enter a residual linearly, which the gate's bootstrap uses: data made up at values v0 have the residuals
+enter a residual linearly, which the gate's bootstrap uses: synthetic data of the values v0 have the residuals
 r(v) - r(v0) + noise.
 
 Names of values: a base parameter by its own name (``stiffness``), a nuisance of a trial as ``gravity_sim[001]``, an
@@ -161,7 +161,7 @@ class Estimate(Protocol):
 
 @dataclass(frozen=True)
 class Planned:
-    """A trial that was not made, and what it would tell between two models."""
+    """A trial that was not made, and how well it would separate two models."""
 
     settings: Mapping[str, float]  # name with its unit -> value
     what: str  # the trial in words
@@ -216,7 +216,7 @@ class Problem(Protocol):
     calmed: Mapping[str, Array] = MappingProxyType({})  # weights of modes as `calm` was given them last
 
     def prepare(self, tell: Callable[[str, float], None]) -> None:
-        """What takes long the first time; `tell` reports it."""
+        """Do once what takes long the first time; progress is reported by calls."""
         return
 
     def samples(self, trial: str) -> Samples:
@@ -354,7 +354,7 @@ class Whitener:
 
     @staticmethod
     def bare(problem: Problem) -> Whitener:
-        """For noise that is white as it is."""
+        """A whitener for white noise: residuals stay unchanged."""
         blocks, weights = {}, {}
         for trial in problem.trials:
             samples = problem.samples(trial.id)
@@ -417,11 +417,10 @@ class Model:
         return replace(self, held=dict(values))
 
     def until(self, share: float, trials: Sequence[str] | None = None) -> Model:
-        """The same, of these trials (None: those that the problem calls `rough`) only the first share of their time
-        looked at.
+        """The same model with only the first share of the time of these trials (None: the problem's `rough` ones).
 
-        A motion with bounces depends on its parameters the more roughly the longer it goes on: fits that begin with its
-        beginning find their way.
+        A motion with bounces depends on its parameters the more roughly the longer it lasts. Fits converge that start
+        with its beginning.
         """
         kept = {}
         for trial in self.problem.rough if trials is None else trials:
@@ -431,7 +430,7 @@ class Model:
 
     @property
     def simulated(self) -> float:
-        """Share of the trials' time that must be simulated: what is not looked at need not be."""
+        """Share of the trials' time that must be simulated: the rest is not used."""
         kept = self.whitener.kept
         return self.share if not self.whitener.blocks or all(trial in kept for trial in self.trials) else 1.0
 

@@ -1,6 +1,6 @@
 """The cores of the machine for array work that numpy does piece by piece, outside Python's lock.
 
-Contract: the pieces touch nothing of one another, so what comes out has the same bits however many threads there are.
+Contract: the pieces touch nothing of one another, so results are bitwise equal for any number of threads.
 """
 
 import os

@@ -2,8 +2,8 @@
 
 Where a tip is only just caught, or only just touches, the smallest thing decides how a trial continues: two integrators
 diverge there, and so do a model and nature. What follows does not show what the model omits, but would be most of what
-it leaves. Such a trial is set aside, with a finding, only as the last resort: where nothing else explains the campaign,
-where one model passes the gate on all the others, fitted and held out, and where it follows this trial, too, for a good
+it leaves. Such a trial is set aside, with a finding, only as the last resort: where nothing else explains the campaign;
+where one model passes the gate on all the others, fitted and held out; and where it follows this trial, too, for a good
 part of its time. Few may be: what shows in one trial of six is hardly an effect, what shows in two is. Beside an effect
 that the others call for, one of the trials that were fitted and one of those held out may.
 """

@@ -1,7 +1,8 @@
 """Beds that differ although no trial repeats another.
 
-Replicates show what differs between beds without any model. Where each trial is of a condition of its own, a factor of
-each trial's own on the bed may stand for anything that changes with the condition. So it counts only where all of these
+Replicates show what differs between beds without any model. Where each trial has a condition of its own, a separate
+factor on the bed for each trial may represent anything that changes with the condition. So it counts only where all of
+these
 hold: the factors scatter beyond their errors, and not for one trial alone; with them every trial is explained from its
 first row to its last (the gate passes, which examines the shape within each trial); and they correlate with nothing by
 which trials differ, neither speed, gravity and kind of trial nor the campaign's order. What correlates with one of

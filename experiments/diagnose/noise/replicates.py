@@ -126,9 +126,9 @@ def find_scatter(
 
     Each trial's own numbers (bed, friction, whatever the problem offers) are fitted, all kinds at once, so that none
     replaces another; within a condition these must agree within their errors. What the model omits is the same for all
-    replicates as long as it is small; where it is not, it bends each trial's factors in their own way: errors are those
-    of noise as large as what is left (`inflation`), or, `apart`, as what each has left of its own (`_own_noise`), and
-    all kinds are examined. The scatter is the most likely one beside these errors, each condition's mean taken out
+    replicates while it is small. Where it is large, it changes each trial's factors differently. Errors then are those
+    of noise as large as the residual (`inflation`) or, `apart`, as each trial's own residual (`_own_noise`), and all
+    kinds are examined. The scatter is the most likely one beside these errors, each condition's mean taken out
     (restricted likelihood): trials without information on a kind do not count. Once found, it is the prior under which
     all is fitted and examined again. `kinds`: those that are examined; none: all that have no search of their own.
     `alone`: sets of trials that are compared although none repeats another (`lone_beds`).

@@ -1,10 +1,10 @@
 """Lines in the spectrum of what a model leaves: a floor that shakes, a wheel out of balance, a mass that is loose.
 
 Method: residuals over the noise, channel by channel and trial by trial, tapered (Hann) against the slow misfit, give
-Lomb's periodogram (Lomb 1976, Astrophys. Space Sci. 39:447; Scargle 1982, ApJ 263:835). What is left beside a line has
-a colour of its own, so each power is divided by the one that its neighbours in frequency predict (a power law, fitted
-to their logarithms). Such ratios are summed over trials and channels, as a line has one frequency but no common phase,
-and compared with their own spread over all frequencies, so that a misfit that is large everywhere makes no line.
+Lomb's periodogram (Lomb 1976, Astrophys. Space Sci. 39:447; Scargle 1982, ApJ 263:835). The rest beside a line has a
+colour of its own. So each power is divided by the one that its neighbours in frequency predict (a power law, fitted to
+their logarithms). Such ratios are summed over trials and channels, as a line has one frequency but no common phase. The
+sums are compared with their own spread over all frequencies, so that a misfit that is large everywhere makes no line.
 """
 
 import math

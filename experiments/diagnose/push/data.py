@@ -139,7 +139,7 @@ def _noisier(tables: PenetrationCampaign, recordings: Mapping[str, Recording]) -
 def _recoloured(
     trials: list[Prepared], noisier: Colour | None, std: float, again: Callable[..., Prepared]
 ) -> tuple[list[Prepared], dict[str, Colour]]:
-    """Smoothed once more where the noise of the depths is not as it was taken, and its colour by trial.
+    """Trials, smoothed once more where the noise of the depths differs from the one assumed, and its colour by trial.
 
     One sensor reads all pushes; rows at another rate are as long apart as they are, so that each rate has its own.
     `noisier`: what the noise was taken for; None: as stated. `std`: of the depth as stated [m]. `again`: smooths a
@@ -207,7 +207,7 @@ def _motion_of(others: Sequence[Prepared], trial: Prepared) -> Drive | None:
 
 
 def _path(trial: Prepared) -> tuple[float, ...]:
-    """Depth, way back and duration, by which drives at one speed differ; of a drop how long it is looked at."""
+    """Depth, withdrawal and duration, by which drives at one speed differ; for a drop the recorded duration."""
     lasted = float(np.ptp(trial.time))
     if trial.smooth is None:
         return (lasted,)

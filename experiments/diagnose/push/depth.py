@@ -1,9 +1,9 @@
 """The motion of a driven spike from its noisy depth column: smooth pieces and kinks, with the error that is left.
 
-The curve is a machine's motion (`push.drive`: levels of speed joined by ramps), or a polynomial or a cubic
-spline with equal intervals, plus kinks (a drive that stops or turns), fitted by least squares; which, and how many of
-each the column calls for, is chosen by the Bayesian information criterion at the stated noise (Schwarz, Annals of
-Statistics 6 (1978), 461). The fit is linear, or all but so, and its error a known linear map of the noise.
+The curve is fitted by least squares. It is a machine's motion (`push.drive`: levels of speed joined by ramps), a
+polynomial or a cubic spline with equal intervals, plus kinks (a drive that stops or turns). The Bayesian information
+criterion at the stated noise chooses the kind, and the number of each (Schwarz, Annals of Statistics 6 (1978), 461).
+The fit is linear, or all but so, and its error a known linear map of the noise.
 """
 
 from dataclasses import dataclass

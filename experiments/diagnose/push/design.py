@@ -2,8 +2,8 @@
 
 Two fitted models predict a push that was not made. Their difference d over the noise of force is expected to give
 d^T (I + J S J^T + J' S' J'^T)^-1 d / 2 nats for the one that is right: J are slopes of a prediction over the numbers of
-its model, S their covariance as the campaign leaves it, so that a difference which both models could still take up does
-not count (Box and Hill, Discrimination among mechanistic models, Technometrics 9 (1967), 57).
+its model, S their covariance from the campaign. So a difference that both models could still take up does not count
+(Box and Hill, Discrimination among mechanistic models, Technometrics 9 (1967), 57).
 """
 
 import itertools

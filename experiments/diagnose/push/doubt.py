@@ -20,8 +20,8 @@ _AT_END = 2  # rows at either end of a hold in which the motion may not have sto
 def path_error(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:
     """What the error of a smoothed depth makes of the force [N], shape [n, error_count].
 
-    A force on the way back depends on two depths, where the spike is and how deep it has been, whose errors are not
-    one: a crater that is steep on the way out sees their difference.
+    The force of a withdrawal depends on the present depth and on the greatest depth, whose errors differ. A crater with
+    a steep unloading is sensitive to their difference.
     """
     so_far = np.maximum.accumulate(smooth.depth)
     deepest = np.maximum.accumulate(np.where(smooth.depth >= so_far, np.arange(len(so_far)), 0))

@@ -2,9 +2,9 @@
 
 A machine that pushes a spike moves at a speed, holds, and comes back; between two speeds it takes some time, during
 which the speed changes in proportion to time or as a raised cosine. Depth is then z0 + sum of L_k (time at level k),
-linear in the levels L_k, and the ramps' middles and widths are found with them by damped least squares (Marquardt,
-J. SIAM 11 (1963), 431). Ramps are added where they take most away, and levels at rest and needless ramps taken for
-such, as long as the Bayesian information criterion falls.
+linear in the levels L_k. The ramps' middles and widths are found with them by damped least squares (Marquardt, J. SIAM
+11 (1963), 431). Ramps are added where they reduce the misfit most, while the Bayesian information criterion falls. By
+the same rule levels are set to rest and needless ramps removed.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Drive:
         return self.start + spent @ self.levels, shares @ self.levels
 
     def softened(self, u: Array, weigh: Weights) -> Drive:
-        """With as wide ramps as the noise may hide, and no level at rest for certain."""
+        """The drive with the widest ramps that the noise may hide, and no level that is certainly at rest."""
         widths = self.widths.copy()
         for k, jump in enumerate(np.diff(self.levels)):
             for width in np.geomspace(2.0 / len(u), 0.5, 24):

@@ -29,7 +29,7 @@ class Scales:
 def push_forms(*, retreats: bool, speeds_differ: bool, drops: bool, own: Sequence[OwnEffect] = ()) -> tuple[Form, ...]:
     """The forms that a campaign can show, with those of effects from files.
 
-    `retreats`: some trial comes back out, without which nothing that acts on the way out can be seen.
+    `retreats`: some trial is withdrawn; without one, effects that act in withdrawal cannot be seen.
     `drops`: some trial is a drop. `speeds_differ`: the speed changes by more than 5 % within or between trials.
     """
     shown = {"": True, "retreats": retreats, "speeds": speeds_differ, "drops": drops}

@@ -15,12 +15,12 @@ def at_the_tip(campaign: Campaign, frame_stiffness: float | None) -> Campaign:
 
     A linear spring k in series between drive and tip. Behind it the ground's spring K and damper C read as
     K / (1 + K / k) and, at a constant speed, C / (1 + K / k)^2, since the tip is also slower than the drive. So pushes
-    cannot tell k; another measurement can, such as a push against a rigid stop. Drops have no drive, so their depth
-    stays. A row without a force takes that between its neighbours. The noise of the force over k is not counted.
+    cannot determine k. Another measurement can, such as a push against a rigid stop. Drops have no drive, so their
+    depth stays. A row without a force takes that between its neighbours. The noise of the force over k is not counted.
 
     Args:
         campaign: trials of kind "penetration".
-        frame_stiffness: k [N/m]; None: the campaign as it is.
+        frame_stiffness: k [N/m]; None: the campaign is returned unchanged.
 
     Raises ValueError for a k that is not above 0, and for a campaign without pushes.
     """

@@ -41,9 +41,9 @@ def model_of(
 
 
 def range_of(trials: Sequence[Prepared], frame_stiffness: float | None = None) -> dict[str, Any]:
-    """What the pushes among `trials` cover: greatest depth [m], slowest and fastest speed on the way in [m/s], and
-    whether one came out again; the stiffness of the frame that was subtracted from their depth [N/m], where it was.
-    Empty without pushes."""
+    """The range of the pushes among `trials`: greatest depth [m], slowest and fastest speed of loading [m/s], and
+    whether one was withdrawn; also the stiffness [N/m] of a frame whose bending was subtracted from their depth. Empty
+    without pushes."""
     pushes = [trial for trial in trials if trial.driven]
     if not pushes:
         return {}

@@ -126,7 +126,7 @@ def comes_back(trials: Sequence[Prepared]) -> bool:
 
 
 def speeds_of(trial: Prepared) -> Array:
-    """Slow and fast on the way in [m/s]."""
+    """Slow and fast speed of loading [m/s]."""
     if trial.smooth is None:
         return np.array([0.0, trial.table.speed or 0.0])
     inside = trial.smooth.depth > 0

@@ -2,8 +2,8 @@
 
 Rows above the surface are the one place where a force zero shows without any model of the bed. Where these means differ
 by more than their errors the zeros are a nuisance of each push with one common spread: it is marginalised in the
-likelihood (`PenetrationProblem.rewhiten`), where rows above the surface determine most of it, and a push without such
-rows has it from the others.
+likelihood (`PenetrationProblem.rewhiten`). Rows above the surface determine most of it, and a push without such rows
+has it from the others.
 """
 
 from collections.abc import Sequence

@@ -3,7 +3,7 @@
 ```
 diagnosis.json       the contract (diagnosis.schema.json beside this file), and how sure, in `evidence` and `gate`
 model.toml           the model with what was added: `hedgebed tumble --model` and `penetrate --model` run it
-latent.csv           where the verdict is unknown: what the model lacks, row by row
+latent.csv           where the verdict is unknown: the missing force, row by row
 evidence.csv         every candidate: its score, and the chi-square a sample that it leaves beyond what noise makes
 series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (as the gap takes it), scatter, depth_m
 ```

@@ -40,7 +40,7 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
 
 
 def _in_series(covered: Mapping[str, Any]) -> str:
-    """What else than the ground gives way in pushes, and so lowers K; empty without pushes."""
+    """The warning that the frame bends in pushes as well as the ground, which lowers K; empty without pushes."""
     frame = covered.get("frame_stiffness_N_m")
     return (f" {say('in_series')}" if frame is None else f" {say('at_the_tip', frame=frame)}") if covered else ""
 

@@ -1,8 +1,8 @@
 """Data that are wrong: found, reported, and set aside before anything is fitted.
 
-Looked at without a model: the marker of the camera that jumps for a while or for good (a step that no motion makes),
-a clock that jumps forward, long gaps. What needs the model (a trial at odds with its replicates) is the
-statistics' affair.
+Checked without a model: a camera marker that jumps for a while or permanently (a step that no motion makes), a clock
+that jumps forward, long gaps. Faults that only a model shows, such as a trial that disagrees with its replicates, are
+found by the statistics.
 """
 
 from collections.abc import Sequence

@@ -62,8 +62,8 @@ class TrialData:
 
     @property
     def condition(self) -> tuple[object, ...]:
-        """What replicates share: stated gravity [m/s2], torque [N m], actuator, until when [s] (as far as the trial is
-        looked at), the wheel's first speed [rad/s] and the counterweight [kg]."""
+        """What replicates share: stated gravity [m/s2], torque [N m], actuator and its end [s] (within the part of the
+        trial that is used), the wheel's first speed [rad/s] and the counterweight [kg]."""
         until = self.torque_until if self.torque_until < self.end else math.inf
         return (self.gravity_sim, self.torque, self.actuator, until, self.wheel_speed_0, self.counterweight)
 

@@ -1,9 +1,9 @@
 """What the sensors of a tumble campaign should have read, for many sets of parameters at once.
 
-Method: one lane of the batched integrator (`rigid.batch.kernel`) for every (trial, set of parameters), all effects of
-the library compiled in with values that change nothing where they are off, so one kernel serves every candidate. The
-motion is sampled at the measured times themselves, and at both ends and the middle of every window of the IMU, whose
-mean specific force is taken by parts as in `rigid.sensors`.
+Method: every (trial, set of parameters) has one lane of the batched integrator (`rigid.batch.kernel`). All effects of
+the library are compiled in; where one is off its values change nothing. So one kernel serves every candidate. The
+motion is sampled at the measured times, and at both ends and the middle of every window of the IMU. Its mean specific
+force is taken by parts as in `rigid.sensors`.
 """
 
 import math
@@ -92,8 +92,8 @@ class Forward:
     ) -> list[Prediction]:
         """Predictions, one a trial (of `trials`, all by default), for all sets at once.
 
-        After the share `horizon` of a trial's time nothing is simulated, and what is given is of no meaning. `states`
-        and `motion`: whether these are wanted too. The same bits come out however many threads there are.
+        After the share `horizon` of a trial's time nothing is simulated, and values are meaningless. `states` and
+        `motion`: whether these are wanted too. Results are bitwise equal for any number of threads.
 
         Raises ValueError for a name there is not.
         """
@@ -217,7 +217,7 @@ class Forward:
             each(read, list(_pieces(lanes, rows)), threads=self.threads)
 
     def _held(self, *shape: int) -> Array:
-        """Room for the motion of some lanes; what is in it is of no meaning, and its next user overwrites it."""
+        """An array for the motion of some lanes. Its content is meaningless, and its next user overwrites it."""
         size = math.prod(shape)
         if len(self._buffer) < size:
             self._buffer = np.empty(size)

@@ -69,9 +69,9 @@ def _gaps(data: TrialData, value: Array, names: tuple[str, ...]) -> tuple[Array,
 def followed_until(trial: TrialData, residual: Array, state: NDArray[np.int8]) -> float | None:
     """The moment [s] from which these residuals (in standard deviations) are off; None where that is too early.
 
-    Gyro and accelerometers are looked at: the camera's unknown zero spreads a late error over a whole recording. None
+    Only gyro and accelerometers are used: the camera's unknown zero spreads a late error over a whole recording. None
     too where nothing is off, where little is right before, or where no state of the model (`state`, at the same
-    samples) ended shortly before: ways part where something touches, catches or lets go.
+    samples) ended shortly before: motions separate where something touches, catches or lets go.
     """
     seen = np.flatnonzero(trial.of("gyro") | trial.of("ax") | trial.of("ay"))
     order = seen[np.argsort(trial.time[seen], kind="stable")]

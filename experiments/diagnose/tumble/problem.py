@@ -265,7 +265,7 @@ class TumbleProblem(Problem):
         return tuple(sentences)
 
     def prepare(self, tell: Callable[[str, float], None]) -> None:
-        """Compile the kernels, which takes a while the first time; `tell` reports it."""
+        """Compile the kernels, which takes a while the first time, and report it."""
         tell("compiling the kernels (kept for the next time)", 0.0)
         self.forward.predict({}, trials=[0], horizon=0.01)
         self.forward.predict({"com-offset.x": np.zeros(1)}, trials=[0], horizon=0.01)

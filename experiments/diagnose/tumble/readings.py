@@ -143,7 +143,7 @@ class Grid:
 
         `series`: as the batch recorded it at `times`, shape [set_count, time_count, channel]; not to be kept. `place`:
         as `times` has it. `optics`: of the same sets. `horizon`: share of the trial's time up to which is read; what
-        comes later is left as it is. Filled are `value`, shape [set_count, sample_count]; `state`, the same shape, or
+        comes later stays unchanged. Filled are `value`, shape [set_count, sample_count]; `state`, the same shape, or
         [.., 0] where it is not wanted; and `motion`: x, y, theta, vx, vy, omega, wheel_speed, shape [set_count,
         sample_count, 7], or [.., 0, 7].
         """

@@ -5,10 +5,10 @@ tip, s pooled over their grain sizes (trends.toml). A length scales with the gra
 logarithm. K of all runs and the mean K of the beds are two estimates, as beds may have different runs: the interval of
 K holds both. Where K of a bed is 0 there is no logarithm, and its lower end is Student's of the values, at least 0.
 
-Grain size. By the kept `converge` run of a sphere, K = K_0 (1 + growth (d - d_0) / D) and the sinkage is that among
-real grains less slope (d - d_0), with D the tip, d_0 the real grain. Its lines through fewer sizes and in (d / D)^2 and
-its chance give the farthest end. For another tip, load or gravity both are extrapolations. So the interval reaches from
-no effect at all to that farthest end, and the value itself is not corrected. Nothing is known of grains that stick.
+Grain size. By the kept `converge` run of a sphere, K = K_0 (1 + growth (d - d_0) / D). The sinkage is that among real
+grains less slope (d - d_0), with D the tip, d_0 the real grain. Its lines through fewer sizes and in (d / D)^2 and its
+chance give the farthest end. For another tip, load or gravity both are extrapolations. So the interval reaches from no
+effect at all to that farthest end, and the value itself is not corrected. Nothing is known of grains that stick.
 
 Width and depth of the bed, softness and speed are not part of it: `hedgebed converge` measures them.
 """

@@ -1,13 +1,13 @@
 """The batched integrator, compiled by Taichi: one trial a lane, the same terms as the accurate integrator.
 
 Method: velocity Verlet (kick, drift, kick) with the speed-dependent forces taken at the predicted end speeds, one
-evaluation a step, order 2. A step in which a spike touches, leaves, slips through zero or reaches its static bound, or
-in which the wheel or the torque stops, is cut at that moment (found to the second order), the modes change, and the
+evaluation a step, order 2. A step is cut at the moment of an event (found to the second order): a spike touches,
+leaves, slips through zero or reaches its static bound, or the wheel or the torque stops. Then the modes change, and the
 rest of the step follows: so events cost no order. Sticking is the same constraint as in `rigid.planar.dynamics`, its
 speed taken out exactly at the end of every step.
 
-Of the spikes only the lowest and its two neighbours are looked at; a trial that sinks so deep that a fourth would touch
-is marked (`status`), and left to the accurate integrator.
+Only the lowest spike and its two neighbours are checked for contact. A trial that sinks so deep that a fourth could
+touch is marked (`status`), and left to the accurate integrator.
 
 Imports `rigid.model`, `rigid.terms`.
 """

@@ -13,8 +13,8 @@ __all__ = ["make_events"]
 def make_events(parts: SimpleNamespace) -> Any:
     """Two Taichi functions, which change what they take as templates.
 
-    `find_events` puts the share of the step at which friction, wheel or a term's own coordinate change first into `e`,
-    where that is before what is there. `switch` changes the modes at an event.
+    `find_events` finds the share of the step at which friction, wheel or a term's own coordinate change first. It
+    writes this into `e`, where that is earlier than the present value. `switch` changes the modes at an event.
     """
     from hedgebed_taichi import ti
 

@@ -7,8 +7,8 @@ s = b - eta beyond their stretch at rest, m_b g / k, at which their tension is m
     T = m_b b'^2 / 2,  V = k s^2 / 2,  D = c s'^2 / 2,
 
 which gives m_b b'' = -(k s + c s'), and k s + c s' upwards on the shaft. A wire does not push: where the whole tension
-m_b g + k s + c s' would fall below zero the wires are slack, counterweight and platform fall each for itself, and
-V = -m_b g s + const goes on from there. They are taut again at full length, where their tension is positive.
+m_b g + k s + c s' would fall below zero the wires are slack. Counterweight and platform then fall separately, and V =
+-m_b g s + const continues from there. They are taut again at full length, where their tension is positive.
 """
 
 import math

@@ -44,9 +44,9 @@ def push_settle(gone, z, span, relax_share, relax_fast, relax_soon):
     """The same after `span` more at the depth z, exactly: c z ln(exp(e / (c z)) + span / tau).
 
     By one time constant instead (`relax_fast`, f): e' = (f / (1 + f) z - e) / tau, where the loading curve is 1 + f
-    times as steep. That is a spring f K in series with a dashpot beside the bed's spring K, the standard linear solid
-    (Zener 1948, Elasticity and Anelasticity of Metals), but that these two cannot pull: e stays at most f / (1 + f) z.
-    K stays what a slow push meets.
+    times as steep. That is a spring f K in series with a dashpot, beside the bed's spring K: the standard linear solid
+    (Zener 1948, Elasticity and Anelasticity of Metals). But these two cannot pull: e stays at most f / (1 + f) z. K
+    stays what a slow push meets.
     """
     after = gone
     if relax_share > 0.0:

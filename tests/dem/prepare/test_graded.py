@@ -105,7 +105,7 @@ def test_small_grains_that_have_drained_are_found():
         ({"footprints": ((0.02, 0.01),)}, "must each begin before they end"),
         ({"footprints": ((0.05, 0.07),)}, "from 0.05 to 0.07 m is outside the bed, which reaches from 0 to 0.06 m"),
         ({"depth": 0.03}, "depth = 0.03 m is more than the bed's, 0.024 m"),
-        ({"coarse": 0.008, "growth": 0.2}, r"size: y = 0.024 m is less than 6 of them; coarse = 0.004 m would do"),
+        ({"coarse": 0.008, "growth": 0.2}, r"size: y = 0.024 m is less than 6 of them; give at most coarse = 0.004 m"),
     ],
 )
 def test_a_grading_that_cannot_be_is_refused_before_any_work(options, words):

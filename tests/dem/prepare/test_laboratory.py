@@ -114,7 +114,7 @@ def test_a_packing_that_taps_cannot_bring_is_refused_before_the_last_of_them(bed
 def test_a_slope_too_steep_is_refused_with_the_steepest_that_held(bed):
     """Steeper than any sand's friction angle; gravity turns and keeps its strength."""
     with pytest.raises(
-        ValueError, match=r"'tilt:60' cannot be held: the bed flows at (\d+) degrees; (\d+) would do"
+        ValueError, match=r"'tilt:60' cannot be held: the bed flows at (\d+) degrees; give (\d+)"
     ) as found:
         work_on(bed, "tilt:60")
     held = float(str(found.value).split(";")[1].split()[0])

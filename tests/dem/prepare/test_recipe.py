@@ -25,7 +25,7 @@ def test_what_stands_behind_the_colon_is_the_stage_s_number():
     [
         ("rian", "'rian' is no stage; did you mean 'rain'"),
         ("shake", "'shake' is no stage; there is rain, stick"),
-        ("compact", r"'compact' lacks its number: compact:0.6 would do"),
+        ("compact", r"'compact' needs a number, for example compact:0.6"),
         ("compact:0.6@hand", "by 'tap' or 'lid', not by 'hand'"),
         ("compact:densest@lid", "a lid takes a packing fraction"),
         ("tilt:steep", "'steep' is no number"),
@@ -42,16 +42,16 @@ def test_words_that_are_no_stage_are_refused(words, said):
 @pytest.mark.parametrize(
     ("stages", "said"),
     [
-        ([], "stages is empty: 'rain'"),
+        ([], "stages is empty: give 'rain'"),
         (["level"], "begins with 'level'"),
         (["rain", "level", "rain"], "'rain' comes once"),
         (["rain", "tilt:10", "compact:0.6"], "'compact:0.6' after 'tilt:10' would undo it"),
-        (["rain", "compact:0.7"], r"packing = 0\.7 .* above 0\.5 and at most 0\.64 would do"),
+        (["rain", "compact:0.7"], r"packing = 0\.7 .* more than 0\.5 and at most 0\.64"),
         (["rain", "packing:0.45"], r"packing = 0\.45 .* grains that stick \(cohesion\) make looser beds"),
         (["rain", "level:0.01"], r"from 0\.016 m, four grains"),
         (["rain", "fluff:3"], "1.02 to 2 times"),
         (["rain", "cut:0.09"], r"width less six grains, 0\.076 m"),
-        (["rain", "tilt:95"], "below 90"),
+        (["rain", "tilt:95"], "less than 90"),
         (["rain:dry", "stick"], "'rain:dry': these grains do not stick anyway"),
         (["rain:0.2", "level"], r"'rain:0.2' needs 'stick' once behind it \(0 found\)"),
         (["rain", "stick"], "'stick' is for what was poured without"),

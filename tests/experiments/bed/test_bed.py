@@ -197,8 +197,8 @@ def test_a_lid_that_presses_harder_than_the_grains_bear_is_refused(shelf):
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        ("cone", "diameter = 0.016 m: from three grains"),
-        ("cut", "m wide would do"),
+        ("cone", "diameter = 0.016 m: give three grains"),
+        ("cut", "m wide, and a cut"),
         ("repose", "size: x = 0.024 m is too narrow for a slot of"),
     ],
 )

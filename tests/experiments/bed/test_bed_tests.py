@@ -167,7 +167,7 @@ def test_a_face_of_grains_that_stick_stands_to_a_height_of_their_strength(tmp_pa
         ("repose", ["--size", "0.08", "0.03", "0.03"], "size: x = 0.08 m is too narrow for a slot of 0.024 m"),
         ("repose", ["--bed", "none-such"], "bed = 'none-such' is no file"),
         ("repose", ["--bed", "x", "--grain", "0.003"], "grain = 0.003 beside bed = 'x'"),
-        ("cone", ["--diameter", "0.01"], "diameter = 0.01 m: from three grains, 0.012 m"),
+        ("cone", ["--diameter", "0.01"], "diameter = 0.01 m: give three grains, 0.012 m"),
         ("cone", ["--angle", "20"], "goes from 0.05671 m, where it is all in, to 0.04 m"),
         ("cut", ["--size", "0.05", "0.03", "0.04"], "width = 0.04 m of the cut"),
         ("cut", ["--seeds", "1", "1"], "seeds holds a seed twice"),

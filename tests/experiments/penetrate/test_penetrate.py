@@ -424,7 +424,7 @@ def test_a_containers_limit_counts(tmp_path, monkeypatch):
         ({"coarse": 0.006, "fine_radius": 0.004}, r"fine_radius = 0.004 m must be between 0.006 m.* and 0.036 m"),
         ({"coarse": 0.006, "fine_depth": 0.006}, r"fine_depth = 0.006 m must be between depth = 0.012 m"),
         ({"coarse": 0.006, "spread": 0.45}, r"spread = 0.45 must be 0 or more and below 0.41"),
-        ({"coarse": 0.02, "bed_size": (0.3, 0.06, 0.05)}, r"coarse = 0.02 m makes grains of .* would do"),
+        ({"coarse": 0.02, "bed_size": (0.3, 0.06, 0.05)}, r"coarse = 0.02 m makes grains of .* give at most"),
     ],
 )
 def test_gradings_that_cannot_be_are_refused(given, words):

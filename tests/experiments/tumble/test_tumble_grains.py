@@ -60,7 +60,7 @@ def on_bed(**more):
         ({"place": -0.31, "bed_size": (0.3, 0.06, 0.046), "bed_repeats": 2}, r"outside the bed, which is 0.6 m long"),
         (
             {"coarse": 0.007, "grain": 0.0024, "bed_size": (0.4, 0.036, 0.046)},
-            r"coarse = 0.007 m makes grains of .* coarse = 0.006 m would do",
+            r"coarse = 0.007 m makes grains of .* give at most coarse = 0.006 m",
         ),
         ({"surface": "steel"}, r"surface = 'steel' has no grains .* use sand, sand-weak, jsc1a"),
         ({"spike_clear": 0.01}, r"spike_diameter = 0.012 m, spike_clear = 0.01 m"),
