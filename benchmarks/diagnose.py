@@ -22,6 +22,8 @@ from functools import cache
 from multiprocessing import active_children, get_context
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from experiments.campaign import read_campaign, write_campaign
@@ -30,7 +32,7 @@ from experiments.runs.types import Json
 
 from .baseline import methods as others
 from .diagnosis.table import CASES_FILE, read_cases, show, summarise
-from .diagnosis.worker import answer, begin
+from .diagnosis.worker import answer, begin, limit
 from .hidden.suite import KINDS, make_case, suite
 from .race.machine import now
 from .race.scratch import scratch
@@ -39,6 +41,7 @@ from .second.campaigns import KINDS as SECOND
 __all__ = ["continues", "digest", "read_cases", "run"]
 
 Ask = Callable[[str], Json]
+Limit = Callable[[dict[str, dict[str, NDArray[np.float64]]]], Json]
 _ROOT = Path(__file__).resolve().parent.parent
 _CODE = {
     "code": ("experiments/diagnose", "experiments/campaign", "rigid"),
@@ -71,7 +74,8 @@ def run(
         structure: of the second simulator's campaigns, how much what the base model leaves out of it changes, over the
             noise; empty: each campaign draws its own.
         baselines: "yes" where the baselines are to run beside, if they are installed; "no".
-        ask: what answers for a folder; None: the diagnosis, in a process of its own.
+        ask: what answers for a folder; None: the diagnosis, in a process of its own, which is then asked for the
+            numbers that readings without noise give, too (`limit`).
 
     Raises ValueError for settings that cannot be.
     """
@@ -100,14 +104,16 @@ def run(
         for case in read_cases(out)
         if case.get("code") == digest("code") and case.get("suite") == digest(case["kind"])
     }
-    with _asking(ask) as asked:
+    with _asking(ask) as (asked, limited):
         for one, cases in plans.items():
             left = [case for case in cases if not _finished(done.get(_key(one, case)), wanted)]
             progress.stage(f"diagnose {one}", total=max(len(left), 1))
             if len(left) < len(cases):
                 progress.message(f"{one}: {len(cases) - len(left)} of {len(cases)} campaigns were done before")
             for number, case in enumerate(left, 1):
-                done[_key(one, case)] = record = _one(one, case, asked, done.get(_key(one, case)), wanted)
+                done[_key(one, case)] = record = _one(
+                    one, case, asked, limited, before=done.get(_key(one, case)), wanted=wanted
+                )  # fmt: skip
                 with path.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(record) + "\n")
                 progress.message(_line(record))
@@ -161,13 +167,15 @@ def _bare(source: str) -> str:
     return ast.dump(tree)
 
 
-def _one(kind: str, case: Json, ask: Ask, before: Json | None, wanted: bool) -> Json:
+def _one(kind: str, case: Json, ask: Ask, limited: Limit | None, *, before: Json | None, wanted: bool) -> Json:
     """One record; `before` is one that lacks the baselines only."""
     campaign, hidden = make_case(kind, case)
     record = before
     with scratch() as place:
         folder = write_campaign(place / "campaign", campaign)
         said = ask(str(folder)) if record is None else {}
+        if limited is not None and record is None and kind in SECOND and hidden.readings:
+            said["limit"] = limited(hidden.readings)
         campaign = read_campaign(folder)  # in the format's units
     if record is None:
         record = {
@@ -205,10 +213,11 @@ def _line(record: Json) -> str:
 
 
 @contextmanager
-def _asking(ask: Ask | None) -> Iterator[Ask]:
-    """What answers for a folder: one process that goes on from case to case, a new one where it broke down."""
+def _asking(ask: Ask | None) -> Iterator[tuple[Ask, Limit | None]]:
+    """What answers for a folder: one process that goes on from case to case, a new one where it broke down; and what
+    then answers for readings without noise."""
     if ask is not None:
-        yield ask
+        yield ask, None
         return
     pools: list[ProcessPoolExecutor] = []
 
@@ -222,8 +231,11 @@ def _asking(ask: Ask | None) -> Iterator[Ask]:
             return {"verdict": "failed", "effects": [], "alternatives": [], "error": str(error), "seconds": 0.0,
                     "cpu": 0.0}  # fmt: skip
 
+    def limited(readings: dict[str, dict[str, NDArray[np.float64]]]) -> Json:
+        return pools[0].submit(limit, readings).result() if pools else {"error": "the process broke down"}
+
     try:
-        yield asked
+        yield asked, limited
     except BaseException:  # stopped: do not wait for the diagnosis under way
         for child in active_children():
             child.kill()

@@ -4,7 +4,7 @@ import json
 import math
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,10 @@ _LABELS = {
     "intervals_90_hold_truth": "90 % intervals that hold the truth",
 }
 """What the table calls figures whose keys do not say enough."""
-_BASE = {"base_parameters": "base parameters of the ground", "apparent_parameters": "base parameters, apparent"}
+_BASE = {
+    "base_parameters": "base parameters of the ground", "apparent_parameters": "base parameters, apparent",
+    "limit_parameters": "parameters of readings without noise, same weights",
+}  # fmt: skip
 _BINS = ((0.0, 1.0), (1.0, 3.0), (3.0, 10.0), (10.0, math.inf))
 _PLAIN = 10.0
 _GAP = 1.5  # chi-square per sample above which there is a gap that can be closed
@@ -97,6 +100,7 @@ def summarise(cases: Sequence[Case]) -> Json:
         "parameters": _parameters(explained),
         "base_parameters": _base_parameters(judged, "base"),
         "apparent_parameters": _base_parameters(judged, "apparent"),
+        "limit_parameters": _limit_parameters(judged),
         "held_out_at_most_1_2": _share(explained, lambda c: _after(c) <= 1.2),
         "held_out_with_scatter_at_most_1_2": _share(explained, lambda c: _with_scatter(c) <= 1.2),
         "replicates_that_differ": _share(explained, lambda c: bool(c.get("with_scatter"))),
@@ -189,12 +193,27 @@ def _base_parameters(cases: Sequence[Case], truth: str) -> Json:
     """How often 90 % intervals of the base model's numbers hold the truth, where the maker of a campaign states it:
     all together, and by number. `cases`: whose verdicts are right. `truth`: "base", the numbers of the ground alone, or
     "apparent", those that the true readings give a model without the maker's structure error."""
+    return _intervals((case, (case.get("hidden") or {}).get(truth) or {}) for case in cases)
+
+
+def _limit_parameters(cases: Sequence[Case]) -> Json:
+    """The same of the found model's numbers, those of its effects too, and of readings without noise, to which it was
+    fitted with the same rows and weights."""
+    limits = [(case, case.get("limit") or {}) for case in cases]
+    failed = sum("error" in limit for _, limit in limits)
+    return _intervals((case, limit) for case, limit in limits if "error" not in limit) | {"failed": failed}
+
+
+def _intervals(truths: Iterable[tuple[Case, dict[str, float]]]) -> Json:
+    """How often the 90 % intervals of a case's numbers hold these, "name" or "effect.name"."""
     rows: dict[str, list[float]] = defaultdict(list)
-    for case in cases:
-        for name, true in ((case.get("hidden") or {}).get(truth) or {}).items():
-            told = case.get("base_parameters", {}).get(name)
+    for case, true in truths:
+        for name, value in true.items():
+            effect, _, short = name.rpartition(".")
+            found = case.get("found_parameters", {}).get(effect, {}) if effect else case.get("base_parameters", {})
+            told = found.get(short)
             if told is not None and told["std"] is not None:
-                rows[name].append(abs(told["value"] - true) / max(told["std"], 1e-300))
+                rows[name].append(abs(told["value"] - value) / max(told["std"], 1e-300))
 
     def held(own: Sequence[float]) -> Json:
         return _share(own, lambda away: away <= _NINETY)
@@ -268,7 +287,7 @@ def _print(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) ->
 
 
 def _rows(summary: Json) -> list[tuple[str, Any]]:
-    apart = ("cases", "top1_by_effect", "parameters", "base_parameters", "apparent_parameters", "baselines", "seconds")
+    apart = ("cases", "top1_by_effect", "parameters", *_BASE, "baselines", "seconds")
     rows = [(_LABELS.get(name, name), value) for name, value in summary.items() if name not in apart]
     told = summary["parameters"]
     kept = ("median_relative_error", "intervals_hold_truth", "intervals_90_hold_truth")

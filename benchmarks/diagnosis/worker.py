@@ -1,5 +1,6 @@
 """Diagnoses a campaign's folder for `hedgebed bench diagnose`, in a process that is told nothing else.
 
+After the answer it may get the same trials' readings without noise, to which `limit` fits the model that was found.
 This module must not import what makes campaigns up (`hidden_*`): the answers are in another process.
 """
 
@@ -13,8 +14,11 @@ from experiments.runs.types import Json
 
 if TYPE_CHECKING:
     from experiments.diagnose.core.outcome import Diagnosis
+    from experiments.diagnose.push.limit import Readings
 
-__all__ = ["answer", "begin"]
+__all__ = ["answer", "begin", "limit"]
+
+_answered: list["Diagnosis"] = []  # the last diagnosis of this process, if it came to its end
 
 
 def begin() -> None:
@@ -28,6 +32,7 @@ def answer(folder: str) -> Json:
     A diagnosis that fails is an answer too: its verdict is "failed", and `error` says why.
     """
     began, spent = time.monotonic(), time.process_time()
+    _answered.clear()
     try:
         told = _diagnosed(folder)
     except Exception:
@@ -39,6 +44,7 @@ def _diagnosed(folder: str) -> Json:
     from experiments.diagnose.experiment import diagnose_campaign
 
     found = diagnose_campaign(Path(folder))
+    _answered.append(found)
     return {
         "verdict": found.verdict,
         "effects": list(found.effects),
@@ -57,6 +63,25 @@ def _diagnosed(folder: str) -> Json:
         "leading": list(found.choice.best.effects) if found.choice is not None else [],
         "at_bounds": [bound.parameter for bound in found.bounds_after],
     }
+
+
+def limit(readings: "Readings") -> Json:
+    """Numbers of the last answer's model, fitted with the same rows and weights to readings without noise: name or
+    effect.name -> value; "error" where that cannot be done."""
+    from experiments.diagnose.push.limit import limit_of
+
+    if not _answered:
+        return {"error": "no diagnosis came to its end"}
+    found = _answered[0]
+    try:
+        at = limit_of(found.best, readings)
+    except (ValueError, RuntimeError) as error:
+        return {"error": str(error)}
+    numbers = {name: float(told["value"]) for name, told in found.base_parameters(at).items()}
+    for form in found.forms:
+        for name, (value, _) in found.problem.reported(at.values, form).items():
+            numbers[f"{form.effect}.{name}"] = float(value)
+    return numbers
 
 
 def _weighed(found: "Diagnosis") -> Json | None:

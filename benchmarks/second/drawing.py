@@ -31,6 +31,8 @@ class Secret:
     coloured: bool
     trials: int
     extra: Table = field(default_factory=dict)
+    readings: dict[str, dict[str, Array]] = field(default_factory=dict)
+    """Of pushes and drops, what the sensors read without noise: trial id -> columns."""
 
 
 @dataclass(frozen=True)

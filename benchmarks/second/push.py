@@ -35,7 +35,9 @@ _LADDER, _SPAN = 13, 3000.0
 _STRUCTURES = np.geomspace(2e-5, 1.0, 16)  # shares of the softest bed and frame that are tried
 _SOFTEST = 5e-3  # depth over which the softest bed sets in [m]
 _SWITCHES = ("layer_slope",)  # settings that choose a form and are no sizes
-_TRIES = 6  # of a search for the apparent numbers
+_TRIES = 40  # of a search for the apparent numbers
+_STILL, _GAIN = 1e-6, 1e-4
+"""Where it has converged, the next step would change K and C by less than this share, and chi-square by less."""
 
 
 class Law:
@@ -119,24 +121,25 @@ def make_push(
     names = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False)) if kind == "pair" else (kind,)
     plan = _draw_plan(random, names, trials)
     plan, reached = _with_structure(random, plan, size)
-    clean, slopes = _slopes(plan)
+    bare, slopes = _slopes(plan)
     forms = [_form(random, plan, name) for name in names if kind != "null"]
 
     def signatures(ladder: list[Numbers]) -> list[float]:
-        return [_left(plan, clean, slopes, _measure(plan, numbers)) for numbers in ladder]
+        return [_left(plan, bare, slopes, _measure(plan, numbers)) for numbers in ladder]
 
     chosen = [at_strength(form, signatures, strength, span=_SPAN, count=_LADDER) for form in forms]
     settings = {name: value for numbers, _ in chosen for name, value in numbers.items()}
-    outside = kind if kind in OUTSIDE else None
+    outside, clean = kind if kind in OUTSIDE else None, _measure(plan, settings)
     secret = Secret(
         () if kind == "null" or outside else names, outside, {}, min((seen for _, seen in chosen), default=0.0),
         any(noise.kind == "coloured" for noise in plan.noise.values()), len(plan.trials),
         {"structure": reached, "legs": plan.structure, "each": [seen for _, seen in chosen], "settings": settings,
          "noise": {name: noise.kind for name, noise in plan.noise.items()},
          "base": {"stiffness": plan.k, "damping": plan.c},
-         "apparent": {} if outside else _apparent(plan, settings)},
+         **({} if outside else _told(plan, settings))},
+        {} if outside else {f"{n:03d}": columns for n, columns in enumerate(clean, 1)},
     )  # fmt: skip
-    return _record(random, plan, _measure(plan, settings)), secret
+    return _record(random, plan, clean), secret
 
 
 def _draw_plan(random: Random, names: Sequence[str], trials: int | None) -> _Plan:
@@ -253,13 +256,24 @@ def _drops(plan: _Plan, law: Law) -> Columns:
     return [{"t_s": t, "depth_m": z[:, n], "accel_m_s2": a[:, n]} for n in range(len(speeds))]
 
 
+def _told(plan: _Plan, settings: Mapping[str, float]) -> Table:
+    """The apparent numbers, or why there are none."""
+    try:
+        return {"apparent": _apparent(plan, settings)}
+    except RuntimeError as error:
+        return {"apparent": {}, "apparent_error": str(error)}
+
+
 def _apparent(plan: _Plan, settings: Mapping[str, float]) -> Numbers:
     """K [N/m] and C [N s/m] that come nearest to the true readings, by least squares over their noise, in a bed without
     loose grains behind a rigid frame.
 
     Of readings without noise, and with the effect's own form, whose sizes are free too (a weak prior of 100 % holds
     what the readings leave open). A model of another structure cannot give K and C of the ground: with ever more
-    readings its fit comes to these numbers (H. White 1982, Econometrica 50, 1-25).
+    readings its fit comes to these numbers (H. White 1982, Econometrica 50, 1-25), if it weights all readings of all
+    trials alike. A diagnosis does not: its own limit is that of `experiments.diagnose.push.limit`.
+
+    Raises RuntimeError where the search does not converge.
     """
     true = _measure(plan, settings)
     read = np.concatenate(_over_noise(plan, true))
@@ -272,8 +286,25 @@ def _apparent(plan: _Plan, settings: Mapping[str, float]) -> Numbers:
         made = np.concatenate(_over_noise(plan, pushes + _drops(plan, Law(*numbers))))
         return np.concatenate([made - read, factors[2:] - 1.0])
 
-    found = least_squares(away, np.ones(2 + len(sizes)), diff_step=1e-4, ftol=1e-6, xtol=1e-6, max_nfev=_TRIES).x
+    found = _nearest(away, 2 + len(sizes))
     return {"stiffness": float(plan.k * found[0]), "damping": float(plan.c * found[1])}
+
+
+def _nearest(away: Callable[[Array], Array], count: int, *, tries: int = _TRIES) -> Array:
+    """Factors near 1, those of K and C first, with the least sum of squares.
+
+    Raises RuntimeError where `tries` evaluations do not suffice: by the Gauss-Newton step from the last point, which
+    is 0 where the gradient is.
+    """
+    found = least_squares(away, np.ones(count), diff_step=1e-4, ftol=1e-9, xtol=1e-9, gtol=1e-9, max_nfev=tries)
+    step = np.linalg.lstsq(found.jac, -found.fun)[0]
+    change, gain = float(np.abs(step[:2] / found.x[:2]).max()), float(np.sum((found.jac @ step) ** 2))
+    if not (change < _STILL and gain < _GAIN):
+        raise RuntimeError(
+            f"not converged after {found.nfev} evaluations: the next step changes K or C by {change:.2g} of it, "
+            f"chi-square by {gain:.2g}"
+        )
+    return np.asarray(found.x)
 
 
 def _along(law: Law, push: Mapping[str, Array]) -> dict[str, Array]:

@@ -9,8 +9,10 @@ import pytest
 from penetration_campaigns import campaign_of, driven_trial
 
 import benchmarks.diagnose as bench
+from benchmarks.diagnosis import worker
 from benchmarks.diagnosis.table import _by_truth, show, summarise
 from benchmarks.hidden.penetration import EFFECTS, Hidden, make_hidden
+from benchmarks.second.drawing import Secret
 from experiments.cli.benching import benchmark_options, goes_on
 from experiments.runs.progress import Progress
 
@@ -93,6 +95,46 @@ def test_ninety_percent_intervals_of_base_parameters_are_counted_by_number():
     assert found["by_name"] == {"mass": {"share": 1.0, "of": 2}, "stiffness": {"share": 0.5, "of": 2}}
     assert found["intervals_90_hold_truth"] == {"share": 0.75, "of": 4}
     assert summary["apparent_parameters"]["by_name"] == {"stiffness": {"share": 1.0, "of": 2}}
+
+
+def test_intervals_are_counted_against_what_the_found_model_gives_of_readings_without_noise():
+    def told(limit, **more):
+        base = {"stiffness": {"value": 100.0, "std": 1.0}, "damping": {"value": 2.0, "std": None}}
+        numbers = {"base_parameters": base, "found_parameters": {"adhesion": {"pull": {"value": 0.5, "std": 0.1}}}}
+        return case(["adhesion"], "named", ["adhesion"], **numbers, limit=limit, **more)
+
+    summary = summarise([
+        told({"stiffness": 101.6, "damping": 2.0, "adhesion.pull": 0.7}),
+        told({"stiffness": 98.3, "adhesion.pull": 0.4}),
+        told({"error": "not converged"}), told(None),
+    ])["limit_parameters"]  # fmt: skip
+    assert summary["by_name"] == {"stiffness": {"share": 0.5, "of": 2}, "adhesion.pull": {"share": 0.5, "of": 2}}
+    assert summary["failed"] == 1
+
+
+def test_a_worker_without_a_diagnosis_states_that_it_has_no_limit(tmp_path):
+    assert worker.answer(str(tmp_path))["verdict"] == "failed"
+    assert set(worker.limit({})) == {"error"}
+
+
+def test_the_process_that_diagnoses_gets_the_readings_without_noise_after_its_answer(monkeypatch, tmp_path):
+    """And only of campaigns of pushes of the second simulator, whose maker states them."""
+    asked = []
+    campaign = campaign_of([("001", "driven", 0.01, driven_trial(lambda z, v, top: 900 * z, speed=0.01))])
+    hidden = Secret((), None, {}, 0.0, False, 1, {}, {"001": {"t_s": np.zeros(1)}})
+    monkeypatch.setattr(bench, "make_case", lambda kind, case: (campaign, hidden))
+
+    def ask(folder):
+        asked.append("answer")
+        return answered(folder)
+
+    def limited(readings):
+        asked.append(sorted(readings))
+        return {"stiffness": 900.0}
+
+    record = bench._one("second-push", {"seed": 1}, ask, limited, before=None, wanted=False)
+    assert asked == ["answer", ["001"]]
+    assert record["limit"] == {"stiffness": 900.0}
 
 
 def test_baselines_stand_beside_us_on_the_very_same_cases():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden.suite import suite
+from benchmarks.second import push as second_push
 from benchmarks.second.campaigns import KINDS, campaign_of
 from benchmarks.second.noise import KINDS as NOISES
 from benchmarks.second.noise import Noise
@@ -93,6 +94,25 @@ def test_apparent_k_is_that_of_frame_and_ground_in_series_less_the_loose_grains(
     loose = legs["soft"] / max(float(made.columns[key]["depth_m"].max()) for key in made.columns)
     lower = 1.0 - told.extra["apparent"]["stiffness"] / series
     assert loose < lower < 3.0 * loose
+
+
+def test_a_search_for_apparent_numbers_has_converged_or_says_that_it_has_not():
+    """Rosenbrock's valley: its least sum of squares is 0 in (1.5, 2.25)."""
+
+    def away(factors):
+        k, c = factors
+        return np.array([10.0 * (c - k * k), 1.0 - k / 1.5, 0.0])
+
+    assert second_push._nearest(away, 2) == pytest.approx([1.5, 2.25], rel=1e-6)
+    with pytest.raises(RuntimeError, match="not converged after 3 evaluations"):
+        second_push._nearest(away, 2, tries=3)
+
+
+def test_apparent_numbers_that_do_not_converge_are_left_out_and_the_reason_is_kept(monkeypatch):
+    monkeypatch.setattr(second_push, "_STILL", 0.0)
+    told = make_push(1061005, kind="null", trials=4)[1].extra
+    assert told["apparent"] == {}
+    assert "not converged" in told["apparent_error"]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -91,7 +91,7 @@ class PenetrationProblem(Problem):
         self.tables: PenetrationCampaign = tables
         self.granular = tables.surface.granular
         prepared, findings = prepare(campaign)
-        self._trials: dict[str, Prepared] = {trial.info.id: trial for trial in prepared}
+        self.prepared: dict[str, Prepared] = {trial.info.id: trial for trial in prepared}
         self.findings: tuple[Finding, ...] = tuple(findings)
         self.trials: tuple[TrialInfo, ...] = tuple(trial.info for trial in prepared)
         self._diameters = diameters_of(prepared)
@@ -210,12 +210,12 @@ class PenetrationProblem(Problem):
             points = [(values, asked[k][1]) for k in mine for values in asked[k][0]]
             models: dict[str, Array] = {}
             for driven in (True, False):
-                chosen = [id for id in trials if self._trials[id].driven == driven]
+                chosen = [id for id in trials if self.prepared[id].driven == driven]
                 if chosen and points:
-                    out = self._run_each(points, [self._trials[id] for id in chosen])
+                    out = self._run_each(points, [self.prepared[id] for id in chosen])
                     models |= dict(zip(chosen, out, strict=True))
             rest = iter(
-                {id: self._residuals(self._trials[id], models[id][k]) for id in trials} for k in range(len(points))
+                {id: self._residuals(self.prepared[id], models[id][k]) for id in trials} for k in range(len(points))
             )
             for k in mine:
                 found[k] = [next(rest) for _ in asked[k][0]]
@@ -236,7 +236,7 @@ class PenetrationProblem(Problem):
 
     def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
         """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
-        moved = [self._trials[id] for id in trials]
+        moved = [self.prepared[id] for id in trials]
         found = {}
         for drops in (False, True):
             chosen = [replace(t, time=t.time + late) if drops else t for t in moved if t.driven != drops]
@@ -253,14 +253,14 @@ class PenetrationProblem(Problem):
         self._along = dict(along)
         self._shaken = {}
         for id, own in along.items():
-            trial = self._trials[id]
+            trial = self.prepared[id]
             if not trial.driven and own.any():
                 row = np.concatenate([np.flatnonzero(trial.has_depth), np.flatnonzero(trial.has_other)])
                 self._shaken[id] = Shaken.of(own, row, np.zeros((len(own), 0)))
 
     def rewhiten(self, values: Values, forms: Sequence[Form]) -> None:
         """Take the error of the smoothed depth into the whitening, at these values."""
-        driven = [trial for trial in self._trials.values() if trial.driven]
+        driven = [trial for trial in self.prepared.values() if trial.driven]
         std_force = stds(self.tables, True)[1] if driven else 0.0
         for trial, by_depth, by_row, by_speed in self._slopes(values, forms, driven) if driven else ():
             smooth = trial.path
@@ -306,7 +306,7 @@ class PenetrationProblem(Problem):
 
     def chi_square(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[float, int]:
         """The sum of docs/diagnose.md; see `Problem`."""
-        this = self._trials[trial]
+        this = self.prepared[trial]
         model = self._run([values], forms, [this])[0][0]
         if this.driven:
             rest = (this.other - model)[this.has_other] / self.gap_std(values, forms, trial)
@@ -321,7 +321,7 @@ class PenetrationProblem(Problem):
 
     def gap_std(self, values: Values, forms: Sequence[Form], trial: str) -> Array:
         """Of each reading of a driven trial's force, as docs/diagnose.md has it for the gap [N], shape [n]."""
-        this = self._trials[trial]
+        this = self.prepared[trial]
         ((_, by_depth, by_row, _),) = self._slopes(values, forms, [this])
         doubt = np.linalg.norm(path_error(this.path, by_depth, by_row), axis=1) / this.path.inflation
         # The force jumps at the surface, and with friction where the motion turns: half of what the path leaves open.
@@ -336,7 +336,7 @@ class PenetrationProblem(Problem):
 
     def samples(self, trial: str) -> Samples:
         """See `Problem`."""
-        this = self._trials[trial]
+        this = self.prepared[trial]
         std_depth, std_other = stds(self.tables, this.driven)
         if this.driven:
             time = this.time[this.has_other]
@@ -350,7 +350,7 @@ class PenetrationProblem(Problem):
 
     def _state(self, values: Values, forms: Sequence[Form], trial: str) -> tuple[Array, Array, NDArray[np.str_], Array]:
         """Depth, speed, phase, and model's force or motion at every row."""
-        this = self._trials[trial]
+        this = self.prepared[trial]
         model = self._run([values], forms, [this])[0][0]
         if this.smooth is None:
             names = np.array(PHASES)[np.clip(model[:, 3].astype(int), 0, 3)]
@@ -362,7 +362,7 @@ class PenetrationProblem(Problem):
 
     def phases(self, values: Values, forms: Sequence[Form], trial: str) -> NDArray[np.str_]:
         """See `Problem`."""
-        this = self._trials[trial]
+        this = self.prepared[trial]
         names = self._state(values, forms, trial)[2]
         force = names[this.has_other]
         return force if this.driven else np.concatenate([names[this.has_depth], force])
@@ -380,7 +380,7 @@ class PenetrationProblem(Problem):
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
         """The force [N] that the model misses; of a drop m (g - a) over the model's, at the accelerometer's rows, or
         from its depth where it has none."""
-        this = self._trials[trial]
+        this = self.prepared[trial]
         depth, speed, _, model = self._state(values, forms, trial)
         rows = this.has_other
         if this.driven:
@@ -398,7 +398,7 @@ class PenetrationProblem(Problem):
 
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """See `Problem`."""
-        this = self._trials[trial]
+        this = self.prepared[trial]
         _, _, _, model = self._state(values, forms, trial)
         if this.smooth is not None:
             columns = {"t_s": this.time, "measured": this.other, "model": model, "depth_m": this.smooth.depth}
@@ -460,11 +460,11 @@ class PenetrationProblem(Problem):
 
     def _pushes(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> list[Push]:
         """The pushes among `trials`; none where C was known beforehand, or drops show it."""
-        if self.tables.uncertainty.damping < 1 or not all(trial.driven for trial in self._trials.values()):
+        if self.tables.uncertainty.damping < 1 or not all(trial.driven for trial in self.prepared.values()):
             return []
         still = {**values, **{named("damping", diameter, self._diameters): 0.0 for diameter in self._diameters}}
         found = []
-        for trial in (self._trials[id] for id in trials):
+        for trial in (self.prepared[id] for id in trials):
             spring, whole = (self._run([point], forms, [trial])[0][0] for point in (still, values))
             columns = (trial.path.depth, trial.path.speed, trial.other, spring, whole - spring)
             found.append(Push(trial.diameter, *(column[trial.has_other] for column in columns)))
@@ -476,7 +476,7 @@ class PenetrationProblem(Problem):
 
     def planned(self, one: Estimate, other: Estimate, *, inflation: tuple[float, float] = (1.0, 1.0)) -> Planned | None:
         """See `Problem`; None where no push was driven."""
-        driven = [trial for trial in self._trials.values() if trial.driven]
+        driven = [trial for trial in self.prepared.values() if trial.driven]
         if not driven:
             return None
 

@@ -48,7 +48,7 @@ def find_force_zeros(trials: Sequence[Prepared], noise: float) -> ForceZeros | N
     freedom = sum(len(rows) - 1 for rows in apart)
     variance = sum(float(rows @ rows) for rows in apart) / freedom
     # A mean of noise that is correlated has a larger error: that of an autoregressive law of first order.
-    along = sum(float(rows[1:] @ rows[:-1]) for rows in apart) / (freedom * variance)
+    along = sum(float(rows[1:] @ rows[:-1]) for rows in apart) / max(freedom * variance, 1e-300)  # 0 of a simulation
     longer = (1 + along) / (1 - along) if along > 2 / np.sqrt(freedom) else 1.0
     one = np.sqrt(max(variance, noise**2) * longer)
     means = np.array([rows.mean() for rows in read.values()])

@@ -41,7 +41,7 @@ def test_a_steep_way_back_sees_the_difference_of_two_depths():
     problem = make_problem(pushes(crater))
     form = form_of(problem, "plastic-sinkage:stiffer unloading")
     std = problem.gap_std(TRUE | {form.amplitude: STEEP}, (form,), "00")
-    smooth = problem._trials["00"].smooth
+    smooth = problem.prepared["00"].smooth
     top = int(np.argmax(smooth.depth))
     # while the crater bears: z > z_m s / (1 + s)
     rows = np.flatnonzero((np.arange(len(std)) > top + 8) & (smooth.depth > 0.017))
@@ -58,7 +58,7 @@ def test_at_a_turn_a_row_or_two_may_lie_on_either_side_of_a_friction_and_no_othe
     problem = make_problem(pushes(rubbing))
     form = form_of(problem, "shaft-friction:constant")
     values = TRUE | {form.amplitude: 0.5 / problem._scales.force}
-    smooth = problem._trials["02"].smooth
+    smooth = problem.prepared["02"].smooth
     std, plain = problem.gap_std(values, (form,), "02"), problem.gap_std(TRUE, (), "02")
     turn = int(np.argmax(smooth.depth))
     inside = smooth.depth > 2e-3

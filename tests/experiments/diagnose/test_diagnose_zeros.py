@@ -1,5 +1,7 @@
 """Sensors whose zero is another in each push, and beds that differ where no push repeats another."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from penetration_campaigns import DAMPING, DEPTH_STD, FORCE_STD, STIFFNESS, campaign_of
@@ -9,6 +11,7 @@ from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.noise.lone_beds import _explained
 from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.push.zeros import find_force_zeros
 
 SPEEDS = (0.01, 0.01, 0.03, 0.03, 0.1, 0.1)
 OFF = np.array([1.3, -0.9, 0.4, -1.2, 1.1, -0.3])
@@ -53,6 +56,15 @@ def test_zeros_of_the_force_are_read_above_the_surface():
     known = problem_of(straight, zeros=FORCE_STD * OFF).known_std
     assert known == {"force zero": pytest.approx(FORCE_STD, rel=0.3)}
     assert problem_of(straight).known_std == {}
+
+
+def test_pushes_that_read_exactly_0_above_the_surface_have_no_zeros_that_differ():
+    """As a simulation writes them."""
+    time = np.linspace(0.0, 1.0, 40)
+    path = SimpleNamespace(depth=time - 0.5, depth_std=np.full(40, 1e-3), speed=np.ones(40))
+    read = {"driven": True, "path": path, "time": time, "other": np.where(time > 0.5, 900 * time, 0.0)}
+    trials = [SimpleNamespace(info=SimpleNamespace(id=id), **read) for id in ("001", "002")]
+    assert find_force_zeros(trials, FORCE_STD) is None
 
 
 def test_a_zero_that_differs_by_one_noise_is_nothing_missing_and_is_said():
