@@ -15,7 +15,7 @@ FILES = {
     "spike.toml": GRAINS + "grain = 0.004\nseeds = [1]\nspeeds = [0.4]\ndrop_speeds = [0.2]\nyoung = 2e7\n",
     "sweep.toml": 'experiment = "tumble"\n[over]\ntorque = [0.2, 0.22]\n',
 }
-# All commands but bench (needs a checkout), and converge, paper, bed calibrate and bed test, which take minutes to hours.
+# All but bench, which needs a checkout, and converge, paper, bed calibrate and bed test, which take long.
 COMMANDS = (
     "--help",
     "doctor",
