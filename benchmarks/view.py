@@ -2,9 +2,9 @@
 
 A made-up bed of ``--grains`` on a loose cubic grid, cut open in the middle, in a window of 1280 by 800. SwiftShader
 draws, so no graphics card takes part. Beside the rate stands the processor time of all of Chromium's processes for a
-frame: it holds on a machine that does other work, where the rate does not.
+frame: it holds on a machine that does other work, where the rate does not. Both are medians of rounds.
 
-Options: --grains, --turns (frames that are drawn).
+Options: --grains, --turns (frames that are drawn at each resolution, in rounds of 4).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import json
 import os
 import shutil
 import signal
+import statistics
 import subprocess
 import sys
 import time
@@ -24,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.race.machine import begin_timing, column_table, wide_console
 from benchmarks.race.scratch import scratch
 from experiments.runs.types import Json
 from vis.pictures.frames import FrameWriter
@@ -33,6 +35,7 @@ __all__ = ["Browser", "bed_of", "chromium", "run"]
 
 _GRAIN = 0.004
 _WINDOW = (1280, 800)
+_ROUND = 4  # Frames from one line of progress to the next
 _START = """
 import fcntl, os, sys
 pipes = [fcntl.fcntl(int(pipe), fcntl.F_DUPFD, 10) for pipe in sys.argv[1:3]]
@@ -203,27 +206,57 @@ def bed_of(folder: Path, grains: int, *, frames: int = 2, title: str = "A made-u
     return folder
 
 
-def run(out: Path, *, progress: Any, grains: int = 100_000, turns: int = 40) -> Json:
-    """Measure, and return grains, frames per second and processor time per frame at full and at half resolution.
+def run(out: Path, *, progress: Any, grains: int = 100_000, turns: int = 20) -> Json:
+    """Measure, and return what goes into bench.json; nothing is written to `out`.
 
     Raises RuntimeError where there is no Chromium, ValueError for fewer than 1 grain or turn.
     """
     if min(grains, turns) < 1:
         raise ValueError(f"grains = {grains}, turns = {turns}: both must be at least 1")
+    bench, remarks = begin_timing("view")
+    for remark in remarks:
+        progress.message(remark)
+    bench |= {"grains": grains, "turns": turns, "window": list(_WINDOW)}
+    progress.plan({"page": 1.0, "frames": 3.0})
     progress.stage("page", total=1.0)
-    page = write_view(bed_of(out / "run", grains), progress=progress.update)
-    rates = {}
-    with Browser() as browser:
+    with tempfile.TemporaryDirectory() as scratch, Browser() as browser:
+        page = write_view(bed_of(Path(scratch), grains), progress=progress.update)
+        bench["page_bytes"] = page.stat().st_size
+        progress.stage("frames", total=float(2 * turns))
         browser.open(page)
-        for name, ratio in (("full", 1.0), ("half", 0.5)):
-            before = browser.processor_time()
-            told = browser.value(_TURN.format(turns=turns, ratio=ratio))
-            spent = browser.processor_time() - before
-            rates[name] = {
-                "pixels": [told["wide"], told["high"]], "grains_drawn": round(told["drawn"]),
-                "frames_per_second": turns / told["seconds"], "processor_time_per_frame_s": spent / turns,
-            }  # fmt: skip
+        for number, (name, ratio) in enumerate((("full", 1.0), ("half", 0.5))):
+            bench[name] = _timed(browser, ratio, turns, lambda done, past=number * turns: progress.update(past + done))
+    progress.close()
+    bench["load_at_the_end"] = os.getloadavg()[0]
+    table = column_table(
+        ("resolution", "pixels", "grains drawn", "frames/s", "processor time a frame [ms]"),
+        title=f"view: {grains:,} grains turn in Chromium, drawn by software",
+    )
+    for name in ("full", "half"):
+        told = bench[name]
+        table.add_row(
+            name, "{} x {}".format(*told["pixels"]), f"{told['grains_drawn']:,}", f"{told['frames_per_second']:.1f}",
+            f"{1e3 * told['processor_time_per_frame_s']:.1f}",
+        )  # fmt: skip
+    wide_console().print(table)
+    return bench
+
+
+def _timed(browser: Browser, ratio: float, turns: int, progress: Any) -> Json:
+    """Rate and processor time of `turns` frames at a share of the resolution; `progress`: called with frames drawn."""
+    rounds: list[tuple[float, float]] = []
+    done, told = 0, {}
+    while done < turns:
+        count = min(_ROUND, turns - done)
+        before = browser.processor_time()
+        told = browser.value(_TURN.format(turns=count, ratio=ratio))
+        # The frame that _TURN draws first, so that each round begins with a page that is ready, counts here alone.
+        rounds.append((count / told["seconds"], (browser.processor_time() - before) / (count + 1)))
+        done += count
+        progress(float(done))
+    rates, times = zip(*rounds, strict=True)
     return {
-        "format": "hedgebed-bench/1", "what": "view", "grains": grains, "turns": turns,
-        "page_bytes": page.stat().st_size, "load_average": os.getloadavg()[0], "cores": os.cpu_count(), **rates,
+        "pixels": [told["wide"], told["high"]], "grains_drawn": round(told["drawn"]),
+        "frames_per_second": statistics.median(rates), "processor_time_per_frame_s": statistics.median(times),
+        "rounds": {"frames_per_second": list(rates), "processor_time_per_frame_s": list(times)},
     }  # fmt: skip

@@ -223,7 +223,9 @@ def _resume(
 
 
 def _bench(
-    what: Annotated[str, Parameter(help="What to measure: bed, answer, diagnose, planar or gpu.")] = "bed",
+    what: Annotated[
+        str, Parameter(help="What to measure: bed, answer, constants, diagnose, feet, gpu, planar or view.")
+    ] = "bed",
     /,
     *,
     out: Annotated[Path | None, Parameter(help="Folder for bench.json; runs/bench-<time> if not given.")] = None,

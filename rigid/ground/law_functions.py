@@ -202,12 +202,12 @@ def rft_foot_loading(depth, p):
     if s < 0.0:
         s = 0.0
     if s > 1.0:
-        above = s - 1.0
+        above = (s - 1.0) * (p[12] + 0.5 * p[13] * (s - 1.0))
         s = 1.0
     square = s * s
     low = p[4] + s * (p[5] + s * (p[6] + s * p[7]))
     high = p[8] + s * (p[9] + s * (p[10] + s * p[11]))
-    return p[0] * (s ** p[3] * (low + square * square * high) + above * (p[12] + 0.5 * p[13] * above))
+    return p[0] * (s ** p[3] * (low + square * square * high) + above)
 
 
 def rft_foot_loading_work(depth, p):

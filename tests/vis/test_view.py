@@ -2,9 +2,13 @@
 
 import json
 import re
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
+from import_graph import ROOT
 
 from benchmarks.view import bed_of
 from experiments.cli.main import BAD_INPUT, DONE, main
@@ -225,3 +229,41 @@ def test_a_run_that_goes_on_is_shown_again_until_it_ends(make_run, tmp_path, mon
     assert main(["view", str(run), "--no-open", "--quiet", "--live", "--interval", "3"]) == DONE
     assert slept == [(3.0, 3.0)]
     assert json.loads(HEAD.search((run / "view.html").read_text())[1])["live"] == 0
+
+
+def test_the_script_of_the_page_shows_a_run_in_a_notebook(make_run, tmp_path, monkeypatch):
+    make_run(tmp_path / "runs" / "foot-earth", frames=1)
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "view.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    imports, cell = script.strip().rsplit("\n", 1)  # the last line of a cell is what a notebook shows
+    exec(imports, names := {})
+    assert eval(cell, names)._repr_html_().startswith("<iframe")
+
+
+@pytest.mark.long
+def test_a_page_is_rewritten_with_more_frames_while_a_run_goes_on(tmp_path):
+    """A real run on a law and `view --live`, each in a process of its own; the page is read while both work."""
+    pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+    run, page = tmp_path / "run", tmp_path / "run" / "view.html"
+    hedgebed = [sys.executable, "-m", "hedgebed"]
+    job = "mujoco hopper --feet foot --surface sand --duration 1 --frame-count 40 --quiet --out"
+    counts = []  # Frames of each page that is there while the run goes on
+    with subprocess.Popen([*hedgebed, *job.split(), str(run)], cwd=ROOT, stdout=subprocess.DEVNULL) as running:
+        while len(list(run.rglob("*.vtu"))) < 2:
+            assert running.poll() is None, "the run has ended before it is looked at"
+            time.sleep(0.05)
+        live = [*hedgebed, "view", str(run), "--no-open", "--quiet", "--live", "--interval", "0.5"]
+        with subprocess.Popen(live, cwd=ROOT, stdout=subprocess.DEVNULL) as viewing:
+            seen = 0
+            while viewing.poll() is None:
+                if page.is_file() and page.stat().st_mtime_ns != seen:
+                    seen = page.stat().st_mtime_ns
+                    head = json.loads(HEAD.search(page.read_text(encoding="utf-8"))[1])
+                    if head["live"]:
+                        counts.append(max(len(scene["times"]) for scene in head["scenes"]))
+                time.sleep(0.05)
+        assert viewing.returncode == 0 == running.wait()
+    assert len(counts) > 1 and counts == sorted(counts) and counts[-1] > counts[0] > 0
+    head = json.loads(HEAD.search(page.read_text(encoding="utf-8"))[1])
+    assert head["live"] == 0 and max(len(scene["times"]) for scene in head["scenes"]) > counts[-1]

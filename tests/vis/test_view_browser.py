@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks import view
 from benchmarks.view import Browser, bed_of, chromium
+from experiments.runs.progress import Progress
 from vis.page.answer import write_page
 from vis.page.page import Page, Section
 from vis.view.page import report_scene, write_view
@@ -219,4 +221,16 @@ def test_the_small_scene_of_a_report_is_drawn_when_it_comes_into_sight(browser, 
                   " v ? v.ready.then(done) : setTimeout(wait, 20); })())")  # fmt: skip
     picture = seen(browser)
     assert (np.ptp(picture[..., :3], axis=-1) > 25).mean() > 0.03
+    ends = "((b) => [b.scrollHeight - b.clientHeight, b.scrollWidth - b.clientWidth])"
+    assert browser.value(f"{ends}(document.querySelector('.scene .curves'))") == [0, 0]  # no plot is out of sight
     assert browser.errors == []
+
+
+def test_bench_view_times_frames_and_leaves_nothing_but_its_numbers(tmp_path, capsys):
+    bench = view.run(tmp_path, progress=Progress(), grains=300, turns=5)
+    for name in ("full", "half"):
+        told = bench[name]
+        assert told["frames_per_second"] > 0.0 < told["processor_time_per_frame_s"] and told["grains_drawn"] > 0
+        assert len(told["rounds"]["frames_per_second"]) == 2
+    assert bench["what"] == "view" and bench["full"]["pixels"][0] > bench["half"]["pixels"][0]
+    assert list(tmp_path.iterdir()) == [] and "frames/s" in capsys.readouterr().out

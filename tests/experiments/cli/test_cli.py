@@ -333,6 +333,15 @@ def test_resume_refuses_settings_it_does_not_know(dig, capsys):
 # Bench
 
 
+def test_the_help_of_bench_lists_each_benchmark(capsys):
+    assert main(["bench", "--help"]) == 0
+    words = re.split(r"\W+", capsys.readouterr().out)
+    there = {
+        path.stem for path in (ROOT / "benchmarks").glob("*.py") if "\ndef run(" in path.read_text(encoding="utf-8")
+    }
+    assert {"feet", "view"} < there <= set(words)
+
+
 def test_bench_names_what_there_is(dig, capsys, monkeypatch):
     import experiments.cli.benching
 

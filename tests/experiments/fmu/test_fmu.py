@@ -1,12 +1,14 @@
 """`hedgebed fmu`: the FMU in fmpy, an importer that is not ours, against the runs of `hedgebed tumble`."""
 
 import math
+import re
 import sys
 import zipfile
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from import_graph import ROOT
 
 from coupling import CoupledTumble
 from experiments.cli.main import main
@@ -367,3 +369,15 @@ def test_the_parameters_of_an_fmu_on_a_ground_file_are_those_of_the_file(tmp_pat
     found = {each.get("name"): each for each in told.iter()}
     assert float(found["stiffness"].get("start")) == 140.0 and float(found["damping"].get("start")) == 1.0
     assert found["surface"].find("Start").get("value") == "sand"
+
+
+def test_the_script_of_the_page_prints_the_angle_that_it_states(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "fmu.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"^hedgebed (fmu .*)$", text, re.MULTILINE)
+    (script,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert main(command.split()) == 0
+    capsys.readouterr()
+    exec(script, {})
+    stated = float(re.search(r"# ([\d.]+) rad", script)[1])
+    assert float(capsys.readouterr().out.split()[-1]) == pytest.approx(stated, abs=5e-4)
