@@ -31,7 +31,7 @@ from vis.paper.figures import PaperRun, figure_5, figure_signs
 
 RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
 
-LEGEND = ("grains of sand-weak: one bed each", "grains of sand: mean of three beds, 95 %")
+LEGEND = ("grains of sand: mean of three beds, 95 %", "other materials, grains of sand-weak: one bed each")
 
 
 @pytest.fixture(scope="module")
@@ -200,16 +200,19 @@ def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
     (figure,) = drawn
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words[0] == "spring-damper of sand"
-    assert words[1:3] == list(LEGEND)
+    assert words[3:5] == list(LEGEND)
+    assert "friction" in words[1] and "± 9°" in words[2]
     assert [text.get_text() for text in figure.axes[0].texts] == ["sand"]
-    law, *grains = (to_hex(entry.get_color()) for entry in figure.legends[0].get_lines())
+    law, *bars_and_grains = (to_hex(entry.get_color()) for entry in figure.legends[0].get_lines())
+    assert set(bars_and_grains[:2]) == {law}
+    grains = bars_and_grains[2:]
     assert (law, set(grains)) == (MODEL.lower(), {BED.lower()})  # as in every figure
     marks = {line.get_marker(): to_hex(line.get_color()) for line in figure.axes[0].lines}
     assert (marks["o"], marks["s"]) == (law, grains[0])
     for entry in paper.result["kept_on_grains"]["one_bed"]:
         del entry["grains"]
     figure_signs(paper)
-    assert drawn[1].legends[0].get_texts()[1].get_text() == ": ".join(("grains", "one bed each"))
+    assert drawn[1].legends[0].get_texts()[4].get_text() == "other materials, grains: one bed each"
 
 
 def trials_of(*, kept=(), **angles):
