@@ -383,7 +383,7 @@ def test_a_robot_on_grains_is_pictured_at_its_largest_force_and_its_end_shows_wh
     ]
     assert "sunk" in drawn.stills[-1].caption and "sunk" not in drawn.stills[0].caption
     assert [still.file.stem for still in drawn.stills] == ["robot-start", "robot-force", "robot-end"]
-    assert jobs[0]["pictures"][1]["times"] == [0.5] and "12 N" in drawn.stills[1].caption
+    assert jobs[0]["pictures"][1]["times"] == [0.5] and "12.0\N{NO-BREAK SPACE}N" in drawn.stills[1].caption
     assert reel.colour_top("height") == 8.0
     page = canvas.Page((400, 300), "height", 8.0)
     level, colours = page.colours(reel.frame(0).grains), page.colours(reel.frame(3).grains)
