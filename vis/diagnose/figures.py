@@ -45,7 +45,7 @@ _QUANTITIES: dict[str, tuple[str, str]] = {
     "accel": ("acceleration", "m/s²"),
 }
 _REPLICATES = "#e6d08f"  # by what replicates differ: darker than the page and than the band of the sensor
-BASE = "#CC79A7"
+BASE = "#7B3FF2"
 """The base model: not the colour of the spring-damper in other figures, which is that of the state "slip" here."""
 _PHASES = STATES | {"free": STATES["hop"], "in": STATES["pivot"], "rest": STATES["stand"], "out": "#503f00"}
 """Of a tumble the colours that its states have everywhere. Of a push, never in one figure with those, three of them and

@@ -11,7 +11,7 @@ from matplotlib.colors import TwoSlopeNorm
 from rigid.intervals import half_width
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, listing, table
-from vis.page.plots import BED, GREY, INK, Array, handle, legend_above, line_styles, new_panels, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, Array, handle, legend_above, line_styles, new_panels, sheet
 from vis.page.report import Report, Result, report_of, tables
 
 __all__ = ["write_lawfit_report"]
@@ -67,6 +67,7 @@ def _laws(report: Report, laws: list[Result], cell: str) -> Block | None:
     drawing, axes = new_panels(len(places), height=3.4, sharey=True)
     named = sorted((law["name"] for law in laws), key=lambda name: name != "spring-damper")  # its colour is MODEL
     styles = line_styles(named, without=(BED,))
+    styles["spring-damper"] = {**styles["spring-damper"], "ls": DASHED, "zorder": 2.5}  # over those on which it lies
     file = f"series/bins-{cell}.csv" if cell else "series/bins.csv"
     columns = report.columns(file) if (report.folder / file).exists() else None  # a kept result has the means alone
     sure = False

@@ -18,7 +18,7 @@ from experiments.cli.main import main
 from experiments.paper.claims import Trials, claims, friction_of_a_rigid_pivot
 from experiments.paper.evidence import RIVALS, evidence, nats, rival_trials
 from experiments.paper.experiment import plan_jobs, run
-from experiments.paper.grains import angles_of_beds, kept_angles, packed_angles
+from experiments.paper.grains import angles_of_beds, kept_angles, packed_angles, spring_angles
 from experiments.paper.settings import PaperSettings
 from experiments.paper.transitions import slip_before_hop
 from experiments.platform.surfaces import find_surface
@@ -188,6 +188,12 @@ def test_angles_at_the_density_of_jsc_1a_are_those_of_the_kept_runs():
     assert {entry.torque: entry.angles for entry in packed_angles()} == {
         0.22: motor, 6: [run["at_10mm"]["angle"] for run in runs]
     }  # fmt: skip
+
+
+def test_the_error_of_the_spring_dampers_angle_is_that_of_the_page():
+    (only,) = spring_angles()
+    page = (RESULTS.parent / "notes" / "calibrate.md").read_text(encoding="utf-8")
+    assert f"{only.angle} ± {only.half}" in page
 
 
 def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
