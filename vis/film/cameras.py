@@ -182,7 +182,7 @@ class _Foot(Camera):
     Width of its picture over that of the foot, and the least and most over the largest distance of a tip.
     """
 
-    width, least, most, arrow = 3.0, 0.75, 1.5, 0.28
+    width, least, most, arrow = 3.0, 0.75, 1.5, 0.22
 
     def set_up(self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         foot, (low, high), kind = reel.foot, reel.box, Stage if opengl else FlatStage
