@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import rigid
-from vis.page.plots import BED, DOTTED, GREY, INK, MODEL, handle, legend_above, sheet, styled
+from vis.page.plots import BED, DOTTED, GREY, INK, MODEL, handle, legend_above, sheet, styled, title_above
 
 DURATION, TOLERANCE = 2.5, 1e-9
 _PLANAR = {"color": MODEL, "lw": 4.0, "alpha": 0.45}
@@ -66,9 +66,10 @@ def draw(path: Path) -> str:
             whole.semilogy(flat.time, np.maximum(values, _LEAST), label=name, lw=1.3, **style)
         whole.set(xlabel="time [s]", ylabel="difference [m] or [rad]", ylim=(0.3 * _LEAST, 1e-7))
         whole.legend(loc="center right", bbox_to_anchor=(1.0, 0.3), ncols=2)
-        left[0].set_title("brick, 0.0085 g, 0.22 N m for 0.5 s")
         left[2].set_xlabel("time [s]")
         legend_above(drawing, [handle("planar", **_PLANAR), handle("spatial", **_SPATIAL)], 2)
+        words = "One trial in the plane and in space, on the spring-damper of brick: 0.0085 g, 0.22 N m for 0.5 s"
+        title_above(drawing, words)
         drawing.savefig(path, dpi=126)
     return ", ".join(f"{name} {values.max():.1e}" for name, values in apart.items())
 

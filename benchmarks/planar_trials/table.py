@@ -17,7 +17,7 @@ import numpy as np
 from rigid import EFFECTS, Trial, simulate, simulate_batch
 from rigid.planar.dynamics import System
 from rigid.planar.located import integrate
-from vis.page.plots import BED, INK, MODEL, STATES, handle, legend_above, sheet, styled
+from vis.page.plots import BED, INK, MODEL, STATES, handle, legend_above, sheet, styled, title_above
 from vis.page.states import legend_of_states, panels, state_runs
 
 GRAVITY, MASS = 9.80665, 5.3
@@ -106,6 +106,7 @@ def draw_orders(path: Path) -> None:
             _draw_orders_of(axis, *trial)
         axes[0].set_ylabel("largest error of x, y, θ and rates [SI]")
         legend_above(drawing, [handle(label, colour, marker=marker) for label, colour, marker, _ in _INTEGRATORS], 3)
+        title_above(drawing, "Error at the end of a tumble over the step, on the spring-damper")
         drawing.savefig(path, dpi=126)
 
 
@@ -147,14 +148,20 @@ def draw_states(path: Path) -> None:
             axis.set_yticks(range(len(TORQUES)), ["0.125 N m (motor)", "0.22 N m (motor)", "6 N m (brake)"])
         axes[1].tick_params(labelleft=False)
         legend_of_states(drawing, np.array(sorted(seen)))
+        title_above(drawing, "States of a tumble over its angle, on the spring-damper")
         drawing.savefig(path, dpi=126)
+
+
+def draw(docs: Path) -> None:
+    """Both figures into the documentation in `docs`."""
+    draw_orders(docs / "images" / "planar-orders.png")
+    draw_states(docs / "images" / "planar-states.png")
 
 
 def main(folder: str) -> None:
     """Write the table and the figures into the documentation in `folder`."""
     docs = Path(folder)
-    draw_orders(docs / "images" / "planar-orders.png")
-    draw_states(docs / "images" / "planar-states.png")
+    draw(docs)
     for page, parts in (
         (docs / "planar.md", {"effects": effects()}),
         (docs / "notes" / "planar.md", {"cases": table(), "effects": details()}),

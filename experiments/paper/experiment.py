@@ -37,7 +37,7 @@ from rigid.planar.simulate import simulate
 
 from .claims import GRANULAR, Trials, claims, first_lasting
 from .evidence import BRAKE_DURATION, DURATION, evidence, rival_trials
-from .grains import angles_of_beds, kept_angles, packed_angles
+from .grains import angles_of_beds, kept_angles, packed_angles, spring_angles
 from .settings import PaperSettings
 from .transitions import HARD, say
 
@@ -259,6 +259,7 @@ def _result(settings: PaperSettings, jobs: Sequence[Job], found: list[Json]) -> 
             "one_bed": [asdict(angle) for angle in kept_angles()],
             "beds": [asdict(angle) for angle in angles_of_beds()],
             "packed": [asdict(angle) for angle in packed_angles()],
+            "springs": [asdict(angle) for angle in spring_angles()],
         },
         cases=cases,
         **{kind: of_kind(kind) for kind in ("sweep", "sliding", "grains")},

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["AngleOfBeds", "KeptAngle", "angles_of_beds", "kept_angles", "packed_angles"]
+__all__ = ["AngleOfBeds", "KeptAngle", "SpringAngle", "angles_of_beds", "kept_angles", "packed_angles", "spring_angles"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +32,17 @@ class AngleOfBeds:
     angles: list[float]  # Of the first 10 mm, one a bed [degrees]
 
 
+@dataclass(frozen=True, kw_only=True)
+class SpringAngle:
+    """An angle on the spring-damper with its error by those of K and C (docs/notes/calibrate.md)."""
+
+    surface: str
+    rig: float  # g_sim [9.80665 m/s2]
+    torque: float  # [N m]
+    angle: float  # Of the first 10 mm [degrees]
+    half: float  # One standard deviation [degrees]
+
+
 def kept_angles() -> tuple[KeptAngle, ...]:
     """Those of one bed each."""
     return tuple(KeptAngle(**entry) for entry in _tables("case"))
@@ -45,6 +56,11 @@ def angles_of_beds() -> tuple[AngleOfBeds, ...]:
 def packed_angles() -> tuple[AngleOfBeds, ...]:
     """Those of JSC-1A of the right cohesion and density, one bed each."""
     return tuple(AngleOfBeds(**entry) for entry in _tables("packed"))
+
+
+def spring_angles() -> tuple[SpringAngle, ...]:
+    """Those on the spring-damper whose error by K and C was computed."""
+    return tuple(SpringAngle(**entry) for entry in _tables("spring"))
 
 
 def _tables(name: str) -> Any:

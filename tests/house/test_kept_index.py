@@ -7,6 +7,7 @@ import pytest
 from import_graph import ROOT
 
 FOLDER = ROOT / "docs" / "results"
+PICTURES = runpy.run_path(str(FOLDER / "pictures.py"))
 MODULE = runpy.run_path(str(FOLDER / "index.py"))
 
 
@@ -50,3 +51,20 @@ def test_a_folder_that_states_no_command_is_named(tmp_path, capsys, name, text, 
     assert MODULE["main"](tmp_path) == 1
     assert said in capsys.readouterr().err
     assert not (tmp_path / "README.md").exists()
+
+
+def test_it_is_stated_how_each_picture_is_made_and_what_that_needs_is_there():
+    entries = PICTURES["entries"]()
+    names = [name for entry in entries for name in entry["names"]]
+    assert sorted(names) == sorted(path.stem for path in (ROOT / "docs" / "images").glob("*.png"))
+    for entry in entries:
+        assert all((FOLDER / kept / "result.json").exists() for kept in entry.get("kept", []))
+        assert not {"kept", "command"} & set(entry) or len(entry["figures"]) == len(entry["names"])
+
+
+def test_a_picture_is_drawn_from_a_kept_result_and_one_of_a_long_run_is_refused(tmp_path, capsys):
+    assert PICTURES["main"](["diagnose-grains-gap", "--out", str(tmp_path)]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["diagnose-grains-gap.png"]
+    with pytest.raises(SystemExit):
+        PICTURES["main"](["tumble-on-sand", "--out", str(tmp_path)])
+    assert "frames are not kept" in capsys.readouterr().err

@@ -10,8 +10,9 @@ from matplotlib.text import Text
 from PIL import Image, ImageColor
 
 from vis.compare.report import _draw_path
-from vis.diagnose.figures import _KINDS, _PHASES
+from vis.diagnose.figures import _KINDS, _PHASES, BASE
 from vis.page.plots import AMENDED, BED, MODEL, STATES, as_it_lies, handle, new_figure, title_above
+from vis.penetrate.lawfit import _over_beds
 from vis.pictures.render import write_gif
 
 
@@ -105,11 +106,16 @@ def test_the_states_have_colours_apart_for_the_colour_blind_too_and_dark_enough_
 
 @pytest.mark.parametrize("sight", SIGHT.values(), ids=SIGHT)
 def test_a_diagnosis_shows_states_in_their_colours_and_phases_of_pushes_apart_from_both_models(sight):
-    """CIE 1976 distances: 30 between phases, 20 from the lines of the models, for the colour-blind too."""
+    """CIE 1976 distances: 30 between phases, 20 from the lines of both models, for the colour-blind too.
+
+    The line of the base model is apart from every state as well: it had the colour of slipping.
+    """
     assert all(_PHASES[name] == colour for name, colour in STATES.items())
     pushed = [lab(_PHASES[name], np.array(sight)) for name in ("free", "in", "rest", "out")]
     assert min(np.linalg.norm(one - other) for one, other in combinations(pushed, 2)) > 30
-    assert min(np.linalg.norm(pushed[3] - lab(line, np.array(sight))) for line in (MODEL, AMENDED)) > 20
+    assert min(np.linalg.norm(pushed[3] - lab(line, np.array(sight))) for line in (BASE, AMENDED)) > 20
+    base = lab(BASE, np.array(sight))
+    assert min(np.linalg.norm(base - lab(one, np.array(sight))) for one in (*_PHASES.values(), AMENDED)) > 25
 
 
 def test_a_film_keeps_the_colours_of_the_states_as_they_are_however_rare(tmp_path):
@@ -127,3 +133,10 @@ def test_a_film_keeps_the_colours_of_the_states_as_they_are_however_rare(tmp_pat
 def test_an_added_effect_has_one_colour_in_all_figures_and_shares_it_with_no_state_and_no_other_line() -> None:
     assert AMENDED not in {BED, MODEL, *STATES.values()}
     assert _KINDS["named"] == _KINDS["with confidence"] == AMENDED
+
+
+def test_the_mean_over_beds_has_the_95_percent_interval_of_each_depth_and_none_of_one_bed() -> None:
+    """Three beds: t = 4.303 for two degrees of freedom, times std / sqrt(3)."""
+    depth = np.array([1.0, 1.1, 0.9, 2.0])
+    half = _over_beds(depth, np.array([1.0, 2.0, 3.0, 9.0]), np.array([1.0, 2.0]))
+    assert half[0] == pytest.approx(4.303 / np.sqrt(3), rel=1e-3) and np.isnan(half[1])

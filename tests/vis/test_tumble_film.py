@@ -124,13 +124,15 @@ def test_a_bed_narrower_than_the_picture_is_seen_down_to_its_floor_unless_two_ru
     """A robot that reaches 0.15 m about its centre, 0.1 m above a bed of 0.2 x 0.2 x 0.17 m, seen level."""
     low, high, reach = np.array([0.0, 0.0, -0.17]), np.array([0.2, 0.2, 0.0]), 0.15
     centres = np.column_stack([np.full(9, 0.1), np.full(9, 0.1), np.full(9, 0.1)])
-    reel = SimpleNamespace(box=(low, high), centres=centres, on_grains=True, radius=0.006)
+    ends = np.column_stack([np.zeros(9), np.full(9, 0.1 + reach)])
+    reel = SimpleNamespace(box=(low, high), centres=centres, ends=ends, on_grains=True, radius=0.006)
     places = {}
     for whole in (True, False):
         stage, way = _Space(whole=whole).set_up(reel, (900, 500), reach, opengl=False)
         ends = np.array([[0.1, 0.1, low[2]], [0.1, 0.1, 0.1 + reach]])
         places[whole] = stage.place(ends, (float(way[0, 0]), float(way[0, 1])))[:, 1]
     assert places[True].min() > 0.02 and places[True].max() < 0.98
+    assert np.ptp(places[True]) > 0.85  # it fills the picture
     assert places[False].min() < 0.0
 
 
@@ -348,8 +350,11 @@ def test_words_above_two_pictures_do_not_lie_on_each_other(hop, monkeypatch):
     assert not [(a, b) for a, b in combinations(boxes, 2) if a.overlaps(b)]
 
 
-def test_the_end_of_a_robot_on_grains_shows_heights_with_the_surface_in_the_middle_of_the_scale(tmp_path, monkeypatch):
-    """Under a foot that goes 8 mm deep the scale reaches 8 mm: blue above the surface, red below, then one grey."""
+def test_a_robot_on_grains_is_pictured_at_its_largest_force_and_its_end_shows_what_rose_and_sank(tmp_path, monkeypatch):
+    """Under a foot that goes 8 mm deep the scale reaches 8 mm: blue has risen, red has sunk, a level bed is pale.
+
+    The force at 0.5 s is the largest; the foot is seen from near, in the plane of its middle.
+    """
     surface, grains = 0.05, np.random.default_rng(1).uniform((0.0, 0.0, 0.0), (0.2, 0.2, 0.055), (300, 3))
     result = {
         "title": "cube on a bed of sand", "experiment": "mujoco", "ground": "bed",
@@ -360,10 +365,13 @@ def test_the_end_of_a_robot_on_grains_shows_heights_with_the_surface_in_the_midd
     cube = BLOCK * (np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) - [0.5, 0.5, 0.0])
     faces = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5]])
     writer = FrameWriter(tmp_path, name="robot")
-    for now in (0.0, 0.5, 1.0):
-        held = {"position": grains, "radius": np.full(300, 2e-3), "displacement": np.zeros((300, 3))}
+    moved = np.random.default_rng(2).uniform(-0.01, 0.01, (300, 3))
+    for now, force in ((0.0, 0.0), (0.5, 12.0), (0.75, 3.0), (1.0, 1.0)):
+        held = {"position": grains, "radius": np.full(300, 2e-3), "displacement": now * moved}
         low = np.array([0.1, 0.1, surface - 0.008 * now])
-        writer.write(now, held, {"spikes": (cube + low, faces), "hull": (cube + low + [0, 0, BLOCK], faces)})
+        pushed = {"row_forces": (low[None], {"force": np.array([[0.0, 0.0, force]])})}
+        bodies = {"spikes": (cube + low, faces), "hull": (cube + low + [0, 0, BLOCK], faces)}
+        writer.write(now, held, bodies, clouds=pushed)
     reel, jobs = SpaceReel(tmp_path), []
     monkeypatch.setattr(film, "carry_out", lambda job, *rest, **more: jobs.append(job) or ("opengl", []))
     drawn = film.draw_runs([reel], tmp_path, "robot", by="displacement", film=True)
@@ -373,17 +381,20 @@ def test_the_end_of_a_robot_on_grains_shows_heights_with_the_surface_in_the_midd
         "height",
         "displacement",
     ]
-    assert "height" in drawn.stills[-1].caption and "height" not in drawn.stills[0].caption
+    assert "sunk" in drawn.stills[-1].caption and "sunk" not in drawn.stills[0].caption
+    assert [still.file.stem for still in drawn.stills] == ["robot-start", "robot-force", "robot-end"]
+    assert jobs[0]["pictures"][1]["times"] == [0.5] and "12.0\N{NO-BREAK SPACE}N" in drawn.stills[1].caption
     assert reel.colour_top("height") == 8.0
-    frame = reel.frame(2)
     page = canvas.Page((400, 300), "height", 8.0)
-    colours = page.colours(frame.grains)
-    deeper = grains[:, 2] - surface < -8e-3
-    assert np.ptp(colours[deeper], axis=0).max() == 0.0
-    assert (colours[grains[:, 2] > surface + 3e-3, 2] > colours[grains[:, 2] > surface + 3e-3, 0]).all()  # blue
-    near = (grains[:, 2] < surface - 3e-3) & ~deeper
-    assert (colours[near, 0] > colours[near, 2]).all()  # red
-    Sheet([reel], (400, 250), by="height", opengl=False).draw(1.0)
+    level, colours = page.colours(reel.frame(0).grains), page.colours(reel.frame(3).grains)
+    assert np.ptp(level, axis=0).max() == 0.0 and level[0, :3].min() > 0.9
+    assert (colours[moved[:, 2] > 3e-3, 2] > colours[moved[:, 2] > 3e-3, 0]).all()  # blue
+    assert (colours[moved[:, 2] < -3e-3, 0] > colours[moved[:, 2] < -3e-3, 2]).all()  # red
+    sheet = Sheet([reel], (400, 250), by="height", opengl=False)
+    assert sheet.panels[1].camera.arrow and sheet.stages[1].cut == pytest.approx(0.1, abs=1e-6)
+    assert sheet.ways[1][:, 0] == pytest.approx(0.1, abs=1e-3)  # the foot in the middle
+    assert sheet.stages[1].width < sheet.stages[0].width
+    sheet.draw(1.0)
 
 
 def test_a_picture_has_nothing_of_the_one_that_was_drawn_before_it(folder):

@@ -97,6 +97,7 @@ def _picture(report: Report) -> tuple[list[Block], str]:
         "name": "bed", "frames": [0], "by": "coordination",
         "title": "\n".join(filter(None, ("The bed", surface_words(result)))),
         "top": nice_above(float(colour_values(grains, "coordination").max())),
+        "forces": [None], "strongest": 0.0,
         "lines": [f"packing {result['quantities']['packing_fraction']['value']:.4f}"],
         "note": f"{count} grains; cut open in the middle; dashed: the surface", "low": low.tolist(),
         "high": high.tolist(), "cut": 0.5 * float(low[1] + high[1]), "radius": float(grains["radius"].mean()),

@@ -45,6 +45,8 @@ _QUANTITIES: dict[str, tuple[str, str]] = {
     "accel": ("acceleration", "m/s²"),
 }
 _REPLICATES = "#e6d08f"  # by what replicates differ: darker than the page and than the band of the sensor
+BASE = "#7B3FF2"
+"""The base model: not the colour of the spring-damper in other figures, which is that of the state "slip" here."""
 _PHASES = STATES | {"free": STATES["hop"], "in": STATES["pivot"], "rest": STATES["stand"], "out": "#503f00"}
 """Of a tumble the colours that its states have everywhere. Of a push, never in one figure with those, three of them and
 a brown for `out`, which would have the colour of the base model."""
@@ -180,7 +182,7 @@ def draw_trajectories(
     if not channels:
         return None
     drawing, axes = sheet(len(channels), 2, 0.8 + 1.72 * len(channels))
-    models = [("before", MODEL, DASHED, labels[0]), ("after", AMENDED, "-", labels[1])]
+    models = [("before", BASE, DASHED, labels[0]), ("after", AMENDED, "-", labels[1])]
     models = [entry for entry in models if entry[3]]
     for (left, right), c in zip(axes, channels, strict=True):
         what, unit = _QUANTITIES.get(c.name, (c.name, "SI"))
@@ -263,7 +265,7 @@ def draw_phases(rows: Sequence[Result], labels: tuple[str, str]) -> Figure | Non
             if labels[1]:
                 axis.plot([before, after], [place, place], color=GREY, lw=1.2, zorder=2)
                 axis.plot(after, place, "o", color=AMENDED, ms=5.5, zorder=4)
-            axis.plot(before, place, "D", color=MODEL, ms=4.8, zorder=3)
+            axis.plot(before, place, "D", color=BASE, ms=4.8, zorder=3)
         shown = [float(row[stage]) for row in rows for stage in ("before", "after")]
         if max(shown) < _NARROW:
             axis.set_xlim(0.0, 1.1 * max(*shown, 1.5))
@@ -273,7 +275,7 @@ def draw_phases(rows: Sequence[Result], labels: tuple[str, str]) -> Figure | Non
         axis.set(title=title, xlabel="chi-square per sample (1: the sensors' noise)")
     axes[0].set_yticks(range(len(keys)), [f"{channel}, {phase}" for channel, phase in keys])
     axes[0].set_ylim(len(keys) - 0.4, -0.6)
-    handles = [handle(labels[0], MODEL, ls="", marker="D", ms=4.8)]
+    handles = [handle(labels[0], BASE, ls="", marker="D", ms=4.8)]
     if labels[1]:
         handles.append(handle(labels[1], AMENDED, ls="", marker="o", ms=5.5))
     legend_above(drawing, handles, 2, fontsize=8)
@@ -323,7 +325,7 @@ def draw_evidence(diagnosis: Result) -> Figure | None:
     shown = [kind for kind in _KINDS if kind in kinds.values()]
     handles: list[Any] = [Patch(color=_KINDS[kind], label=kind) for kind in shown]
     handles.append(handle("the noise alone", INK, ls=(0, (1, 1.5))))
-    handles.append(handle("the base model", MODEL, ls=DASHED))
+    handles.append(handle("the base model", BASE, ls=DASHED))
     legend_above(drawing, handles, 5, fontsize=8)
     return drawing
 
@@ -340,7 +342,7 @@ def _draw_left(axis: Axes, rows: Sequence[Result], colours: Sequence[str], diagn
     left = [max(1 + float(row["left"]), 1e-2) for row in rows]
     axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
     whole = 1 + float(base["left"]) if base else max(left)
-    axis.axvline(whole, color=MODEL, lw=1.0, ls=DASHED)
+    axis.axvline(whole, color=BASE, lw=1.0, ls=DASHED)
     most = max(whole, *left)
     for place, (row, value, colour) in enumerate(zip(rows, left, colours, strict=True)):
         axis.plot([whole, value], [place, place], color=GREY, lw=1.0, zorder=2)

@@ -1,7 +1,7 @@
 """The cameras that follow a platform or robot.
 
-In the plane: the whole of it, and its feet from near. In space: the whole of it, from above on grains, from the side on
-a law.
+In the plane: the whole of it, and its feet from near. In space: the whole of it, from above on grains, where a foot is
+seen from near too, from the side on a law.
 """
 
 from __future__ import annotations
@@ -92,10 +92,7 @@ class _Plane(Camera):
 
     def dress(self, axis: Any, reel: Reel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
         _frame_and_ruler(axis, stage)
-        level = stage.place(np.array([[focus[0], reel.cut, reel.surface]]), focus)[0, 1]
-        axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
-        if 0.0 < level < 0.8:
-            axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", color=INK, bbox=HALO)
+        level = _dash_surface(axis, stage, reel.surface, focus)
         self.mark(axis, stage, frame, focus, level)
 
     def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
@@ -135,23 +132,28 @@ class _Space(Camera):
     """From above and aside; least width and height of the picture over the largest distance of a tip from the centre.
 
     The plane that a rendered picture looks at is the front of the bed: no grain is left out. ``whole``: A bed that is
-    narrower than the picture is seen down to its floor; two runs side by side keep one scale instead.
+    narrower than the picture fills it, from its floor to the top of the body; two runs side by side keep one scale
+    instead.
     """
 
-    width, tall, arrow, pitch = 4.4, 2.6, 0.22, 0.5
+    width, tall, pitch, most = 4.4, 2.6, 0.5, 3.0
 
     def __init__(self, *, whole: bool = False) -> None:
-        self.whole = whole
+        self.whole, self.arrow = whole, 0.0 if whole else 0.22
 
     def set_up(self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
         width = max(self.width, self.tall * pixels[0] / pixels[1]) * reach
         (low, high), centres = reel.box, reel.centres
         cut, pitch = (float(low[1]), self.pitch) if opengl else (float(centres[:, 1].mean()), 0.0)
-        level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(pitch)
         narrow = self.whole and reel.on_grains and float(high[0] - low[0]) < width
-        if narrow:
-            deep = float(level.max() - low[2]) * np.cos(pitch) + reach
-            width = max(width, deep / _INNER * pixels[0] / pixels[1])
+        tops = reel.ends[:, 1] + (centres[:, 1] - cut) * np.tan(pitch)
+        floor, shown = float(low[2]), float(tops.max() - low[2])
+        if narrow:  # a body that goes higher than so many times its own height is followed
+            tall = float((reel.ends[:, 1] - reel.ends[:, 0]).max())
+            shown = min(shown, float(high[2] - low[2]) + self.most * tall)
+            across = max(float(high[0]), float(centres[:, 0].max()) + 0.5 * reach)
+            across -= min(float(low[0]), float(centres[:, 0].min()) - 0.5 * reach)
+            width = max(across, shown * np.cos(pitch) * pixels[0] / pixels[1]) / _INNER
         seen: dict[str, Any] = {
             "width": width,
             "cut": cut,
@@ -163,14 +165,38 @@ class _Space(Camera):
         ruled = nice_below(_RULER * width)
         stage = Stage(pixels, **seen, opacity=OPACITY, ruled=ruled) if opengl else FlatStage(pixels, **seen)
         stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
-        focus = level - 0.12 * stage.height
         if narrow:
-            focus = np.minimum(focus, low[2] + 0.5 * _INNER * stage.height / np.cos(pitch))
-        return stage, _steady(np.column_stack([centres[:, 0], focus]))
+            middle = np.maximum(floor + 0.5 * shown, tops - 0.5 * shown)
+            return stage, _steady(np.column_stack([np.full(len(middle), 0.5 * (low[0] + high[0])), middle]))
+        level = centres[:, 2] + (centres[:, 1] - cut) * np.tan(pitch)
+        return stage, _steady(np.column_stack([centres[:, 0], level - 0.12 * stage.height]))
 
     def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
         _frame_and_ruler(axis, stage)
         _mark_lowest(axis, reel, stage, frame, focus)
+
+
+class _Foot(Camera):
+    """One foot in the bed from near, with the forces; the bed is cut along the middle of the foot.
+
+    Width of its picture over that of the foot, and the least and most over the largest distance of a tip.
+    """
+
+    width, least, most, arrow = 3.0, 0.75, 1.5, 0.22
+
+    def set_up(self, reel: SpaceReel, pixels: tuple[int, int], reach: float, *, opengl: bool) -> View:
+        foot, (low, high), kind = reel.foot, reel.box, Stage if opengl else FlatStage
+        width = float(np.clip(self.width * foot.wide, self.least * reach, self.most * reach))
+        stage = kind(pixels, width=width, cut=foot.cut, low=low, high=high, radius=reel.radius)
+        stage.reach = 0.5 * width + 2.0 * float(np.linalg.norm(high - low))
+        surface = float(high[2]) if reel.surface is None else reel.surface
+        middle = np.minimum(surface + 0.06 * stage.height, foot.low + _BELOW * stage.height)
+        return stage, _steady(np.column_stack([foot.x, middle]))
+
+    def dress(self, axis: Any, reel: SpaceReel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
+        _frame_and_ruler(axis, stage)
+        if reel.surface is not None:
+            _dash_surface(axis, stage, reel.surface, focus)
 
 
 class _Level(Camera):
@@ -216,6 +242,15 @@ class _Level(Camera):
             axis.text(0.988, level + 0.012, "undisturbed surface", fontsize=9, ha="right", va="bottom", color=INK)
         _heights(axis, stage, focus)
         _mark_lowest(axis, reel, stage, frame, focus)
+
+
+def _dash_surface(axis: Any, stage: Stage | FlatStage, height: float, focus: Focus) -> float:
+    """A dashed line of the undisturbed surface at this height [m] across the picture; where it lies on that."""
+    level = float(stage.place(np.array([[focus[0], stage.cut, height]]), focus)[0, 1])
+    axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
+    if 0.0 < level < 0.8:
+        axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", color=INK, bbox=HALO)
+    return level
 
 
 def _heights(axis: Any, stage: Stage | FlatStage, focus: Focus) -> None:
@@ -268,7 +303,11 @@ def layout(reels: Sequence[AnyReel]) -> list[Panel]:
             foot = 0.17 if len(reels[0].states) else 0.03  # below it the states, where there are any
             if level:  # there is no bar of colours beside it
                 return [Panel(0, _Level(spaces), (0.015, foot, 0.97, 0.885 - foot))]
-            return [Panel(0, _Space(whole=True), (0.015, foot, 0.895, 0.885 - foot))]
+            tall = 0.885 - foot
+            return [
+                Panel(0, _Space(whole=True), (0.015, foot, 0.40, tall)),
+                Panel(0, _Foot(), (0.43, foot, 0.48, tall)),
+            ]
         wide = 0.485 if level else 0.445
         places = [(left, 0.18, wide, 0.70) for left in (0.015, 0.025 + wide)]
         return [Panel(run, _Level(spaces) if level else _Space(), place) for run, place in enumerate(places)]

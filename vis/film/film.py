@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vis.film.cameras import layout
 from vis.film.reel import AnyReel, Reel, SpaceReel
-from vis.page.numbers import typeset
+from vis.page.numbers import quote, typeset
 from vis.page.page import Block, figure
 from vis.page.plots import Array, styled
 from vis.page.report import Progress, capital
@@ -196,15 +196,7 @@ def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> li
     """
     coarse, first = min(reels, key=len), reels[0]
     if isinstance(first, SpaceReel):
-        end = min(float(reel.times[-1]) for reel in reels)
-        wanted = dict.fromkeys(float(coarse.times[coarse.nearest(time)]) for time in (0.0, 0.5 * end, end))
-        names = ("start", "middle", "end") if len(wanted) == 3 else ("start", "end")
-        seen = f"Both {first.what}s" if len(reels) == 2 else f"The whole {first.what}"
-        whence = " from above" if any(reel.on_grains for reel in reels) else ""
-        return [
-            (name, f"At the {name}", time, f"{seen}, seen along y{whence}, at {time:.4g} s.")
-            for name, time in zip(names, wanted, strict=False)
-        ]
+        return _moments_in_space([reel for reel in reels if isinstance(reel, SpaceReel)], coarse)
     end = min(float(reel.series["t_s"][-1]) for reel in reels)
     turned = np.abs(first.series["theta_rad"] - first.series["theta_rad"][0])
     half = float(first.series["t_s"][int(np.argmax(turned >= 0.5 * turned.max()))])
@@ -215,6 +207,32 @@ def moments(reels: Sequence[AnyReel], labels: Sequence[str] | None = None) -> li
         parts = [f"{label}: {line}" for label, line in zip(labels, lines, strict=True)] if labels else lines
         found.append((name, f"Both {words}" if labels else capital(words), at, "; ".join(parts) + "."))
     return found
+
+
+def _moments_in_space(reels: Sequence[SpaceReel], coarse: AnyReel) -> list[tuple[str, str, float, str]]:
+    """Of one run the start, the picture with the largest force, and the end; the middle where that is one of both or
+    there is no force, and of two runs."""
+    end, first = min(float(reel.times[-1]) for reel in reels), reels[0]
+    seen = f"Both {first.what}s" if len(reels) == 2 else f"The whole {first.what}"
+    whence = " from above" if any(reel.on_grains for reel in reels) else ""
+    near = ", and a foot from near" if whence and len(reels) == 1 else ""
+    names, pushes = {"start": 0.0, "middle": 0.5 * end, "end": end}, ""
+    hardest = int(np.argmax(first.loads))
+    if len(reels) == 1 and 0 < hardest < len(first) - 1 and first.loads[hardest] > 0.0:
+        names = {"start": 0.0, "force": float(first.times[hardest]), "end": end}
+        pushes = say("hardest", force=quote(float(first.loads[hardest]), unit="N"))
+        if (most := (first.result.get("quantities") or {}).get("largest_force")) is not None:
+            pushes += say("hardest_of_all", force=quote(float(most["value"]), unit="N"))
+        pushes += "."
+    wanted = {name: float(coarse.times[coarse.nearest(time)]) for name, time in names.items()}
+    if len(set(wanted.values())) < len(wanted):
+        wanted = {name: time for name, time in wanted.items() if name in ("start", "end")}
+    titles = {"force": "At the largest force of all pictures"}
+    return [
+        (name, titles.get(name, f"At the {name}"), time,
+         f"{seen}, seen along y{whence}{near}, at {time:.4g} s.{pushes if name == 'force' else ''}")
+        for name, time in wanted.items()
+    ]  # fmt: skip
 
 
 def film_times(reels: Sequence[AnyReel]) -> Array:
@@ -278,9 +296,14 @@ def draw_runs(
 
 
 def _shows_heights(reels: Sequence[AnyReel]) -> bool:
-    """Whether the still at the end shows heights: of one run in space on grains whose undisturbed surface is known."""
+    """Whether the still at the end shows changes of height: of one run in space on grains whose surface is known.
+
+    Its frames must have the directions in which grains moved.
+    """
     only = reels[0]
-    return len(reels) == 1 and isinstance(only, SpaceReel) and only.on_grains and only.surface is not None
+    if len(reels) != 1 or not isinstance(only, SpaceReel) or not only.on_grains or only.surface is None:
+        return False
+    return canvas.HEIGHT in only.grains(only.frames[len(only) - 1])
 
 
 def shown(drawn: Pictures, *, first: int = 0) -> list[Block]:

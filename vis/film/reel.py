@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from rigid.result import read_result
 from vis.page.folder import read_columns
@@ -22,7 +24,7 @@ from vis.pictures.canvas import HEIGHT, colour_top, moved_since, nice_above
 from vis.pictures.frames import Frame, Frames, frames_of, grains_box, read_frames
 from vis.pictures.meshes import in_place, spike_mesh
 
-__all__ = ["AnyReel", "Reel", "SpaceReel"]
+__all__ = ["AnyReel", "Foot", "Reel", "SpaceReel"]
 
 _SPIKE, _CLEAR, _WIDE = 0.012, 0.04, 0.06
 """Of the platform on a law, which sees points only: diameter and length of a spike, width of the hull as they are
@@ -31,6 +33,35 @@ _TOUCHES = 0.05
 """Distance from the surface below which a foot is at it [mm]."""
 _BLOCK, _THIN = 0.08, 0.06
 """Depth of the ground that is drawn where there are no grains [m], in the plane and in space."""
+
+
+_LEVEL = 0.01
+"""Points of a foot that are so little over its lowest one, over the reach of the body, are its underside."""
+
+
+@dataclass(frozen=True)
+class Foot:
+    """The foot or spike with the largest force of all pictures.
+
+    ``cut``: y of its middle then [m]. ``wide``: Its extent along x then [m]. ``x``, ``low``: Middle of what is lowest
+    there at every picture, and its height [m], shape (n,).
+    """
+
+    cut: float
+    wide: float
+    x: Array
+    low: Array
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What one reading of all frames of a run in space shows; the lists have an entry for each picture."""
+
+    centres: Array
+    ends: Array
+    feet: list[Array]
+    pushed: list[Array]
+    forces: list[Array]
 
 
 class _Filmed:
@@ -117,29 +148,55 @@ class SpaceReel(_Filmed):
     @property
     def centres(self) -> Array:
         """Middle of what the hull's corners span at every picture [m], shape (n, 3)."""
-        return self._seen[0]
-
-    @property
-    def peak(self) -> float:
-        """Largest force of one foot or spike in any picture [N]; 0: there is none."""
-        return self._seen[1]
+        return self._seen.centres
 
     @property
     def ends(self) -> Array:
         """z of the lowest and the highest point of the body at every picture [m], shape (n, 2)."""
-        return self._seen[2]
+        return self._seen.ends
+
+    @property
+    def peak(self) -> float:
+        """Largest force of one foot or spike in any picture [N]; 0: there is none."""
+        return max((float(np.linalg.norm(force, axis=1).max(initial=0.0)) for force in self._seen.forces), default=0.0)
 
     @cached_property
-    def _seen(self) -> tuple[Array, float, Array]:
-        """`centres`, `peak` and `ends`, from one reading of the frames."""
-        centres, peak, ends = [], 0.0, []
+    def loads(self) -> Array:
+        """Force of the ground on the whole body at every picture [N], shape (n,)."""
+        return np.array([float(np.linalg.norm(force.sum(axis=0))) for force in self._seen.forces])
+
+    @cached_property
+    def foot(self) -> Foot:
+        """The foot or spike with the largest force of all pictures; where there is none, the lowest at the end."""
+        seen, last = self._seen, int(np.argmax(self.loads)) if self.loads.any() else len(self) - 1
+        points, touched = seen.feet[last], _most_pushed(seen, last)
+        faces = self.frames[0].bodies[_feet_of(self.frames[0])][1]
+        sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+        links = coo_array((np.ones(len(sides)), (sides[:, 0], sides[:, 1])), shape=(len(points), len(points)))
+        parts = connected_components(links, directed=False)[1]
+        own = points[parts == parts[int(np.argmin(np.linalg.norm(points - touched, axis=1)))]]
+        (left, front, _), (right, back, _) = own.min(axis=0), own.max(axis=0)
+        cut, half = 0.5 * float(front + back), 0.5 * float(back - front) + 1e-6
+        x, low = [], []
+        for every in seen.feet:
+            near = every[np.abs(every[:, 1] - cut) <= half]
+            near = near if len(near) else every
+            low.append(float(near[:, 2].min()))
+            x.append(float(near[near[:, 2] <= low[-1] + _LEVEL * self.reach, 0].mean()))
+        return Foot(cut, float(right - left), np.array(x), np.array(low))
+
+    @cached_property
+    def _seen(self) -> _Seen:
+        centres, ends, feet, pushed, forces = [], [], [], [], []
         for frame in self.frames:
             centres.append(np.asarray(frame.bodies["hull"][0].mean(axis=0), dtype=float))
-            force = frame.clouds["row_forces"][1]["force"] if "row_forces" in frame.clouds else np.zeros((0, 3))
-            peak = max(peak, float(np.linalg.norm(force, axis=1).max(initial=0.0)))
             heights = np.concatenate([points[:, 2] for points, _ in frame.bodies.values()])
             ends.append((float(heights.min()), float(heights.max())))
-        return np.array(centres), peak, np.array(ends)
+            feet.append(np.asarray(frame.bodies[_feet_of(frame)][0], dtype=float))
+            points, fields = frame.clouds.get("row_forces", (np.zeros((0, 3)), {}))
+            pushed.append(np.asarray(points, dtype=float))
+            forces.append(np.asarray(fields.get("force", np.zeros((0, 3))), dtype=float).reshape(-1, 3))
+        return _Seen(np.array(centres), np.array(ends), feet, pushed, forces)
 
     @property
     def surface(self) -> float | None:
@@ -150,9 +207,10 @@ class SpaceReel(_Filmed):
         return None if origin is None else float(origin[2])
 
     def grains(self, found: Frame) -> dict[str, NDArray[Any]]:
-        """Those of a frame as any reel has them, with the height over the undisturbed surface where that is known."""
+        """Those of a frame as any reel has them, and how far each has risen where the frame has directions."""
         known = super().grains(found)
-        return known if self.surface is None else known | {HEIGHT: known["position"][:, 2] - self.surface}
+        moved = known.get("displacement")
+        return known if moved is None or moved.ndim != 2 else known | {HEIGHT: moved[:, 2]}
 
     def colour_top(self, by: str) -> float:
         """As of any reel; that of heights is the largest sinkage of a foot, at least a grain's diameter."""
@@ -173,7 +231,7 @@ class SpaceReel(_Filmed):
         """
         if self.surface is None:
             return None
-        points = frame.bodies.get("spikes", frame.bodies["hull"])[0]
+        points = frame.bodies[_feet_of(frame)][0]
         return np.asarray(points[int(np.argmin(points[:, 2]))], dtype=float)
 
     @cached_property
@@ -211,6 +269,19 @@ class SpaceReel(_Filmed):
         """The frame of a picture."""
         found = self.frames[index]
         return replace(found, grains=self.grains(found))
+
+
+def _feet_of(frame: Frame) -> str:
+    """Which body of a frame stands on the ground: the feet or spikes, or the whole body where they are points."""
+    return "spikes" if "spikes" in frame.bodies else "hull"
+
+
+def _most_pushed(seen: _Seen, index: int) -> Array:
+    """Where the largest force of a picture is [m], shape (3,); the lowest point where there is none."""
+    force, feet = seen.forces[index], seen.feet[index]
+    if not len(force):
+        return np.asarray(feet[int(np.argmin(feet[:, 2]))])
+    return np.asarray(seen.pushed[index][int(np.argmax(np.linalg.norm(force, axis=1)))])
 
 
 class Reel(_Filmed):

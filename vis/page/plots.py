@@ -189,13 +189,16 @@ def smooth_ratio(way: Array, columns: dict[str, Array]) -> tuple[Array, Array]:
     return way[count // 2 : count // 2 + len(shear)], shear / normal
 
 
-def line_styles(keys: Sequence[Hashable], *, beside_axes: bool = False) -> dict[Hashable, Mapping[str, Any]]:
+def line_styles(
+    keys: Sequence[Hashable], *, beside_axes: bool = False, without: Sequence[str] = ()
+) -> dict[Hashable, Mapping[str, Any]]:
     """Colour and dash of a line for each different key, in their order: replicates that share a key share a line.
 
-    ``beside_axes``: Whether x, y and z are in the same figure or report, so that their colours are left out. Beyond 24
-    keys, or 15, they begin again.
+    ``beside_axes``: Whether x, y and z are in the same figure or report, so that their colours are left out.
+    ``without``: Further colours that are left out. Beyond 24 keys, or 15 beside axes, they begin again.
     """
-    colours = tuple(colour for colour in _COLOURS if not (beside_axes and colour in AXES.values()))
+    taken = {*without, *(AXES.values() if beside_axes else ())}
+    colours = tuple(colour for colour in _COLOURS if colour not in taken)
     count = len(colours)
     return {
         key: {"color": colours[place % count], "ls": _DASHES[place // count % len(_DASHES)]}

@@ -126,7 +126,6 @@ def figure_5(paper: PaperRun) -> Block | None:
         gap = max(gap, float(np.hypot(x[:shared] - fixed[0][:shared], y[:shared] - fixed[1][:shared]).max()))
     axis.plot(0, 0, "o", color=INK, ms=4)
     axis.set(
-        title=f"steel, {rig:g} g",
         aspect="equal",
         xlim=(-2.0, 1.25e3 * _SHOWN),
         ylim=(-1.0, 1.02e3 * _SHOWN),
@@ -319,10 +318,15 @@ def figure_signs(paper: PaperRun) -> Block | None:
     axes[0, 0].set(ylabel="launch angle [degrees]", ylim=(-45.0, 62.0))
     packed = [entry for entry in kept.get("packed", []) if entry["surface"] in surfaces]
     denser = [handle(f"{_grains_of(packed, surfaces)} at the powder's density: one bed", BED, marker="D", ls="", ms=5)]
+    springs = [entry for entry in kept.get("springs", []) if entry["surface"] in surfaces]
+    thin = f"by the error of K and C, ± {springs[0]['half']:g}° (one case)" if springs else ""
     legend_above(drawing, [
         handle(f"spring-damper of {' and '.join(surfaces)}", MODEL, marker="o", ls="", ms=6),
-        handle(f"{_grains_of(kept['one_bed'], surfaces)}: one bed each", BED, marker="s", mfc="none", ls="", ms=6),
+        handle("by both ends of its friction band", MODEL, lw=3.0, alpha=0.4),
+        *([handle(thin, MODEL, lw=1.0)] if springs else []),
         handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three beds, 95 %", BED, marker="s", ls="", ms=6),
+        handle(f"other materials, {_grains_of(kept['one_bed'], surfaces)}: one bed each", BED, marker="s", mfc="none",
+               ls="", ms=6),
         *(denser if packed else []),
         Patch(color=GREY, alpha=0.22, lw=0, label="the paper: motors about +22.5°, brakes below 0"),
     ], 2)  # fmt: skip
@@ -351,6 +355,8 @@ def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, floa
     if nominal is not None:
         axis.plot([place - 0.2] * 2, np.degrees([min(band), max(band)]), color=MODEL, lw=3.0, alpha=0.4)
         axis.plot(place - 0.2, math.degrees(nominal), "o", color=MODEL, ms=5.5)
+    for entry in of_this(kept.get("springs", [])):
+        axis.errorbar(place - 0.2, entry["angle"], entry["half"], fmt="none", color=MODEL, lw=1.0, capsize=3)
     for entry in of_this(kept["one_bed"]):
         axis.plot(place, entry["angle"], "s", color=BED, mfc="none", ms=5.5)
     for entry in of_this(kept["beds"]):

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 
+from rigid.intervals import half_width
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, listing, table
-from vis.page.plots import BED, GREY, INK, Array, handle, legend_above, line_styles, new_panels, sheet
+from vis.page.plots import BED, DASHED, GREY, INK, Array, handle, legend_above, line_styles, new_panels, sheet
 from vis.page.report import Report, Result, report_of, tables
 
 __all__ = ["answer_tiles", "write_lawfit_report"]
@@ -70,15 +71,21 @@ def _laws(report: Report, laws: list[Result], cell: str) -> Block | None:
     speeds = first["speeds"]
     places = np.unique(np.linspace(0, len(speeds) - 1, min(_MOST, len(speeds))).round().astype(int))
     drawing, axes = new_panels(len(places), height=3.4, sharey=True)
-    styles = line_styles([law["name"] for law in laws])
+    named = sorted((law["name"] for law in laws), key=lambda name: name != "spring-damper")  # its colour is MODEL
+    styles = line_styles(named, without=(BED,))
+    styles["spring-damper"] = {**styles["spring-damper"], "ls": DASHED, "zorder": 2.5}  # over those on which it lies
     file = f"series/bins-{cell}.csv" if cell else "series/bins.csv"
     columns = report.columns(file) if (report.folder / file).exists() else None  # a kept result has the means alone
+    sure = False
     for axis, place in zip(axes, places, strict=True):
+        depth, force = 1e3 * np.array(first["depth"]), np.array(first["force"][place])
+        half = np.full(len(depth), np.nan)
         if columns is not None:
             rows = np.isclose(columns["rate_m_s"], speeds[place], rtol=1e-3)
             axis.plot(1e3 * columns["depth_m"][rows], columns["force_N"][rows], ".", color=BED, ms=3, alpha=0.4)
-        depth, force = 1e3 * np.array(first["depth"]), np.array(first["force"][place])
-        axis.plot(depth, force, "o", color=INK, ms=4)
+            half = _over_beds(1e3 * columns["depth_m"][rows], columns["force_N"][rows], depth)
+        axis.errorbar(depth, force, half, fmt="o", color=BED, ms=4, lw=1.0, capsize=2)
+        sure = sure or bool(np.isfinite(half).any())
         for law in laws:
             law_force = force * (1 + np.array(law["map"]["error"][place]))
             axis.plot(depth, law_force, lw=1.5, **styles[law["name"]])
@@ -86,10 +93,20 @@ def _laws(report: Report, laws: list[Result], cell: str) -> Block | None:
         axis.axhline(0.0, color=GREY, lw=0.8)
     axes[0].set_ylabel("force of the ground [N]")
     marks = [handle("a run on grains", BED, marker=".", ls="", alpha=0.5)] if columns is not None else []
-    marks.append(handle("grains, mean of the beds", INK, marker="o", ms=4, ls=""))
+    marks.append(handle(f"grains, mean of the beds{', 95 %' if sure else ''}", BED, marker="o", ms=4, ls=""))
     lines = [handle(law["name"], lw=1.5, **styles[law["name"]]) for law in laws]
     legend_above(drawing, [*marks, *lines], 3)
     return report.draw("laws", drawing, name=f"laws-{cell}" if cell else "")
+
+
+def _over_beds(depth: Array, force: Array, middles: Array) -> Array:
+    """Half of the 95 % interval of the mean force over runs [N] at each of the `middles` of depth; NaN of one run.
+
+    Each reading counts at the nearest of the middles [mm], which it may miss by half of their distance.
+    """
+    nearest = np.abs(depth[:, None] - middles).argmin(axis=1)
+    at = [force[nearest == place] for place in range(len(middles))]
+    return np.array([half_width(float(own.std(ddof=1)), len(own)) if len(own) > 1 else np.nan for own in at])
 
 
 def _crossed(report: Report) -> list[Block]:

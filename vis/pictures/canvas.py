@@ -36,10 +36,8 @@ COLOURS: dict[str, tuple[str, float]] = {
     "coordination": ("contacts of the grain [1]", 1.0),
 }
 HEIGHT = "height"
-"""A further colouring, of the ends of runs in space: height over the undisturbed surface, around 0."""
-_LABELS = COLOURS | {HEIGHT: ("height over the undisturbed surface [mm]", 1e3)}
-_DEEPER = "#cfc8bb"
-"""Of grains that lie deeper than the scale of heights."""
+"""A further colouring, of the ends of runs in space: how far a grain has risen since the start, around 0."""
+_LABELS = COLOURS | {HEIGHT: ("change of height since the start [mm]", 1e3)}
 HALO = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1.5}
 """Box of a word on a picture."""
 FORCE: dict[str, Any] = {
@@ -51,6 +49,8 @@ _STEPS = {1.0: 5, 1.5: 3, 2.0: 4, 3.0: 3, 4.0: 4, 5.0: 5, 6.0: 6, 8.0: 4}
 """Ends of a colour scale, over a power of ten, and how many equal steps of a round number each is divided into."""
 _SHORTEST = 0.005
 """A shorter arrow is not drawn, in fractions of the picture."""
+_NUMBERS = 0.7
+"""Where the lines of numbers begin on a page, over its width: to the right of the widest body."""
 _RIM = 0.01
 """Left free at the picture's edge by an arrow that is cut, in fractions of it."""
 Place = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -124,7 +124,7 @@ class Page:
     def __init__(self, size: tuple[int, int], by: str, top: float) -> None:
         self.size, self.by, self.norm, self.map = size, by, Normalize(0.0, top), colourmap()
         if by == HEIGHT:
-            self.norm, self.map = Normalize(-top, top), colormaps["RdBu"].with_extremes(under=_DEEPER)
+            self.norm, self.map = Normalize(-top, top), colormaps["RdBu"]
 
     def colours(self, grains: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
         """Colours of the grains of a frame, shape (n, 4)."""
@@ -141,13 +141,15 @@ class Page:
         place: Place,
         section: tuple[float, float, float, float, float],
         note: str = "",
+        arrow: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint8]:
         """The finished picture, shape (height, width, 3).
 
-        ``title``, ``lines``: Its words, a few short lines of numbers below the title. ``draw``: Draws the scene on an
+        ``title``, ``lines``: Its words, a few short lines of numbers beside the body. ``draw``: Draws the scene on an
         axes that fills the page, in the page's fractions. ``place``: Where a point of the bed lies on the page.
         ``section``: Of the plane of the cut: x of its left and right end, its y, z of the floor and of the undisturbed
-        surface [m]. ``note``: Small print at the foot.
+        surface [m]. ``note``: Small print at the foot. ``arrow``: Foot and head of that of a force, in the page's
+        fractions, shape (2, 2).
         """
         with styled():
             figure = blank_page(self.size, 8.0)
@@ -156,9 +158,12 @@ class Page:
             axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), autoscale_on=False)
             draw(axis)
             self._rulers(axis, place, section)
+            if arrow is not None:
+                axis.annotate("", arrow[1], arrow[0], arrowprops=FORCE)
             figure.text(0.03, 0.965, title, fontsize=16, fontweight="bold", va="top", bbox=HALO)
-            below = 0.965 - 0.06 - 0.045 * title.count("\n")
-            figure.text(0.03, below, lines, fontsize=12.5, va="top", color="#444444", linespacing=1.35, bbox=HALO)
+            # Beside the body, where they lie on no grains.
+            style: dict[str, Any] = {"va": "top", "color": "#444444", "linespacing": 1.35, "bbox": HALO}
+            figure.text(_NUMBERS, 0.965, lines, fontsize=12.5, **style)
             if note:
                 figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
             self.colour_bar(figure, (0.885, 0.2, 0.018, 0.5), 11.5).ax.tick_params(labelsize=11)

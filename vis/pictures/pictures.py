@@ -28,7 +28,7 @@ from vis.page.plots import Array
 from vis.page.report import Progress
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import Frame, Frames, frame_names, grains_box, read_frames
-from vis.pictures.render import CUT, PictureJob, View, run_job
+from vis.pictures.render import ARROW, CUT, PictureJob, View, run_job
 
 __all__ = ["Picture", "Pictures", "carry_out", "make_pictures", "opengl_available", "render_apart"]
 
@@ -402,11 +402,15 @@ def _view(
     elif isinstance(stated, int | float):
         surface = float(stated)
     high[2] = max(min(high[2], surface + 0.25 * (surface - low[2])), surface)  # a grain that flies does not count
+    strongest = float(np.nanmax(story.force)) if np.isfinite(story.force).any() else 0.0
+    forces = [float(force) if force > 0.0 else None for force in story.force[frames]]
+    seen = f"{CUT}; {ARROW}" if any(forces) else CUT
     count = f"{len(position):,}".replace(",", "\N{NO-BREAK SPACE}")
     title = _above(story.title, run.surface)
     return {
         "name": story.name, "frames": frames, "by": by, "top": top, "title": title,
-        "lines": [story.line(index) for index in frames], "note": f"{count} grains; {CUT}", "low": low.tolist(),
+        "lines": [story.line(index) for index in frames], "forces": forces,
+        "strongest": strongest, "note": f"{count} grains; {seen}", "low": low.tolist(),
         "high": high.tolist(), "cut": cut, "radius": float(first.grains["radius"].mean()), "surface": surface,
         "tilt": _tilt(story, float(high[1]) - cut),
         "file": str(file), "size": list(size),

@@ -20,11 +20,11 @@ from PIL import Image, ImageColor
 
 from vis.page.plots import STATES
 from vis.pictures.canvas import FORCE, Page, colourmap
-from vis.pictures.frames import read_frames
+from vis.pictures.frames import Frame, read_frames
 from vis.pictures.scene import Scene
 from vis.pictures.sections import Section
 
-__all__ = ["CUT", "PictureJob", "View", "main", "run_job", "write_gif", "write_pictures"]
+__all__ = ["ARROW", "CUT", "PictureJob", "View", "main", "run_job", "write_gif", "write_pictures"]
 
 
 class View(TypedDict):
@@ -39,6 +39,10 @@ class View(TypedDict):
     title: str
     lines: list[str]
     """A text for each frame."""
+    forces: list[float | None]
+    """Of the ground on the body in each frame [N], upwards; None: not known."""
+    strongest: float
+    """The force whose arrow is longest [N]; 0: there are no arrows."""
     note: str
     low: list[float]
     high: list[float]
@@ -56,6 +60,9 @@ class PictureJob(TypedDict):
 
 
 CUT = "bed and body are cut along the mid-plane of the body; dashed: the undisturbed surface"
+ARROW = "red: the force on the body"
+_LONG = 0.25
+"""Length of the longest arrow, over the height of the picture."""
 _SLAB = "up to four diameters behind the mid-plane of the body, the farther the darker; dashed: the undisturbed surface"
 """In the small print of a picture with OpenGL, and of one without."""
 _GIF_LIMIT = 5_500_000  # bytes
@@ -99,9 +106,23 @@ def _images(folder: Path, view: View, opengl: bool) -> Iterator[NDArray[np.uint8
     note = view["note"] if opengl else view["note"].replace(CUT, _SLAB)
     drawer = (Scene if opengl else Section)(size, low, high, cut=view["cut"], radius=view["radius"], tilt=view["tilt"])
     with closing(drawer):
-        for index, line in zip(view["frames"], view["lines"], strict=True):
-            draw = partial(drawer.draw, frame=frames[index], colours=page.colours(frames[index].grains))
-            yield page.compose(view["title"], line, draw, place=drawer.place, section=section, note=note)
+        for index, line, force in zip(view["frames"], view["lines"], view["forces"], strict=True):
+            frame = frames[index]
+            draw = partial(drawer.draw, frame=frame, colours=page.colours(frame.grains))
+            ends = None if not force else _arrow(drawer, frame, view["cut"], _LONG * force / view["strongest"])
+            yield page.compose(
+                view["title"], line, draw, place=drawer.place, section=section, note=note, arrow=ends
+            )  # fmt: skip
+
+
+def _arrow(drawer: Scene | Section, frame: Frame, cut: float, length: float) -> NDArray[np.float64] | None:
+    """Foot and head of the arrow of a force on the body's lowest point, places on the picture, shape (2, 2)."""
+    if not frame.bodies:
+        return None
+    points = np.concatenate([points for points, _ in frame.bodies.values()])
+    middle = 0.5 * float(points[:, 0].min() + points[:, 0].max())
+    foot = drawer.place(np.array([[middle, cut, float(points[:, 2].min())]]))[0]
+    return np.array([foot, foot + [0.0, length]])
 
 
 def write_gif(path: Path, images: list[NDArray[np.uint8]], *, frame_ms: int = 80, limit: int = _GIF_LIMIT) -> None:

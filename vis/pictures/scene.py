@@ -88,8 +88,13 @@ class Rendered:
             self._plotter.add_mesh(lines, color=_RULED, line_width=2.0, lighting=False)
 
     def draw(self, axis: Any, *frame: Any, **more: Any) -> None:
-        """Show the picture of a frame on an axes whose limits are 0 to 1; arguments as those of `render`."""
-        axis.imshow(self.render(*frame, **more), extent=(0.0, 1.0, 0.0, 1.0), aspect="auto", interpolation="nearest")
+        """Show the picture of a frame on an axes whose limits are 0 to 1; arguments as those of `render`.
+
+        Pixel by pixel, below the axes: `imshow` would compute them anew, which takes a sixth of the time of a picture.
+        """
+        left, foot = (round(at) for at in axis.bbox.p0)
+        axis.patch.set_visible(False)
+        axis.figure.figimage(self.render(*frame, **more)[::-1], left, foot, origin="lower", zorder=-1.0)
 
     def close(self) -> None:
         """Free the window."""

@@ -1,6 +1,7 @@
 """Feet of a robot: names, refusals, the points of a law, the shapes of grains."""
 
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -219,3 +220,21 @@ def test_the_picture_of_a_geom_is_as_large_as_the_geom():
         a, b, c = (vertices[faces[:, k]] for k in range(3))
         assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(volume, rel=0.02)
         assert vertices.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-9)
+
+
+def test_the_parts_of_the_hopper_join_wherever_its_knee_is_by_geoms_without_mass_and_contact():
+    """Seen along y: heights of trunk, sleeve, shaft, ankle and foot overlap from the lower to the upper stop."""
+    model = load_model("experiments/examples/mujoco-hopper/hopper.xml")
+    data = mujoco.MjData(model)
+    assert model.body_mass[1:].tolist() == [1.5, 0.22]
+    for name in ("sleeve", "ankle"):
+        assert not model.geom(name).contype[0] and not model.geom(name).conaffinity[0]
+    for knee in np.linspace(*model.joint("knee").range, 12):
+        data.joint("knee").qpos = knee
+        mujoco.mj_forward(model, data)
+        spans = []
+        for name in ("trunk", "sleeve", "shaft", "ankle", "foot"):
+            k = model.geom(name).id
+            up = data.geom_xpos[k, 2] + mesh_of(model, k)[0] @ data.geom_xmat[k].reshape(3, 3)[2]
+            spans.append((up.min(), up.max()))
+        assert all(low <= high for (low, _), (_, high) in pairwise(spans))

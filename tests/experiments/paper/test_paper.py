@@ -18,7 +18,7 @@ from experiments.cli.main import main
 from experiments.paper.claims import Trials, claims, friction_of_a_rigid_pivot
 from experiments.paper.evidence import RIVALS, evidence, nats, rival_trials
 from experiments.paper.experiment import plan_jobs, run
-from experiments.paper.grains import angles_of_beds, kept_angles, packed_angles
+from experiments.paper.grains import angles_of_beds, kept_angles, packed_angles, spring_angles
 from experiments.paper.settings import PaperSettings
 from experiments.paper.transitions import slip_before_hop
 from experiments.platform.surfaces import find_surface
@@ -31,7 +31,7 @@ from vis.paper.figures import PaperRun, figure_5, figure_signs
 
 RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
 
-LEGEND = ("grains of sand-weak: one bed each", "grains of sand: mean of three beds, 95 %")
+LEGEND = ("grains of sand: mean of three beds, 95 %", "other materials, grains of sand-weak: one bed each")
 
 
 @pytest.fixture(scope="module")
@@ -190,6 +190,12 @@ def test_angles_at_the_density_of_jsc_1a_are_those_of_the_kept_runs():
     }  # fmt: skip
 
 
+def test_the_error_of_the_spring_dampers_angle_is_that_of_the_page():
+    (only,) = spring_angles()
+    page = (RESULTS.parent / "notes" / "calibrate.md").read_text(encoding="utf-8")
+    assert f"{only.angle} ± {only.half}" in page
+
+
 def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
     """One bed each is of `sand-weak`, three beds are of `sand`; JSC-1A, which was not asked for, is not named."""
     drawn = []
@@ -200,16 +206,19 @@ def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
     (figure,) = drawn
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words[0] == "spring-damper of sand"
-    assert words[1:3] == list(LEGEND)
+    assert words[3:5] == list(LEGEND)
+    assert "friction" in words[1] and "± 9°" in words[2]
     assert [text.get_text() for text in figure.axes[0].texts] == ["sand"]
-    law, *grains = (to_hex(entry.get_color()) for entry in figure.legends[0].get_lines())
+    law, *bars_and_grains = (to_hex(entry.get_color()) for entry in figure.legends[0].get_lines())
+    assert set(bars_and_grains[:2]) == {law}
+    grains = bars_and_grains[2:]
     assert (law, set(grains)) == (MODEL.lower(), {BED.lower()})  # as in every figure
     marks = {line.get_marker(): to_hex(line.get_color()) for line in figure.axes[0].lines}
     assert (marks["o"], marks["s"]) == (law, grains[0])
     for entry in paper.result["kept_on_grains"]["one_bed"]:
         del entry["grains"]
     figure_signs(paper)
-    assert drawn[1].legends[0].get_texts()[1].get_text() == ": ".join(("grains", "one bed each"))
+    assert drawn[1].legends[0].get_texts()[4].get_text() == "other materials, grains: one bed each"
 
 
 def trials_of(*, kept=(), **angles):
