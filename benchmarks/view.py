@@ -219,8 +219,8 @@ def run(out: Path, *, progress: Any, grains: int = 100_000, turns: int = 20) -> 
     bench |= {"grains": grains, "turns": turns, "window": list(_WINDOW)}
     progress.plan({"page": 1.0, "frames": 3.0})
     progress.stage("page", total=1.0)
-    with tempfile.TemporaryDirectory() as scratch, Browser() as browser:
-        page = write_view(bed_of(Path(scratch), grains), progress=progress.update)
+    with scratch() as folder, Browser() as browser:
+        page = write_view(bed_of(folder, grains), progress=progress.update)
         bench["page_bytes"] = page.stat().st_size
         progress.stage("frames", total=float(2 * turns))
         browser.open(page)
