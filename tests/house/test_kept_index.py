@@ -67,4 +67,4 @@ def test_a_picture_is_drawn_from_a_kept_result_and_one_of_a_long_run_is_refused(
     assert [path.name for path in tmp_path.iterdir()] == ["diagnose-grains-gap.png"]
     with pytest.raises(SystemExit):
         PICTURES["main"](["tumble-on-sand", "--out", str(tmp_path)])
-    assert "frames are not kept" in capsys.readouterr().err
+    assert "not kept" in capsys.readouterr().err

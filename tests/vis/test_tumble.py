@@ -46,6 +46,7 @@ def folder(tmp_path):
             "torque_until": {"value": None, "unit": "s", "origin": "default"},
         },
         "ground": "spring-damper", "actuator": "motor", "method": "located", "warnings": ["mind the gap"],
+        "departures": {"sentences": ["It hops early."]},
         "effects": [{"id": "pendulum", "parameters": {"length": 2.2}}],
         "transitions": [{"time": 0.2, "state": "pivot", "theta": 0.02}] * 70,
     }  # fmt: skip
@@ -58,6 +59,7 @@ def test_the_report_of_a_tumble_has_its_figures_numbers_and_warnings(folder):
     assert page.count("data:image/png") == 3 and page.count("data:image/gif") == 1
     for words in (
         "A &lt;made up&gt; tumble",
+        "It hops early.",
         "Mind the gap",
         "pendulum (length = 2.2)",
         "And 10 more",

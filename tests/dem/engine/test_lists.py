@@ -176,7 +176,7 @@ def test_a_machine_without_memory_for_larger_lists_says_how_much_they_need(littl
     monkeypatch.setattr(dem.engine.engine, "_free", {})
     answers = iter([None])  # what is free is unknown for the first engine; then it is a kilobyte
     monkeypatch.setattr("dem.engine.runtime.free_memory", lambda: next(answers, 1024))
-    with pytest.raises(BedFailure, match=r"room for \d+ pairs.* \d+ and \d+ are needed.* GiB of memory"):
+    with pytest.raises(BedFailure, match=r"hold \d+ pairs.* \d+ and \d+ are needed.* GiB of memory"):
         cloud.make()
 
 
