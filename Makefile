@@ -44,8 +44,8 @@ slow: $(VENV)/.installed-test  ## the tests that take minutes: physics against c
 fuzz: $(VENV)/.installed-test  ## settings and campaigns drawn at random, 10,000 and 500, and 1,000 computed, what FUZZED=fuzzed.jsonl has left out
 	HEDGEBED_FUZZ=10000 HEDGEBED_FUZZ_KEPT=$(abspath $(FUZZED)) $(PYTEST) -m "long or not long" tests/faults/test_fuzz.py tests/faults/test_fuzz_computed.py $(ARGS)
 
-torture: $(VENV)/.installed-test  ## files damaged, 4,200 in all, and experiments killed, 50 times in all, resumed to the same bits
-	HEDGEBED_DAMAGES=200 $(PYTEST) -m "long or slow or not long" tests/faults/test_damage.py tests/faults/test_damaged_folders.py tests/faults/test_damaged_lammps.py $(ARGS)
+torture: $(VENV)/.installed-test  ## files damaged, 4,400 in all, disks filled, a cache taken away, experiments killed 50 times: resumed to the same bits
+	HEDGEBED_DAMAGES=200 $(PYTEST) -m "long or slow or not long" tests/faults/test_damage.py tests/faults/test_damaged_folders.py tests/faults/test_damaged_lammps.py tests/faults/test_disk.py $(ARGS)
 	HEDGEBED_KILLS=50 HEDGEBED_KILLED_KEPT=$(abspath $(KILLED)) $(PYTEST) -m "long or slow" tests/faults/test_killed.py $(ARGS)
 
 tiers: $(VENV)/.installed-test  ## measure again how long each file of tests takes (tests/durations.toml)
