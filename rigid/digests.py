@@ -52,7 +52,9 @@ def check_digests(folder: Path, *names: str) -> None:
     for name, (digest, keeper) in kept_digests(folder).items():
         path = Path(folder) / name
         if (not names or name in names) and path.is_file() and digest_of(path) != digest:
-            raise ValueError(f"{path}: is not as the run wrote it: its digest differs from that in {keeper}")
+            raise ValueError(
+                f"{path}: is not as the run wrote it: its digest differs from that in {Path(folder) / keeper}"
+            )
 
 
 def check_as_written(path: Path) -> None:
