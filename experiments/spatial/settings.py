@@ -97,11 +97,9 @@ class SpatialSettings(GrainsSettings):
     def _known_ground(self) -> str | None:
         if self.ground in GROUNDS:
             return None
-        return (
-            say("in_lammps")
-            if self.ground == "lammps"
-            else say("no_ground", s=self, known=nearest(self.ground, GROUNDS))
-        )
+        if self.ground == "lammps":
+            return say("in_lammps")
+        return say("no_ground", s=self, known=nearest(self.ground, GROUNDS))
 
     def _friction(self) -> str | None:
         above = self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from vis.page.limits import bias_of
+from vis.page.limits import bias_of, kind_of
 from vis.page.numbers import quote, short, split_spread
 from vis.page.page import Tile
 from vis.page.sentences import Sentences
 
-__all__ = ["cell_of", "law_row"]
+__all__ = ["answer_rows", "cell_of", "law_row"]
 
 say = Sentences(__package__)
 
@@ -31,6 +31,21 @@ def law_row(
     values, errors = zip(*(_with_error(result, one, law) for one in names), strict=True)
     value, error = (" at ".join(values), " at ".join(errors) if len(set(errors)) > 1 else errors[0])
     return Tile(label, value, note, errors=(say("no_chance"), error, bias_of(result, name) or say("not_validated")))
+
+
+def answer_rows(
+    result: Mapping[str, Any], rows: Mapping[str, tuple[str, str]], shown: Callable[[Mapping[str, Any]], str]
+) -> list[Tile]:
+    """The rows of a motion on a law or on grains; a folder of an older hedgebed has fewer.
+
+    `rows`: number of result.json -> its label and note. `shown`: how a number on grains reads.
+    """
+    quantities, on_law = result["quantities"], kind_of(result) == "planar model"
+    return [
+        law_row(result, name, label, note) if on_law else Tile(label, shown(quantities[name]), note)
+        for name, (label, note) in rows.items()
+        if name in quantities
+    ]
 
 
 def cell_of(value: float | None, std: float | None, unit: str) -> str:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from vis.page.law_rows import law_row
-from vis.page.limits import kind_of
+from vis.page.law_rows import answer_rows
 from vis.page.numbers import quantity
 from vis.page.page import Tile
 
@@ -24,10 +23,5 @@ _ROWS = {
 
 def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     """Rows of the table at the top of a report."""
-    quantities, on_law = result["quantities"], kind_of(result) == "planar model"
-    rows = [
-        law_row(result, name, label, note) if on_law else Tile(label, quantity(quantities[name]), note)
-        for name, (label, note) in _ROWS.items()
-        if name in quantities  # a folder of an older hedgebed has fewer
-    ]
-    return [*rows, Tile("Energy left over", quantity(quantities["energy_residual"]), "of all there was")]
+    left_over = Tile("Energy left over", quantity(result["quantities"]["energy_residual"]), "of all there was")
+    return [*answer_rows(result, _ROWS, quantity), left_over]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from vis.page.law_rows import cell_of, law_row
-from vis.page.limits import kind_of
+from vis.page.law_rows import answer_rows, cell_of
 from vis.page.page import Tile
 
 __all__ = ["answer_tiles"]
@@ -24,12 +23,4 @@ _ROWS = {
 
 def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     """Rows of the table at the top of a report."""
-    quantities, on_law = result["quantities"], kind_of(result) == "planar model"
-    rows = []
-    for name, (label, note) in _ROWS.items():
-        if name not in quantities:  # a folder of an older hedgebed
-            continue
-        entry = quantities[name]
-        shown = cell_of(entry["value"], entry.get("std"), entry["unit"])
-        rows.append(law_row(result, name, label, note) if on_law else Tile(label, shown, note))
-    return rows
+    return answer_rows(result, _ROWS, lambda entry: cell_of(entry["value"], entry.get("std"), entry["unit"]))
