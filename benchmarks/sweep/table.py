@@ -47,6 +47,8 @@ def markdown(bench: Json) -> str:
         counts = ", ".join(f"{tests[key]} {key}" for key in ("passed", "failed", "skipped"))
         lines += [
             f"Tests of beds (`tests/dem`, `tests/physics`) with `arch = 'cuda'`: {counts}, {tests['wall_s']:.0f} s.",
+            *([] if tests.get("ended", True) else ["Their time ended before all had run."]),
+            *(f"Failed: `{name}`." for name in tests.get("failures", ())),
             "",
         ]
     lines += ["| " + " | ".join(HEADINGS) + " |", "|" + "---:|" * len(HEADINGS)]

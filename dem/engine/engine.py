@@ -212,8 +212,7 @@ class Engine(Lists, Pairs, Steps, Readings, Shapes, Sleepers, BalanceKernels):
         self.block_stride = build.threads
         self.store = FieldStore(planned=True)  # fields that are made cannot be left unused: count their memory first
         self._make_fields(build)
-        if not self.gpu:
-            runtime.refuse_memory(self.store.bytes)
+        runtime.refuse_memory(self.store.bytes)
         self.store = FieldStore()
         self._make_fields(build)
         self.store.lay_out()

@@ -8,6 +8,7 @@ belong to and refuse to go on after it has ended.
 import contextlib
 import io
 import os
+import subprocess
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,8 +37,20 @@ def generation() -> int:
     return _generation
 
 
+def _free_on_gpu() -> int | None:
+    """Bytes that the GPU with most of them has free; None if unknown."""
+    query = ["nvidia-smi", "--query-gpu=memory.free", "--format=csv,noheader,nounits"]
+    try:
+        said = subprocess.run(query, capture_output=True, text=True, check=True, timeout=30).stdout
+        return 2**20 * max(int(line) for line in said.split())
+    except (OSError, subprocess.SubprocessError, ValueError):
+        return None
+
+
 def free_memory() -> int | None:
-    """Bytes that this process may still take: what the system has to give, or its control group; None if unknown."""
+    """Bytes that beds may still take: of the GPU if Taichi runs there, else of this process; None if unknown."""
+    if _current is not None and _current.arch == "cuda":
+        return _free_on_gpu()
     found = []
     try:
         rows = dict(line.split(":") for line in Path("/proc/meminfo").read_text().splitlines())
@@ -57,7 +70,8 @@ def refuse_memory(needed: int) -> None:
     """Raise MemoryError, with numbers, where so many bytes cannot be had."""
     free = free_memory()
     if free is not None and needed > free:
-        raise MemoryError(f"needs {needed / 2**30:.3g} GiB of memory, {free / 2**30:.3g} GiB are free")
+        where = " on the GPU" if _current is not None and _current.arch == "cuda" else ""
+        raise MemoryError(f"needs {needed / 2**30:.3g} GiB of memory, {free / 2**30:.3g} GiB are free{where}")
 
 
 def start(*, arch: str = "cpu", threads: int | None = None, precision: str = "float64") -> Runtime:

@@ -32,7 +32,7 @@ def times_as_long(size: Sequence[float], grain: float, *, wanted: Sequence[float
 
 def costs(times: float, seconds: float | None = None) -> str:
     """The cost of a change that takes `times` as long, in words; `seconds`: time of the run without it, if known."""
-    many = f"{times:.2g} times the time"
+    many = f"{float(f'{times:.2g}'):,g} times the time"
     return many if seconds is None else f"{many}, about {_clock(times * seconds)} in place of {_clock(seconds)}"
 
 
@@ -43,12 +43,12 @@ def resolution_advice(
     size: Sequence[float],
     depth: float,
     seconds: float | None = None,
-    across: float = ENOUGH_ACROSS,
+    cohesive: bool = False,
 ) -> Iterator[str]:
     """One sentence for each reason why a bed is too small or too coarse; none for a good bed. Lengths in m.
 
     `tip`: its diameter; `size`: both widths and the depth of the bed; `depth`: how deep the tip is driven; `seconds`:
-    expected time of the runs; `across`: grains across the tip from which on there is no advice on them.
+    expected time of the runs; `cohesive`: whether the grains stick, for which `COARSE` does not hold.
     """
     width, height = min(size[:2]), size[2]
     if width < ENOUGH_TIPS * tip * (1 - 1e-9):
@@ -60,12 +60,13 @@ def resolution_advice(
         high = depth + LEAST_BELOW * tip
         cost = costs(times_as_long(size, grain, wanted=(*size[:2], high), wanted_grain=grain), seconds)
         yield say("shallow_bed", below=(height - depth) / tip, high=high, cost=cost)
-    if tip / grain < across * (1 - 1e-3):
+    if tip / grain < ENOUGH_ACROSS * (1 - 1e-3):
         found, finer = tip / grain, tip / ENOUGH_ACROSS
         cost = costs(times_as_long(size, grain, wanted=size, wanted_grain=finer), seconds)
         counts, ratios = zip(*COARSE, strict=True)
+        told = {"across": found, "finer": finer, "enough": ENOUGH_ACROSS, "cost": cost}
         percent = 100 * (float(np.interp(found, counts, ratios)) - 1)
-        yield say("coarse_bed", across=found, percent=percent, finer=finer, enough=ENOUGH_ACROSS, cost=cost)
+        yield say("coarse_sticky_bed", **told) if cohesive else say("coarse_bed", percent=percent, **told)
 
 
 def _clock(seconds: float) -> str:

@@ -26,7 +26,7 @@ from .units import RAIN, deepest
 
 __all__ = [
     "bed_step", "choose_softness", "expected_bearing", "expected_stiffness", "find_material", "fingerprint",
-    "first_gravity", "overlap_bound", "packing_of", "prepare_bed", "resting_load",
+    "first_gravity", "overlap_bound", "packing_of", "prepare_bed", "resolution_of", "resting_load",
     "sinks_away", "stages_of", "stiffened", "within_numbers",
 ]  # fmt: skip
 
@@ -38,6 +38,14 @@ _FLAT = 2.0
 def find_material(settings: PenetrateSettings) -> Any:
     """The grain material, for grains of this size. Raises ValueError naming those there are."""
     return material(settings.material, grain=settings.grain)
+
+
+def resolution_of(settings: PenetrateSettings) -> dict[str, Any]:
+    """What `resolution_advice` asks of a bed and its tip."""
+    return {
+        "tip": settings.tip_diameter, "grain": settings.grain, "depth": settings.depth, "size": settings.bed_size,
+        "cohesive": find_material(settings).cohesion != "none",
+    }  # fmt: skip
 
 
 def fingerprint() -> str:

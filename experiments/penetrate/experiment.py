@@ -94,8 +94,7 @@ def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) 
             stiffness=beds.expected_stiffness(settings), held=beds.expected_bearing(settings).held,
             stages=beds.stages_of(settings), gravity=beds.first_gravity(settings),
         )  # fmt: skip
-        size = {"tip": settings.tip_diameter, "grain": settings.grain, "depth": settings.depth}
-        for text in resolution_advice(**size, size=settings.bed_size, seconds=plan.seconds or None):
+        for text in resolution_advice(**beds.resolution_of(settings), seconds=plan.seconds or None):
             progress.message(text)
         work = _Work(settings, units, softening, folder, progress, plan)
         for seed in settings.seeds:

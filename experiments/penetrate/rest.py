@@ -14,7 +14,7 @@ from dataclasses import asdict
 from typing import Any
 
 from dem.grains.materials import MATERIALS
-from experiments.grains.bearing import COHESIONS, bearing_capacity, bearing_of, friction_angle, strength
+from experiments.grains.bearing import COHESIONS, UNSURE, bearing_capacity, bearing_of, friction_angle, strength
 from experiments.grains.recipes import recipe_of
 from experiments.runs.types import Json
 from rigid.intervals import NORMAL
@@ -67,7 +67,7 @@ def answer(findings: Findings, material: Any) -> Json | None:
         "angle": angle, "enough": f"{enough:.2g}", "g": settings.gravity / STANDARD_GRAVITY,
         "driven": 1e3 * settings.depth, "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the K expected",
     }  # fmt: skip
-    beside = _beside(settings, material, stiffness) if material.cohesion == "none" else None
+    beside = _beside(settings) if material.cohesion == "none" else None
     sentences = [say("rests_never" if never else "rests_below_the_bed", **told)]
     sentences += [say("left_out")] if not stood else []
     sentences += [say("with_cohesion", **told)] + ([] if beside is None else [beside.pop("sentence")])
@@ -80,17 +80,13 @@ def answer(findings: Findings, material: Any) -> Json | None:
     }  # fmt: skip
 
 
-def _beside(settings: PenetrateSettings, material: Any, stiffness: float) -> Json:
+def _beside(settings: PenetrateSettings) -> Json:
     """The foot on `_BESIDE`: the cohesion that carries it by either angle, and the depth at which it would rest.
 
-    The friction angle is that of `_BESIDE`, not of these grains: N_c grows from 32 at 31 degrees to 55 at 37. K is the
-    one of this bed times the expected ratio of the two materials.
+    Friction angle and K are those of `_BESIDE`, not of these grains: N_c grows from 32 at 31 degrees to 55 at 37.
     """
-    other, area = MATERIALS[_BESIDE], math.pi * settings.tip_diameter**2 / 4
-    facts = {"grain": settings.grain, "gravity": settings.gravity, "area": area}
-    of_it = stiffness * bearing_of(other, **facts).stiffness / bearing_of(material, **facts).stiffness
-    found, told = _by_terzaghi(settings, other, of_it)
-    verdict = say(f"beside_{told.pop('verdict')}", **told, ratio=_two_digits(of_it / stiffness))
+    found, told = _by_terzaghi(settings, MATERIALS[_BESIDE])
+    verdict = say(f"beside_{told.pop('verdict')}", **told)
     return found | {"sentence": say("try_cohesive", **told, verdict=verdict)}
 
 
@@ -101,21 +97,20 @@ def _stuck(settings: PenetrateSettings, material: Any) -> Json | None:
     recipe = recipe_of(material)
     if recipe.cohesion is None or recipe.cohesion_std is None or recipe.circle is None:
         return None
-    area = math.pi * settings.tip_diameter**2 / 4
-    bears = bearing_of(material, grain=settings.grain, gravity=settings.gravity, area=area)
-    found, told = _by_terzaghi(settings, material, bears.stiffness)
+    found, told = _by_terzaghi(settings, material)
     verdict = say(f"sticky_{told.pop('verdict')}", **told)
     return {
-        "comes_to_rest": True, "load": settings.weight, "stiffness": bears.stiffness, **found,
+        "comes_to_rest": True, "load": settings.weight, **found,
         "sentences": [say("on_sticky", **told, mm=1e3 * settings.grain, verdict=verdict)], "source": say("terzaghi"),
     }  # fmt: skip
 
 
-def _by_terzaghi(settings: PenetrateSettings, material: Any, stiffness: float) -> tuple[Json, Json]:
-    """The cohesion that a material has and needs, and the depths [m] where K = ``stiffness`` [N/m] carries the rest.
+def _by_terzaghi(settings: PenetrateSettings, material: Any) -> tuple[Json, Json]:
+    """The cohesion that a material has and needs, and the depths [m] where K carries the rest of the load.
 
-    The ends are those of the 95 % interval of the cohesion, which is not below 0. Returns the numbers, and what the
-    sentences on them take, with "verdict": holds, sinks or open.
+    The ends are those of the 95 % interval of the cohesion, which is not below 0, with `UNSURE` times the K expected of
+    the material at the upper and the inverse at the lower end. Returns the numbers, and what the sentences on them
+    take, with "verdict": holds, sinks or open.
     """
     recipe, area = recipe_of(material), math.pi * settings.tip_diameter**2 / 4
     assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
@@ -124,10 +119,12 @@ def _by_terzaghi(settings: PenetrateSettings, material: Any, stiffness: float) -
     half = NORMAL * recipe.cohesion_std
     least, most = max(0.0, recipe.cohesion - half), recipe.cohesion + half
     shares = [max(0.0, 1.0 - most / min(needs)), max(0.0, 1.0 - least / max(needs))]
-    low, high = (load * share / stiffness for share in shares)
+    stiffness = bearing_of(material, grain=settings.grain, gravity=settings.gravity, area=area).stiffness
+    low, high = load * shares[0] / (UNSURE * stiffness), load * shares[1] * UNSURE / stiffness
     found: Json = {
         "material": material.name, "cohesion": recipe.cohesion, "cohesion_std": recipe.cohesion_std,
         "friction_angles": [angle, recipe.circle], "cohesions_enough": needs, "depth_range": [low, high],
+        "stiffness": stiffness,
     }  # fmt: skip
     told: Json = {
         "name": material.name, "beside": material.name, "cohesion": recipe.cohesion, "least": least, "most": most,

@@ -211,9 +211,7 @@ def warnings_of(findings: Findings) -> Iterator[str]:
     own = [one.correlation for one in findings.seed_fits.values() if one.correlation is not None]
     if len(own) >= 2 and not findings.beds_separate:
         yield say("traded", least=min(own))
-    yield from resolution_advice(
-        tip=settings.tip_diameter, grain=settings.grain, size=settings.bed_size, depth=settings.depth,
-    )  # fmt: skip
+    yield from resolution_advice(**beds.resolution_of(settings))
     if fit.damping == 0:
         yield say("damping_zero")
     if fit.stiffness == 0:

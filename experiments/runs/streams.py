@@ -29,10 +29,16 @@ class RefusedError(ValueError):
     """Bad input, found before any work."""
 
 
+LONGEST = 800
+"""Characters of a line on stderr; a longer one quotes a value that nobody reads to its end, and is cut in its middle."""
+
+
 def say(text: str) -> None:
     """Say `text` on stderr."""
     for line in text.splitlines():
-        print(f"hedgebed: {line}", file=sys.stderr, flush=True)
+        half = LONGEST // 2 - 20
+        short = line if len(line) <= LONGEST else f"{line[:half]} ... {line[-half:]}"
+        print(f"hedgebed: {short}", file=sys.stderr, flush=True)
 
 
 def fault_words(error: Exception) -> str:

@@ -63,11 +63,20 @@ def check_parameters(parameters: Sequence[Parameter], given: Mapping[str, Any], 
     }
 
 
+_LISTED, _ALIKE = 40, 8
+"""Words up to which `nearest` lists all, and how many it lists of more."""
+
+
 def nearest(word: str, words: Iterable[str]) -> str:
-    """``did you mean 'x'?`` for the word most like `word`; where none is like it, all `words`."""
+    """``did you mean 'x'?`` for the word most like `word`; where none is like it, all `words`, of many the most alike."""
     words = list(words)
     close = get_close_matches(word, words, n=1) or get_close_matches(word.replace("-", "_").lower(), words, n=1)
-    return f"did you mean {close[0]!r}?" if close else f"there is {', '.join(words)}"
+    if close:
+        return f"did you mean {close[0]!r}?"
+    if len(words) <= _LISTED:
+        return f"there is {', '.join(words)}"
+    alike = get_close_matches(word, words, n=_ALIKE, cutoff=0.0)
+    return f"the most alike of {len(words)} are {', '.join(alike)}; --help lists all"
 
 
 def is_number(value: Any) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -45,6 +46,34 @@ def test_a_bed_side_by_side_is_itself_in_every_copy():
     assert len({tuple(row) for row in np.round(back[:, 0, :2] / PERIOD).astype(int).tolist()}) == 6
 
 
+@pytest.mark.parametrize("ended", [True, False])
+def test_tests_are_counted_with_the_names_of_those_that_failed_also_where_their_time_ends(tmp_path, ended):
+    """The log of real tests, whole and cut before its last lines."""
+    (tmp_path / "test_four.py").write_text(
+        "import pytest\ndef test_good(): pass\n@pytest.mark.parametrize('k', ['a b'])\ndef test_bad(k): assert 0\n"
+        "@pytest.mark.skip\ndef test_left_out(): pass\n@pytest.fixture\ndef broken(): raise ValueError\n"
+        "def test_not_begun(broken): pass\n"
+    )
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-v",
+        "-n",
+        "1",
+        "-p",
+        "no:cacheprovider",
+        "--rootdir",
+        ".",
+        "test_four.py",
+    ]
+    log = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True).stdout
+    found = gpu._counts(log if ended else log[: log.index("= ERRORS =")])
+    assert {name.partition("::")[2] for name in found.pop("failures")} == {"test_bad[a b]", "test_not_begun"}
+    assert found == {"passed": 1, "failed": 2, "skipped": 1, "ended": ended}
+    assert gpu._counts("no module named pytest")["failed"] == 1
+
+
 @pytest.mark.long
 def test_a_row_of_the_sweep_goes_into_the_table(tmp_path):
     row = worker.measure(layer(), arch="cpu", steps=20, precision="float64", rolling=True, warm=10)
@@ -53,7 +82,7 @@ def test_a_row_of_the_sweep_goes_into_the_table(tmp_path):
     bench = {
         "date": "today", "version": "1", "commit": "abc", "command": "make gpu", "rows": [row], "remarks": ["one"],
         "gpu": {"name": "card", "driver": "5"}, "machine": {"cores": 2, "taichi": "taichi 1"},
-        "tests": {"passed": 3, "failed": 0, "skipped": 1, "wall_s": 2.0},
+        "tests": {"passed": 3, "failed": 1, "skipped": 1, "wall_s": 2.0, "failures": ["a.py::b"], "ended": False},
     }  # fmt: skip
     file, page = tmp_path / "bench.json", tmp_path / "page.md"
     file.write_text(json.dumps(bench), encoding="utf-8")
@@ -63,3 +92,4 @@ def test_a_row_of_the_sweep_goes_into_the_table(tmp_path):
     assert "old" not in text and text.startswith("before") and text.endswith("after\n")
     cells = next(line for line in text.splitlines() if line.startswith("| 36 |")).split(" | ")
     assert cells[1:3] == ["float64", "yes"] and "3 passed" in text and "- one" in text
+    assert "Failed: `a.py::b`." in text and "time ended" in text

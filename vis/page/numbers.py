@@ -50,6 +50,11 @@ def digits_for(std: float) -> int:
     return -exponent + (1 if leading < 1.95 else 0)
 
 
+def _two_digits(std: float) -> int:
+    """Decimals at which an uncertainty has two digits: 0.75 ± 1.6 is 0.8 ± 1.6, not 1 ± 2."""
+    return 1 - math.floor(math.log10(std))
+
+
 def beside(value: float, std: float | None) -> str:
     """A number as tables show it next to a column of its standard error: to the digits that `std` allows.
 
@@ -58,9 +63,7 @@ def beside(value: float, std: float | None) -> str:
     """
     if not std or not math.isfinite(std) or not math.isfinite(value):
         return short(value)
-    decimals = digits_for(std)
-    if abs(value) < std:
-        decimals = 1 - math.floor(math.log10(std))
+    decimals = digits_for(std) if abs(value) >= std else _two_digits(std)
     return f"{value:.{max(decimals, 0)}f}" if decimals <= 9 else short(value)
 
 
@@ -117,7 +120,7 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
     elif std is None or std == 0.0 or not math.isfinite(std) or not math.isfinite(value):
         text = plain(value / scale, significant)
     else:
-        decimals = digits_for(std / scale)
+        decimals = digits_for(std / scale) if abs(value) >= std else _two_digits(std / scale)
         text = f"{_fixed(value / scale, decimals)}{_SPACE}±{_SPACE}{_fixed(std / scale, decimals)}"
     return f"{text}{_SPACE}{shown}" if shown else text
 

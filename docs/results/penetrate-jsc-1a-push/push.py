@@ -1,5 +1,6 @@
 """Pushes a ball tip into a bed of jsc-1a-loose-cut: `python push.py SEED GRAIN_MM SPEED...`, the repository on
-PYTHONPATH. Further words: `gravity=1e-3` [g], `tip=12` [mm], `places=01234`, `box=50x50x38` [mm] instead of 64x64x44.
+PYTHONPATH. Further words: `gravity=1e-3` [g], `tip=12` [mm], `places=01234`, `box=50x50x38` [mm] instead of 64x64x44,
+`arch=cuda` for a GPU.
 
 The bed is prepared at 1 g by the recipe of the material (as docs/results/penetrate-foot-jsc-1a-loose-cut-beds before
 gravity is lowered), and its grains are stiffened to 80 MPa. Every push starts from this bed, in its centre (place 0) or
@@ -45,6 +46,7 @@ class Case:
     tip: float = 12.0  # [mm]
     places: tuple[int, ...] = (0, 1, 2, 3, 4)
     box: str = "64x64x44"  # [mm]
+    arch: str = "cpu"
 
     @property
     def size(self) -> tuple[float, ...]:
@@ -82,14 +84,14 @@ def prepared(case: Case) -> PenetrateSettings:
     spike = PenetrateSettings(
         material=foot.material, bed_size=foot.bed_size, grain=grain, depth=1e-3 * case.tip * DEPTH, speeds=(0.03125,),
         tip_diameter=1e-3 * case.tip, drop_speeds=(), seeds=(case.seed,), allow_coarse=True, threads=1,
-        max_overlap=0.08,
+        arch=case.arch, max_overlap=0.08,
     )  # fmt: skip
     if not case.kept.exists():
         bed = staged_bed(
             beds.find_material(foot), beds.stages_of(foot) or (), progress=Progress(), asked_to_stop=lambda: False,
             size=foot.bed_size, grain=grain, spread=foot.spread, gravity=beds.first_gravity(foot), seed=case.seed,
             young=beds.choose_softness(foot).young, max_overlap=foot.max_overlap, time_step=None,
-            precision="float64", arch="cpu", threads=1, cache=True,
+            precision="float64", arch=case.arch, threads=1, cache=True,
         )  # fmt: skip
         beds.stiffened(bed, YOUNG, spike).save(case.kept)
     return spike
@@ -97,7 +99,7 @@ def prepared(case: Case) -> PenetrateSettings:
 
 def push(case: Case, spike: PenetrateSettings, speed: float, place: int) -> tuple[np.ndarray, float]:
     """Depth [m] and force [N] of a push at `speed` [m/s], shape (n, 2), and its largest overlap [of a diameter]."""
-    bed = Bed.load(case.kept, arch="cpu", threads=1)
+    bed = Bed.load(case.kept, arch=case.arch, threads=1)
     if case.gravity != 1:
         unit = (spike.grain / STANDARD_GRAVITY) ** 0.5  # [s]
         bed.set_gravity(max(case.gravity, LEAST) * STANDARD_GRAVITY)

@@ -3,6 +3,8 @@
 Against a plain double loop, and with all lists checked, the tests of lists have it.
 """
 
+import os
+
 import falling_bed
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 import dem.engine.engine
 import dem.gpu.steps
 from dem import Bed
+from dem.engine import runtime
 from experiments.validate.base import cloud
 
 pytestmark = pytest.mark.cpu_only("a CPU's engine to compare with")
@@ -78,3 +81,19 @@ def test_a_file_of_the_one_goes_on_with_the_other(first, engines, tmp_path, monk
     other = Bed.load(path, threads=1)
     assert other.engine.gpu != (first == "gpu") and touching > 20
     same(after(other, 60), wanted, within=1e-8)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the stand-in is a shell script")
+def test_a_bed_too_large_for_the_gpu_is_refused_by_what_the_gpu_has_free(tmp_path, monkeypatch):
+    stand_in = tmp_path / "nvidia-smi"
+    stand_in.write_text("#!/bin/sh\necho 100\necho 300\n")  # [MiB], of two cards
+    stand_in.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    monkeypatch.setattr(runtime, "_current", runtime.Runtime("cuda", 1, "float64"))
+    assert runtime.free_memory() == 300 * 2**20
+    runtime.refuse_memory(2**20)
+    with pytest.raises(MemoryError, match=r"1 GiB of memory, 0\.293 GiB are free on the GPU"):
+        runtime.refuse_memory(2**30)
+    stand_in.write_text("#!/bin/sh\nexit 9\n")
+    assert runtime.free_memory() is None
+    runtime.refuse_memory(2**60)  # unknown: Taichi will say

@@ -133,6 +133,18 @@ def test_an_unknown_command_is_refused_with_the_nearest(dig, capsys):
     assert '"dig"' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("value", ['"' + "x y " * 900 + '"', "[" + "1, " * 900 + "]"])
+@pytest.mark.parametrize("key", ["mass", "qqq"])
+def test_a_refusal_of_a_long_value_is_short_and_has_both_its_ends(tmp_path, capsys, key, value):
+    """Of a setting that takes no such value, and of a name that is none of 70: the most alike of them are listed."""
+    case = tmp_path / "case.toml"
+    case.write_text(f"{key} = {value}\n")
+    assert main(["calibrate", str(case), "--out", str(tmp_path / "out")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert len(line) < 900 and f"{key} = " in line
+    assert ("number" if key == "mass" else "--help") in line[-300:]
+
+
 def test_every_command_stands_in_a_group_of_the_help(capsys, monkeypatch):
     """An experiment without a group, or with one that does not exist, would be listed beside --help and --version."""
     monkeypatch.setenv("COLUMNS", "200")
