@@ -30,7 +30,7 @@ class RefusedError(ValueError):
 
 
 LONGEST = 800
-"""Characters of a line on stderr; a longer one quotes a value that nobody reads to its end, and is cut in its middle."""
+"""Characters of a line on stderr; a longer one quotes a long value, and is cut in its middle."""
 
 
 def say(text: str) -> None:

@@ -68,7 +68,7 @@ _LISTED, _ALIKE = 40, 8
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """``did you mean 'x'?`` for the word most like `word`; where none is like it, all `words`, of many the most alike."""
+    """``did you mean 'x'?`` for the word most like `word`; where none is, all `words`, of many the most alike."""
     words = list(words)
     close = get_close_matches(word, words, n=1) or get_close_matches(word.replace("-", "_").lower(), words, n=1)
     if close:
