@@ -52,7 +52,7 @@ def standing_depth(table: RftTable, pieces: Pieces, *, load: float, gravity: flo
         strongest = force(table.factors, bottom + most)
         raise ValueError(
             f"load = {load:g} N: at most {strongest:.3g} N was expected, what the law carries at its largest depth of "
-            f"{most:.3g} m"
+            f"{most:.3g} m; hedgebed penetrate finds whether it rests deeper, or not at all"
         )
     loads = [force(factors, depth) for factors in table.left_out]
     spread = float(jackknife_std([[value] for value in loads])[0]) if len(loads) > 1 else None

@@ -71,7 +71,7 @@ def test_tests_are_counted_with_the_names_of_those_that_failed_also_where_their_
     found = gpu._counts(log if ended else log[: log.index("= ERRORS =")])
     assert {name.partition("::")[2] for name in found.pop("failures")} == {"test_bad[a b]", "test_not_begun"}
     assert found == {"passed": 1, "failed": 2, "skipped": 1, "ended": ended}
-    assert gpu._counts("no module named pytest")["failed"] == 1
+    assert gpu._counts("")["failed"] == 1
 
 
 @pytest.mark.long
