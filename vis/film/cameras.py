@@ -250,6 +250,7 @@ def _dash_surface(axis: Any, stage: Stage | FlatStage, height: float, focus: Foc
 def _key(axis: Any, number: int, words: str, **style: Any) -> None:
     """A line of the key in the upper left corner of a picture: a line of a style, and what it is."""
     y = 1.0 - (0.9 + number) * _LINE / axis.get_position().height
+    axis.plot([0.014, 0.066], [y, y], color="white", lw=9.0, alpha=HALO["alpha"], solid_capstyle="butt")  # off a hull
     axis.plot([0.02, 0.06], [y, y], color=INK, **style)
     axis.text(0.075, y, words, fontsize=9, va="center", color=INK, bbox=HALO)
 

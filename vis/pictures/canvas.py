@@ -170,8 +170,8 @@ class Page:
             style: dict[str, Any] = {"va": "top", "color": "#444444", "linespacing": 1.35, "bbox": HALO}
             figure.text(_NUMBERS, 0.965, lines, fontsize=12.5, **style)
             if note:
-                small: dict[str, Any] = {"fontsize": _SMALL, "va": "bottom", "color": "#666666", "linespacing": 1.3}
-                figure.text(0.03, 0.016, fill(note, _LETTERS), **small)
+                foot = figure.text(0.03, 0.016, fill(note, _LETTERS), fontsize=_SMALL, va="bottom", color="#666666")
+                foot.set_linespacing(1.3)
             self.colour_bar(figure, (0.885, 0.2, 0.018, 0.5), 11.5).ax.tick_params(labelsize=11)
             return pixels(figure)
 
