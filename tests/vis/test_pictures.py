@@ -11,7 +11,8 @@ from dem.grains.materials import MATERIALS
 from vis.pictures import canvas, pictures
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.pictures import make_pictures, opengl_available
-from vis.pictures.render import write_gif
+from vis.pictures.render import ARROW, CUT, write_gif
+from vis.pictures.scene import Scene
 
 SMALL = {"size": (400, 300), "animation_size": (200, 150)}
 
@@ -112,7 +113,7 @@ def test_the_camera_is_low_where_a_spike_hardly_sinks(tmp_path, make_run):
     """The surface behind the cut rises by tilt x its extent: no more than the spike sinks, within the bounds."""
     run = pictures.read_folder(make_run(tmp_path, frames=2))
     story = pictures._tell(run, "driven-0.1-seed1")
-    for depth, tilt in ((0.0001, 0.06), (0.006, 0.2), (0.030, 0.4)):
+    for depth, tilt in ((0.0001, 0.06), (0.003, 0.1), (0.030, 0.15)):
         assert pictures._tilt(replace(story, depth=np.array([0.0, depth])), 0.030) == pytest.approx(tilt)
 
 
@@ -124,6 +125,27 @@ def test_the_undisturbed_surface_is_dashed_across_the_cut(monkeypatch):
     page.compose("A title", "", lambda axis: None, **places)
     (line,) = (line for line in drawn[0].axes[0].lines if line.is_dashed())
     assert line.get_xydata().tolist() == [[0.2, 0.6], [0.8, 0.6]]
+
+
+def test_words_of_a_page_stay_on_it_and_off_the_bed(monkeypatch, needs_opengl):
+    """The longest small print and four lines of numbers, around a bed that is wide and one that is deep."""
+    drawn = []
+    monkeypatch.setattr(canvas, "pixels", lambda figure: drawn.append(figure))
+    for high in ((0.1, 0.1, 0.04), (0.1, 0.1, 0.3)):
+        box = np.zeros(3), np.array(high)
+        scene, lines = Scene((400, 300), *box, cut=0.5 * high[1], radius=0.001, tilt=0.15), "bed 1\nt\ndepth\nforce"
+        page, section = canvas.Page((400, 300), "displacement", 1.0), (0.0, high[0], 0.5 * high[1], 0.0, high[2])
+        note = f"1,000,000 grains; {CUT}; {ARROW}"
+        page.compose("A\nB\nC", lines, lambda axis: None, place=scene.place, section=section, note=note)
+        top = scene.place(np.array([[0.0, high[1], high[2]]]))[0, 1]
+        scene.close()
+        drawn[-1].draw_without_rendering()
+        boxes = [text.get_window_extent().transformed(drawn[-1].transFigure.inverted()) for text in drawn[-1].texts]
+        assert all(box.x0 > 0.0 and box.x1 < 1.0 and box.y0 > 0.0 for box in boxes)
+        assert min(box.y0 for box in boxes[:2]) > top
+        on_page = {text.get_text(): text.get_window_extent() for text in drawn[-1].axes[0].texts}
+        edge = drawn[-1].bbox.width * scene.place(np.zeros((1, 3)))[0, 0]
+        assert 0.0 < on_page["undisturbed\nsurface"].x0 < on_page["undisturbed\nsurface"].x1 < edge
 
 
 def test_a_renderer_that_dies_costs_no_pictures(tmp_path, monkeypatch, make_run):

@@ -1,5 +1,6 @@
 """Ways of a platform, drawn in their true shape where something of it can be seen; colours of its states."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -11,8 +12,11 @@ from PIL import Image, ImageColor
 
 from vis.compare.report import _draw_path
 from vis.diagnose.figures import _KINDS, _PHASES, BASE
-from vis.page.plots import AMENDED, BED, MODEL, STATES, as_it_lies, handle, new_figure, title_above
+from vis.page.folder import read_folder
+from vis.page.plots import AMENDED, BED, MODEL, STATES, as_it_lies, handle, legend_above, new_figure, title_above
 from vis.penetrate.lawfit import _over_beds
+from vis.penetrate.plot_drag import OVER_BEDS, by_speed
+from vis.penetrate.report import PLOTS
 from vis.pictures.render import write_gif
 
 
@@ -140,3 +144,53 @@ def test_the_mean_over_beds_has_the_95_percent_interval_of_each_depth_and_none_o
     depth = np.array([1.0, 1.1, 0.9, 2.0])
     half = _over_beds(depth, np.array([1.0, 2.0, 3.0, 9.0]), np.array([1.0, 2.0]))
     assert half[0] == pytest.approx(4.303 / np.sqrt(3), rel=1e-3) and np.isnan(half[1])
+
+
+def test_a_bar_over_beds_is_half_of_their_95_percent_interval(tmp_path, make_run) -> None:
+    run = read_folder(make_run(tmp_path, frames=0))
+    driven = run.of_kind("driven")
+    _, half = by_speed(driven, [0.1], "work_in", 1.0)
+    works = [r.quantities["work_in"]["value"] for r in driven if r.speed == 0.1]
+    assert len(works) == 3 and half[0] == pytest.approx(4.303 * np.std(works, ddof=1) / np.sqrt(3), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("plot", "words"),
+    [
+        ("Drag against depth", "one standard deviation between beds"),
+        ("Spread between beds", "one standard deviation between beds"),
+        ("Set down under its load", f"bar and ±: {OVER_BEDS}"),
+        ("Work in and out", OVER_BEDS),
+        ("Peaks of the drops", OVER_BEDS),
+    ],
+)
+def test_a_legend_names_each_band_and_bar(tmp_path, make_run, plot: str, words: str) -> None:
+    legend = PLOTS[plot](read_folder(make_run(tmp_path, frames=0))).figure.legends[0]
+    assert any(words in text.get_text() for text in legend.get_texts())
+
+
+@pytest.mark.parametrize("speeds", [2, 3, 9])
+def test_numbers_at_bars_lie_on_no_bar_and_not_on_one_another(tmp_path, make_run, speeds: int) -> None:
+    """Work of the bed on the way out is a part in 10,000 of that on the way in: "about 0"."""
+    run = read_folder(make_run(tmp_path, frames=0))
+    one = next(r for r in run.of_kind("driven"))
+    works = {"work_in": 7.9e-3, "work_out": -7.6e-7, "model_work_in": 8.1e-3, "model_work_out": 4.8e-3}
+    runs = [replace(one, speed=0.1 * (1 + count), quantities=works) for count in range(speeds)]
+    figure = PLOTS["Work in and out"](replace(run, runs=runs)).figure
+    figure.draw_without_rendering()
+    labels = [text for axis in figure.axes for text in axis.texts]
+    assert [text.get_text() for text in labels].count("about 0") == speeds
+    boxes = [text.get_window_extent() for text in labels]
+    bars = [bar.get_window_extent() for axis in figure.axes for bar in axis.patches if abs(bar.get_height()) > 0.01]
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    assert not any(box.overlaps(bar) for box in boxes for bar in bars)
+    assert all(box.y1 < figure.legends[0].get_window_extent().y0 for box in boxes)
+
+
+@pytest.mark.parametrize("columns", [None, 2])
+def test_a_legend_too_wide_for_its_figure_goes_on_below(columns: int | None) -> None:
+    figure = new_figure(3.0)
+    legend_above(figure, [handle("a long name of a line that goes on and on and on and on", BED)] * 4, columns)
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert box.x0 >= 0 and box.x1 <= figure.bbox.width

@@ -407,3 +407,11 @@ def test_a_picture_has_nothing_of_the_one_that_was_drawn_before_it(folder):
     rows = slice(round(360 * (1 - foot - high)), round(360 * (1 - foot)))
     bar = later[rows, round(640 * left) : round(640 * (left + wide))]
     assert len(np.unique(bar.reshape(-1, 3), axis=0)) > 50
+
+
+def test_the_line_of_the_surface_is_named_in_the_upper_corner_and_hides_no_grains(folder, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(canvas, "pixels", lambda figure, over=None: drawn.append(figure))
+    Sheet([Reel(folder)], (640, 360), by="displacement", opengl=False).draw(0.5)
+    words = [text for axis in drawn[-1].axes for text in axis.texts if text.get_text() == "undisturbed surface"]
+    assert len(words) == 2 and all(text.get_position()[1] > 0.9 for text in words)

@@ -215,9 +215,9 @@ def draw_trajectories(
         right.set_ylabel("left over [std]", fontsize=8.5)
     handles: list[Any] = [handle(source, INK, ls="", marker=".")]
     handles += [handle(label, colour, ls=dash) for _, colour, dash, label in models]
-    handles.append(Patch(color="#e3e8ec", label="± 2 std of the sensor"))
+    handles.append(Patch(color="#e3e8ec", label="2 std of the sensor"))
     if any(c.scatter is not None for c in channels):
-        handles.append(Patch(color=_REPLICATES, label="and of replicates"))
+        handles.append(Patch(color=_REPLICATES, label="2 std of sensor and replicates"))
     handles += _phase_handles(phase for c in channels for phase in c.phase)
     legend_above(drawing, handles, 4, fontsize=8)
     return drawing

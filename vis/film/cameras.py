@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from vis.film.reel import AnyReel, Reel, SpaceReel
-from vis.page.plots import INK, Array, nice_below
+from vis.page.plots import DOTTED, INK, Array, nice_below
 from vis.pictures.canvas import HALO
 from vis.pictures.frames import Frame
 from vis.pictures.scene import OPACITY, Eye, Stage
@@ -92,27 +92,22 @@ class _Plane(Camera):
 
     def dress(self, axis: Any, reel: Reel, stage: Stage | FlatStage, frame: Frame, focus: Focus) -> None:
         _frame_and_ruler(axis, stage)
-        level = _dash_surface(axis, stage, reel.surface, focus)
-        self.mark(axis, stage, frame, focus, level)
+        _dash_surface(axis, stage, reel.surface, focus)
+        self.mark(axis, stage, frame, focus)
 
-    def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
+    def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus) -> None:
         """A line from the centre to where row 0 begins: it shows how far the platform has turned, with a key."""
         hull = frame.bodies["hull"][0]
         ring = hull[: len(hull) // 2]  # its face in front
         ends = stage.place(np.array([ring.mean(axis=0), ring[0]]), focus)
         axis.plot(ends[:, 0], ends[:, 1], color=INK, lw=1.6, solid_capstyle="round")
         axis.plot(ends[:1, 0], ends[:1, 1], "o", color=INK, ms=4)
-        line = _LINE / axis.get_position().height
-        first, second = 1.0 - 0.9 * line, 1.0 - 1.9 * line
-        axis.plot([0.02, 0.06], [first, first], color=INK, lw=1.6)
-        axis.plot([0.02], [first], "o", color=INK, ms=4)
-        axis.text(0.075, first, "from the centre to row 0", fontsize=9, va="center", color=INK, bbox=HALO)
+        _key(axis, 1, "from the centre to row 0", lw=1.6, marker="o", ms=4, markevery=[0])
         if radius := frame.values.get("hull_radius"):
             turn = np.linspace(0.0, 2 * np.pi, 181)
             circle = ring.mean(axis=0) + radius * np.column_stack([np.cos(turn), 0.0 * turn, np.sin(turn)])
-            axis.plot(*stage.place(circle, focus).T, color=INK, lw=1.0, ls=(0, (4, 3)))
-            axis.plot([0.02, 0.06], [second, second], color=INK, lw=1.0, ls=(0, (4, 3)))
-            axis.text(0.075, second, "the cylinder that grains touch", fontsize=9, va="center", color=INK, bbox=HALO)
+            axis.plot(*stage.place(circle, focus).T, color=INK, lw=1.4, ls=DOTTED)
+            _key(axis, 2, "the cylinder that grains touch", lw=1.4, ls=DOTTED)
 
 
 class _Near(_Plane):
@@ -124,7 +119,7 @@ class _Near(_Plane):
         high = np.minimum(reel.surface + 0.06 * stage.height, reel.lowest() + _BELOW * stage.height)
         return np.column_stack([reel.feet(), high])
 
-    def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus, level: float) -> None:
+    def mark(self, axis: Any, stage: Eye, frame: Frame, focus: Focus) -> None:
         """Nothing: which row is which shows on the whole of it."""
 
 
@@ -244,13 +239,20 @@ class _Level(Camera):
         _mark_lowest(axis, reel, stage, frame, focus)
 
 
-def _dash_surface(axis: Any, stage: Stage | FlatStage, height: float, focus: Focus) -> float:
-    """A dashed line of the undisturbed surface at this height [m] across the picture; where it lies on that."""
+def _dash_surface(axis: Any, stage: Stage | FlatStage, height: float, focus: Focus) -> None:
+    """A dashed line of the undisturbed surface at this height [m] across the picture, and its key above all grains."""
     level = float(stage.place(np.array([[focus[0], stage.cut, height]]), focus)[0, 1])
     axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
-    if 0.0 < level < 0.8:
-        axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", color=INK, bbox=HALO)
-    return level
+    if 0.0 < level < 1.0:
+        _key(axis, 0, "undisturbed surface", lw=0.8, ls=(0, (5, 4)))
+
+
+def _key(axis: Any, number: int, words: str, **style: Any) -> None:
+    """A line of the key in the upper left corner of a picture: a line of a style, and what it is."""
+    y = 1.0 - (0.9 + number) * _LINE / axis.get_position().height
+    axis.plot([0.014, 0.066], [y, y], color="white", lw=9.0, alpha=HALO["alpha"], solid_capstyle="butt")  # off a hull
+    axis.plot([0.02, 0.06], [y, y], color=INK, **style)
+    axis.text(0.075, y, words, fontsize=9, va="center", color=INK, bbox=HALO)
 
 
 def _heights(axis: Any, stage: Stage | FlatStage, focus: Focus) -> None:

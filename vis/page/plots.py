@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from textwrap import wrap
+from textwrap import fill, wrap
 from typing import Any
 
 import matplotlib as mpl
@@ -16,6 +16,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
@@ -51,6 +52,8 @@ to whom Okabe and Ito's green is the grey of standing or the blue of pivoting; T
 DPI = 160
 _TITLE, _TITLE_LINE, _TITLE_LETTERS = 10.5, 0.185, 11.2
 """Title of a figure: its size [points], the height of a line [inch], letters in an inch of a line."""
+_LEGEND_LETTERS, _KEY = 13.5, 8
+"""Letters in an inch of a line of a legend, and how many of them a line or mark with its gaps takes."""
 _TOO_LONG = 8.0  # times as long as high: drawn in its true shape such a way is a line
 
 _STYLE: dict[Any, Any] = {
@@ -132,11 +135,23 @@ def new_panels(count: int, *, height: float, sharex: bool = False, sharey: bool 
 
 
 def legend_above(figure: Figure, handles: Sequence[Any], columns: int | None = None, **options: Any) -> None:
-    """One legend for the whole figure: in one line above its middle, or in so many columns above its left."""
+    """One legend for the whole figure: above its middle in lines that hold it, or in so many columns at its left."""
     if columns is None:
-        figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), handlelength=2.6)
-    else:
-        figure.legend(handles=handles, loc="outside upper left", ncols=columns, **options)
+        for lines in range(1, len(handles) + 1):
+            count = -(-len(handles) // lines)
+            legend = figure.legend(handles=handles, loc="outside upper center", ncols=count, handlelength=2.6)
+            if lines == len(handles) or _fits(figure, legend):
+                return
+            legend.remove()
+        return
+    legend = figure.legend(handles=handles, loc="outside upper left", ncols=columns, **options)
+    if not _fits(figure, legend):
+        for words in legend.get_texts():
+            words.set_text(fill(words.get_text(), int(_LEGEND_LETTERS * figure.get_size_inches()[0] / columns) - _KEY))
+
+
+def _fits(figure: Figure, legend: Legend) -> bool:
+    return bool(legend.get_window_extent().width < figure.bbox.width)
 
 
 def title_above(figure: Figure, words: str) -> None:

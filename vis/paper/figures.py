@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from rigid.intervals import half_width
 from vis.page.folder import read_columns
@@ -214,14 +215,24 @@ def figure_7(paper: PaperRun) -> Block | None:
                         flat.append(f"{surface}, {rig:g} g, {torque:g} N m")
             axis.plot(0, 0, "o", color=INK, ms=4)
     for axis in axes[-1]:
-        axis.set_xlabel("x from the launch [mm]")
+        axis.set_xlabel("x [mm]; x and y are from the launch")
     for axis in axes[:, 0]:
-        axis.set_ylabel("y from the launch [mm]")
+        axis.set_ylabel("y [mm]")
+    _square(axes)
     gravities = [handle(f"{rig:g} g", INK, ls=style, lw=1.6) for rig, style in styles.items()]
     band = Patch(color=GREY, alpha=0.35, lw=0, label="friction band")
     legend_above(drawing, [*paper.handles(), *gravities, band], columns=6)
     missing = f" No hop that rises: {'; '.join(flat)}." if flat else ""
     return paper.draw("figure7", drawing, about=paper.on("First hops", paper.hard), missing=missing)
+
+
+def _square(axes: NDArray[Any]) -> None:
+    """Give each row of panels one scale for x and y, and a height to match: a fifth of its width to all of it."""
+    for row in axes:
+        for axis in row:
+            axis.set_aspect("equal", adjustable="box")
+    slopes = [abs(np.ptp(row[0].get_ylim()) / np.ptp(row[0].get_xlim())) for row in axes]
+    axes[0, 0].get_gridspec().set_height_ratios(np.clip(slopes, 0.2, 1.0))
 
 
 def _motors(paper: PaperRun) -> list[float]:
@@ -259,7 +270,7 @@ def figure_8(paper: PaperRun) -> Block:
                 _draw_measures(axis, paper, surface, rig, key, scale, place)
             if j == 0:
                 axis.set_ylabel(label)
-            axis.set_xticks(range(len(paper.surfaces)), paper.surfaces)
+            axis.set_xticks(range(len(paper.surfaces)), [_SOILS.get(name, name) for name in paper.surfaces])
             axis.tick_params(axis="x", length=0)
             axis.grid(False, axis="x")
             for edge in range(1, len(paper.surfaces)):

@@ -14,7 +14,7 @@ from rigid.intervals import NORMAL, half_width, student
 from vis.page.numbers import quantity, quote
 from vis.penetrate.summary_parts import fit_error, joined, list_of, mapping_of, say, std_of, value_of
 
-__all__ = ["fit_part", "fitted", "in_95"]
+__all__ = ["fit_part", "fitted", "half_of_fit", "in_95"]
 
 _UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 
@@ -62,7 +62,7 @@ def fit_part(result: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str,
     one = len(own) < 2
     gap = quantity(numbers.get("drag_gap"), unit="%")
     rows = [["this bed" if one else "all beds together", *(fitted(numbers, key) for key in _UNITS), gap]]
-    halves = [{key: _half_of_fit(result, fit, key) for key in _UNITS} for fit in own]
+    halves = [{key: half_of_fit(result, fit, key) for key in _UNITS} for fit in own]
     for i, fit in enumerate([] if one else own):
         gap = quote(value_of(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}"
         cells = (quote(value_of(fit, key), halves[i][key], unit) for key, unit in _UNITS.items())
@@ -83,7 +83,7 @@ def fit_part(result: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str,
     return {"table": {"head": head, "rows": rows}, "note": " ".join(notes)}
 
 
-def _half_of_fit(result: Mapping[str, Any], fit: Mapping[str, Any], key: str) -> float | None:
+def half_of_fit(result: Mapping[str, Any], fit: Mapping[str, Any], key: str) -> float | None:
     """Half of the 95 % interval of K or C of a bed's own fit; None where its error or its runs are unknown."""
     error = fit_error(fit, key)
     return None if error is None else _of_runs(error, _run_count(result, fit))

@@ -15,8 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator
 
+from rigid.intervals import half_width
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import plain, quote, short
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, sheet
@@ -24,15 +26,21 @@ from vis.page.sentences import Sentences
 from vis.penetrate.summary_parts import Departure, departure_rows, value_of
 
 __all__ = [
-    "RECORDED", "Plot", "above_surface", "by_speed", "drag_plot", "gap_plot", "has_model", "pair_of_handles",
-    "spread_words", "work_plot",
+    "OVER_BEDS", "RECORDED", "Plot", "above_surface", "band_handle", "bar_handle", "by_speed", "drag_plot", "gap_plot",
+    "has_model", "pair_of_handles", "spread_words", "work_plot",
 ]  # fmt: skip
 
 say = Sentences(__package__)
 captions = Sentences(__package__, "figures.toml")
 RECORDED: dict[str, Any] = {"color": GREY, "lw": 0.7, "alpha": 0.7}
 """Line of a force of the bed as recorded: grey, so that only means are in the bed's blue."""
+OVER_BEDS = "95 % interval of the mean over beds"
+"""What a bar or a band is that shows a ±."""
 _UNLOADING: Any = (0, (5, 1.3, 1, 1.3))
+_BAR = 0.36
+"""Width of a bar, over the distance of two speeds."""
+_SMALL = 1e-3
+"""Share of the largest number of a figure below which a number at a bar is "about 0"."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,16 @@ def pair_of_handles(*, markers: bool = False, bars: bool = False) -> list[Any]:
     return [handle("bed", BED, marker=marks[0]), handle("spring-damper", MODEL, ls=DASHED, marker=marks[1])]
 
 
+def band_handle(label: str, color: Any, alpha: float) -> Patch:
+    """What stands for a band in a legend."""
+    return Patch(facecolor=color, alpha=alpha, lw=0, label=label)
+
+
+def bar_handle(label: str = OVER_BEDS) -> Any:
+    """What stands for an error bar in a legend."""
+    return handle(label, INK, marker="|", ls="", ms=10, mew=1.0)
+
+
 def above_surface(series: Series | None) -> Series | None:
     """The rows of loading above depth 0 from the first contact with a grain; None without such a contact."""
     if series is None:
@@ -85,21 +103,21 @@ def has_model(runs: Iterable[Run]) -> bool:
 
 
 def by_speed(runs: list[Run], speeds: list[float], key: str, scale: float) -> tuple[Array, Array]:
-    """Mean and standard deviation between seeds of a quantity at each speed; NaN where unknown."""
-    mean, spread = np.full(len(speeds), np.nan), np.full(len(speeds), np.nan)
+    """Mean over seeds of a quantity at each speed, and half of its 95 % interval; NaN where unknown."""
+    mean, half = np.full(len(speeds), np.nan), np.full(len(speeds), np.nan)
     for i, speed in enumerate(speeds):
         numbers = [n for r in runs if r.speed == speed and (n := value_of(r.quantities, key)) is not None]
         if numbers:
             mean[i] = scale * float(np.mean(numbers))
         if len(numbers) > 1:
-            spread[i] = scale * float(np.std(numbers, ddof=1))
-    return mean, spread
+            half[i] = scale * (half_width(float(np.std(numbers, ddof=1)), len(numbers)) or np.nan)
+    return mean, half
 
 
 def spread_words(runs: list[Run]) -> str:
     """What the bars are, where several runs have one speed."""
     speeds = [r.speed for r in runs]
-    return " Bars: standard deviation between beds, where there are several." if len(set(speeds)) < len(speeds) else ""
+    return f" Bars: {OVER_BEDS}, where there are several." if len(set(speeds)) < len(speeds) else ""
 
 
 def drag_plot(run: RunFolder) -> Plot | None:
@@ -130,15 +148,17 @@ def drag_plot(run: RunFolder) -> Plot | None:
         axis.set_xlim(left=1e3 * min((float(part.depth.min()) for part in above), default=0.0))
         axis.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     _label(axes, "depth of the tip [mm]", "force of the ground [N]")
-    handles = [handle("bed, loading", BED, lw=2.2)]
+    handles: list[Any] = [handle("bed, loading", BED, lw=2.2)]
     out = any(((r.bed.phase == "out") & (r.bed.depth >= 0.0)).any() for r in driven if r.bed is not None)
     handles += [handle("bed, unloading", BED, lw=1.8, ls=_UNLOADING)] if out else []
     handles += [handle("bed, as recorded", **RECORDED)]
+    many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
+    if many:
+        handles.append(band_handle("band: one standard deviation between beds", BED, 0.2))
     law = has_model(driven)
     handles += [handle("spring-damper, in", MODEL, ls=DASHED)] if law else []
     handles += [handle("spring-damper, out", MODEL, ls=(0, (1, 1.5)))] if law and out else []
     legend_above(figure, handles)
-    many = any(sum(r.speed == s for r in driven) > 1 for s in speeds)
     # The slices of depth that `_mean_by_depth` averages over, where they are the same at all speeds.
     slices = {part.depth.max() / _bins([part]) for part in _parts([r.bed for r in driven], "in")}
     widths = {quote(float(width), None, "m", significant=2) for width in slices}
@@ -172,22 +192,26 @@ def gap_plot(run: RunFolder) -> Plot | None:
     image = axis.imshow(difference, cmap="RdBu_r", norm=norm, aspect="auto")
     axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
     axis.set_yticks(range(len(depths)), [f"{short(1e3 * a)} to {short(1e3 * b)}" for a, b in depths])
-    axis.set(xlabel="speed [m/s]", ylabel="depth [mm]")
+    axis.set_ylabel("depth [mm]")
     axis.grid(False)
     axis.set_xticks(np.arange(len(speeds) + 1) - 0.5, minor=True)
     axis.set_yticks(np.arange(len(depths) + 1) - 0.5, minor=True)
     axis.grid(True, which="minor", color="white", lw=2.0)
     axis.tick_params(which="both", length=0)
     axis.spines[:].set_visible(False)
+    sure = False
     for (i, j), row in cells.items():
         number = row.difference
-        text = f"{'+' if number > 0 else ''}{quote(number, row.bed_std, 'N', significant=2)}"
+        text = f"{'+' if number > 0 else ''}{quote(number, None, 'N', significant=2)}"
         if row.share is not None:
             text += f"   ({'+' if row.share > 0 else ''}{plain(100.0 * row.share, 2)} %)"
         if row.known:
-            text += f"\n{row.known}"
+            half = half_width(row.bed_std, round(row.beds or 0))
+            text += f"\n{'' if half is None else f'± {plain(half, 2)} N, '}{row.known}"
+            sure = sure or half is not None
         dark = abs(number) > 0.55 * bound
         axis.text(j, i, text, ha="center", va="center", fontsize=8.5, color="white" if dark else INK)
+    axis.set_xlabel(f"speed [m/s]{f'     (±: half of the {OVER_BEDS})' if sure else ''}")
     bar = figure.colorbar(image, ax=axis, pad=0.015, fraction=0.05)
     bar.set_label("spring-damper − bed [N]")
     bar.outline.set_visible(False)
@@ -206,21 +230,26 @@ def work_plot(run: RunFolder) -> Plot | None:
     law = any(value_of(r.quantities, "model_work_in") is not None for r in driven)
     sides = ((-0.2, "", BED), (0.2, "model_", MODEL)) if law else ((0.0, "", BED),)
     titles = {"work_in": "Work done in loading", "work_out": "Work recovered on withdrawal"}
+    known_of = {prefix + key: by_speed(driven, speeds, prefix + key, 1e3) for _, prefix, _ in sides for key in titles}
+    largest = float(np.nanmax(np.abs([mean for mean, _ in known_of.values()])))
+    labels, bars = [], False
     for axis, (key, title) in zip(axes, titles.items(), strict=True):
         for shift, prefix, colour in sides:
-            mean, spread = by_speed(driven, speeds, prefix + key, 1e3)
+            mean, half = known_of[prefix + key]
             where = np.arange(len(speeds)) + shift
-            axis.bar(where, mean, 0.36, color=colour, hatch="///" if prefix else "", edgecolor="white", lw=0.6)
+            axis.bar(where, mean, _BAR, color=colour, hatch="///" if prefix else "", edgecolor="white", lw=0.6)
             if prefix:
-                spread = np.zeros_like(spread)  # one law: its runs differ in where they start only
+                half = np.zeros_like(half)  # one law: its runs differ in where they start only
             else:
-                axis.errorbar(where, mean, spread, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
-            for x, y, s in zip(where, mean, np.nan_to_num(spread), strict=True):
+                axis.errorbar(where, mean, half, fmt="none", ecolor=INK, elinewidth=1.0, capsize=3)
+                bars = bars or bool(np.isfinite(half).any())
+            for x, y, over in zip(where, mean, np.nan_to_num(half), strict=True):
                 if np.isfinite(y):
-                    axis.annotate(
-                        plain(y, 2 if abs(y) < 0.1 else 3), (x, max(y, 0.0) + s), xytext=(0, 3), fontsize=7.5,
+                    words = plain(y, 2 if abs(y) < 0.1 else 3) if abs(y) >= _SMALL * largest else "about 0"
+                    labels.append(axis.annotate(
+                        words, (x, max(y + over, 0.0)), xytext=(0, 3), fontsize=7.5,
                         textcoords="offset points", ha="center", color=INK,
-                    )  # fmt: skip
+                    ))  # fmt: skip
         axis.set_title(title)
         axis.set_xticks(range(len(speeds)), [f"{s:.4g}" for s in speeds])
         axis.grid(False, axis="x")
@@ -228,8 +257,20 @@ def work_plot(run: RunFolder) -> Plot | None:
         axis.margins(y=0.15)
         axis.axhline(0.0, color=GREY, lw=0.8)
     _label(axes, "speed [m/s]", "work [mJ]")
-    legend_above(figure, pair_of_handles(bars=True)[: 2 if law else 1])
+    legend_above(figure, [*pair_of_handles(bars=True)[: 2 if law else 1], *([bar_handle()] if bars else [])])
+    _stand_up(figure, axes, labels)
     return Plot.of("work", figure, words=_returned_words(driven) + spread_words(driven))
+
+
+def _stand_up(figure: Figure, axes: list[Axes], labels: list[Annotation]) -> None:
+    """Turn the numbers above bars upright where one is wider than its bar: it would lie on the next one."""
+    figure.draw_without_rendering()
+    wide = min(float(np.ptp(axis.transData.transform([(0.0, 0.0), (_BAR, 0.0)])[:, 0])) for axis in axes)
+    if max((label.get_window_extent().width for label in labels), default=0.0) > wide:
+        for label in labels:
+            label.set_rotation(90)
+        for axis in axes:
+            axis.margins(y=0.3)
 
 
 def _label(axes: list[Axes], x: str, y: str) -> None:

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from rigid.intervals import half_width
 from vis.page.folder import Run, RunFolder, Series
 from vis.page.numbers import quote
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, nice_below, sheet
 from vis.page.report import capital
 from vis.page.sentences import Sentences
-from vis.penetrate.plot_drag import RECORDED, Plot, above_surface, by_speed, has_model, pair_of_handles, spread_words
-from vis.penetrate.summary_parts import fit_error, joined, std_of, value_of
+from vis.penetrate.errors import half_of_fit, in_95
+from vis.penetrate.plot_drag import (
+    OVER_BEDS,
+    RECORDED,
+    Plot,
+    above_surface,
+    band_handle,
+    bar_handle,
+    by_speed,
+    has_model,
+    pair_of_handles,
+    spread_words,
+)
+from vis.penetrate.summary_parts import joined, std_of, value_of
 
 __all__ = ["drop_peaks_plot", "drops_plot", "set_down_plot", "spread_plot"]
 
@@ -89,17 +105,20 @@ def drop_peaks_plot(run: RunFolder) -> Plot | None:
     if not columns:
         return None
     figure, axes = new_panels(len(columns), height=2.6)
+    bars = False
     for axis, (key, title, unit, scale) in zip(axes, columns, strict=True):
         for prefix, colour, style in (("", BED, "o-"), ("model_", MODEL, "D--")):
-            mean, spread = by_speed(drops, speeds, prefix + key, scale)
-            axis.errorbar(speeds, mean, spread, fmt=style, color=colour, ms=5, mec="white", mew=0.8, capsize=3)
+            mean, half = by_speed(drops, speeds, prefix + key, scale)
+            half = np.full_like(half, np.nan) if prefix else half  # one law: its runs differ in where they start only
+            bars = bars or bool(np.isfinite(half).any())
+            axis.errorbar(speeds, mean, half, fmt=style, color=colour, ms=5, mec="white", mew=0.8, capsize=3)
         label, top = f"{title[0].lower()}{title[1:]} [{unit}]", 1.1 * axis.get_ylim()[1]
         axis.set(ylabel=label, xlabel="speed at touch-down [m/s]", ylim=(0.0, top))
         axis.margins(x=0.12)
         if len(speeds) <= 5:
             axis.set_xticks(speeds, [f"{s:.4g}" for s in speeds])
     law = any(value_of(r.quantities, "model_peak_force") is not None for r in drops)
-    legend_above(figure, pair_of_handles(markers=True)[: 2 if law else 1])
+    legend_above(figure, [*pair_of_handles(markers=True)[: 2 if law else 1], *([bar_handle()] if bars else [])])
     listed = joined([title[0].lower() + title[1:] for _, title, *_ in columns])
     return Plot.of("drop_peaks", figure, listed=capital(listed), spread=spread_words(drops))
 
@@ -125,30 +144,15 @@ def set_down_plot(run: RunFolder) -> Plot | None:
             dots = [handle("at rest", BED, marker="o", ls="", ms=5)]
             end_of = 1e3 * r.bed.time[-1], 1e3 * r.bed.depth[-1]
             axis.plot(*end_of, "o", color=BED, ms=5, mec="white", mew=0.8, zorder=5)
-    rests = []
-    for key, what, colour in (("sinkage", "bed", BED), ("model_sinkage", "spring-damper", MODEL)):
-        depths = [1e3 * n for r in sets if (n := value_of(r.quantities, key)) is not None]
-        if depths:
-            spread = float(np.std(depths, ddof=1)) if len(depths) > 1 else None
-            if what != "bed":  # one law here; between beds it is the fits that differ
-                std = std_of(run.result.get("quantities"), "sinkage_spring_damper")
-                spread = 1e3 * std if std else None
-            rests.append((float(np.mean(depths)), spread, what, colour))
     axis.invert_yaxis()
-    low, high = sorted(axis.get_ylim())
-    gap = 0.075 * (high - low)
-    last = -np.inf
-    for depth, spread, what, colour in sorted(rests, key=lambda rest: rest[0]):
-        axis.axhline(depth, color=colour, lw=0.8, alpha=0.6)
-        if spread:
-            axis.axhspan(depth - spread, depth + spread, color=colour, alpha=0.12, lw=0)
-        last = max(depth, last + gap)
-        number = quote(1e-3 * depth, None if spread is None else 1e-3 * spread, "m", significant=2)
-        axis.text(1.01, last, f"{what}: {number}", color=colour, va="center", transform=axis.get_yaxis_transform())
+    rests = _rests(run, sets)
+    _draw_rests(axis, rests)
     axis.set_xlim(0.0, 1e3 * end)
     axis.axhline(0.0, color=GREY, lw=0.8)
     axis.set(xlabel="time since the release [ms]", ylabel="depth of the tip [mm]")
-    legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots])
+    sure = any(half for _, half, *_ in rests)
+    bars = [bar_handle(f"bar and ±: {OVER_BEDS}")] if sure else []
+    legend_above(figure, [*pair_of_handles()[: 2 if has_model(sets) else 1], *dots, *bars])
     still = sum(value_of(r.quantities, "sinkage") is not None for r in sets)
     many = len(sets) > 1
     caption = f"Sinking under the load, {len(sets)} bed{'s' if many else ''}."
@@ -159,7 +163,9 @@ def set_down_plot(run: RunFolder) -> Plot | None:
             else (" It did not come to rest in the time that was followed.")
         )
     if rests:
-        caption += f" Right: the depth at rest{', ± the standard deviation between beds' if still > 1 else ''}."
+        caption += " Right: the depth at rest."
+    if sure:
+        caption += f" ±: half of the {OVER_BEDS}; a bar that leaves the picture is longer than shown."
     if has_model(sets):
         fitted = "all beds" if many else "this bed's drives and drops"
         caption += f" The spring-damper is the one fitted to {fitted}; where it rests is predicted, not fitted."
@@ -167,6 +173,44 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     if isinstance(departures, dict) and isinstance(departures.get("set_down"), str):
         caption += f" {departures['set_down']}"
     return Plot("set_down", "Set down under its load", caption, figure)
+
+
+_Rest = tuple[float, float | None, str, str]
+"""Depth at rest and half of its 95 % interval [mm], of what, its colour."""
+
+
+def _rests(run: RunFolder, sets: list[Run]) -> list[_Rest]:
+    """Where bed and law rest, the means over beds."""
+    found: list[_Rest] = []
+    for key, what, colour in (("sinkage", "bed", BED), ("model_sinkage", "spring-damper", MODEL)):
+        depths = [1e3 * n for r in sets if (n := value_of(r.quantities, key)) is not None]
+        if depths:
+            half = half_width(float(np.std(depths, ddof=1)), len(depths)) if len(depths) > 1 else None
+            if what != "bed":  # one law here; between beds it is the fits that differ
+                std = std_of(in_95(run.result), "sinkage_spring_damper")
+                half = 1e3 * std if std else None
+            found.append((float(np.mean(depths)), half, what, colour))
+    return found
+
+
+def _draw_rests(axis: Axes, rests: list[_Rest]) -> None:
+    """A line for each, its number beside it, and its interval a bar at the right edge, within the picture."""
+    for depth, _, _, colour in rests:
+        axis.axhline(depth, color=colour, lw=0.8, alpha=0.6)
+    ends = axis.get_ylim()
+    low, high = sorted(ends)
+    gap, last, place = 0.075 * (high - low), -np.inf, axis.get_yaxis_transform()
+    for number, (depth, half, what, colour) in enumerate(sorted(rests, key=lambda rest: rest[0])):
+        last = max(depth, last + gap)
+        words = quote(1e-3 * depth, None if half is None else 1e-3 * half, "m", significant=2)
+        axis.text(1.01, last, f"{what}: {words}", color=colour, va="center", transform=place)
+        if half:
+            x = 0.992 - 0.012 * number
+            span = [max(depth - half, low), min(depth + half, high)]
+            axis.plot([x, x], span, color=colour, lw=2.0, transform=place, solid_capstyle="butt")
+            caps = [end for end in (depth - half, depth + half) if low <= end <= high]
+            axis.plot([x] * len(caps), caps, "_", color=colour, ms=8, mew=1.5, transform=place)
+    axis.set_ylim(ends)
 
 
 def spread_plot(run: RunFolder) -> Plot | None:
@@ -180,9 +224,10 @@ def spread_plot(run: RunFolder) -> Plot | None:
     if not panels or len(fits) < 2 or not all(f.get("separates", True) for f in fits):
         return None
     figure, axes = new_panels(len(panels), height=2.5)
+    known = banded = False
     for axis, (key, title, unit) in zip(axes, panels, strict=True):
         rows = [
-            (f.get("seed", i + 1), n, fit_error(f, key))
+            (f.get("seed", i + 1), n, half_of_fit(run.result, f, key))
             for i, f in enumerate(fits)
             if (n := value_of(f, key)) is not None
         ]
@@ -195,6 +240,8 @@ def spread_plot(run: RunFolder) -> Plot | None:
         if spread:
             axis.axhspan(mean - spread, mean + spread, color=MODEL, alpha=0.15, lw=0)
         errors = [np.nan if error is None else error for *_, error in rows]
+        known = known or any(error is not None for *_, error in rows)
+        banded = banded or bool(spread)
         axis.errorbar(range(len(rows)), values, errors, fmt="o", color=MODEL, ms=7, mec="white", capsize=3)
         axis.set_xticks(range(len(rows)), [str(seed) for seed, *_ in rows])
         axis.set(xlim=(-0.6, len(rows) - 0.4), xlabel="seed of the bed")
@@ -205,8 +252,13 @@ def spread_plot(run: RunFolder) -> Plot | None:
             max(mean + reach, together + 0.2 * reach, *axis.get_ylim()),
         )
         axis.grid(False, axis="x")
-    known = any(fit_error(f, key) is not None for f in fits for key in ("stiffness", "damping"))
-    bars = "; bars: standard error of the fit" if known else "; how well each fit is determined is not known"
+    handles: list[Any] = [
+        handle("fit to one bed", MODEL, marker="o", ls="", ms=6),
+        handle("fit to all runs of all beds", INK, lw=1.0),
+    ]
+    handles += [band_handle("band: one standard deviation between beds", MODEL, 0.15)] if banded else []
+    legend_above(figure, [*handles, *([bar_handle("95 % interval of the fit")] if known else [])])
+    bars = "; bars: 95 % interval of the fit" if known else "; how well each fit is determined is not known"
     return Plot.of("spread", figure, bars=bars)
 
 

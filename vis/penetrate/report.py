@@ -165,6 +165,8 @@ def draw_amended(run: RunFolder) -> Figure | None:
         for axis, (title, runs) in zip(row, group, strict=False):
             axis.set_title(title)
             _draw_panel(axis, runs)
+            if axis is not row[0]:
+                axis.set_ylabel("")
         for axis in row[len(group) :]:
             axis.set_visible(False)
     handles = [handle("bed", BED, lw=1.0)] if any(r.bed is not None for r in run.runs) else []
@@ -237,4 +239,4 @@ def _draw_panel(axis: Axes, runs: Sequence[Run]) -> None:
         axis.set(xlabel="depth of the tip [mm]", ylabel="force of the ground [N]")
     else:
         axis.invert_yaxis()
-        axis.set(xlabel="time [ms], at most the first second", ylabel="depth of the tip [mm]")
+        axis.set(xlabel="time [ms]", ylabel="depth of the tip [mm]")

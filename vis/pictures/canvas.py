@@ -8,6 +8,7 @@ left corner.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from vis.page.numbers import quote
 from vis.page.plots import DASHED, INK, styled
 
 __all__ = [
-    "COLOURS", "FORCE", "HALO", "HEIGHT", "Page", "blank_page", "colour_top", "colour_values", "colourmap",
+    "BED_SPACE", "COLOURS", "FORCE", "HALO", "HEIGHT", "Page", "blank_page", "colour_top", "colour_values", "colourmap",
     "draw_force", "draw_measure", "drawn", "even_steps", "moved_since", "nice_above", "pixels",
 ]  # fmt: skip
 
@@ -51,6 +52,10 @@ _SHORTEST = 0.005
 """A shorter arrow is not drawn, in fractions of the picture."""
 _NUMBERS = 0.7
 """Where the lines of numbers begin on a page, over its width: to the right of the widest body."""
+_SMALL, _LETTERS = 9.5, 100
+"""Size of the small print [points], and how many letters a line of it has at most across a page."""
+BED_SPACE = (0.125, 0.865, 0.15, 0.78)
+"""Left, right, foot and head of a bed on a page: beside the scales, over the small print, below title and numbers."""
 _RIM = 0.01
 """Left free at the picture's edge by an arrow that is cut, in fractions of it."""
 Place = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -165,7 +170,8 @@ class Page:
             style: dict[str, Any] = {"va": "top", "color": "#444444", "linespacing": 1.35, "bbox": HALO}
             figure.text(_NUMBERS, 0.965, lines, fontsize=12.5, **style)
             if note:
-                figure.text(0.03, 0.018, note, fontsize=9.5, va="bottom", color="#666666")
+                foot = figure.text(0.03, 0.016, fill(note, _LETTERS), fontsize=_SMALL, va="bottom", color="#666666")
+                foot.set_linespacing(1.3)
             self.colour_bar(figure, (0.885, 0.2, 0.018, 0.5), 11.5).ax.tick_params(labelsize=11)
             return pixels(figure)
 
@@ -201,6 +207,9 @@ class Page:
             z = surface - i * step
             ends = line([(x, y, z), (x - 0.5 * offset, y, z)], color=INK, lw=1.0)
             axis.text(ends[1, 0] - 0.006, ends[1, 1], f"{1e3 * i * step:g}", ha="right", va="center", fontsize=11)
+            if not i:  # beside the bed: on it the words would hide grains
+                words = {"fontsize": 8.5, "ha": "right", "va": "bottom", "linespacing": 1.1}
+                axis.text(ends[0, 0], ends[0, 1] + 0.02, "undisturbed\nsurface", **words)
         middle = place(np.array([[x - 0.5 * offset, y, 0.5 * (floor + surface)]]))[0]
         style = {"ha": "center", "va": "center", "fontsize": 11.5}
         axis.text(middle[0] - 0.06, middle[1], "depth below the surface [mm]", rotation=90, **style)

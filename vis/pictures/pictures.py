@@ -66,7 +66,7 @@ _STILLS = 6
 _STILL_COSTS = 4.0  # in frames of the animation, as measured in software
 _ANIMATED = 48
 _WIDE = 22  # letters of a title that reach the shaft of a foot as wide as a quarter of the bed
-_TILTS = (0.06, 0.40)
+_TILTS = (0.06, 0.15)
 """Least and greatest slope of the view down on a bed [1]."""
 
 

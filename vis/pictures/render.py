@@ -59,11 +59,13 @@ class PictureJob(TypedDict):
     views: list[View]
 
 
-CUT = "bed and body are cut along the mid-plane of the body; dashed: the undisturbed surface"
+CUT = """bed and body are cut along the mid-plane of the body; dashed: the undisturbed surface; grains above the \
+dashed line lie behind the cut or were raised"""
 ARROW = "red: the force on the body"
 _LONG = 0.25
 """Length of the longest arrow, over the height of the picture."""
-_SLAB = "up to four diameters behind the mid-plane of the body, the farther the darker; dashed: the undisturbed surface"
+_SLAB = """up to four diameters behind the mid-plane of the body, the farther the darker; dashed: the undisturbed \
+surface"""
 """In the small print of a picture with OpenGL, and of one without."""
 _GIF_LIMIT = 5_500_000  # bytes
 _KEPT = tuple(ImageColor.getrgb(colour)[:3] for colour in ("#ffffff", *STATES.values(), str(FORCE["color"])))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from vis.page.plots import Array
+from vis.pictures.canvas import BED_SPACE
 from vis.pictures.frames import Frame
 
 __all__ = ["FLOOR", "GROUND", "METAL", "OPACITY", "PARTS", "Eye", "Rendered", "Scene", "Stage"]
@@ -179,7 +180,7 @@ class Scene(Rendered):
         # From near: the shading of gaps stripes what is flat where the camera is far away (`Stage.render`).
         camera.clipping_range = (0.1 * reach, 2.5 * reach)
         corners = [(x, y, z) for x in (low[0], high[0]) for y in (cut, high[1]) for z in (low[2], high[2])]
-        self._fit(np.array([*corners, (centre[0], cut, high[2] + 0.55 * height)]))
+        self._fit(np.array(corners))
 
     def render(self, frame: Frame, colours: Array) -> NDArray[np.uint8]:
         """Image of a frame, shape (height, width, 3).
@@ -209,8 +210,8 @@ class Scene(Rendered):
         return 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
 
     def _fit(self, points: Array) -> None:
-        """Zoom and shift so that these points fill the page between the depth scale and the colour bar."""
-        left, right, foot, head = 0.125, 0.865, 0.12, 0.90
+        """Zoom and shift so that these points fill the space of a bed on the page."""
+        left, right, foot, head = BED_SPACE
         camera = self._plotter.camera
         low, high = (edge(self.place(points), axis=0) for edge in (np.min, np.max))
         zoom = min((right - left) / (high[0] - low[0]), (head - foot) / (high[1] - low[1]))

@@ -14,6 +14,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from vis.page.plots import Array
+from vis.pictures.canvas import BED_SPACE
 from vis.pictures.frames import Frame
 from vis.pictures.scene import FLOOR, GROUND, METAL, PARTS, Eye
 
@@ -35,10 +36,10 @@ class Section:
     def __init__(
         self, size: tuple[int, int], low: Array, high: Array, *, cut: float, radius: float, tilt: float = 0.0
     ) -> None:
-        left, right, foot, head = 0.125, 0.865, 0.13, 0.90
+        left, right, foot, head = BED_SPACE
         self._low, self._high = low, high
         self._cut, self._depth = cut, SLAB * radius
-        height = 1.55 * (high[2] - low[2])
+        height = high[2] - low[2]
         aspect = size[0] / size[1]
         across = min((right - left) / (high[0] - low[0]), (head - foot) / (height * aspect))
         self._scale = np.array([across, across * aspect])  # page fractions per metre

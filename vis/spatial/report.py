@@ -121,7 +121,7 @@ def pair(left: str, right: str) -> tuple[Figure, Axes, Axes]:
 
 
 def _draw_path(path: Columns) -> Figure:
-    drawing, way, speed = pair("displacement of the centre of mass [mm]", "velocity [m/s]")
+    drawing, way, speed = pair("displacement of the centre [mm]", "velocity [m/s]")
     for axis, style in AXIS_LINES.items():
         way.plot(path["t_s"], 1e3 * (path[f"{axis}_m"] - path[f"{axis}_m"][0]), label=axis, **style)
         speed.plot(path["t_s"], path[f"v{axis}_m_s"], **style)

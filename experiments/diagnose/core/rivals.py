@@ -100,7 +100,7 @@ class Rival:
 def compare(effect: str, best: Hypothesis, other: Hypothesis, rest: Fit) -> Rival:
     """`other`, which has `effect` in the place of the best's first one, against `best`; `rest` has neither."""
     names = [p.name for p in best.fit.model.parameters]
-    shared = [p for p in rest.model.parameters if p.name in names]
+    shared = [p for p in rest.model.parameters if p.name in names and p.name in other.fit.values]  # forms may differ
     columns = [names.index(p.name) for p in shared]
     weights = np.array([0.0 if math.isinf(p.std) else 1 / p.std for p in shared])
     scales = np.array([p.scale for p in shared])

@@ -180,3 +180,18 @@ def test_a_form_begins_where_another_of_its_effect_that_shares_its_scales_has_en
     assert best.forms == (forms["adhesion:held by depth"],)
     assert excess(best.fit) < 0.1 * excess(found)
     assert best.fit.values["adhesion.pull_growth"] == pytest.approx(0.5, abs=0.1)
+
+
+def test_effects_are_compared_where_one_kept_beside_them_has_another_form():
+    """The hardening's number is one of its form only, and counts in neither signature."""
+    base, friction, drag = fitted((0.01, 0.1))
+    forms = {form.id: form for form in base.model.problem.forms}
+    power, cubic = forms["depth-hardening:power"], forms["depth-hardening:cubic"]
+
+    def beside(own, kept):
+        found = fit(base.model.with_forms([*own, kept]), {**base.values, **kept.starts[0]}, rounds=2)
+        return Hypothesis(found, score(found))
+
+    one, other, rest = beside(friction.forms, power), beside(drag.forms, cubic), beside((), power).fit
+    rival = compare("inertial-drag", one, other, rest)
+    assert math.isfinite(rival.angle) and rival.distance > 0
