@@ -8,7 +8,7 @@ from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
-from vis.page.answer import answer
+from vis.page.answer import answer, without_unknown
 from vis.page.numbers import foldable
 from vis.page.page import Tile
 
@@ -34,6 +34,8 @@ def headline_of_tiles(tiles: Sequence[Tile], result: Mapping[str, Any]) -> Headl
     if not tiles:
         return None
     table, *notes = answer(tiles, result)
+    if any(tile.beside for tile in tiles):
+        table, notes = without_unknown(table, notes)
     end = None if len(table.head) == 3 and any(row[-1] for row in table.rows) else -1
     rows = tuple(tuple(foldable(cell) for cell in row[:end]) for row in table.rows)
     warnings, said = result.get("warnings", []), result.get("departures", {}).get("sentences", [])
