@@ -134,9 +134,10 @@ def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> i
         _show_headline(headline, console)
     else:
         _show_all(result, console)
-    if headline is not None and headline.left:
+    if headline is not None and (headline.left or headline.more):
         rest = "in the report, or with" if report.exists() else "with"
-        print(f"{headline.left} more findings and all numbers: {rest} `hedgebed resume {folder.path} --verbose`")
+        what = f"{headline.left} more findings and all numbers" if headline.left else "tables and all numbers"
+        print(f"{what}: {rest} `hedgebed resume {folder.path} --verbose`")
     print(f"report: {report}" if report.exists() else f"folder: {folder.path}")
     return DONE
 

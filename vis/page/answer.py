@@ -46,8 +46,11 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     on_grains = kind_of(result) in _ON_GRAINS
     errors, keys = _errors(result, on_grains)
     shown = [k for k in range(len(errors)) if on_grains or any(row[2 + k] for row in rows)]
-    beside = [say("beside")] if any(tile.beside for tile in tiles) else []
-    head = ("", "value", *(errors[k] for k in shown), *beside, "")
+    compared = result.get("experiment") == "compare"
+    beside = [say("difference" if compared else "beside")] if any(tile.beside for tile in tiles) else []
+    end = result.get("compared_over")
+    values = say("two_values") + (f", over {end:.3g}\N{NO-BREAK SPACE}s" if end is not None else "") if compared else "value"
+    head = ("", values, *(errors[k] for k in shown), *beside, "")
     cells = [
         (*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), *([tile.beside] if beside else []), row[-1])
         for tile, row in zip(tiles, rows, strict=True)
@@ -71,7 +74,9 @@ def without_unknown(numbers: Block, notes: Sequence[Block]) -> tuple[Block, list
     kept = [k for k in columns if k not in empty]
     head, *rows = (tuple(row[k] for k in kept) for row in (numbers.head, *numbers.rows))
     names = "; ".join(numbers.head[k] for k in empty)
-    return replace(numbers, head=head, rows=tuple(rows)), [text(say("unknown", names=names), small=True), *notes]
+    dashes = any("\N{EN DASH}" in row for row in rows)
+    left = [note for note in notes if dashes or not note.text.startswith("\N{EN DASH}")]
+    return replace(numbers, head=head, rows=tuple(rows)), [text(say("unknown", names=names), small=True), *left]
 
 
 def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], list[str]]:
@@ -86,6 +91,8 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
         keys = [key for key, so in told.items() if so]
     else:
         keys = ["empty_cells"] if on_grains else []
+    if experiment == "diagnose":
+        return (say("of_fit"), *_ERRORS[1:]), keys
     if experiment == "ground":
         return (say("of_std"), *_ERRORS[1:]), keys
     if "ground_file" in result or (experiment == "penetrate" and result.get("ground", "bed") != "bed"):

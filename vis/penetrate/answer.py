@@ -34,7 +34,7 @@ def answer_tiles(result: Entries) -> list[Tile]:
 def grains_of(result: Entries) -> str:
     """What pushes back: the name of the material, where it is known."""
     name = str(words.mapping_of(result.get("bed")).get("material") or "bed")
-    return name if name.startswith("jsc-") else f"the {name}"
+    return name if "-" in name else f"the {name}"
 
 
 def largest_force(result: Entries) -> tuple[str, str, str] | None:
