@@ -49,7 +49,9 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     compared = result.get("experiment") == "compare"
     beside = [say("difference" if compared else "beside")] if any(tile.beside for tile in tiles) else []
     end = result.get("compared_over")
-    values = say("two_values") + (f", over {end:.3g}\N{NO-BREAK SPACE}s" if end is not None else "") if compared else "value"
+    values = (
+        say("two_values") + (f", over {end:.3g}\N{NO-BREAK SPACE}s" if end is not None else "") if compared else "value"
+    )
     head = ("", values, *(errors[k] for k in shown), *beside, "")
     cells = [
         (*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), *([tile.beside] if beside else []), row[-1])
