@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
 
 from coupling import SpatialRun
 from experiments.platform.law_spread import (
@@ -16,6 +15,7 @@ from experiments.platform.law_spread import (
 )
 from experiments.platform.settled import Number
 from experiments.platform.surfaces import find_surface
+from experiments.runs.types import Json
 
 from .result import quantities_of
 from .trial import SpatialPlan
@@ -34,7 +34,7 @@ def uncertain_in(plan: SpatialPlan) -> list[Uncertain]:
 
 def add_spread(
     plan: SpatialPlan,
-    result: dict[str, Any],
+    result: Json,
     run_on: Callable[[SpatialPlan], SpatialRun],
     *,
     answer_of: Callable[[SpatialRun], Answer] | None = None,

@@ -67,7 +67,12 @@ def test_the_report_of_an_unknown_has_every_part_and_names_columns_in_words(tmp_
 def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left(tmp_path):
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
-    for part in ("after, with the scatter of replicates", "<td>1.5", "replicates&#39; scatter added", "Certain: nothing."):
+    for part in (
+        "after, with the scatter of replicates",
+        "<td>1.5",
+        "replicates&#39; scatter added",
+        "Certain: nothing.",
+    ):
         assert part in page or part.replace("&#39;", "'") in page
     channel = read_channel(tmp_path / "series" / "a.force.csv")
     assert channel.scatter is not None and set(channel.scatter) == {0.2}
