@@ -61,8 +61,12 @@ def _list(
     *,
     json: _Json = False,
 ) -> int:
-    """List the kept beds: those in the folder HEDGEBED_BEDS, or in another one."""
+    """List the beds that you named: those in the folder HEDGEBED_BEDS, or in another one.
+
+    Beds that other commands prepare are kept in a cache, without names.
+    """
     from dem.prepare.bedfile import bed_shelf, list_beds
+    from dem.prepare.code import cache_folder
 
     where = bed_shelf() if folder is None else folder
     with refusing():
@@ -78,7 +82,9 @@ def _list(
         table.add_row(*(_cells(bed) if "problem" not in bed else (bed["name"], *[""] * 6, bed["problem"])))
     Console(file=sys.stdout, highlight=False).print(table, markup=False)
     if not beds:
-        say("none yet: `hedgebed bed make --name NAME` puts one there")
+        say("none here yet: `hedgebed bed make --name NAME` puts one into the folder HEDGEBED_BEDS")
+    if folder is None and (count := len(list((cache_folder() / "beds").glob("*.npz")))):
+        say(f"{count} more without a name, which commands prepared and use again: {cache_folder() / 'beds'}")
     return 0
 
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from cyclopts import App, CycloptsError, Group, Parameter
 
 from experiments.cli.benching import spelled_out
+from experiments.cli.grounds import on_another_ground
 from experiments.cli.options import as_typed, option_of, reserved_option, with_parameters
 from experiments.cli.runs import BAD_INPUT, DONE, FAILED, STOPPED, carry_out, redraw_old_report, show_folder
 from experiments.runs import registry
@@ -118,12 +119,13 @@ def _experiment_command(experiment: Experiment) -> Callable[..., int]:
             layers = [read_case(registry.CASES / preset.case) for preset in presets if given.pop(preset.option, False)]
             layers += [read_case(find_case(case, registry.CASES, below))] if case is not None else []
             typed = Layer(None, as_typed(given, fields))
+            layers, left_out = on_another_ground(settings_class, layers, typed)
             settings = settings_from(settings_class, [*layers, typed])
             with stdout_to_stderr():
                 experiment.check(settings)
                 code = experiment.code()
             folder = RunFolder.create(out or fresh_path(experiment.name), experiment.name, settings, code=code)
-            for text in gravities_told(settings, [*layers, typed]):
+            for text in [*left_out, *gravities_told(settings, [*layers, typed])]:
                 say(text)
 
         def work(progress: Progress) -> Result:

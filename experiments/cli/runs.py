@@ -134,9 +134,10 @@ def show_folder(folder: RunFolder, *, as_json: bool, verbose: bool = False) -> i
         _show_headline(headline, console)
     else:
         _show_all(result, console)
-    if headline is not None and headline.left:
+    if headline is not None and (headline.left or headline.more):
         rest = "in the report, or with" if report.exists() else "with"
-        print(f"{headline.left} more findings and all numbers: {rest} `hedgebed resume {folder.path} --verbose`")
+        what = f"{headline.left} more findings and all numbers" if headline.left else "tables and all numbers"
+        print(f"{what}: {rest} `hedgebed resume {folder.path} --verbose`")
     print(f"report: {report}" if report.exists() else f"folder: {folder.path}")
     return DONE
 
@@ -163,6 +164,8 @@ def _interval(ends: Sequence[float] | None) -> str:
 
 _NARROW = 24
 """Characters of a first column that is not broken into lines."""
+_HEAD = 9
+"""Characters of a heading that stays on one line above narrower cells."""
 
 
 def _unit(unit: str, value: Any, std: Any = None) -> str:
@@ -179,9 +182,10 @@ def _show_headline(headline: Headline, console: Console) -> None:
     """A short table, what to be warned of, and the findings that matter most."""
     table = Table(box=None, pad_edge=False)
     for place, name in enumerate(headline.head):
-        words = place > 0 and max((len(row[place]) for row in headline.rows), default=0) > _NARROW
-        right = place > 0 and not words
-        table.add_column(name, justify="right" if right else "left", no_wrap=right)
+        widest = max((len(row[place]) for row in headline.rows), default=0)
+        right = place > 0 and widest <= _NARROW
+        heading = "\n".join(textwrap.wrap(name, max(widest, _HEAD), break_on_hyphens=False, break_long_words=False))
+        table.add_column(heading, justify="right" if right else "left", no_wrap=right)
     for row in headline.rows:
         table.add_row(*map(Text, row))
     console.print(table, markup=False)

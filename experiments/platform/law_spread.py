@@ -9,6 +9,7 @@ The error of the law itself is not in it.
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from experiments.runs.types import Json
 from rigid.ground_file import GroundFile
@@ -20,7 +21,7 @@ from .settled import Number
 from .surfaces import Surface
 
 __all__ = [
-    "Answer", "Uncertain", "moved", "spread_entries", "spread_of_law", "spread_of_surface", "uncertain_of",
+    "Answer", "Seen", "Uncertain", "moved", "spread_entries", "spread_of_law", "spread_of_surface", "uncertain_of",
     "with_spread",
 ]  # fmt: skip
 
@@ -58,6 +59,27 @@ def spread_of_law(fitted: GroundFile, answer: Callable[[GroundFile], Answer], be
         if (low := lower.values[name]) != (high := higher.values[name])
     )
     return _spread(best, moves)
+
+
+class Seen:
+    """A function of moved parameters that remembers its answers."""
+
+    def __init__(self, answer: Callable[..., Answer]) -> None:
+        self._answer = answer
+        self._answers: list[Answer] = []
+
+    def __call__(self, *moved: Any) -> Answer:
+        found = self._answer(*moved)
+        self._answers.append(found)
+        return found
+
+    def absent(self, best: Answer) -> list[str]:
+        """The numbers of `best` that there are, but not on some moved law, such as the angle of a first hop."""
+        return [
+            name
+            for name, value in best.items()
+            if value is not None and any(name in answer and answer[name] is None for answer in self._answers)
+        ]
 
 
 def _spread(best: Answer, moves: Iterable[tuple[float, Answer, Answer]]) -> dict[str, float | None]:
@@ -131,7 +153,7 @@ def spread_entries(
     if not law:
         symbols = [_SYMBOLS[name] for name in parameters or _SYMBOLS]
         of = say("of_surface", names=" and ".join(symbols), surface=surface)
-    entries = {"parameters": list(parameters)}
+    entries: Json = {"parameters": list(parameters)}
     if not parameters:
         return entries, say("no_spread", of=of)
     told = [

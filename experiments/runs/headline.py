@@ -8,7 +8,8 @@ from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
-from vis.page.answer import answer
+from vis.page.answer import answer, without_unknown
+from vis.page.limits import kind_of
 from vis.page.numbers import foldable
 from vis.page.page import Tile
 
@@ -26,7 +27,10 @@ def headline_of(experiment: Experiment, result: Mapping[str, Any]) -> Headline |
     if not experiment.answer:
         return found
     shown = headline_of_tiles(found, result)
-    return replace(shown, tables=tuple(result.get("tables", ()))) if shown is not None and experiment.tables else shown
+    tables = tuple(result.get("tables", ()))
+    if shown is None or not tables:
+        return shown
+    return replace(shown, tables=tables) if experiment.tables else replace(shown, more=True)
 
 
 def headline_of_tiles(tiles: Sequence[Tile], result: Mapping[str, Any]) -> Headline | None:
@@ -34,11 +38,14 @@ def headline_of_tiles(tiles: Sequence[Tile], result: Mapping[str, Any]) -> Headl
     if not tiles:
         return None
     table, *notes = answer(tiles, result)
+    if any(tile.beside for tile in tiles) or kind_of(result) == "bed":
+        table, notes = without_unknown(table, notes)
     end = None if len(table.head) == 3 and any(row[-1] for row in table.rows) else -1
     rows = tuple(tuple(foldable(cell) for cell in row[:end]) for row in table.rows)
     warnings, said = result.get("warnings", []), result.get("departures", {}).get("sentences", [])
     shown = said[: findings_shown(warnings)]
+    first = [*result.get("summary", ()), *shown]
     return Headline(
-        tuple(table.head[:end]), rows, tuple(map(foldable, warnings)), tuple(map(foldable, shown)),
+        tuple(table.head[:end]), rows, tuple(map(foldable, warnings)), tuple(map(foldable, first)),
         len(said) - len(shown), tuple(foldable(note.text) for note in notes),
     )  # fmt: skip

@@ -65,6 +65,7 @@ class Headline:
     left: int  # findings that are left to the report
     notes: tuple[str, ...] = ()  # what the columns of the table mean
     tables: tuple[Mapping[str, Any], ...] = ()  # further ones of the result
+    more: bool = False  # whether tables are left to the report
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from rigid.spatial.quaternions import from_turn, to_matrix
 from . import say
 from .result import SpatialFrames, conclude, sinkage_start, write_series_of
 from .settings import SpatialSettings
+from .spread import add_spread, uncertain_in
 from .trial import SpatialPlan
 
 __all__ = ["SpatialFollowed", "SpatialForecast", "SpatialOnBed"]
@@ -84,9 +85,14 @@ class SpatialFollowed(Followed[SpatialRun]):
         """Every default, and the warnings."""
         for sentence in self.plan.announcement():
             progress.message(sentence)
+        if self.settings.ground != "bed" and (count := 2 * len(uncertain_in(self.plan))):
+            progress.message(say("moved_trials", count=count))
 
     def conclude(self, run: SpatialRun, folder: Path) -> Result:
-        return conclude(self.settings, self.plan, run, folder)
+        def spread(result: Json) -> None:
+            add_spread(self.plan, result, lambda plan: SpatialFollowed(self.settings, plan).run_on_law())
+
+        return conclude(self.settings, self.plan, run, folder, spread=spread)
 
 
 @dataclass(frozen=True, kw_only=True)

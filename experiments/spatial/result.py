@@ -1,6 +1,7 @@
 """What a run of a platform in space leaves: its frames, its series and its result."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -125,8 +126,12 @@ def conclude(
     *,
     beside: SpatialRun | None = None,
     softening: Softening | None = None,
+    spread: Callable[[Json], None] | None = None,
 ) -> Result:
-    """The result, its series written. On grains `beside` is the trial on the spring-damper."""
+    """The result, its series written. On grains `beside` is the trial on the spring-damper.
+
+    `spread` adds what the errors of the law change.
+    """
     write_series_of(run, folder)
     numbers, trial, in_rig = quantities_of(run), plan.trial, plan.trial.counterweight > 0
     where, what = "rig" if in_rig else "free", "bed of " if settings.ground == "bed" else ""
@@ -142,6 +147,8 @@ def conclude(
         "macro_step": run.master.macro_step, "steps": run.master.count,
         "lowering_time": run.placing_steps * run.master.macro_step,
     }  # fmt: skip
+    if spread is not None:
+        spread(result)
     if softening is not None and beside is not None and isinstance(run.ground, BedGround):
         write_series(folder / "series" / "spring-damper.csv", path_columns(beside))
         bed = run.ground.bed

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.grains.settings import GrainsSettings
+from experiments.grains.settings import HIDDEN, GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
 from rigid.checks import nearest
 from vis.page.sentences import Sentences
@@ -31,6 +31,8 @@ class SpatialSettings(GrainsSettings):
     """Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; brick if not given."""
     ground: str = "spring-damper"
     """Law of the force of the ground: spring-damper, or bed (of grains)."""
+    ranks: int | None = Field(None, json_schema_extra=HIDDEN)
+    """Not in space: belongs to ground lammps, whose grains move bodies in a plane only [1]."""
     stiffness: Positive | None = None
     """Stiffness K under one spike [N/m]; if not given, half of the surface's, which is for a row of two."""
     damping: NotNegative | None = None
@@ -95,6 +97,8 @@ class SpatialSettings(GrainsSettings):
         return self
 
     def _known_ground(self) -> str | None:
+        if self.ranks is not None:
+            return say("ranks_in_space", s=self)
         if self.ground in GROUNDS:
             return None
         if self.ground == "lammps":

@@ -13,6 +13,7 @@ from experiments.campaign.files import keep_model
 from experiments.platform.ground_file import naming_gravity, with_kept_ground
 from experiments.platform.law_spread import (
     Answer,
+    Seen,
     moved,
     spread_entries,
     spread_of_law,
@@ -126,12 +127,14 @@ def _add_spread(
         return
     if fitted is not None:
         parameters = [name for name, _, _ in moved(fitted)]
-        stds, law = spread_of_law(fitted, of_file, depends), "file"
+        seen = Seen(of_file)
+        stds, law = spread_of_law(fitted, seen, depends), "file"
     else:
         uncertain = uncertain_of(plan.numbers, find_surface(surface)) if surface in surface_names() else []
         parameters = [one.name for one in uncertain]
+        seen = Seen(of_surface)
         stds, law = (
-            spread_of_surface(uncertain, of_surface, depends),
+            spread_of_surface(uncertain, seen, depends),
             "" if plan.trial.ground is None else settings.ground,
         )
     if fitted is not None or parameters:
@@ -139,6 +142,7 @@ def _add_spread(
     result["law_spread"], sentence = spread_entries(
         result["quantities"], _SPREAD_OF, surface=surface, law=law, parameters=parameters
     )
+    result["law_spread"]["absent"] = seen.absent(depends)
     result["departures"]["sentences"].append(sentence)
 
 

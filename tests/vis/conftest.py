@@ -139,6 +139,7 @@ def synthetic_run(folder, frames=6):
                 "work_in": value(work(depth, bed, phase, "in"), None, "J"),
                 "work_out": value(work(depth, bed, phase, "out"), None, "J"),
                 "peak_force": value(float(bed.max()), None, "N"),
+                "max_depth": value(float(depth.max()), None, "m"),
                 "drag_gap": value(gap),
                 "model_work_in": value(work(depth, model, phase, "in"), None, "J"),
                 "model_work_out": value(work(depth, model, phase, "out"), None, "J"),

@@ -10,6 +10,7 @@ import pytest
 
 from experiments.runs.headline import headline_of, headline_of_tiles
 from experiments.runs.registry import EXPERIMENTS
+from rigid.result import read_result
 from vis.page.answer import MOST_ROWS, answer, write_page
 from vis.page.page import Page, Section, Tile, listing, text
 from vis.report import write_report
@@ -186,3 +187,57 @@ def test_the_terminal_of_a_tumble_has_the_rows_and_the_note_of_its_report():
 def test_every_answer_in_the_registry_is_there(name):
     module, _, function = EXPERIMENTS[name].answer.partition(":")
     assert callable(getattr(import_module(module), function)) and not EXPERIMENTS[name].headline
+
+
+KEPT = Path(__file__).parents[2] / "docs" / "results"
+ANSWERED = (
+    "validate", "diagnose-grains", "diagnose-tumbles-grains-3mm", "bed-make-jsc-1a-dense", "bed-test-repose",
+    "bed-test-cone", "bed-test-plates", "bed-test-cut-jsc-1a-loose", "bed-test-shear-sand-dense", "calibrate-sand",
+    "calibrate-jsc-1a-loose", "converge-flagship",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ANSWERED)
+def test_a_terminal_ends_with_words_and_not_with_keys(name):
+    """Every kept result that is no motion: at most six rows of its page, none of which is a key of result.json."""
+    result = read_result(KEPT / name / "result.json")
+    shown = headline_of(EXPERIMENTS[result["experiment"]], result)
+    assert 0 < len(shown.rows) <= MOST_ROWS and shown.more == bool(result.get("tables"))
+    for row in shown.rows:
+        assert row[0][0].isupper() and not any("_" in cell for cell in row)
+    assert shown.sentences[: len(result.get("summary", []))] == tuple(result.get("summary", []))
+
+
+def test_errors_that_no_row_of_a_bed_knows_are_named_below_the_table():
+    result = read_result(KEPT / "bed-test-repose" / "result.json")
+    shown = headline_of(EXPERIMENTS["bed test repose"], result)
+    assert shown.rows[0] == ("Angle of repose", "31.2°", "1.5°")
+    assert shown.head == ("", "value", "± chance")
+    assert all(name in shown.notes[0] for name in ("grain size", "softness"))
+
+
+def test_a_fitted_number_has_its_standard_error_or_why_it_has_none():
+    result = read_result(KEPT / "diagnose-grains" / "result.json")
+    shown = headline_of(EXPERIMENTS["diagnose"], result)
+    rows = {row[0]: row[1:] for row in shown.rows}
+    assert "standard error" in shown.head[2]
+    assert rows["Crater share (plastic-sinkage)"] == ("0.955", "0.019")
+    assert rows["Crater bend (plastic-sinkage)"] == ("2.50", "end of range")
+    assert rows["Stiffness"] == ("39 N/m", "2 N/m")
+
+
+def test_a_comparison_has_both_numbers_their_spreads_and_the_difference():
+    row = {"unit": "rad", "first": math.radians(10), "second": math.radians(-17), "difference": math.radians(-27)}
+    compared = [
+        row | {"name": "trajectory_angle", "relative": None, "first_std": math.radians(9), "second_std": None},
+        {"name": "max_speed", "unit": "m/s", "first": 0.1, "second": 0.2, "difference": 0.1, "relative": 1.0},
+    ]
+    result = {"experiment": "compare", "compared": compared, "quantities": {"compared": {"value": 2}}}
+    shown = headline_of(EXPERIMENTS["compare"], result)
+    assert shown.head[1:] == ("first | second", "± chance", "difference")
+    assert shown.rows[0] == ("Trajectory angle", "10° | −17°", "9° | –", "−27°")
+    assert [cell.split() for cell in shown.rows[1][1:]] == [
+        ["0.1", "m/s", "|", "0.2", "m/s"],
+        ["–"],
+        ["+0.1", "m/s", "(+100", "%)"],
+    ]

@@ -44,6 +44,11 @@ def write_folder(folder, *, trials: dict[str, float], scatter: float | None = No
         said["gap_with_scatter"] = {stage: {"fit": 2.0, "held_out": 1.5} for stage in ("before", "after")}
     result = {"title": "Something is missing", "summary": ["Certain: nothing."], "version": "0", "warnings": ["a gap"],
               "departures": {"sentences": ["The base model fails most in in."]}}  # fmt: skip
+    gaps = {"gap": said["gap"]} | ({"gap_with_scatter": said["gap_with_scatter"]} if scatter is not None else {})
+    result["quantities"] = {
+        f"{name}_{stage}_{part}": {"value": gap[stage][part], "std": None, "unit": "1"}
+        for name, gap in gaps.items() for stage in ("before", "after") for part in ("fit", "held_out")
+    }  # fmt: skip
     (folder / "diagnosis.json").write_text(json.dumps(said))
     (folder / "result.json").write_text(json.dumps(result))
 
@@ -62,7 +67,12 @@ def test_the_report_of_an_unknown_has_every_part_and_names_columns_in_words(tmp_
 def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left(tmp_path):
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
-    for part in ("1.5 with the scatter of replicates", "replicates&#39; scatter added", "Certain: nothing."):
+    for part in (
+        "after, with the scatter of replicates",
+        "<td>1.5",
+        "replicates&#39; scatter added",
+        "Certain: nothing.",
+    ):
         assert part in page or part.replace("&#39;", "'") in page
     channel = read_channel(tmp_path / "series" / "a.force.csv")
     assert channel.scatter is not None and set(channel.scatter) == {0.2}

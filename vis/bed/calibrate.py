@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -14,7 +13,7 @@ from vis.page.page import Block, Section, Tile, code, text
 from vis.page.plots import BED, GREY, INK, MODEL, Array, handle, legend_above, new_panels, smooth_ratio
 from vis.page.report import Report, Result, again, report_of, tables
 
-__all__ = ["write_calibration_report"]
+__all__ = ["answer_tiles", "write_calibration_report"]
 
 _COLOURS = (BED, MODEL, INK, GREY)
 
@@ -22,23 +21,14 @@ _COLOURS = (BED, MODEL, INK, GREY)
 @report_of(named=True)
 def write_calibration_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a calibration, and return the report."""
-    result, quantities = report.result, report.result["quantities"]
-    free = tomllib.loads((report.folder / "run.toml").read_text(encoding="utf-8"))["settings"]["free"]
+    result = report.result
     drawn = [
-        *(_response(report, key) for key in free),
+        *(_response(report, key) for key in result["curves"]),
         _residuals(report),
         *_tests(report),
         *_slopes(report),
         *_faces(report),
     ]
-
-    def tile(name: str, note: str) -> Tile:
-        entry = quantities[name]
-        unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
-        return Tile(name.replace("_", " ").capitalize(), quoted(entry, 1.0, unit), note)
-
-    tiles = [tile(key, quantities[key]["note"]) for key in free]
-    tiles += [tile(one["name"], one["verdict"]) for one in result["figures"]]
     material = (report.folder / "material.toml").read_text(encoding="utf-8")
     sections = [
         Section("", tables(result) + drawn),
@@ -46,7 +36,19 @@ def write_calibration_report(report: Report) -> Path:
         Section("The material", [text("material.toml, for --material:"), code(material)]),
         again("hedgebed bed calibrate run.toml"),
     ]
-    return report.write(sections, lead=["bed calibrate"], tiles=tiles[:MOST_ROWS])
+    return report.write(sections, lead=["bed calibrate"], tiles=answer_tiles(result))
+
+
+def answer_tiles(result: Result) -> list[Tile]:
+    """The fitted parameters, then the figures that they meet, six rows at most."""
+    quantities, figures = result["quantities"], {one["name"]: one for one in result["figures"]}
+    tiles = []
+    for name in sorted(quantities, key=lambda name: name in figures):
+        entry = quantities[name]
+        unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
+        note = figures[name]["verdict"] if name in figures else entry["note"]
+        tiles.append(Tile(name.replace("_", " ").capitalize(), quoted(entry, 1.0, unit), note))
+    return tiles[:MOST_ROWS]
 
 
 def _axis_words(entry: Result) -> str:

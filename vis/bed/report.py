@@ -8,33 +8,22 @@ from vis.page.folder import surface_words
 from vis.page.numbers import short
 from vis.page.page import Block, Section, Tile, figure, listing
 from vis.page.plots import DASHED, handle, legend_above, new_panels, shades
-from vis.page.report import Report, report_of, tables
+from vis.page.report import Report, Result, report_of, tables
 from vis.pictures.canvas import colour_values, nice_above
 from vis.pictures.frames import grains_box, read_frames
 from vis.pictures.pictures import carry_out
 from vis.pictures.render import PictureJob, View, run_job
 from vis.view.page import report_scene
 
-__all__ = ["write_bed_report"]
+__all__ = ["answer_tiles", "write_bed_report"]
 
 
 @report_of(named=True)
 def write_bed_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a prepared bed, and return the report."""
-    result, quantities = report.result, report.result["quantities"]
+    result = report.result
     drawn = [_profiles(report), *_passes(report)]
     picture, note = _picture(report)
-
-    def show(name: str, scale: float = 1.0, unit: str = "") -> str:
-        value = quantities[name]["value"]
-        return "–" if value is None else f"{short(scale * value, 4)} {unit}".strip()
-
-    tiles = [
-        Tile("Packing fraction", show("packing_fraction"), f"from {show('loosest')} to {show('densest')} on the way"),
-        Tile("Contacts of a grain", show("coordination_number"), f"{quantities['grain_count']['value']} grains"),
-        Tile("Surface", show("surface", 1e3, "mm"), "above the floor"),
-        Tile("Horizontal over vertical stress", show("pressure_ratio"), "away from floor and surface"),
-    ]
     criteria = [f"{stage['stage']}: {stage['criterion']}." for stage in result["stages"]]
     command = result["experiment"]
     sections = [
@@ -44,7 +33,23 @@ def write_bed_report(report: Report) -> Path:
         report.again(f"hedgebed {command} run.toml\nhedgebed bed show bed.npz", "bits"),
     ]
     lead = [command, f"seed {result['bed']['seed']}"]
-    return report.write(sections, lead=lead, tiles=tiles, missing=[note] if note else [])
+    return report.write(sections, lead=lead, tiles=answer_tiles(result), missing=[note] if note else [])
+
+
+def answer_tiles(result: Result) -> list[Tile]:
+    """What the bed is after its preparation."""
+    quantities = result["quantities"]
+
+    def show(name: str, scale: float = 1.0, unit: str = "") -> str:
+        value = quantities[name]["value"]
+        return "–" if value is None else f"{short(scale * value, 4)} {unit}".strip()
+
+    return [
+        Tile("Packing fraction", show("packing_fraction"), f"from {show('loosest')} to {show('densest')} on the way"),
+        Tile("Contacts of a grain", show("coordination_number"), f"{quantities['grain_count']['value']} grains"),
+        Tile("Surface", show("surface", 1e3, "mm"), "above the floor"),
+        Tile("Horizontal over vertical stress", show("pressure_ratio"), "away from floor and surface"),
+    ]
 
 
 def _profiles(report: Report) -> Block:

@@ -24,6 +24,7 @@ from vis.pictures.frames import read_frames
 
 __all__ = [
     "FALLEN_SHARE",
+    "answer_tiles",
     "cut_profiles",
     "flank_lines",
     "quoted",
@@ -42,7 +43,7 @@ Grains = Mapping[str, NDArray[Any]]
 def write_test_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of such a test, shear aside, and return the report."""
     result, command = report.result, report.result["experiment"]
-    plots, tiles, method = _TESTS[command.rpartition(" ")[2]]
+    plots, method = _TESTS[command.rpartition(" ")[2]]
     one = result["runs"][0]
     sides = " x ".join(f"{1e3 * side:.3g}" for side in one["size"][:2])
     scaled = {"mm": 1e3 * one["grain"], "deep": 1e3 * one["surface"], "mpa": 1e-6 * one["young"]}
@@ -53,7 +54,7 @@ def write_test_report(report: Report) -> Path:
         report.numbers(std=True),
         again(f"hedgebed {command} run.toml"),
     ]
-    return report.write(sections, lead=[command, f"{len(result['runs'])} runs"], tiles=tiles(result))
+    return report.write(sections, lead=[command, f"{len(result['runs'])} runs"], tiles=answer_tiles(result))
 
 
 def quoted(entry: Result, scale: float = 1.0, unit: str = "") -> str:
@@ -361,13 +362,13 @@ def thicknesses(
 
 
 _Drawer = Callable[[Report], list[Block]]
-_TESTS: dict[str, tuple[tuple[_Drawer, ...], Callable[[Result], list[Tile]], tuple[str, ...]]] = {
-    "cone": ((_indices, _cone_side), _cone_tiles, (say("cone_method_1"), say("cone_method_2"))),
-    "plates": ((_forces_of_plates,), _plates_tiles, (say("plates_method_1"), say("plates_method_2"))),
-    "cut": ((_cut_side, _cut_profiles, _trials), _cut_tiles, (say("cut_method_1"), say("cut_method_2"))),
-    "repose": ((_repose_side, _repose_profiles), _repose_tiles, (say("repose_method_1"), say("repose_method_2"))),
+_TESTS: dict[str, tuple[tuple[_Drawer, ...], tuple[str, ...]]] = {
+    "cone": ((_indices, _cone_side), (say("cone_method_1"), say("cone_method_2"))),
+    "plates": ((_forces_of_plates,), (say("plates_method_1"), say("plates_method_2"))),
+    "cut": ((_cut_side, _cut_profiles, _trials), (say("cut_method_1"), say("cut_method_2"))),
+    "repose": ((_repose_side, _repose_profiles), (say("repose_method_1"), say("repose_method_2"))),
 }
-"""What draws, the numbers on top, and how the test is made, a paragraph each."""
+"""What draws, and how the test is made, a paragraph each."""
 
 
 # A lid shears it ------------------------------------------------------------------------------------------------------
@@ -376,7 +377,17 @@ _TESTS: dict[str, tuple[tuple[_Drawer, ...], Callable[[Result], list[Tile]], tup
 @report_of(named=True)
 def write_shear_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a shear test, and return the report."""
-    result, quantities = report.result, report.result["quantities"]
+    result = report.result
+    sections = [
+        Section("", [*tables(result), _curves(report), _lines(report)]),
+        report.numbers(std=True),
+        again("hedgebed bed test shear run.toml"),
+    ]
+    return report.write(sections, lead=["bed test shear"], tiles=answer_tiles(result))
+
+
+def _shear_tiles(result: Result) -> list[Tile]:
+    quantities = result["quantities"]
     slope = "slope through the runs"
     numbers = (
         ("Critical friction angle", "critical_friction_angle", "°", slope),
@@ -385,19 +396,7 @@ def write_shear_report(report: Report) -> Path:
         ("Critical stress ratio", "critical_ratio", "", "shear over normal"),
     )
 
-    def words(value: float, std: float | None) -> str:
-        return quote(value) if std is None else f"{value:.3g} ± {std:.1g}"
-
-    tiles = [
-        Tile(label, words(quantities[name]["value"], quantities[name]["std"]) + unit, note)
-        for label, name, unit, note in numbers
-    ]
-    sections = [
-        Section("", [*tables(result), _curves(report), _lines(report)]),
-        report.numbers(std=True),
-        again("hedgebed bed test shear run.toml"),
-    ]
-    return report.write(sections, lead=["bed test shear"], tiles=tiles)
+    return [Tile(label, quoted(quantities[name], 1.0, unit), note) for label, name, unit, note in numbers]
 
 
 def _curves(report: Report) -> Block:
@@ -433,3 +432,17 @@ def _lines(report: Report) -> Block:
     axis.set(xlim=(0.0, None), ylim=(0.0, None), xlabel="normal stress [Pa]", ylabel="shear stress [Pa]")
     legend_above(drawing, handles)
     return report.draw("mohr_coulomb", drawing, name="mohr-coulomb")
+
+
+_TILES: dict[str, Callable[[Result], list[Tile]]] = {
+    "shear": _shear_tiles,
+    "repose": _repose_tiles,
+    "cone": _cone_tiles,
+    "plates": _plates_tiles,
+    "cut": _cut_tiles,
+}
+
+
+def answer_tiles(result: Result) -> list[Tile]:
+    """The numbers of a test that a reader wants first."""
+    return _TILES[str(result["experiment"]).rpartition(" ")[2]](result)

@@ -13,7 +13,7 @@ from vis.page.page import Block, Section, Tile, figure, listing, table, text
 from vis.page.plots import GREY, new_figure, title_above
 from vis.page.report import Report, Result, capital, number_text, report_of
 
-__all__ = ["write_validation_report"]
+__all__ = ["answer_tiles", "write_validation_report"]
 
 _WIDTH, _HEIGHT, _DPI = 5.6, 3.6, 110
 _COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#009E73", "#D55E00", "#56B4E9", "#8a8a8a", "#222222", "#8C564B")
@@ -32,7 +32,7 @@ def write_validation_report(report: Report) -> Path:
         report.tell(done / len(cases))
     lead = [result["title"].partition(": ")[2], result["date"], f"version {result['version']}, code {result['code']}"]
     more = {"title": "Verification of the bed", "warnings": result["warnings"], "missing": _absent(cases)}
-    return report.write(_sections(cases, blocks), lead=lead, version=False, tiles=_tiles(cases), **more)
+    return report.write(_sections(cases, blocks), lead=lead, version=False, tiles=answer_tiles(result), **more)
 
 
 def _draw(folder: Path, case: Result, plot: Result, number: int) -> Block:
@@ -115,14 +115,16 @@ def _run(cases: Sequence[Result]) -> list[Result]:
     return [case for case in cases if case["status"] in ("pass", "fail", "informational")]
 
 
-def _tiles(cases: Sequence[Result]) -> list[Tile]:
+def answer_tiles(result: Result) -> list[Tile]:
+    """How many cases and numbers agree."""
+    cases = result["cases"]
     run, many = _run(cases), Counter(case["status"] for case in cases)
     numbers = [one for case in run for one in case["comparisons"]]
     return [
-        Tile("cases that pass", str(many["pass"]), f"of {len(run)} that were run"),
-        Tile("cases that fail", str(many["fail"]), "each with its reason if known"),
-        Tile("numbers compared", str(len(numbers)), f"{sum(one['passes'] for one in numbers)} within their bands"),
-        Tile("not yet", str(many["not yet"]), "cases that the bed cannot compute yet"),
+        Tile("Cases that pass", str(many["pass"]), f"of {len(run)} that were run"),
+        Tile("Cases that fail", str(many["fail"]), "each with its reason if known"),
+        Tile("Numbers compared", str(len(numbers)), f"{sum(one['passes'] for one in numbers)} within their bands"),
+        Tile("Not yet", str(many["not yet"]), "cases that the bed cannot compute yet"),
     ]
 
 

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from rigid.series import read_series
 from vis.film.film import ARROWS, draw_runs, shown
 from vis.film.reel import AnyReel, Reel, SpaceReel
+from vis.page.answer import MOST_ROWS
 from vis.page.folder import read_folder
-from vis.page.numbers import short, typeset
+from vis.page.numbers import plain, short, typeset
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, Array, as_it_lies, handle, legend_above, sheet
 from vis.page.report import Report, Result, again, report_of, unit_text
@@ -22,7 +23,7 @@ from vis.pictures.frames import frames_of
 
 from .robots import draw_robots
 
-__all__ = ["titles_of", "write_compare_report"]
+__all__ = ["answer_tiles", "titles_of", "write_compare_report"]
 
 Columns = Mapping[str, Array]
 Labels = tuple[str, str]
@@ -49,7 +50,7 @@ def write_compare_report(report: Report) -> Path:
         again("hedgebed compare run.toml"),
     ]
     lead = ["compare", *(f"{run['label']}: {run['title']}" for run in result["runs"])]
-    return report.write(sections, lead=lead, tiles=_tiles(result), title=f"Compared: {result['title']}")
+    return report.write(sections, lead=lead, tiles=answer_tiles(result), title=f"Compared: {result['title']}")
 
 
 def titles_of(result: Result) -> str:
@@ -135,7 +136,8 @@ def _drives(report: Report, labels: Labels) -> list[Block]:
     return [report.draw("drives", drawing)]
 
 
-def _tiles(result: Result) -> list[Tile]:
+def answer_tiles(result: Result) -> list[Tile]:
+    """Numbers that both runs have: first and second, the spreads of both, and the difference."""
     wanted = (
         ("trajectory_angle", "Trajectory angle"), ("max_speed", "Largest speed"), ("largest_turn", "Largest turn"),
         ("highest", "Rise"), ("sinkage_largest", "Sinkage"), ("sinkage", "Sinkage"), ("stiffness", "Stiffness"),
@@ -143,24 +145,28 @@ def _tiles(result: Result) -> list[Tile]:
         ("energy_residual", "Energy left over"),
     )  # fmt: skip
     rows = {row["name"]: row for row in result["compared"]}
-    end = result.get("compared_over")
-    words = "first | second" if end is None else f"first | second, over {end:.3g} s"
     tiles = []
     for name, label in wanted:
         row = rows.get(name)
         if row is None or row["first"] is None or row["second"] is None:
             continue
-        values = [_in_unit(row[key], row["unit"]) for key in ("first", "second")]
-        tiles.append(Tile(label, f"{values[0]} | {values[1]}", words))
-    return tiles[:5]
+        values = " | ".join(_in_unit(row[key], row["unit"]) for key in ("first", "second"))
+        stds = [row.get(f"{key}_std") for key in ("first", "second")]
+        spread = " | ".join(_in_unit(std, row["unit"], 2) if std else "\N{EN DASH}" for std in stds)
+        relative = row["relative"]
+        sign = "+" if row["difference"] > 0 else ""
+        share = "" if relative is None else f" ({sign if relative > 0 else ''}{plain(100 * relative, 2)} %)"
+        change = f"{sign}{_in_unit(row['difference'], row['unit'])}{share}"
+        tiles.append(Tile(label, values, "", (spread if any(stds) else "", "", ""), change))
+    return tiles[:MOST_ROWS]
 
 
-def _in_unit(value: float, unit: str) -> str:
+def _in_unit(value: float, unit: str, significant: int = 3) -> str:
     if unit == "rad":
-        return f"{short(math.degrees(value), 3)}°"
+        return f"{short(math.degrees(value), significant)}°"
     if unit == "m" and abs(value) < 0.1:
-        return f"{short(1e3 * value, 3)} mm"
-    return f"{short(value, 3)}{'' if unit == '1' else ' ' + unit}"
+        return f"{short(1e3 * value, significant)} mm"
+    return f"{short(value, significant)}{'' if unit == '1' else ' ' + unit}"
 
 
 def _numbers(result: Result, labels: Labels) -> list[Block]:

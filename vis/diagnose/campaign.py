@@ -18,7 +18,7 @@ from vis.page.page import Section, Tile, listing, table, text
 from vis.page.plots import BED, GREY, MODEL, RED, Array, handle, legend_above, line_handles, line_styles, sheet
 from vis.page.report import Report, Result, again, capital, report_of, terms_text
 
-__all__ = ["write_campaign_report", "write_inspection_report"]
+__all__ = ["campaign_tiles", "inspection_tiles", "write_campaign_report", "write_inspection_report"]
 
 _MOST = 12
 """Trials drawn at most; of a campaign that is checked those with findings first."""
@@ -39,7 +39,7 @@ _TUMBLE = (
 @report_of(dpi=130, named=True)
 def write_campaign_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a synthetic campaign, and return the report."""
-    result, quantities = report.result, report.result["quantities"]
+    result = report.result
     drawn = report.draw("recordings", _draw(report.folder / result["campaign"], result["trials"]))
     rows = [
         (trial["id"], f"{trial['gravity_sim']:.5g}", f"{trial['true_gravity_sim']:.5g}", f"{trial['torque']:g}",
@@ -54,13 +54,18 @@ def write_campaign_report(report: Report) -> Path:
     note = text("campaign/ is what a laboratory would hand over; truth.toml is what made it.", small=True)
     trials = [text(terms_text(result)), table(head, rows), note]
     sections = [Section("", [drawn]), Section("The trials", trials), again("hedgebed campaign run.toml", "")]
-    tiles = [
+    warnings = [str(warning) for warning in result["warnings"]]
+    return report.write(sections, lead=["campaign"], tiles=campaign_tiles(result), warnings=warnings)
+
+
+def campaign_tiles(result: Result) -> list[Tile]:
+    """How large a synthetic campaign is."""
+    quantities = result["quantities"]
+    return [
         Tile("Trials", str(quantities["trial_count"]["value"])),
         Tile("Rows recorded", str(quantities["row_count"]["value"])),
         Tile("Each lasts", f"{quantities['duration']['value']:g} s"),
     ]
-    warnings = [str(warning) for warning in result["warnings"]]
-    return report.write(sections, lead=["campaign"], tiles=tiles, warnings=warnings)
 
 
 def _draw(campaign: Path, trials: Sequence[Result]) -> Figure:
@@ -88,7 +93,7 @@ def _draw(campaign: Path, trials: Sequence[Result]) -> Figure:
 @report_of(dpi=130, named=True)
 def write_inspection_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a checked campaign, and return the report."""
-    result, quantities = report.result, report.result["quantities"]
+    result = report.result
     drawing = (_draw_tumbles if result["kind"] == "tumble" else _draw_penetrations)(report)
     drawn = [report.draw("inspection_recordings", drawing, name="recordings")]
     drawn.append(report.draw("coverage", _draw_coverage(result)))
@@ -102,13 +107,20 @@ def write_inspection_report(report: Report) -> Path:
         Section("The recordings", [*drawn, table(head, [_row(entry) for entry in result["recordings"]])]),
         again("hedgebed campaign check run.toml", ""),
     ]
-    tiles = [
+    return report.write(
+        sections, lead=["campaign check", str(result["kind"])], tiles=inspection_tiles(result), warnings=()
+    )
+
+
+def inspection_tiles(result: Result) -> list[Tile]:
+    """How large a checked campaign is, and how much was found."""
+    quantities = result["quantities"]
+    return [
         Tile("Trials", str(quantities["trial_count"]["value"])),
         Tile("Conditions", str(quantities["condition_count"]["value"])),
         Tile("Rows recorded", str(quantities["row_count"]["value"])),
         Tile("Found", str(quantities["finding_count"]["value"])),
     ]
-    return report.write(sections, lead=["campaign check", str(result["kind"])], tiles=tiles, warnings=())
 
 
 def _row(entry: Result) -> tuple[str, ...]:

@@ -17,18 +17,20 @@ from vis.diagnose.figures import (
     worst,
 )
 from vis.diagnose.usable import has_numbers_to_use, secant_depth
-from vis.page.numbers import beside, plain, short
+from vis.page.answer import MOST_ROWS
+from vis.page.numbers import beside, plain, quote, short
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
-from vis.page.report import Report, Result, again, report_of, unit_text
+from vis.page.report import Report, Result, again, capital, report_of, unit_text
 from vis.page.sentences import Sentences
 
-__all__ = ["write_diagnosis_report"]
+__all__ = ["answer_tiles", "write_diagnosis_report"]
 
 say = Sentences(__package__)
 _IN_UNITS = ("rms_before", "rms_after", "noise_after")
 _MOST_PLACES = 8
 """Stretches that are listed."""
 _DASH = "\N{EN DASH}"
+_STAGES = ("before", "after")
 
 
 @report_of(dpi=130)
@@ -40,13 +42,6 @@ def write_diagnosis_report(report: Report) -> Path:
     diagnosis: Result = json.loads((report.folder / "diagnosis.json").read_text(encoding="utf-8"))
     drawn = _drawn(report, diagnosis)
     result, gap = report.result, diagnosis["gap"]
-    named = ", ".join(effect["id"] for effect in diagnosis["effects"]) or "nothing"
-    which = "chi-square a sample, " + ("fitted" if gap["before"]["held_out"] is None else "held-out") + " trials"
-    tiles = [
-        Tile("Verdict", diagnosis["verdict"], " or ".join([named, *diagnosis["alternatives"]])),
-        Tile("Gap before", _gap(gap["before"]), which + _weighed(diagnosis, "before")),
-        Tile("Gap after", _gap(gap["after"]), which + _weighed(diagnosis, "after")),
-    ]
     departures, following = result["departures"]["sentences"], diagnosis.get("next_experiment")
     left = [_gap_table(diagnosis), *_in_units(diagnosis), *drawn["residuals"], *_phase_table(diagnosis),
             *_set_aside(diagnosis)]  # fmt: skip
@@ -62,8 +57,32 @@ def write_diagnosis_report(report: Report) -> Path:
         again("hedgebed diagnose THIS_FOLDER/run.toml", f"With hedgebed {result['version']}, where it was started from "
               "(the campaign's path is as given):"),
     ]  # fmt: skip
-    lead = ["diagnose", f"held out: {', '.join(gap['held_out_trials']) or 'none'}"]
-    return report.write([section for section in sections if section.blocks], lead=lead, tiles=tiles)
+    lead = ["diagnose", f"verdict: {diagnosis['verdict']}", f"held out: {', '.join(gap['held_out_trials']) or 'none'}"]
+    return report.write([section for section in sections if section.blocks], lead=lead, tiles=answer_tiles(result))
+
+
+def answer_tiles(result: Result) -> list[Tile]:
+    """The gap before and after, then the fitted numbers: those of the named effects first, six rows at most."""
+    numbers = result["quantities"]
+    part = "held_out" if numbers["gap_after_held_out"]["value"] is not None else "fit"
+    which = say(f"gap_{part}")
+    tiles = [Tile(say(f"gap_{stage}"), _number(numbers[f"gap_{stage}_{part}"]["value"]), which) for stage in _STAGES]
+    if weighed := numbers.get(f"gap_with_scatter_after_{part}"):
+        tiles.append(Tile(say("gap_scatter"), quote(weighed["value"], weighed["std"]), which))
+    fitted = [name for name in numbers if "." in name] + [name for name in numbers if name.endswith("_after")]
+    tiles += [_tile_of(name, numbers[name]) for name in fitted]
+    return tiles[:MOST_ROWS]
+
+
+def _tile_of(name: str, entry: Result) -> Tile:
+    """A fitted number with its standard error, or why it has none."""
+    effect, _, own = name.rpartition(".")
+    label = capital(own.removesuffix("_after").replace("_", " ")) + (f" ({effect})" if effect else "")
+    note, unit = str(entry.get("note", "")), entry["unit"]
+    if entry["std"]:
+        return Tile(label, quote(entry["value"], entry["std"], unit), note)
+    why = say("at_the_end" if "end of its range" in note else "not_determined")
+    return Tile(label, quote(entry["value"], None, unit), note, (why, "", ""))
 
 
 def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
@@ -97,16 +116,6 @@ def _labels(diagnosis: Result) -> tuple[str, str]:
 
 
 # Its parts ------------------------------------------------------------------------------------------------------------
-
-
-def _weighed(diagnosis: Result, stage: str) -> str:
-    """The same weighed against what replicates differ by, where that is more than the sensors."""
-    weighed = diagnosis.get("gap_with_scatter")
-    return "" if weighed is None else f"; {_gap(weighed[stage])} with the scatter of replicates"
-
-
-def _gap(gap: Result) -> str:
-    return _number(gap["fit"] if gap["held_out"] is None else gap["held_out"])
 
 
 def _number(value: float) -> str:

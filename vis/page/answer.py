@@ -12,7 +12,7 @@ from vis.page.numbers import split_spread
 from vis.page.page import Block, Page, Section, Tile, listing, table, text, write_template
 from vis.page.sentences import Sentences
 
-__all__ = ["MOST_ROWS", "answer", "write_page"]
+__all__ = ["MOST_ROWS", "answer", "without_unknown", "write_page"]
 
 say = Sentences(__package__)
 MOST_ROWS = 6
@@ -45,9 +45,18 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     rows = [_row(tile) for tile in tiles]
     on_grains = kind_of(result) in _ON_GRAINS
     errors, keys = _errors(result, on_grains)
-    shown = [k for k in range(3) if on_grains or any(row[2 + k] for row in rows)]
-    head = ("", "value", *(errors[k] for k in shown), "")
-    cells = [(*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), row[5]) for row in rows]
+    shown = [k for k in range(len(errors)) if on_grains or any(row[2 + k] for row in rows)]
+    compared = result.get("experiment") == "compare"
+    beside = [say("difference" if compared else "beside")] if any(tile.beside for tile in tiles) else []
+    end = result.get("compared_over")
+    values = (
+        say("two_values") + (f", over {end:.3g}\N{NO-BREAK SPACE}s" if end is not None else "") if compared else "value"
+    )
+    head = ("", values, *(errors[k] for k in shown), *beside, "")
+    cells = [
+        (*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), *([tile.beside] if beside else []), row[-1])
+        for tile, row in zip(tiles, rows, strict=True)
+    ]
     if result.get("experiment") == "mujoco" and not on_grains and 0 in shown:
         keys = ["range_of_law", *keys]
     if "empty_cells" in keys and not any("\N{EN DASH}" in row for row in cells):
@@ -57,9 +66,26 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     return [table(head, cells, words=True), *([text(" ".join(map(say, keys)), small=True)] if keys else [])]
 
 
+def without_unknown(numbers: Block, notes: Sequence[Block]) -> tuple[Block, list[Block]]:
+    """The table of an answer without the errors that no row knows, and a note that names them; for narrow screens."""
+    none = {say("not_known"), "\N{EN DASH}"}
+    columns = range(len(numbers.head))
+    empty = [k for k in columns if numbers.head[k].startswith("±") and all(row[k] in none for row in numbers.rows)]
+    if not empty:
+        return numbers, list(notes)
+    kept = [k for k in columns if k not in empty]
+    head, *rows = (tuple(row[k] for k in kept) for row in (numbers.head, *numbers.rows))
+    names = "; ".join(numbers.head[k] for k in empty)
+    dashes = any("\N{EN DASH}" in row for row in rows)
+    left = [note for note in notes if dashes or not note.text.startswith("\N{EN DASH}")]
+    return replace(numbers, head=head, rows=tuple(rows)), [text(say("unknown", names=names), small=True), *left]
+
+
 def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], list[str]]:
     """The heads of the three errors of this result, and the keys of the sentences below the table."""
     experiment = result.get("experiment")
+    if experiment == "converge":
+        return (say("of_95"), *_ERRORS[1:], say("all")), ["sum"]
     if kind_of(result) == "planar model" and experiment in _ON_ONE_LAW:
         return (_ERRORS[0], say("of_one_law"), say("bias")), ["one_law"]
     if experiment == "mujoco":
@@ -67,9 +93,11 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
         keys = [key for key, so in told.items() if so]
     else:
         keys = ["empty_cells"] if on_grains else []
+    if experiment == "diagnose":
+        return (say("of_fit"), *_ERRORS[1:]), keys
     if experiment == "ground":
         return (say("of_std"), *_ERRORS[1:]), keys
-    if "ground_file" in result:
+    if "ground_file" in result or (experiment == "penetrate" and result.get("ground", "bed") != "bed"):
         return (say("of_the_law"), *_ERRORS[1:]), keys
     if experiment == "penetrate" or "beds" in result:
         return (say("of_95"), *_ERRORS[1:]), keys

@@ -14,6 +14,8 @@ from vis.page.sentences import Sentences
 __all__ = ["answer_rows", "cell_of", "law_row"]
 
 say = Sentences(__package__)
+_ABSENT = {"hop": "no_hop", "slip": "no_slip"}
+"""End of the name of a number that a moved law does not have -> what the table says of it."""
 
 
 def law_row(
@@ -67,6 +69,8 @@ def _with_error(result: Mapping[str, Any], name: str, law: bool) -> tuple[str, s
         value, error = split_spread(cell_of(entry["value"], std, entry["unit"]))
         if error:
             return value, error
+    if law and name in (result.get("law_spread") or {}).get("absent", ()):
+        return cell_of(entry["value"], None, entry["unit"]), say(_ABSENT.get(name.rpartition("_")[2], "not_there"))
     if std is not None and (result.get("law_spread") or {}).get("parameters"):
         return cell_of(entry["value"], None, entry["unit"]), cell_of(0.0, None, entry["unit"])
     return cell_of(entry["value"], None, entry["unit"]), say("not_known" if law else "no_chance")

@@ -144,6 +144,8 @@ def split_spread(text: str) -> tuple[str, str]:
     if not found:
         return text, ""
     unit = found["unit"] or ""
+    if found["error"].endswith("°") and not found["mean"].endswith("°"):
+        return found["mean"] + "°", found["error"]
     return found["mean"] + unit, found["error"] + unit
 
 

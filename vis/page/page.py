@@ -62,7 +62,8 @@ class Tile:
     label: str
     value: str
     note: str = ""
-    errors: tuple[str, str, str] = ("", "", "")  # Of chance, of grain size, of bed, softness and speed; "": not known
+    errors: tuple[str, ...] = ("", "", "")  # Of chance, of grain size, of bed, softness and speed; all; "": not known
+    beside: str = ""  # The same number on the spring-damper
 
 
 @dataclass(frozen=True)

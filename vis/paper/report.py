@@ -14,7 +14,7 @@ from vis.page.report import Report, Result, again, report_of
 from vis.page.sentences import Sentences
 from vis.paper.figures import FIGURES, PaperRun, in_order
 
-__all__ = ["write_paper_report"]
+__all__ = ["answer_tiles", "write_paper_report"]
 
 say = Sentences(__package__)
 _MEASURES = (
@@ -57,10 +57,12 @@ def write_paper_report(report: Report) -> Path:
         again("hedgebed paper run.toml", ""),
     ]
     count = result.get("integrations", len(paper.cases) + len(paper.sweep))
-    return report.write(sections, lead=["paper", f"{count} integrations"], tiles=_tiles(result["quantities"]))
+    return report.write(sections, lead=["paper", f"{count} integrations"], tiles=answer_tiles(result))
 
 
-def _tiles(quantities: Result) -> list[Tile]:
+def answer_tiles(result: Result) -> list[Tile]:
+    """The numbers that a reader wants first."""
+    quantities = result["quantities"]
     met, compared = int(quantities["claims_met"]["value"]), int(quantities["claims_compared"]["value"])
     moved, left = math.degrees(quantities["step_angle_gap"]["value"]), quantities["energy_residual"]["value"]
     return [

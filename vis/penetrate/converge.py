@@ -11,18 +11,25 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from vis.page.numbers import quote
+from vis.page.numbers import column, quantity, quote
 from vis.page.page import Block, Section, Tile, listing
 from vis.page.plots import BED, DASHED, GREY, INK, MODEL, handle, legend_above, new_figure
 from vis.page.report import Report, Result, capital, report_of, tables, title_of
+from vis.penetrate.summary_parts import NBSP, say
 
-__all__ = ["titled", "write_converge_report"]
+__all__ = ["answer_tiles", "titled", "write_converge_report"]
 
 _SHOWN = {"m": (1e3, "mm"), "J": (1e3, "mJ"), "1": (1.0, "")}
 """SI unit -> how many of the unit shown it has, and that unit."""
 _BEYOND = 0.4
 """How far the axis of a figure goes beyond beds and line for all errors, over their height [1]."""
-_TILES = ("stiffness", "damping", "sinkage", "stiffness_standing")
+_TILES = {
+    "stiffness": "Fitted stiffness K",
+    "damping": "Fitted damping C",
+    "sinkage": "Sinkage{load}",
+    "stiffness_standing": "Stiffness of a foot that stands",
+    "work": "Work to the deepest point",
+}
 
 
 @report_of(named=True)
@@ -40,7 +47,7 @@ def write_converge_report(report: Report) -> Path:
         report.again("hedgebed converge run.toml", "bits"),
     ]
     counted = f"{result['quantities']['members']['value']} runs"
-    return report.write(sections, lead=["converge", counted], tiles=list(_tiles(result)))
+    return report.write(sections, lead=["converge", counted], tiles=answer_tiles(result))
 
 
 def titled(report: Report) -> str:
@@ -51,21 +58,26 @@ def titled(report: Report) -> str:
     return title_of({"title": body, "bed": given.get("settings")}) + comma + rest
 
 
-def _tiles(result: Result) -> list[Tile]:
-    """The numbers that a reader wants first, each with all of its known errors."""
+def answer_tiles(result: Result) -> list[Tile]:
+    """The numbers that a reader wants first, each at the real grain with all of its known errors and their sum."""
+    numbers = result["quantities"]
+    load = f" under {quantity(numbers['load'])}" if "load" in numbers else ""
     tiles = []
-    for name in _TILES:
-        entry = result["quantities"].get(name)
+    for name, label in _TILES.items():
+        entry = numbers.get(name)
         if entry is not None:
-            unit = entry["unit"]
-            errors = (
-                "" if entry[key] is None else quote(entry[key], None, unit, significant=2)
-                for key in ("chance", "grain_size", "rest")
-            )
-            chance, size, rest = errors
-            value = quote(entry["value"], None, unit, significant=3)
-            tiles.append(Tile(capital(name.replace("_", " ")), value, "95 %", (chance, size, rest)))
+            row = [entry["value"], *(_known(entry, key) for key in ("chance", "grain_size", "rest", "total"))]
+            unit, (_, *errors) = column(row, entry["unit"], significant=2)
+            value = column(row, entry["unit"])[1][0]
+            cells = tuple(say("not_known") if error == "\N{EN DASH}" else f"{error}{NBSP}{unit}" for error in errors)
+            tiles.append(Tile(label.format(load=load), f"{value}{NBSP}{unit}", errors=cells))
     return tiles
+
+
+def _known(entry: Result, key: str) -> float | None:
+    """An error of a number, 0 for round-off."""
+    error = entry[key]
+    return error if error is None or error > 1e-9 * abs(entry["value"]) else 0.0
 
 
 def _figure(report: Report, name: str, told: Result) -> Block:

@@ -20,7 +20,8 @@ from vis.page.limits import limits_words
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, figure, table, text, write_template
 from vis.page.plots import AMENDED, BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
-from vis.page.report import Progress, Report, Result, again, report_of, title_of
+from vis.page.report import Progress, Report, again, report_of, title_of
+from vis.penetrate.answer import answer_tiles, words_of_effects
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
@@ -143,13 +144,6 @@ def _amended_plot(run: RunFolder) -> Plot | None:
     return None if drawing is None else Plot.of("amended", drawing)
 
 
-def words_of_effects(result: Result) -> str:
-    """The added effects, in words."""
-    model = result.get("model")
-    effects = model.get("effects") if isinstance(model, Mapping) else None
-    return " and ".join(map(str, effects)) if effects else "nothing added"
-
-
 def draw_amended(run: RunFolder) -> Figure | None:
     """Force against depth of driven runs, depth against time of drops and set-downs; None where there is no law."""
     alone = "ground_file" in run.result
@@ -187,24 +181,13 @@ def _write_law_report(report: Report) -> Path:
         (name.replace("_", " "), quote(entry["value"], entry["std"], entry["unit"]), str(entry.get("note", "")))
         for name, entry in numbers.items()
     ]
-    laws = {"spring_damper": "spring-damper", "amended": f"with {words_of_effects(report.result)}"}
-    laws = {"law": str(report.result["ground"])} if of_file else laws
-    tiles = [tile for law, words in laws.items() for tile in _law_tiles(numbers, law, words)]
     whose = f"no bed: the law of {'a ground file' if of_file else 'the model'} only"
     sections = [
         Section("", blocks),
         Section("Numbers", [table(("quantity", "value", "note"), rows, words=True)]),
         again("hedgebed penetrate THIS_FOLDER/run.toml", "From where it was started:"),
     ]
-    return report.write(sections, lead=["penetrate", whose], tiles=tiles)
-
-
-def _law_tiles(numbers: Result, law: str, words: str) -> list[Tile]:
-    """How deep a foot rests on a law, or where none is set down, the peak force of its one push."""
-    for title, name, unit in (("Sinks", f"sinkage_{law}", "m"), ("Peak force", f"peak_force_{law}", "N")):
-        if name in numbers:
-            return [Tile(title, quote(numbers[name]["value"], numbers[name]["std"], unit), words)]
-    return []
+    return report.write(sections, lead=["penetrate", whose], tiles=answer_tiles(report.result))
 
 
 def _by_speed(runs: Sequence[Run]) -> list[tuple[str, list[Run]]]:

@@ -7,14 +7,15 @@ or reads "unknown"; nothing here raises for a part that is missing.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from rigid.intervals import half_width
 from vis.page.folder import RunFolder
-from vis.page.numbers import between, plain, quantity, quote, short, within
+from vis.page.numbers import plain, quantity, quote, short
 from vis.penetrate import summary_parts as words
+from vis.penetrate.answer import answer_tiles, grains_of, largest_force, peaks_of, rests_at
 from vis.penetrate.errors import fit_part, fitted, in_95
 from vis.penetrate.summary_parts import say
 from vis.pictures.frames import frame_names
@@ -49,7 +50,7 @@ def summarise(run: RunFolder) -> dict[str, Any]:
         "banner": _banner(run),
         "lead": _lead(run, experiment),
         "seeds": len({r.seed for r in run.runs if r.seed is not None}),
-        "tiles": named(_with_errors(_tiles(run, numbers), words.mapping_of(result.get("sure")))),
+        "tiles": [asdict(tile) for tile in answer_tiles(result)],
         "caveat": _caveat(result, quantities),
         "answers": named(_answers(run, numbers)),
         "rest": named(words.rest_part(result)),
@@ -88,109 +89,6 @@ def _lead(run: RunFolder, experiment: str) -> list[str]:
     return list(filter(None, (f"hedgebed {version}" if version else "", experiment, started, f"status: {run.status}")))
 
 
-def _tiles(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
-    tiles: list[tuple[str, str, str]] = []
-    model = quantity(quantities.get("sinkage_spring_damper"))
-    if (needed := words.value_of(quantities, "depth_to_rest")) is not None:
-        under = f"under {quantity(quantities['load'])}; " if words.value_of(quantities, "load") is not None else ""
-        tiles.append(
-            (
-                "Sinks to rest",
-                "not in this bed",
-                f"{under}it would need about {quote(needed, None, 'm', significant=2)}{_needs(run)}",
-            )
-        )
-    elif _restless(run, quantities):
-        note = f"no set-down came to rest in time; the spring-damper predicts {model}"
-        tiles.append(("Sinks to rest at", "unknown", note))
-    if words.value_of(quantities, "sinkage_dem") is not None:
-        load = words.value_of(quantities, "load")
-        under = f"under {quantity(quantities['load'])}" if load is not None else "under its load"
-        note = f"{under}; the spring-damper predicts {model}"
-        tiles.append(("Sinks to rest at", _rests_at(quantities), note))
-    if push := _push(run):
-        tiles.append((f"Largest force of {_grains(run)}", *push))
-    if words.value_of(quantities, "drag_gap") is not None:
-        note = "rms difference over rms force, loading, all pushes"
-        tiles.append(("Error of the spring-damper", quantity(quantities["drag_gap"], unit="%"), note))
-    if words.value_of(quantities, "stiffness") is not None:
-        tiles.append(("Fitted stiffness K", quantity(quantities["stiffness"]), _fitted_note(run, quantities)))
-    return [{"label": label, "value": value, "note": note} for label, value, note in tiles]
-
-
-def _with_errors(tiles: list[dict[str, str]], sure: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The tiles with their errors of chance and grain size, as result.json states them, and a row of real grains."""
-    rows: list[dict[str, Any]] = []
-    for tile in tiles:
-        name = "stiffness" if tile["label"].startswith("Fitted stiffness") else "sinkage_dem"
-        entry = words.mapping_of(sure.get(name))
-        if entry and (name == "stiffness" or tile["label"].startswith("Sinks to rest at")):
-            value = quote(entry["value"], None, entry["unit"], significant=2)
-            if name == "sinkage_dem" and entry["value"] < 0:
-                value = tile["value"].split(f"{words.NBSP}±")[0] + f"{words.NBSP}mm above the surface"
-                value = value if "±" in tile["value"] else tile["value"]
-            rows.append({**tile, "value": value, "errors": _errors(entry)})
-            if name == "sinkage_dem":
-                known = entry["low"] is not None
-                ends = within(entry["low"], entry["high"], "m") if known else "not known"
-                note = say("of_real_grains") if known else words.sentence(str(entry["sentence"]))
-                rows.append({"label": "Sinkage among real grains (95 %)", "value": ends, "note": note})
-            elif entry["low"] is not None:
-                ends = within(entry["low"], entry["high"], "N/m")
-                rows.append({"label": "K among real grains (95 %)", "value": ends, "note": say("of_real_grains")})
-        else:
-            rows.append(tile)
-    return rows
-
-
-def _errors(entry: Mapping[str, Any]) -> tuple[str, str, str]:
-    """Chance as a half-width or as two ends, grain size as what it may change, and what is not known."""
-    value, unit, parts = entry["value"], entry["unit"], []
-    for name in ("chance", "grain_size"):
-        low, high = entry[name] if entry[name] is not None else (None, None)
-        if low is None or high is None:
-            parts.append("not known")
-        elif abs((high - value) - (value - low)) < 1e-6 * abs(high - low):
-            parts.append(quote(high - value, None, unit, significant=2))
-        else:
-            sides = [(f"{words.MINUS}", value - low), ("+", high - value)]
-            parts.append(" ".join(f"{sign}{quote(by, None, unit, significant=2)}" for sign, by in sides if by > 0))
-    return parts[0], parts[1] or "0", "not known"
-
-
-def _fitted_note(run: RunFolder, quantities: Mapping[str, Any]) -> str:
-    parts = [f"and damping C = {fitted(quantities, 'damping')}, for motion"]
-    drops = [r for r in run.of_kind("drop") if words.value_of(r.quantities, "stop_time") is not None]
-    depths = [float(r.bed.depth.max()) for r in (*run.of_kind("driven"), *drops) if r.bed is not None]
-    parts[0] += f" down to {quote(max(depths), None, 'm')}" if depths else ""
-    if "stiffness_standing" in quantities:
-        parts.append(_standing(run, quantities))
-    if words.std_of(quantities, "stiffness") is None and words.value_of(quantities, "stiffness_error") is not None:
-        parts.append(f"error of the fit, 95{words.NBSP}%: {quantity(quantities['stiffness_error'])}")
-    return "; ".join(parts)
-
-
-def _needs(run: RunFolder) -> str:
-    """The ends of the depth to rest and how far it is extrapolated, as far as result.json has them."""
-    sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("depth_to_rest"))
-    ends = f" ({between(sure['low'], sure['high'], 'm')} with its errors, 95{words.NBSP}%)" if sure.get("high") else ""
-    if sure.get("low") and not ends:
-        ends = f" (at least {quote(sure['low'], None, 'm', significant=2)}, 95{words.NBSP}%)"
-    times = sure.get("times_beyond")
-    return ends + (say("beyond_pushes", times=plain(times, 2)) if times is not None else "")
-
-
-def _standing(run: RunFolder, quantities: Mapping[str, Any]) -> str:
-    """Which K a foot that stands has: load over the ends of its sinkage, or none where it may not sink at all."""
-    sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("sinkage_dem"))
-    chance, load = words.list_of(sure.get("chance")), words.value_of(quantities, "load")
-    if chance and chance[0] <= 0:
-        return say("standing_unknown")
-    if sure.get("low") and load is not None:
-        return say("standing", k=between(load / sure["high"], load / sure["low"], "N/m"))
-    return say("standing", k=quantity(quantities["stiffness_standing"]))
-
-
 def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
     """How far the grains of this run are from real ones; empty where that is not known."""
     bed = words.mapping_of(result.get("bed"))
@@ -218,20 +116,6 @@ def _frames(run: RunFolder) -> list[str]:
     ]
 
 
-def _push(run: RunFolder) -> tuple[str, str] | None:
-    """The largest force of loading over all speeds, the speed of it, and the peaks at the other speeds."""
-    by_speed = _peaks(run, "driven", "peak_force")
-    if not by_speed:
-        return None
-    depth = max((float(r.bed.depth.max()) for r in run.of_kind("driven") if r.bed is not None), default=None)
-    to = f" to {quote(depth, unit='m')}" if depth is not None else ""
-    speed, high = max(by_speed, key=lambda peak: peak[1][0])
-    note = f"pushed{to} at {speed:g}{words.NBSP}m/s"
-    note += " (mean over beds of the largest)" if high[1] is not None else ""
-    others = [f"{quote(*peak, 'N')} at {other:g}{words.NBSP}m/s" for other, peak in by_speed if other != speed]
-    return quote(*high, "N"), f"{note}; {words.joined(others)}" if others else note
-
-
 def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, str]]:
     remarks = words.mapping_of(run.result.get("departures"))
 
@@ -239,15 +123,15 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
         return "".join(f" {words.sentence(str(remarks[name]))}" for name in names if remarks.get(name))
 
     answers = {"How far does it sink?": _sinks(run, quantities, also("set_down", "surface"))}
-    if push := _push(run):
-        text = f"{push[0]} {push[1]}."
-        drops = _peaks(run, "drop", "peak_force")
+    if push := largest_force(run.result):
+        text = f"{push[0]} {push[2]}."
+        drops = peaks_of(run.result, "drop", "peak_force")
         if drops:
             peaks = [f"{quote(*peak, 'N')} at {speed:g}{words.NBSP}m/s" for speed, peak in drops]
             text += f" In drops the force peaks at {words.joined(peaks)}."
         if words.value_of(quantities, "work_returned_dem") is not None:
             text += " " + _returned(quantities)
-        answers[f"How large is the force of {_grains(run)}?"] = text
+        answers[f"How large is the force of {grains_of(run.result)}?"] = text
     if words.value_of(quantities, "drag_gap") is not None:
         text = (
             f"With K = {fitted(quantities, 'stiffness')} and C = {fitted(quantities, 'damping')} its "
@@ -270,7 +154,7 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
     model = f" The fitted spring-damper predicts {quantity(quantities.get('sinkage_spring_damper'))}"
     if sunk is not None:
         load = f" of {quantity(quantities['load'])}" if words.value_of(quantities, "load") is not None else ""
-        text = f"Set down under its load{load}, the spike comes to rest {_rests_at(quantities)}"
+        text = f"Set down under its load{load}, the spike comes to rest {rests_at(quantities)}"
         text += " deep." if sunk >= 0 else say("on_uppermost", size=_size_of_grains(run))
         sure = words.mapping_of(words.mapping_of(run.result.get("sure")).get("sinkage_dem")).get("sentence")
         text += f" {words.sentence(str(sure))}" if sure else ""
@@ -286,12 +170,6 @@ def _sinks(run: RunFolder, quantities: Mapping[str, Any], more: str) -> str:
     return text + (f"{model}." if law is not None else "") + more
 
 
-def _grains(run: RunFolder) -> str:
-    """What pushes back: the name of the material, where it is known."""
-    name = str(words.mapping_of(run.result.get("bed")).get("material") or "bed")
-    return name if name.startswith("jsc-") else f"the {name}"
-
-
 def _size_of_grains(run: RunFolder) -> str:
     """The mean diameter of the grains in brackets, where it is known."""
     grain = words.plain_value(words.mapping_of(run.result.get("bed")).get("grain"))
@@ -302,13 +180,6 @@ def _by_cohesion(result: Mapping[str, Any]) -> list[str]:
     """What a formula gives for a foot that rests on grains that stick."""
     rest = words.mapping_of(result.get("rest"))
     return [str(text) for text in words.list_of(rest.get("sentences"))] if rest.get("comes_to_rest") is True else []
-
-
-def _rests_at(quantities: Mapping[str, Any]) -> str:
-    """The depth at rest, or how far above depth 0 a spike rests that grains which stick out carry."""
-    entry = quantities["sinkage_dem"]
-    above = -(words.value_of(quantities, "sinkage_dem") or 0.0)
-    return f"{quantity({**entry, 'value': above})} above the surface" if above > 0 else quantity(entry)
 
 
 def _restless(run: RunFolder, quantities: Mapping[str, Any]) -> bool:
@@ -360,18 +231,6 @@ def _peak_gap(run: RunFolder) -> float | None:
         if bed and model is not None:
             ratios.append(model / bed - 1.0)
     return float(np.mean(ratios)) if ratios else None
-
-
-def _peaks(run: RunFolder, kind: str, key: str) -> list[tuple[float, tuple[float, float | None]]]:
-    """Speed -> mean over seeds and half of its 95 % interval (None for a single seed)."""
-    found = []
-    for speed in run.speeds(kind):
-        own = (r for r in run.runs if r.kind == kind and r.speed == speed)
-        numbers = [n for r in own if (n := words.value_of(r.quantities, key)) is not None]
-        if numbers:
-            half = half_width(float(np.std(numbers, ddof=1)), len(numbers)) if len(numbers) > 1 else None
-            found.append((speed, (float(np.mean(numbers)), half)))
-    return found
 
 
 def _deeper(ratio: float) -> str:

@@ -14,7 +14,7 @@ from vis.page.page import Block, Section, Tile, text
 from vis.page.plots import BED, GREY, MODEL, handle, legend_above, new_panels, shades
 from vis.page.report import Report, Result, again, report_of, tables, unit_text
 
-__all__ = ["write_sweep_report"]
+__all__ = ["answer_tiles", "write_sweep_report"]
 
 MOST_DRAWN = 8
 """Quantities that have a figure."""
@@ -31,7 +31,6 @@ def write_sweep_report(report: Report) -> Path:
     figures = [_over(report, table, column) for column in drawn]
     if len(result["columns"]) > len(drawn):
         figures.append(text(f"Figures show the first {len(drawn)} of {len(result['columns'])} that vary.", small=True))
-    tiles = [Tile(name.capitalize(), f"{result['quantities'][name]['value']}") for name in ("runs", "failed")]
     listed = text("table.csv has every run; table.nc the same for xarray. Each run's folder is under members/.")
     sections = [
         *([Section("", [_sensitivities(report, result["sensitivities"])])] if result["sensitivities"] else []),
@@ -39,7 +38,12 @@ def write_sweep_report(report: Report) -> Path:
         Section("Numbers", [*tables(result), listed]),
         again("hedgebed sweep run.toml"),
     ]
-    return report.write(sections, lead=[f"sweep of {result['of']}"], tiles=tiles)
+    return report.write(sections, lead=[f"sweep of {result['of']}"], tiles=answer_tiles(result))
+
+
+def answer_tiles(result: Result) -> list[Tile]:
+    """How many runs there are, and how many failed."""
+    return [Tile(name.capitalize(), f"{result['quantities'][name]['value']}") for name in ("runs", "failed")]
 
 
 def _over(report: Report, table: Mapping[str, NDArray], column: Result) -> Block:

@@ -18,7 +18,6 @@ from experiments.cli.main import main
 from experiments.converge import experiment as converge
 from experiments.converge.analysis import numbers_of, two_finest
 from experiments.converge.design import affordable, inertial_number, members_of, variants_of
-from experiments.converge.headline import converge_headline
 from experiments.converge.result import doubts, plan_told
 from experiments.converge.settings import ConvergeSettings
 from experiments.penetrate import beds
@@ -26,7 +25,9 @@ from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.result import SHIPPED_RESULT
 from experiments.pool.tasks import carry_out, done_before
 from experiments.runs.folder import RunFolder
+from experiments.runs.headline import headline_of
 from experiments.runs.progress import Progress
+from experiments.runs.registry import EXPERIMENTS
 from experiments.runs.result import Result, quantity
 from vis.report import write_report
 
@@ -343,7 +344,7 @@ def test_what_is_told_before_and_after(swift, tmp_path):
     members = members_of(settings, variants_of(settings))
     chosen = affordable(members, 0.6 * sum(member.core_hours for member in members))
     result = sweep(tmp_path / "run", seeds=(1, 2))
-    lines = converge_headline(result)
+    lines = headline_of(EXPERIMENTS["converge"], result)
     said = {
         "before": [*plan_told(settings.model_copy(update={"budget": 1.0}), chosen, members[len(chosen) :])],
         "doubts": [*doubts(settings.model_copy(update={"widths": ()}))],

@@ -5,12 +5,17 @@ import os
 import shutil
 from pathlib import Path
 
+import pytest
 from golden import golden
 
 from experiments.cli.main import main
 from experiments.penetrate.headline import penetrate_headline
+from vis.page.answer import MOST_ROWS, answer
+from vis.page.numbers import foldable
+from vis.penetrate.answer import answer_tiles
 
-SHIPPED = Path(__file__).resolve().parents[3] / "docs" / "results" / "penetrate" / "result.json"
+KEPT = Path(__file__).resolve().parents[3] / "docs" / "results"
+SHIPPED = KEPT / "penetrate" / "result.json"
 
 
 def test_a_run_ends_with_a_short_table_and_what_matters(tmp_path, capsys, monkeypatch):
@@ -28,8 +33,8 @@ def test_a_run_ends_with_a_short_table_and_what_matters(tmp_path, capsys, monkey
     assert len(lines) < 25 and lines[-1] == f"report: {folder.path / 'report.html'}"
     assert all(len(line) <= 80 for line in lines[:-2])
     table = [line for line in lines[2:] if "  " in line.strip()][:9]
-    for words in ("sinkage at rest", "drag at 0.1 m/s", "drag at 0.4 m/s", "drop at 0.2 m/s", "stiffness K"):
-        assert any(line.startswith(words) or words in line for line in table), words
+    for words in ("Sinkage under", "Largest force", "Work recovered", "stiffness K", "damping C"):
+        assert any(words in line for line in table), words
     assert main(["resume", str(folder.path), "--verbose"]) == 0
     whole = capsys.readouterr().out
     assert "coordination_number" in whole and len(whole.splitlines()) > 2 * len(lines)
@@ -45,7 +50,38 @@ def test_warnings_are_never_left_out_and_a_reference_is_one_sentence():
     assert len(headline.sentences) == 2
     golden("penetrate/headline_reference", headline.sentences[-1])
     assert headline.left >= found - 2
-    assert penetrate_headline({"quantities": {"stiffness": {"value": 1.0}}}) is None  # without a bed
+    assert penetrate_headline({"quantities": {"load": {"value": 1.0}}}) is None
+
+
+@pytest.mark.parametrize(
+    "name", ["penetrate-first", "penetrate-sand", "penetrate-foot-jsc-1a-1g", "penetrate-foot-sand-beds"]
+)
+def test_the_terminal_has_the_rows_of_the_report(name):
+    """Label, value and the spring-damper's of each row; an error that no row knows is named below the table."""
+    kept = KEPT / name
+    result = json.loads((kept / "result.json").read_text(encoding="utf-8"))
+    numbers, *_ = answer(answer_tiles(result), result)
+    shown = penetrate_headline(result)
+    beside = numbers.head.index("spring-damper")
+    of_report = [(*row[:2], row[beside]) for row in numbers.rows]
+    assert [(*row[:2], row[-1]) for row in shown.rows] == [tuple(map(foldable, row)) for row in of_report]
+    assert len(shown.rows) <= MOST_ROWS and len(numbers.head) == 7
+    left_out = [name for name in numbers.head[2:5] if name not in shown.head]
+    assert left_out and all(foldable(name) in shown.notes[0] for name in left_out)
+    for error in left_out:
+        assert {row[numbers.head.index(error)] for row in numbers.rows} <= {"–", "not known"}
+
+
+def test_a_law_without_a_bed_stands_beside_the_spring_damper():
+    numbers = {
+        "peak_force_amended@0.2": {"value": 1.5, "std": 0.1, "unit": "N", "note": "driven at 0.2 m/s, with a"},
+        "peak_force_spring_damper@0.2": {"value": 1.0, "std": None, "unit": "N"},
+        "work_returned_amended": {"value": 0.02, "std": None, "unit": "1"},
+    }
+    result = {"experiment": "penetrate", "ground": "spring-damper", "model": {"effects": ["a"]}, "quantities": numbers}
+    shown = penetrate_headline(result)
+    assert [row[1:] for row in shown.rows] == [("1.50 N", "0.10 N", "1.0 N"), ("2.0 %", "–", "")]
+    assert "std" in shown.head[2]
 
 
 def test_a_report_older_than_its_result_is_made_anew(tmp_path, capsys, monkeypatch):

@@ -332,7 +332,7 @@ def test_a_foot_on_coarse_grains_that_stick_is_held_against_terzaghi(fake, tmp_p
     assert verdict in rest["sentences"][0]
     shown = penetrate_headline(result)
     assert any(verdict in text for text in shown.sentences)
-    assert "uppermost grains" in shown.rows[1][0]
+    assert "uppermost grains" in shown.rows[0][0] and "Terzaghi" in shown.rows[1][0]
     assert verdict in summarise(read_folder(tmp_path / "run"))["answers"][0]["answer"]
 
 

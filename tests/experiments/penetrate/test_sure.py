@@ -136,14 +136,13 @@ def test_terminal_and_report_state_the_sinkage_among_real_grains(tmp_path):
     own = interval_of_sinkage(depths, tip="flat", grain=0.0032, real=REAL, cohesive=False)
     result["sure"] = {"sinkage_dem": {"unit": "m", "sentence": "so", **asdict(own)}}
     result["quantities"]["stiffness_standing"] = {"value": 6400.0, "std": None, "unit": "N/m"}
-    rows = [" ".join(row) for row in penetrate_headline(result).rows[:4]]
+    rows = [" ".join(row) for row in penetrate_headline(result).rows[:2]]
     (tmp_path / "result.json").write_text(json.dumps(result), encoding="utf-8")
     shutil.copy(KEPT / "penetrate-foot-sand-1g" / "run.toml", tmp_path)
     tiles = {tile["label"]: tile for tile in summarise(read_folder(tmp_path))["tiles"]}
     golden("penetrate/foot_among_real_grains", [
         *rows,
-        *(str(tiles["Sinks to rest at"][part]) for part in ("value", "errors")),
-        *tiles["Sinkage among real grains (95 %)"].values(), tiles["Fitted stiffness K"]["note"],
+        tiles["Sinkage among real grains (95 %)"]["note"], tiles["Fitted stiffness K"]["note"],
     ])  # fmt: skip
 
 

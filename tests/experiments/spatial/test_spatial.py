@@ -2,6 +2,7 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,12 +14,14 @@ from experiments.runs.folder import RunFolder, read_series
 from experiments.spatial import experiment as spatial
 from experiments.spatial.on_grains import SpatialFollowed, SpatialOnBed
 from experiments.spatial.settings import SpatialSettings
+from experiments.spatial.spread import add_spread, uncertain_in
 from experiments.spatial.trial import plan_spatial
 from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
 from rigid import find_platform
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.page.folder import read_columns
+from vis.page.law_rows import answer_rows
 
 
 @pytest.fixture
@@ -271,3 +274,30 @@ def test_the_wheels_columns_are_of_the_axes_that_they_turn_about(tmp_path, monke
     wheel = find_platform(mine).wheels[0]
     assert motion["wheel_y_rad_s"][-1] == pytest.approx(-1e-4 * 0.05 / wheel.inertia, rel=1e-6)
     assert not motion["wheel_x_rad_s"].any() and not motion["wheel_z_rad_s"].any()
+
+
+def test_a_standard_deviation_of_k_and_c_changes_the_answer_of_a_run_in_space():
+    """x = 3 K + C: std = hypot(3 std_K, std_C). A hop that a moved law does not have is named, and has no error."""
+    plan = plan_spatial(SpatialSettings(surface="sand"))
+    stds = {one.name: one.std for one in uncertain_in(plan)}
+    assert stds == {"stiffness": pytest.approx(0.5 * 40.6), "damping": pytest.approx(0.5 * 2.26)}
+    entry = {"std": 0.0, "unit": "m", "note": ""}
+    best = {name: entry | {"value": value} for name, value in (("max_speed", 5.0), ("transition_angle_hop", 0.3))}
+    result = {"quantities": best, "departures": {"sentences": []}}
+
+    def run_on(other):
+        law = {name: other.trial.ground_parameters[name] for name in stds}
+        assert law == {name: other.numbers[name].value for name in stds}
+        hops = None if law["stiffness"] < plan.numbers["stiffness"].value else 0.3
+        answer = {"max_speed": 3 * law["stiffness"] + law["damping"], "transition_angle_hop": hops}
+        return SimpleNamespace(run=lambda: None, answer=answer)
+
+    add_spread(plan, result, run_on, answer_of=lambda run: run.answer)
+    expected = math.hypot(3 * stds["stiffness"], stds["damping"])
+    assert result["quantities"]["max_speed"]["std"] == pytest.approx(expected)
+    assert result["quantities"]["transition_angle_hop"]["std"] is None
+    assert result["law_spread"] == {"parameters": ["stiffness", "damping"], "absent": ["transition_angle_hop"]}
+    rows = answer_rows(
+        result | {"experiment": "tumble spatial"}, {"transition_angle_hop": ("Hops from", "")}, lambda entry: ""
+    )
+    assert rows[0].errors[1] == "does not hop"
