@@ -249,7 +249,7 @@ def _dash_surface(axis: Any, stage: Stage | FlatStage, height: float, focus: Foc
     level = float(stage.place(np.array([[focus[0], stage.cut, height]]), focus)[0, 1])
     axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
     if 0.0 < level < 0.8:
-        axis.text(0.012, level + 0.012, "undisturbed surface", fontsize=9, va="bottom", color=INK, bbox=HALO)
+        axis.text(0.012, level + 0.012, "undisturbed surface at the cut", fontsize=9, va="bottom", color=INK, bbox=HALO)
     return level
 
 
