@@ -106,7 +106,7 @@ def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller
     assert made[0]["grain"] == 0.012 and run.done and np.any(run.columns["actuator_work"])
     assert (run.foot("foot")["force"] == run.feet_now[0, 7:10]).all()
     assert run.foot("foot")["depth"] == run.feet_now[0, 13]
-    with pytest.raises(ValueError, match="the robot has foot"):
+    with pytest.raises(ValueError, match="robot has"):
         run.foot("toe")
-    with pytest.raises(ValueError, match="On grains in Python"):
+    with pytest.raises(ValueError, match="grains in Python"):
         law_of_run(load_model(find_model("hopper")), ["foot"], ground="bed")

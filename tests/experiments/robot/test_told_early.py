@@ -55,7 +55,7 @@ def test_a_controller_that_never_pushes_is_warned_of_half_way_before_a_bed_and_f
     assert any("no work" in one for one in warnings) == ("no work" in warnings[0]) == idle
     progress = Kept()
     on_bed(**own).announce(progress)
-    assert any("no work on rft" in one for one in progress.said) == idle
+    assert any("work on rft" in one for one in progress.said) == idle
 
 
 def test_a_robot_without_a_controller_is_not_said_to_be_idle(tmp_path):
