@@ -34,7 +34,13 @@ class Bed(BedCore):
 
     @classmethod
     def prepare(cls, material: str | Material, **options: Any) -> Self:
-        """A bed rained in, levelled and settled; ``dem.prepare.prepare.prepare_bed`` lists the options."""
+        """A bed rained in, levelled and settled, or the same from the cache.
+
+        Options: ``size`` (x, y, depth) and ``grain`` (mean diameter) [m] are required; ``gravity`` [m/s2] is 9.81 and
+        ``seed`` 1 if not given. ``young`` [Pa] is chosen from ``max_overlap`` (0.05 of a diameter) if not given; much
+        softer grains end the preparation with BedFailure. Further ones: ``dem.prepare.specification.BedOptions``,
+        ``dem.prepare.prepare.prepare_bed``.
+        """
         return prepare_bed(material, make=cls, **options)
 
     @classmethod

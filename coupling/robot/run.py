@@ -162,8 +162,18 @@ class RobotRun(EnergyBalance, Stepper):
 
     @property
     def feet_now(self) -> Vector:
-        """The last row of `feet`, shape (foot, FOOT)."""
+        """The last row of `feet`, shape (foot, FOOT); `foot` has it by names."""
         return self._feet[-1].reshape(-1, FOOT)
+
+    def foot(self, name: str) -> dict[str, Vector | float]:
+        """The last row of one foot: ``position`` [m], ``turn`` (quaternion), ``force`` of the ground on it [N],
+        ``torque`` [N m], ``depth`` of its lowest point [m]. Raises ValueError for a foot that there is not."""
+        names = [foot.name for foot in self.body.feet]
+        if name not in names:
+            raise ValueError(f"foot {name!r}: the robot has {', '.join(names)}")
+        row = self.feet_now[names.index(name)]
+        parts = {"position": row[:3], "turn": row[3:7], "force": row[7:10], "torque": row[10:13]}
+        return {**parts, "depth": float(row[13])}
 
     @property
     def _turning(self) -> Vector:

@@ -46,6 +46,10 @@ class Followed(ABC, Generic[Run]):
     sinkage: Callable[[Any], float]  # Of a run: how deep the platform stands once it is set down [m]
     write_series: Callable[[Any, Path], Any]  # Of a run and a folder: writes the series, as far as it has come
 
+    def notice(self, run: Run) -> str | None:
+        """A message on the way, after a step; None where there is none."""
+        return None
+
     @abstractmethod
     def conclude(self, run: Run, folder: Path) -> Result:
         """The result, its series written."""
@@ -80,6 +84,8 @@ class Followed(ABC, Generic[Run]):
             if isinstance(run.ground, BedGround):
                 show_bed(progress, run.ground.bed)
             progress.update(run.fraction)
+            if said := self.notice(run):
+                progress.message(said)
             if run.placement_is_long and not late:
                 late = True
                 progress.message(say("long_placement", held=run.body.time))

@@ -80,6 +80,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     repeats = 1  # How often the prepared bed is laid end to end [1]
     given_stages: tuple[str, ...] | None = None  # Stages of the bed that are set; None: those of its material
     bed_stage = "bed"  # What the progress calls the preparation
+    report_seconds = 10.0  # Expected duration of its report [s]
     plans = True  # Whether it reports the stages to come; one of several beds does not
 
     # What differs
@@ -267,5 +268,5 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         if self.given_stages is None and self.stages is not None:
             progress.message(say("by_recipe", material=self.material, stages=" ".join(self.stages)))
         if self.plans:
-            progress.plan(self.costs, seconds={"report": 10.0})
+            progress.plan(self.costs, seconds={"report": self.report_seconds})
         return self.finish(self.stepper(self.bed(self.softening(), progress)), folder, progress)

@@ -9,16 +9,18 @@ from dem.grains.materials import Material
 from dem.grains.sizes import sizes_of
 from dem.prepare.prepare import prepare_as
 from dem.prepare.recipe import check_stages, parse_stage
-from experiments.runs.progress import Progress
+from experiments.runs.progress import Progress, as_expected
 from rigid.checks.unfit import UnfitSettingsError
 
 from . import say
 from .bed_progress import Stages
 
-__all__ = ["check_bed_stages", "come_to_rest", "lower_gravity", "staged_bed"]
+__all__ = ["LOWERED", "check_bed_stages", "come_to_rest", "lower_gravity", "staged_bed"]
 
 _SPELL, _MOST_SPELLS = 1.5, 60
 """How long grains are left to come to rest at a time [sqrt(d / g)], and how often at most."""
+LOWERED = 45.0
+"""Time to rest in a lowered gravity [sqrt(d / g) before]: 40 and 50 in two beds of 10 mm, from 1 g to 0.01 g."""
 _DRAG = 0.3  # Time of the drag at first [sqrt(d / g)]
 _STILL = 1e-5  # Mean kinetic energy at rest [m g d]
 _CARRIED = 0.02  # Share of the weight by which the force on the floor may differ from it
@@ -79,24 +81,41 @@ def staged_bed(
     return prepared.bed
 
 
-def lower_gravity(bed: Any, gravity: float, *, unit: float) -> None:
+def lower_gravity(bed: Any, gravity: float, *, unit: float, progress: Stages | None = None) -> None:
     """Lower gravity to this [m/s2], and let the grains come to rest until the floor carries their weight.
 
-    ``unit``: sqrt(d / g) in the gravity before [s]. Stiff grains ring for longer than their kinetic energy shows.
-    Raises UnfitSettingsError where they do not come to rest.
+    ``unit``: sqrt(d / g) in the gravity before [s]. ``progress``: shows each spell, and may stop it by
+    KeyboardInterrupt. Stiff grains ring for longer than their kinetic energy shows. Raises UnfitSettingsError where
+    they do not come to rest.
     """
     bed.set_gravity(gravity)
-    come_to_rest(bed, unit=unit)
+    shown = None if progress is None else _Spells(progress, bed)
+    come_to_rest(bed, unit=unit, progress=shown)
     for _ in range(_MOST_SPELLS):
         if abs(bed.floor_force / bed.weight - 1) < _CARRIED:
             break
         bed.advance(math.ceil(_SPELL * unit / bed.time_step))
+        if shown is not None:
+            shown.update(1.0)
     else:
         raise UnfitSettingsError("the floor does not come to carry the weight of the bed after gravity was lowered")
     _begin_from_here(bed)
 
 
-def come_to_rest(bed: Any, *, unit: float, progress: Progress | None = None) -> None:
+class _Spells:
+    """Shows spells of rest as shares of `LOWERED`: how far a spell has come is not known before the end."""
+
+    def __init__(self, progress: Stages, bed: Any) -> None:
+        self.progress, self.bed, self.count = progress, bed, 0
+
+    def update(self, _: float) -> None:
+        """One spell more is done."""
+        self.count += 1
+        self.progress.show_bed(self.bed)
+        self.progress.update(as_expected(self.count * _SPELL / LOWERED))
+
+
+def come_to_rest(bed: Any, *, unit: float, progress: "Progress | _Spells | None" = None) -> None:
     """Let grains that have sprung apart come to rest, in a drag first; `unit`: sqrt(d / g) [s]. Then time is 0 again.
 
     At rest as a bed is when it is prepared: their mean kinetic energy is below 1e-5 m g d, in the drag and then without

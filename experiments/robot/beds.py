@@ -14,10 +14,12 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import keeping_status, publish
+from vis.page.numbers import foldable
 from vis.page.numbers import quantity as in_words_of
 from vis.robot.answer import BALLISTIC
 
 from . import say
+from .forms import NO_FORMS, Forms, expected_words, with_grains
 from .on_grains import RobotOnBed
 from .plan import CONTROLLER, MODEL, RobotPlan
 from .settings import RobotSettings
@@ -39,7 +41,7 @@ def carry_out_beds(settings: RobotSettings, plan: RobotPlan, folder: RunFolder, 
     copies of model and controller from `folder`. Raises as `RobotOnBed.carry_out`.
     """
     runs = {seed: _OneOfSeveral(settings.of_bed(seed), plan) for seed in settings.seeds}
-    progress.plan({name: cost for run in runs.values() for name, cost in run.costs.items()}, seconds={"report": 10.0})
+    progress.plan({name: cost for run in runs.values() for name, cost in run.costs.items()}, seconds={"report": 5.0})
     results: list[Mapping[str, Any]] = []
     before: RobotOnBed | None = None
     for place, (seed, run) in enumerate(runs.items(), 1):
@@ -65,12 +67,15 @@ class _OneOfSeveral(RobotOnBed):
 
     def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
         super().__init__(settings, replace(plan, settings=settings))
-        self.stage, self.bed_stage = f"robot, seed {settings.seed}", f"bed, seed {settings.seed}"
+        names = (f"{name}, seed {settings.seed}" for name in (self.stage, self.bed_stage, self.lowering_stage))
+        self.stage, self.bed_stage, self.lowering_stage = names
 
     def take_laws_of(self, other: RobotOnBed | None) -> None:
         """Take the runs on surface laws of another bed, where there is one: they do not depend on the bed."""
         if other is not None:
             self.forecast, self.beside = other.forecast, other.beside
+            if "forms" in vars(other):  # computed already
+                self.forms = other.forms
 
 
 def _copy_given(source: Path, folder: Path) -> None:
@@ -94,6 +99,8 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
     sentences = [say("over_beds", count=count, words=in_words(sure, half=True)), say("chance_alone")]
     shared = [said for said in first["departures"]["sentences"] if _in_all(results, said)]
     notes = [said for said in shared if said != say("invalid")]
+    forms = _forms_over(results, {name: one["value"] for name, one in sure.items()})
+    sentences = [*forms.words, *sentences]
     return Result.make(
         "mujoco",
         title=say("title_beds", title=(invalid or [first["title"]])[0], count=count),
@@ -103,6 +110,7 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
         sure=sure,
         **({"ballistic": True} if any(set(BALLISTIC.values()) & set(one["quantities"]) for one in results) else {}),
         **{name: first[name] for name in OF_ALL},
+        **({"forms": forms.numbers} if forms.numbers else {}),
         feet_reached=_mean_reached(results),
         beds=[
             {"seed": seed, "folder": f"beds/seed-{seed}", "answer": answer, "grains": _of_its_own(result)}
@@ -113,6 +121,19 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
         code=first["code"],
         warnings=list(_warnings(seeds, results)),
     )
+
+
+def _forms_over(results: Sequence[Mapping[str, Any]], mean: Mapping[str, float]) -> Forms:
+    """The ranges over the laws of sand and every bed, around the `mean` over the beds."""
+    every = [result["forms"] for result in results if "forms" in result]
+    if len(every) < len(results):  # another surface, or a bed that an older hedgebed has computed
+        return NO_FORMS
+    forms = with_grains(Forms(numbers=every[0]), mean)
+    for name, one in forms.numbers["ranges"].items():
+        one["low"] = min(bed["ranges"][name]["low"] for bed in every)
+        one["high"] = max(bed["ranges"][name]["high"] for bed in every)
+    words = expected_words(forms.numbers, mean, on_grains=True)
+    return Forms(numbers=forms.numbers, words=tuple(map(foldable, words)))
 
 
 def _common(results: Sequence[Mapping[str, Any]]) -> set[str]:

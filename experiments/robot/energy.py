@@ -2,14 +2,17 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from coupling.robot import LawFeet, RobotRun
 from coupling.robot.stability import ITERATED, ExchangeLoad, Load
 from experiments.grains.bed_result import residual_warning
 
 from . import say
+from .plan import RobotPlan
 from .settings import RobotSettings
 
-__all__ = ["MOST_RESIDUAL", "balance_warning", "growth_warning"]
+__all__ = ["MOST_RESIDUAL", "balance_warning", "growth_warning", "idle"]
 
 MOST_RESIDUAL = 0.05
 """`energy_residual` above which the numbers of a run are not to be used. The height of a hop is in
@@ -49,6 +52,11 @@ def balance_warning(settings: RobotSettings, run: RobotRun) -> str | None:
         cause="the exchange of forces" if load else "the exchange of forces, or the step of the bed,",
         remedy=_listed(_remedies(settings, run, load)),
     )  # fmt: skip
+
+
+def idle(plan: RobotPlan, run: RobotRun) -> bool:
+    """Whether the robot has a controller and its actuators have given no work so far."""
+    return plan.controller is not None and run.robot.model.nu > 0 and not np.any(run.columns["actuator_work"])
 
 
 def _remedies(settings: RobotSettings, run: RobotRun, load: Load | None) -> Iterator[str]:

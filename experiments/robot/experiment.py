@@ -10,7 +10,7 @@ from experiments.runs.result import Result
 from experiments.runs.whole_runs import whole_run
 
 from .energy import growth_warning
-from .on_grains import RobotFollowed, RobotOnBed
+from .on_grains import RobotFollowed, RobotOnBed, report_seconds
 from .plan import keep_files, plan_robot, try_controller
 from .settings import RobotSettings, say
 
@@ -46,7 +46,7 @@ def _carry_out(settings: RobotSettings, folder: RunFolder, progress: Progress) -
         if settings.threads is not None:
             progress.message(say("threads_on_law", s=settings))
         followed.announce(progress)
-        progress.plan({followed.stage: settings.duration}, seconds={"report": 10.0})
+        progress.plan({followed.stage: settings.duration}, seconds={"report": report_seconds(settings)})
         run: RobotRun = followed.run_on_law()
         if warning := growth_warning(settings, run):
             progress.message(f"warning: {warning}")

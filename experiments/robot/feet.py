@@ -1,5 +1,6 @@
 """How high and how deep each foot of a robot goes: its lowest point over the undisturbed surface."""
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -111,11 +112,11 @@ def too_deep(run: RobotRun, law: str = "spring-damper") -> list[str]:
     return [say(key, law=law, name=name, depth=1e3 * depth, limit=1e3 * limits[name])] if most > 1 else []
 
 
-def too_fast(plan: RobotPlan, run: RobotRun, heights: Array) -> list[str]:
+def too_fast(plan: RobotPlan, run: RobotRun, heights: Array, laws: Collection[str] = ()) -> list[str]:
     """A sentence where a foot goes into sand faster than its law was compared with grains, of the fastest foot.
 
-    ``heights``: as of `heights_of`. At v above sqrt(g D) the inertia of the grains, rho v^2 D^2, exceeds their weight,
-    rho g D^3. This weight is the scale of the static force.
+    ``heights``: as of `heights_of`. ``laws``: names of those that the run was computed on. At v above sqrt(g D) the
+    inertia of the grains, rho v^2 D^2, exceeds their weight, rho g D^3. This weight is the scale of the static force.
     """
     gravity, time = plan.numbers["gravity"].value, run.columns["time"]
     if plan.fitted is not None or not plan.surface.granular or not gravity > 0 or len(time) < 2:
@@ -124,12 +125,12 @@ def too_fast(plan: RobotPlan, run: RobotRun, heights: Array) -> list[str]:
     found = []
     for foot, speed in zip(run.robot.feet, downwards, strict=True):
         diameter = max(plan.diameters[part.name] for part in foot.parts)
-        found.append((float(speed) / np.sqrt(gravity * diameter), foot.name, float(speed), diameter))
-    froude, name, speed, diameter = max(found)
+        found.append((float(speed) / np.sqrt(gravity * diameter), foot.name, float(speed)))
+    froude, name, speed = max(found)
     if froude <= FASTEST:
         return []
-    cause = say("inertia_of_rft", inertia=plan.numbers["inertia"].value) if plan.law == "rft" else ""
-    return [say("too_fast", name=name, speed=speed, froude=froude, diameter=1e3 * diameter, most=FASTEST, cause=cause)]
+    bounds = say("one_bound" if "rft, inertia=10" in laws else "bed_as_bound")
+    return [say("too_fast", name=name, speed=speed, froude=froude, most=FASTEST, bounds=bounds)]
 
 
 def feet_quantities(reached: dict[str, dict[str, float]]) -> dict[str, tuple[float, str, str]]:

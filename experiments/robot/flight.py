@@ -19,6 +19,7 @@ from .settings import RobotSettings
 __all__ = ["APART", "Flights", "at_end", "fall_warning", "find_flights", "launched", "to_landing", "touch_words"]
 
 APART = 5e-3  # A flight lasts at least that long [s]
+IN_CRATER = 1e-3  # Depth of the lowest foot from which on a launch is said to be in its crater [m]
 
 Array = NDArray[np.float64]
 
@@ -54,14 +55,16 @@ def find_flights(run: RobotRun, heights: Array) -> Flights:
     return Flights(rows, touched, at_end=bool(rows) and rows[-1][1] == len(free), longest=longest)
 
 
-def launched(run: RobotRun, begin: int) -> list[str]:
-    """What the speed at a launch, row `begin`, means in this gravity, in a sentence; none without gravity or speed."""
-    gravity, speed = run.robot.gravity, float(_upwards(run)[begin])
-    if gravity <= 0 or speed <= 0:
+def launched(run: RobotRun, heights: Array, begin: int) -> list[str]:
+    """When and how fast the first flight begins, at row `begin`, in a sentence; none where it begins downwards.
+
+    ``heights``: as of `to_landing`. A flight may begin below the undisturbed surface, in the crater of the last foot.
+    """
+    speed, height = float(_upwards(run)[begin]), float(heights[begin].min())
+    if speed <= 0:
         return []
-    time = float(run.columns["time"][begin])
-    rise, flight = speed**2 / (2 * gravity), 2 * speed / gravity
-    return [say("launched", time=time, speed=speed, gravity=gravity, rise=1e3 * rise, flight=flight)]
+    where = say("in_its_crater", depth=-1e3 * height) if height < -IN_CRATER else ""
+    return [say("launched", time=float(run.columns["time"][begin]), speed=speed, where=where)]
 
 
 def to_landing(run: RobotRun, heights: Array) -> str:

@@ -5,7 +5,7 @@ inertia of the grains, damping, the power of the depth. None of them is the trut
 the error that the form of the law makes, and no bound.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from experiments.runs.types import Json
@@ -17,15 +17,17 @@ from .plan import RobotPlan, plan_robot
 from .settings import DEFAULT
 from .sure import ANSWER, Answer, entry
 
-__all__ = ["NO_FORMS", "Forms", "forms_of", "other_laws"]
+__all__ = ["MOST_INERTIA", "NO_FORMS", "Forms", "expected_words", "forms_of", "other_laws", "with_grains"]
 
 MOST_INERTIA = "inertia=10"
 """The largest inertia of `rft`, beside its default of plates (rigid/ground/rft.py)."""
+DROPPED_INERTIA = "inertia=2"
+"""Inertia of `rft` of a dropped ball: real sand is expected between it and grains (docs/notes/mujoco.md)."""
 OF_MOTION = {"inertia", "rebound", "loss", "loss_speed"}
 """Parameters that change how a law follows a motion, not how strong the sand is."""
 LAWS: tuple[tuple[str, tuple[str, ...]], ...] = (
-    (DEFAULT, ()), (DEFAULT, (MOST_INERTIA,)), ("spring-damper", ()), ("power-irreversible", ()),
-    ("katsuragi-durian", ()), ("bekker", ()),
+    (DEFAULT, ()), (DEFAULT, (DROPPED_INERTIA,)), (DEFAULT, (MOST_INERTIA,)), ("spring-damper", ()),
+    ("power-irreversible", ()), ("katsuragi-durian", ()), ("bekker", ()),
 )  # fmt: skip
 """Laws that have numbers for sand, with their parameters."""
 
@@ -81,20 +83,49 @@ def forms_of(
             lost.append(name)
     if len(answers) == 1:
         return NO_FORMS
+    ends = [{name: one[end] for name, one in sure.items()} for end in ("low", "high")]
+    forms = _ranges(answers, best, ends, on_grains=False)
+    words = [foldable(say("forms_lost", laws=", ".join(lost)))] if lost else []
+    return replace(forms, words=(*forms.words, *words))
+
+
+def with_grains(laws: Forms, best: Answer) -> Forms:
+    """The ranges over `laws`, widened to a run on grains with the answer `best`; nothing where there are no laws."""
+    return _ranges(laws.numbers["laws"], best, [best], on_grains=True) if laws.numbers else NO_FORMS
+
+
+def _ranges(answers: Mapping[str, Answer], best: Answer, more: Sequence[Answer], *, on_grains: bool) -> Forms:
+    """The ranges over `answers` and `more`, around the answer `best` of the run."""
     ranges = {}
     for name in ANSWER:
-        values = [answer[name] for answer in answers.values()]
-        values += [sure[name][end] for end in ("low", "high") if name in sure]
+        values = [answer[name] for answer in (*answers.values(), *more) if name in answer]
         ranges[name] = entry(name, best[name], min(values), max(values))
+    numbers: Json = {"laws": answers, "ranges": ranges}
+    words = expected_words(numbers, best, on_grains=on_grains)
+    return Forms(numbers=numbers, words=tuple(map(foldable, words)))
+
+
+def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]:
+    """Rise or sinkage on each law, and on which side real sand is expected, in sentences.
+
+    ``numbers``: as of `Forms`. ``best``: answer of the run, on grains (`on_grains`) or on a law.
+    """
+    answers, ranges = numbers["laws"], numbers["ranges"]
     told = "highest" if best["longest_flight"] > 0 else "sinkage_largest"
     unit, one = ANSWER[told], ranges[told]
-    each = "; ".join(
-        f"{law} {quantity({'value': answer[told], 'std': None, 'unit': unit})}" for law, answer in answers.items()
-    )
     ends = between(one["low"], one["high"], unit)
-    words = [say(f"forms_{told}", ends=ends, each=each), *([say("forms_lost", laws=", ".join(lost))] if lost else [])]
-    numbers: Json = {"laws": answers, "ranges": ranges}
-    return Forms(numbers=numbers, words=tuple(map(foldable, words)))
+
+    def shown(answer: Answer) -> str:
+        return quantity({"value": answer[told], "std": None, "unit": unit})
+
+    each = "; ".join(f"{law} {shown(answer)}" for law, answer in answers.items())
+    near = next((law for law in (_named(DEFAULT, (DROPPED_INERTIA,)), DEFAULT) if law in answers), None)
+    words = {"what": say(f"called_{told}"), "ends": ends, "each": each}
+    said = [say("forms_with_grains" if on_grains else "forms_of_laws", **words)]
+    if near is not None:
+        key = "expected_of_grains" if on_grains else "expected_of_laws"
+        said.insert(0, say(key, what=words["what"], law=near, low=shown(answers[near]), high=shown(best)))
+    return said
 
 
 def _named(law: str, parameters: tuple[str, ...]) -> str:

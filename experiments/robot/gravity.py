@@ -98,7 +98,7 @@ class GravityRule:
         told = []
         for name in names:
             (symbol, unit), number = SYMBOLS[name], getattr(self.answer, name)
-            told.append(f"{symbol} = {number.value:.3g} ± {number.std:.2g} {unit}")
+            told.append(_quoted(symbol, number, unit))
         real = say("real_grains") if self.share < NEAR[0] and self.sticky is None else ""
         numbers, grains = " and ".join(told), surface.name
         told = [
@@ -109,9 +109,20 @@ class GravityRule:
         similar = self.answer.stiffness.value * (self.largest / surface.spike) ** POWERS["stiffness"][1]
         if "stiffness" in names and self.of_foot is not None and abs(self.of_foot.value / similar - 1) > SAME:
             told.append(
-                say("of_foot", own=similar, map=self.of_foot, largest=1e3 * self.largest, grain=1e3 * self.answer.grain)
+                say(
+                    "of_foot",
+                    own=similar,
+                    of_map=_quoted("K", self.of_foot, "N/m"),
+                    largest=1e3 * self.largest,
+                    grain=1e3 * self.answer.grain,
+                )
             )
         return told
+
+
+def _quoted(symbol: str, number: Number, unit: str) -> str:
+    """A number of a map with its standard deviation in two digits: 390, not 3.9e+02."""
+    return f"{symbol} = {number.value:.3g} ± {float(f'{number.std:.2g}'):g} {unit}"
 
 
 def gravity_rule(

@@ -21,25 +21,28 @@ from coupling.robot.soles import plan_area
 from coupling.robot.stability import ExpectedBed, check_exchange
 from dem import Bed
 from dem.contact.timestep import time_step_for
+from experiments.grains.bed_progress import Stages
 from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps, moved_to_lammps
 from experiments.grains.on_bed import Forecast, PlatformOnBed
 from experiments.grains.softening import Softening, run_limit
-from experiments.grains.staged import lower_gravity
+from experiments.grains.staged import LOWERED, lower_gravity
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
+from experiments.runs.stopping import held_back
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
+from .energy import idle
 from .feet import feet_reached, heights_of
 from .flight import fall_warning, find_flights, touch_words
-from .forms import forms_of
+from .forms import MOST_INERTIA, NO_FORMS, Forms, forms_of, with_grains
 from .plan import RobotPlan, width_of
 from .result import RobotFrames, conclude, deepest_at_start, quantities_of, write_series_of
 from .settings import RobotSettings
 from .sure import answer_of, sure_of_law
 
-__all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed"]
+__all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed", "report_seconds"]
 
 SEEN = 200  # Moments of the forecast at which the extent of the feet is taken
 WIDE = 4.0
@@ -47,6 +50,12 @@ WIDE = 4.0
 PACE = 3.0
 """Grain-steps in a second of processor time [1e6]: the leg for 1 s on 3,921 grains, 1.2e8 grain-steps, took 62 s with
 its bed on one core (docs/notes/mujoco.md). Sleep makes it less."""
+REPORT = {True: 45.0, False: 20.0}
+"""Expected duration of a report with pictures and film on grains and on a law [s]; `CURVES` without pictures."""
+CURVES = 5.0
+DEEPER = 1.3
+"""Depth for which a bed must be deep, over that on `rft` with inertia=10 [1]. Four legs on grains of 10 and 12 mm went
+0.7 to 1.25 times as deep (docs/notes/mujoco.md). This law is the nearest to grains."""
 SPARE = 0.2  # Share of the way and depth of the feet that the advised bed has more than it needs
 FEWEST_ACROSS = 5.0  # Grains across the widest part of a foot, below which it is refused [1]
 
@@ -61,7 +70,7 @@ class RobotFollowed(Followed[RobotRun]):
 
     def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
         self.settings, self.plan = settings, plan
-        self.weight = plan.numbers["weight"].value
+        self.weight, self._half_way = plan.numbers["weight"].value, False
 
     def run_on_law(self, *, as_spring: bool = False) -> RobotRun:
         """The robot on its surface law, ready to be stepped; `as_spring`: explicitly, on the spring-damper."""
@@ -81,6 +90,13 @@ class RobotFollowed(Followed[RobotRun]):
         touch = touch_words(self.settings, robot)
         for sentence in [*plan.announcement(), *touch, *(f"warning: {warning}" for warning in falls)]:
             progress.message(sentence)
+
+    def notice(self, run: RobotRun) -> str | None:
+        """Once, half way: that the actuators have given no work."""
+        if self._half_way or run.fraction < 0.5:
+            return None
+        self._half_way = True
+        return f"warning: {say('idle_so_far', time=run.time)}" if idle(self.plan, run) else None
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
         best = _answer(run)
@@ -106,6 +122,11 @@ def _stepping(settings: RobotSettings) -> Mapping[str, Any]:
     return {name: getattr(settings, name) for name in ("substeps", "extrapolation", "iterations")}
 
 
+def report_seconds(settings: RobotSettings) -> float:
+    """Expected duration of the report [s]."""
+    return REPORT[settings.on_grains] if settings.frame_count else CURVES
+
+
 @dataclass(frozen=True, kw_only=True)
 class RobotForecast(Forecast):
     """What the same robot on the spring-damper says of the bed."""
@@ -118,6 +139,8 @@ class RobotForecast(Forecast):
 
 class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotForecast]):
     """A robot on a bed."""
+
+    lowering_stage = "lower gravity"  # What the progress calls the rest in the gravity of the run
 
     def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
         super().__init__(settings, plan)
@@ -219,14 +242,48 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         self.progress = progress
         _ = self.beside  # before the bed is made: a failure loses no work on grains
         self._announce(self.told, progress)
+        for sentence in self._softness():
+            progress.message(sentence)
+        if idle(self.plan, self.beside):
+            law, time = self.settings.default_law, self.beside.time
+            progress.message(f"warning: {say('idle_on_law', law=law, time=time)}")
         if self.settings.ground != "lammps":
             progress.message(self._work())
 
+    def _softness(self) -> list[str]:
+        """The modulus of the grains, and a warning where one that is set makes them overlap by more than was meant."""
+        s, used, chosen = self.settings, self.softening(), self.softening(chosen=True)
+        overlap = s.max_overlap * (chosen.young / used.young) ** (2 / 3)  # Hertz
+        words: Mapping[str, Any] = {
+            "s": s, "young": used.young, "chosen": chosen.young, "factor": used.factor, "overlap": overlap,
+        }  # fmt: skip
+        softer = s.young is not None and used.young < chosen.young
+        own = say("young_given" if s.young is not None else "young_chosen", **words)
+        return [own, *([f"warning: {say('young_soft', **words)}"] if softer else [])]
+
     def _work(self) -> str:
-        """Grains, steps and processor time of the run without bed and pictures, in a sentence."""
+        """Grains, steps and processor time of the run, its bed and its report, in a sentence."""
         count, step = self.grain_count(), self._time_step()
-        run, bed = (count * time / step / (60e6 * PACE) for time in (self.duration, self.costs[self.bed_stage]))
-        return say("work", count=count, steps=self.duration / step, minutes=run, bed=bed, pace=PACE)
+        beds = sum(cost for name, cost in self.costs.items() if name != self.stage)
+        run, bed = (count * time / step / (60e6 * PACE) for time in (self.duration, beds))
+        report = self.report_seconds / 60
+        words = {"minutes": run, "bed": bed, "report": report, "pace": PACE}
+        pictures = say("with_pictures" if self.settings.frame_count else "without_pictures")
+        return say("work", count=count, steps=self.duration / step, pictures=pictures, **words)
+
+    @property
+    def report_seconds(self) -> float:  # type: ignore[override]
+        """Expected duration of the report [s]."""
+        return report_seconds(self.settings)
+
+    @property
+    def costs(self) -> dict[str, float]:
+        """As of every bed, and the rest in the gravity of the run where the bed is prepared in more."""
+        found = dict(super().costs)
+        run = found.pop(self.stage)
+        if self.first_gravity != self.gravity:
+            found[self.lowering_stage] = LOWERED * math.sqrt(self.settings.grain / self.first_gravity)
+        return found | {self.stage: run}
 
     def _time_step(self) -> float:
         """Of the grains [s]."""
@@ -257,7 +314,11 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         """
         bed = super().prepare(softening, progress)
         if self.first_gravity != self.gravity:
-            lower_gravity(bed, self.gravity, unit=math.sqrt(self.settings.grain / self.first_gravity))
+            unit = math.sqrt(self.settings.grain / self.first_gravity)
+            with held_back() as asked_to_stop:
+                shown = Stages(progress, asked_to_stop)
+                shown.stage(self.lowering_stage, total=1.0)
+                lower_gravity(bed, self.gravity, unit=unit, progress=shown)
         return bed
 
     def check(self) -> None:
@@ -301,14 +362,33 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
                 faults.append(say("too_short", s=s, name=name, **words))
                 need += SPARE * way
             sizes[axis] = max(s.bed_size[axis], math.ceil(100 * max(need, wide) - 1e-6) / 100)
-        least = forecast.deepest + 2 * self.spike_diameter
+        deepest, on = self._depth
+        least = deepest + 2 * self.spike_diameter
         if s.bed_size[2] < least:
-            sizes[2] = math.ceil(1e3 * (least + SPARE * forecast.deepest)) / 1e3
-            words = {"width": self.spike_diameter, "least": math.ceil(1e3 * least) / 1e3}
-            faults.insert(0, say("too_shallow", s=s, f=forecast, **words))
+            sizes[2] = math.ceil(1e3 * (least + SPARE * deepest)) / 1e3
+            least = math.ceil(1e3 * least) / 1e3
+            faults.insert(
+                0, say("too_shallow", s=s, width=self.spike_diameter, least=least, deepest=deepest, on=on)
+            )  # fmt: skip
         if faults:
             told = " ".join(f"{size:g}" for size in sizes)
             raise ValueError(say("all_sides", s=s, faults=". ".join(faults), sizes=told, spare=SPARE))
+
+    @cached_property
+    def _depth(self) -> tuple[float, str]:
+        """Depth for which the bed must be deep [m], and on what it is expected, in words.
+
+        On sand that on the law which is nearest to grains, times `DEEPER`, if that is less than on the spring-damper.
+        """
+        deepest, on = self.forecast.deepest, self.forecast.on
+        if self.settings.default_law == "spring-damper":
+            return deepest, on
+        nearest = self.plan.on_law("rft", MOST_INERTIA)
+        try:
+            near = DEEPER * self._answer_of(nearest)["sinkage_largest"]
+        except (RuntimeError, ValueError):  # lost, or an exchange that would be unstable
+            return deepest, on
+        return (near, say("on_nearest_law", times=DEEPER)) if near < deepest else (deepest, on)
 
     @property
     def pressure(self) -> float:
@@ -344,8 +424,16 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         robot: MujocoRobot = self.plan.robot()
         return RobotRun(robot, ground, duration=self.duration, **_stepping(self.settings))
 
+    @cached_property
+    def forms(self) -> Forms:
+        """The same robot on the laws of sand; nothing on other surfaces. They do not depend on the bed."""
+        law = self.settings.default_law
+        if law == "spring-damper":
+            return NO_FORMS
+        return forms_of(self.plan.on_law(law), _answer(self.beside), self._answer_of, sure={})
+
     def conclude(self, run: RobotRun, folder: Path) -> Result:
         return conclude(
             self.settings, self.told, run, folder, beside=self.beside, softening=self.softening(),
-            across=self.narrowest / self.settings.grain,
+            across=self.narrowest / self.settings.grain, forms=with_grains(self.forms, _answer(run)),
         )  # fmt: skip

@@ -108,9 +108,9 @@ class RobotPlan:
         told = dict(zip(of_all, of_some, strict=True))
         return replace(self, numbers=numbers, warnings=tuple(told.get(said, said) for said in self.warnings))
 
-    def on_law(self, law: str) -> "RobotPlan":
-        """The same on this surface law with its defaults, in place of grains."""
-        return replace(self, settings=self.settings.model_copy(update={"ground": law, "ground_parameters": ()}))
+    def on_law(self, law: str, *parameters: str) -> "RobotPlan":
+        """The same on this surface law with its defaults but for these parameters, in place of grains."""
+        return replace(self, settings=self.settings.model_copy(update={"ground": law, "ground_parameters": parameters}))
 
     def announcement(self) -> list[str]:
         """What was not given, then the warnings."""

@@ -21,7 +21,7 @@ from rigid.spatial.quaternions import to_matrix
 from vis.robot.answer import BALLISTIC
 
 from . import say
-from .energy import MOST_RESIDUAL, balance_warning
+from .energy import MOST_RESIDUAL, balance_warning, idle
 from .feet import (
     bounce_warning,
     bounce_words,
@@ -163,11 +163,12 @@ def conclude(
     write_series_of(run, folder)
     title = say("title", name=robot.name, what=_ground_named(plan), gravity=robot.gravity)
     told = [sure_words] if sure_words else []
-    known = [*forms.words, *(told if sure else [])]
+    known = [*forms.words[:1], *(told if sure else []), *forms.words[1:]]
     sentences = [*known, *_sentences(run, heights, flights), *([] if sure or forms.words else told), *plan.notes]
     if run.energy_residual > MOST_RESIDUAL:
         title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
     warnings: list[str | None] = [
+        say("idle", time=run.time) if idle(plan, run) else None,
         *plan.warnings, balance_warning(settings, run), grains.unsettled_warning(run.master),
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
@@ -175,7 +176,7 @@ def conclude(
         _cut_off(run, heights, flights) if flights.at_end else None,
         *bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law),
         *(too_deep(run, plan.law) if plan.fitted is None else []),
-        *([] if settings.on_grains else too_fast(plan, run, heights)),
+        *([] if settings.on_grains else too_fast(plan, run, heights, forms.numbers.get("laws", ()))),
     ]  # fmt: skip
     if plan.fitted is not None:
         warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]
@@ -202,6 +203,7 @@ def conclude(
             "origin": [float(number) for number in run.ground.origin],
             "beside": quantities_of(beside, lifted, find_flights(beside, lifted)), "beside_law": settings.default_law,
         }  # fmt: skip
+        sentences.append(say("modulus", young=1e-6 * softening.young, factor=softening.factor))
         if settings.sleep:
             done, awake = (result["grains"][key] for key in ("grain_steps", "grain_steps_all_awake"))
             sentences.append(say("slept", share=done / awake))
@@ -322,7 +324,7 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
     rise = 1e3 * _highest(run, touched)
     rose = say("rose", rise=rise) if rise >= 0 else say("stayed_below", rise=-rise)
-    told = launched(run, flown[0][0]) if flown else []
+    told = launched(run, heights, flown[0][0]) if flown else []
     told.append(say("went", way=1e3 * way, rose=rose))
     lost = bounce_words(crater_losses(run, heights, apart=APART))
     stayed = say("stayed_in_crater" if lost else "stayed")

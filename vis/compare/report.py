@@ -142,7 +142,7 @@ def answer_tiles(result: Result) -> list[Tile]:
         ("trajectory_angle", "Trajectory angle"), ("max_speed", "Largest speed"), ("largest_turn", "Largest turn"),
         ("highest", "Rise"), ("sinkage_largest", "Sinkage"), ("sinkage", "Sinkage"), ("stiffness", "Stiffness"),
         ("largest_force", "Largest force"),
-        ("energy_residual", "Energy left over"),
+        ("energy_residual", "Energy error"),
     )  # fmt: skip
     rows = {row["name"]: row for row in result["compared"]}
     tiles = []

@@ -244,7 +244,7 @@ def _dash_surface(axis: Any, stage: Stage | FlatStage, height: float, focus: Foc
     level = float(stage.place(np.array([[focus[0], stage.cut, height]]), focus)[0, 1])
     axis.plot([0.0, 1.0], [level, level], color=INK, lw=0.8, ls=(0, (5, 4)))
     if 0.0 < level < 1.0:
-        _key(axis, 0, "undisturbed surface", lw=0.8, ls=(0, (5, 4)))
+        _key(axis, 0, "undisturbed surface at the cut", lw=0.8, ls=(0, (5, 4)))
 
 
 def _key(axis: Any, number: int, words: str, **style: Any) -> None:

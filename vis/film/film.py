@@ -216,6 +216,7 @@ def _moments_in_space(reels: Sequence[SpaceReel], coarse: AnyReel) -> list[tuple
     seen = f"Both {first.what}s" if len(reels) == 2 else f"The whole {first.what}"
     whence = " from above" if any(reel.on_grains for reel in reels) else ""
     near = ", and a foot from near" if whence and len(reels) == 1 else ""
+    behind = f" {say('behind_the_cut')}" if whence else ""
     names, pushes = {"start": 0.0, "middle": 0.5 * end, "end": end}, ""
     hardest = int(np.argmax(first.loads))
     if len(reels) == 1 and 0 < hardest < len(first) - 1 and first.loads[hardest] > 0.0:
@@ -230,7 +231,7 @@ def _moments_in_space(reels: Sequence[SpaceReel], coarse: AnyReel) -> list[tuple
     titles = {"force": "At the largest force of all pictures"}
     return [
         (name, titles.get(name, f"At the {name}"), time,
-         f"{seen}, seen along y{whence}{near}, at {time:.4g} s.{pushes if name == 'force' else ''}")
+         f"{seen}, seen along y{whence}{near}, at {time:.4g} s.{pushes if name == 'force' else ''}{behind}")
         for name, time in wanted.items()
     ]  # fmt: skip
 

@@ -89,8 +89,7 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
     if kind_of(result) == "planar model" and experiment in _ON_ONE_LAW:
         return (_ERRORS[0], say("of_one_law"), say("bias")), ["one_law"]
     if experiment == "mujoco":
-        told = {"one_bed": on_grains and "beds" not in result, "laws_of_sand": "forms" in result, "no_error": True}
-        keys = [key for key, so in told.items() if so]
+        return _errors_of_robot(result, on_grains)
     else:
         keys = ["empty_cells"] if on_grains else []
     if experiment == "diagnose":
@@ -101,9 +100,24 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
         return (say("of_the_law"), *_ERRORS[1:]), keys
     if experiment == "penetrate" or "beds" in result:
         return (say("of_95"), *_ERRORS[1:]), keys
-    if not on_grains and ("sure" in result or experiment == "mujoco"):
-        return (say("left_open"), _ERRORS[1], say("form_of_law")), keys
+    if not on_grains and "sure" in result:
+        return (say("left_open"), _ERRORS[1], say("over_laws")), keys
     return _ERRORS, keys
+
+
+def _errors_of_robot(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], list[str]]:
+    """The same of a robot of MuJoCo."""
+    forms, rise = "forms" in result, [result["quantities"].get("highest", {}).get("value")]
+    rise += [one["low"] for one in [(result.get("forms") or {}).get("ranges", {}).get("highest")] if one]
+    told = {
+        "one_bed": on_grains and "beds" not in result, "laws_of_sand": forms and not on_grains,
+        "laws_and_grains": forms and on_grains, "below_start": any((one or 0.0) < 0 for one in rise), "no_error": True,
+    }  # fmt: skip
+    chance = say("of_95") if "beds" in result else _ERRORS[0]
+    if on_grains:
+        return (chance, _ERRORS[1], say("with_laws") if forms else _ERRORS[2]), [key for key, so in told.items() if so]
+    first = say("of_the_law") if "ground_file" in result else say("left_open")
+    return (first, _ERRORS[1], say("over_laws")), [key for key, so in told.items() if so]
 
 
 def _row(tile: Tile) -> tuple[str, ...]:

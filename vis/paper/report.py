@@ -69,7 +69,7 @@ def answer_tiles(result: Result) -> list[Tile]:
         Tile("Statements met", f"{met} of {compared}", "those of the text that can be compared"),
         Tile("Cases", str(quantities["case_count"]["value"]), "gravities × torques × surfaces"),
         Tile("1 ms step moves angles by", f"{moved:.2g}°", "at most"),
-        Tile("Energy left over", f"{left:.1g}", "largest, relative"),
+        Tile("Energy error", f"{left:.1g}", "largest, relative"),
     ]
 
 

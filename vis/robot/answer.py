@@ -30,8 +30,8 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     """Rows of the table at the top of a report, each with its errors in words.
 
     Of chance: half of the 95 % interval over several beds, "one bed" on one, and on a law the range that its numbers
-    leave open. Of grain size: a law has none. The third is on grains of bed, softness and speed, which no run of a
-    robot has, and on a law of its form: the range over the laws of sand.
+    leave open. Of grain size: a law has none. The third is the range over the laws of sand, on grains with them; where
+    there are no laws on grains it is of bed, softness and speed, which no run of a robot has.
     """
     quantities, sure, several = result["quantities"], result.get("sure") or {}, "beds" in result
     on_grains = several or "grains" in result or result.get("ground") == "bed"
@@ -59,4 +59,4 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
             chance = between(one["low"], one["high"], one["unit"])
         rows.append(Tile(label, value, note, errors=(chance, UNKNOWN if on_grains else "", third)))
     note = "largest of all beds, of all there was" if several else "of all there was"
-    return [*rows, Tile("Energy left over", quantity(quantities["energy_residual"]), note)]
+    return [*rows, Tile("Energy error", quantity(quantities["energy_residual"]), note)]

@@ -32,6 +32,7 @@ REACHED = {
 """Number of a foot in result.json -> head of its column."""
 STILL = 1e-3
 """Displacement below which an axis is left out of the path [mm]: a rail keeps a robot in its place."""
+NO_FRAMES = "There are no pictures of the robot: the run has --frame-count 0."
 HEIGHTS = (
     "Largest height and depth of the lowest point of each foot, from the undisturbed surface. The clearance is that "
     "after the first touch of any foot."
@@ -65,6 +66,8 @@ def write_robot_report(
         made = draw_runs([SpaceReel(home)], home, "robot", by=colour, film=film, progress=report.rest())
         notes = [text(ARROWS_OF_FEET, small=True), *(text(note) for note in made.notes)]
         seen = [Section("Pictures", [*report_scene(home), *shown(made), *notes])]
+    elif not frames_of(home):
+        seen = [Section("Pictures", [text(NO_FRAMES, small=True)])]
     sections = [
         Section("", [listing(result["departures"]["sentences"])]),
         *seen,
@@ -104,7 +107,8 @@ def _draw_ground(motion: Columns, feet: Columns, names: list[str]) -> Figure:
     time = motion["t_s"]
     means = mean_over(5e-3, time, (motion[f"f{axis}_N"] for axis in AXES))
     for (axis, style), mean in zip(AXIS_LINES.items(), means, strict=True):
-        force.plot(time, mean, label=axis, **style)
+        if axis == "z" or np.any(mean):  # a rail may hold a robot in x and y, where it has no force
+            force.plot(time, mean, label=axis, **style)
     for name, own in line_styles(names[:MOST_LINES], beside_axes=True).items():
         depth.plot(time, 1e3 * feet[f"{name}_depth_m"], label=str(name), **own)
     depth.invert_yaxis()

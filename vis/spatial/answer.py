@@ -23,5 +23,5 @@ _ROWS = {
 
 def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     """Rows of the table at the top of a report."""
-    left_over = Tile("Energy left over", quantity(result["quantities"]["energy_residual"]), "of all there was")
+    left_over = Tile("Energy error", quantity(result["quantities"]["energy_residual"]), "of all there was")
     return [*answer_rows(result, _ROWS, quantity), left_over]

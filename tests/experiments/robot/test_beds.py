@@ -157,7 +157,11 @@ def test_a_bed_prepared_in_more_gravity_rests_in_that_of_the_run(monkeypatch):
     settings = RobotSettings(**ON_BED | {"grain": 0.006}, gravity=0.0981, settle_gravity=9.81)
     on_bed = RobotOnBed(settings, plan_robot(settings))
     assert on_bed.first_gravity == 9.81
-    bed = on_bed.prepare(None, Progress())
+    progress, shares = Progress(), []
+    monkeypatch.setattr(progress, "update", lambda done: shares.append((progress.stage_name, done)))
+    bed = on_bed.prepare(None, progress)
+    assert len(shares) > 2 and {stage for stage, _ in shares} == {"lower gravity"}
+    assert [done for _, done in shares] == sorted({done for _, done in shares}) and shares[-1][1] < 1
     assert bed is made[0] and bed.gravity[2] == pytest.approx(-0.0981) and bed.steps == 0
     assert bed.floor_force == pytest.approx(bed.weight, rel=0.02)
 

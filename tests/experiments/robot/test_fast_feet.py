@@ -47,7 +47,9 @@ def test_a_foot_faster_than_the_pushes_of_grains_is_warned_of_with_the_speed_of_
             speed, times = re.findall(r"at ([0-9.]+) m/s, ([0-9.]+) times", said)[0]
             assert float(times) == pytest.approx(froude, rel=0.05)
             assert float(speed) == pytest.approx(froude * np.sqrt(gravity * 0.03), rel=0.05)
-            assert ("inertia = 1.1" in said) == (ground == "rft")
+            assert len(said) < 160 and "bed" in said and "inertia" not in said
+            (bounded,) = too_fast(plan, run, heights_of(run), ["rft", "rft, inertia=10"])
+            assert "inertia=10" in bounded and len(bounded) < 200
 
 
 @pytest.mark.parametrize("froude", [1.0, 4.0])

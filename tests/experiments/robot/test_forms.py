@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.robot.forms import NO_FORMS, forms_of, other_laws
+from experiments.robot.forms import NO_FORMS, forms_of, other_laws, with_grains
 from experiments.robot.on_grains import RobotFollowed
 from experiments.robot.plan import plan_robot
 from experiments.robot.settings import RobotSettings
@@ -20,7 +20,7 @@ def planned(**given):
 
 def test_other_laws_are_those_with_numbers_for_this_gravity_and_never_the_own():
     assert set(other_laws(planned())) == {
-        "rft, inertia=10", "spring-damper", "power-irreversible", "katsuragi-durian", OF_1_G,
+        "rft, inertia=2", "rft, inertia=10", "spring-damper", "power-irreversible", "katsuragi-durian", OF_1_G,
     }  # fmt: skip
     low = other_laws(planned(gravity=0.098, ground="spring-damper"))
     assert OF_1_G not in low and "spring-damper" not in low and "rft" in low
@@ -52,6 +52,26 @@ def test_the_range_holds_each_law_and_a_law_that_fails_is_named():
     assert forms.numbers["ranges"]["largest_force"]["high"] == most == pytest.approx(0.1 * (len(tried) - 1))
     assert forms.numbers["ranges"]["highest"]["low"] == -0.5
     assert "bekker" in forms.words[-1] and "bekker" not in forms.numbers["laws"]
+
+
+@pytest.mark.parametrize(("flight", "told"), [(0.2, "highest"), (0.0, "sinkage_largest")])
+def test_real_sand_is_expected_between_a_law_and_grains_and_the_range_holds_both(flight, told):
+    plan = planned()
+    answers = {law: dict.fromkeys(ANSWER, 0.01 * place) for place, law in enumerate(other_laws(plan), 1)}
+    laws = forms_of(plan, dict.fromkeys(ANSWER, 0.05), lambda other: answers[named(other)], sure={})
+    assert laws.numbers["laws"]["rft, inertia=2"] == answers["rft, inertia=2"]
+    own = dict.fromkeys(ANSWER, 7.0) | {"longest_flight": flight}
+    forms = with_grains(laws, own)
+    assert forms.numbers["ranges"][told]["high"] == 7.0 and forms.numbers["ranges"][told]["value"] == 7.0
+    assert forms.numbers["ranges"][told]["low"] == laws.numbers["ranges"][told]["low"] == 0.01
+    word = {"highest": "rise", "sinkage_largest": "sinkage"}[told]
+    assert f"inertia=2 ({word} 10" in forms.words[0] and f"({word} 7.0 m)" in forms.words[0]
+    assert "Real sand" in laws.words[0] and "'bed'" in laws.words[0]
+    assert with_grains(NO_FORMS, own) == NO_FORMS
+
+
+def named(plan):
+    return ", ".join((plan.law, *plan.settings.ground_parameters))
 
 
 def test_a_robot_on_another_law_moves_as_in_a_run_of_that_law():

@@ -1,7 +1,10 @@
 """The law of a run in MuJoCo's own loop: the robot goes the same way."""
 
+import re
+
 import numpy as np
 import pytest
+from import_graph import ROOT
 
 from coupling.robot import FootForces, find_feet, load_model
 from coupling.robot.models import switch_off_floors
@@ -81,4 +84,29 @@ def test_the_spring_of_katsuragi_and_durian_is_as_gravity_and_its_drag_is_not():
 
 def test_a_loop_of_ones_own_takes_no_grains():
     with pytest.raises(ValueError, match="made of grains"):
+        law_of_run(load_model(find_model("hopper")), ["foot"], ground="bed")
+
+
+def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller_works(monkeypatch):
+    """The bed is three layers of grains, and the run shorter: the rest is what docs/mujoco.md prints."""
+    from spatial_runs import grain_bed
+
+    from dem import Bed
+
+    page = (ROOT / "docs" / "mujoco.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"### On grains in Python\n```python\n(.*?)```", page, re.DOTALL)
+    made = []
+    monkeypatch.setattr(Bed, "prepare", lambda *_, **options: made.append(options) or grain_bed())
+    monkeypatch.chdir(ROOT)
+    code = code.replace("duration=0.4", "duration=0.06").replace("0.25 < run", "0.05 < run")
+    code = code.replace("(0.1, 0.1)", "(0.048, 0.048)")
+    found = {}
+    exec(code, found)
+    run = found["run"]
+    assert made[0]["grain"] == 0.012 and run.done and np.any(run.columns["actuator_work"])
+    assert (run.foot("foot")["force"] == run.feet_now[0, 7:10]).all()
+    assert run.foot("foot")["depth"] == run.feet_now[0, 13]
+    with pytest.raises(ValueError, match="robot has"):
+        run.foot("toe")
+    with pytest.raises(ValueError, match="grains in Python"):
         law_of_run(load_model(find_model("hopper")), ["foot"], ground="bed")
