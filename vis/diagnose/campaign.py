@@ -95,9 +95,10 @@ def write_inspection_report(report: Report) -> Path:
     (trials,) = result["tables"]
     head = ("recording", "rows", "rate [Hz]", "from [s]", "to [s]", "rows with gaps", "longest gap [s]")
     found = [capital(what) + "." for what in result["warnings"]]
+    said = [text(words) for words in result.get("departures", {}).get("sentences", [])]
     rows = [[str(cell) for cell in row] for row in trials["rows"]]
     sections = [
-        Section("Findings", [listing(found) if found else text("Nothing odd was found in the recordings.")]),
+        Section("Findings", [listing(found) if found else text("Nothing odd was found in the recordings."), *said]),
         Section("", [table(trials["head"], rows, title="Trials", words=True)]),
         Section("The recordings", [*drawn, table(head, [_row(entry) for entry in result["recordings"]])]),
         again("hedgebed campaign check run.toml", ""),

@@ -28,6 +28,7 @@ from experiments.diagnose.fit.fitting import Fit, fit
 from experiments.diagnose.fit.gaps import si_unit_of, unit_of
 from experiments.diagnose.fit.localise import phases_of
 from experiments.diagnose.fit.problem import Array, Form, Values
+from experiments.diagnose.noise.replicates import has_replicates
 from experiments.diagnose.noise.spectrum import line_rows
 from experiments.runs.folder import write_json, write_series, write_text
 
@@ -97,6 +98,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
     diagnosis["candidates"] = candidate_rows(diagnosis)
     diagnosis["noise"] = _noise(found)
     diagnosis["model_std"] = dict(found.model_std)
+    diagnosis["has_replicates"] = has_replicates(found.problem.trials)
     diagnosis["findings"] = [asdict(finding) for finding in found.findings]
     diagnosis["next_experiment"] = found.next_experiment
     if (plan := found.planned) is not None:

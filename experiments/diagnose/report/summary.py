@@ -103,7 +103,7 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
     use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
     return [*_doubts(diagnosis), *_stated_far(diagnosis), *use, *apart, *first,
-            *scatter_sentence(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
+            *scatter_sentence(diagnosis), *_no_replicates(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
 
 
 def _stated_far(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -167,6 +167,11 @@ def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
         after=_both(weighed["after"], weighed.get("after_std", {})),
         rests_on=f"; the scatter has {freedom} degree{s} of freedom" if freedom else "",
     )]  # fmt: skip
+
+
+def _no_replicates(diagnosis: Mapping[str, Any]) -> list[str]:
+    """That no trial repeats another, so that the scatter between trials is unknown."""
+    return [] if diagnosis.get("has_replicates", True) else [say(f"no_replicates_{diagnosis['kind']}")]
 
 
 def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -> str:
