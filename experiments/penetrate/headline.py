@@ -11,7 +11,7 @@ from typing import Any
 from experiments.runs.registry import Headline, findings_shown
 from rigid.intervals import half_width
 from vis.page.numbers import foldable, quote
-from vis.penetrate.errors import in_95
+from vis.penetrate.errors import error_words, in_95
 from vis.penetrate.summary_parts import as_foot
 
 from .sure import in_words, known_within
@@ -78,7 +78,7 @@ def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
 
 def _of_model(result: Mapping[str, Any]) -> Headline:
     """What was asked of the law of a model.toml: peaks of pushes, sinkages, K and C, beside the spring-damper's."""
-    numbers = result["quantities"]
+    numbers = in_95(result)
     effects = " and ".join(result.get("model", {}).get("effects", ())) or "nothing added"
 
     def cell(name: str, unit: str = "") -> str:
@@ -101,8 +101,8 @@ def _of_model(result: Mapping[str, Any]) -> Headline:
     warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
     shown = said[: findings_shown(warnings)]
     return Headline(
-        ("", f"with {effects}", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
-        tuple(map(foldable, warnings)), tuple(map(foldable, shown)), len(said) - len(shown),
+        ("", f"with {effects}, 95 %", "spring-damper"), tuple(tuple(foldable(cell) for cell in row) for row in rows),
+        tuple(map(foldable, warnings)), tuple(map(foldable, shown)), len(said) - len(shown), (error_words(result),),
     )  # fmt: skip
 
 

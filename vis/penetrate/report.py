@@ -21,6 +21,7 @@ from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, figure, table, text, write_template
 from vis.page.plots import AMENDED, BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
 from vis.page.report import Progress, Report, Result, again, report_of, title_of
+from vis.penetrate.errors import error_words, in_95
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
@@ -185,13 +186,16 @@ def _write_law_report(report: Report) -> Path:
         (name.replace("_", " "), quote(entry["value"], entry["std"], entry["unit"]), str(entry.get("note", "")))
         for name, entry in numbers.items()
     ]
+    head = "value" if of_file else "value ± standard error"
     laws = {"spring_damper": "spring-damper", "amended": f"with {words_of_effects(report.result)}"}
     laws = {"law": str(report.result["ground"])} if of_file else laws
-    tiles = [tile for law, words in laws.items() for tile in _law_tiles(numbers, law, words)]
+    halves = numbers if of_file else in_95(report.result)
+    tiles = [tile for law, words in laws.items() for tile in _law_tiles(halves, law, words)]
+    meant = [] if of_file else [text(f"At the top, {error_words(report.result)}", small=True)]
     whose = f"no bed: the law of {'a ground file' if of_file else 'the model'} only"
     sections = [
         Section("", blocks),
-        Section("Numbers", [table(("quantity", "value", "note"), rows, words=True)]),
+        Section("Numbers", [table(("quantity", head, "note"), rows, words=True), *meant]),
         again("hedgebed penetrate THIS_FOLDER/run.toml", "From where it was started:"),
     ]
     return report.write(sections, lead=["penetrate", whose], tiles=tiles)

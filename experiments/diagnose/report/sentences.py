@@ -16,7 +16,7 @@ from vis.diagnose.held_out import worsens_held_out
 from vis.page.sentences import Sentences
 
 __all__ = [
-    "behind_words", "candidate_rows", "findings_in_words", "remark_sentences", "say", "setting_words", "shares_words",
+    "behind_words", "candidate_rows", "findings_in_words", "near_model_sentences", "remark_sentences", "say", "setting_words", "shares_words",
     "size_sentences", "small_names", "spread_sentences", "sure_sentences", "told_tables", "unnamed_sentence",
     "where_sentences", "worse_sentences",
 ]  # fmt: skip
@@ -62,17 +62,16 @@ def sure_sentences(diagnosis: Row) -> list[str]:
         parts.append(f"on held-out trials it changes the gap from {numeral(before)} to {numeral(after)} "
                      "(1 is noise)")  # fmt: skip
     sure = f"Confidence: {'; '.join(parts)}" if parts else ""
-    if answer := diagnosis.get("nearest_answer"):
-        sure += say(
-            "nearest_answer", names=" + ".join(answer["effects"]), behind=answer["evidence_behind"], needed=LEAD
-        )
+    nearest = diagnosis.get("nearest_each", []) if len(names) > 1 else []
+    if nearest:
+        sure += say("nearest_answers", each="; ".join(map(_near_words, nearest)))
     elif rivals := diagnosis["equivalence"][1:]:
         near = min(rivals, key=lambda row: row.get("lead", row["evidence_behind"]))
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         if near.get("same_meaning"):
             apart = "at the fitted numbers both names mean the same"
         if sure:
-            sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)}, "
+            sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)} ({LEAD:.0f} are needed), "
         sure += f"and its change of the data is {near['angle_deg']:.0f} degrees away (0: the same): {apart}"
     return [*sentences, *size_sentences(diagnosis), *remark_sentences(diagnosis), *([f"{sure}."] if sure else []),
             *_how_often(diagnosis), *unnamed_sentence(diagnosis)]  # fmt: skip
@@ -119,14 +118,30 @@ def spread_sentences(model_std: Mapping[str, float], *, granular: bool) -> list[
 
 
 def behind_words(rival: Row) -> str:
-    """33 nats behind; where prediction says more, both numbers, since the larger of the two decides."""
+    """33 nats behind; where prediction was compared, both numbers, since the larger of the two decides."""
     evidence, left_out = rival["evidence_behind"], rival.get("left_out_behind")
-    if left_out is None or left_out <= evidence:
-        return f"{evidence:.0f} nats behind"
-    return (
-        f"{evidence:.0f} nats behind by evidence and {left_out:.0f} in predicting conditions left out (the larger "
-        f"decides; {LEAD:.0f} are needed)"
-    )
+    if left_out is None:
+        return f"{evidence:.0f} nats behind by evidence"
+    return f"{evidence:.0f} nats behind by evidence and {left_out:.0f} in predicting conditions left out"
+
+
+def _near_words(near: Row) -> str:
+    """for depth-hardening: plastic-sinkage + layering, 4 nats behind by evidence"""
+    return f"for {near['effect']}: {' + '.join(near['instead'])}, {behind_words(near)} ({_needed(near)})"
+
+
+def _needed(near: Row) -> str:
+    """What the rule for verdicts asks of this one."""
+    if near["needed"] >= LEAD:
+        return f"a first name needs {LEAD:.0f} in one of them"
+    sure = max(near["evidence_behind"], near.get("left_out_behind") or 0.0) >= LEAD
+    return f"a further name needs {near['needed']:.0f} by evidence" + ("" if sure else ", so it is the less certain one")
+
+
+def near_model_sentences(diagnosis: Row) -> list[str]:
+    """Which files have the models of near rivals, and the command that predicts with them."""
+    files = [row["file"] for row in diagnosis.get("near_models", [])]
+    return [say(f"near_models_{diagnosis['kind']}", files=" and ".join(files), file=files[0])] if files else []
 
 
 def size_sentences(diagnosis: Row) -> list[str]:

@@ -13,6 +13,7 @@ from vis.page.numbers import foldable, quote
 
 from .sentences import (
     behind_words,
+    near_model_sentences,
     remark_sentences,
     say,
     shares_words,
@@ -103,7 +104,8 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
     use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
     return [*_doubts(diagnosis), *_stated_far(diagnosis), *use, *apart, *first,
-            *scatter_sentence(diagnosis), *_no_replicates(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
+            *scatter_sentence(diagnosis), *_no_replicates(diagnosis),
+            *near_model_sentences(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
 
 
 def _stated_far(diagnosis: Mapping[str, Any]) -> list[str]:

@@ -285,7 +285,7 @@ class TumbleProblem(Problem):
 
     def write_model(
         self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
-        errors: Mapping[str, object] | None = None,
+        errors: Mapping[str, object] | None = None, scatter: Mapping[str, float] | None = None,
     ) -> None:  # fmt: skip
         """model.toml, which `hedgebed tumble --model` runs."""
         tables = self.data.tables
