@@ -31,6 +31,7 @@ _WORTH_SAYING = 1.0  # nats by which a candidate must beat what is named to be m
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
 _OTHER = 0.01  # relative difference from which on two settings are two
 _SMALL_SHARE, _SMALL_BESIDE = 0.05, 0.2  # of the force, and of the largest signature, up to which an effect is small
+_CARRIES = 0.2  # of the force where it is largest, from which on an effect is not called small
 _STANDING = 2.0  # chi-square per sample of a platform that stands from which on it is explained
 _WORSE_OF_ALL, _WORSE_CELL, _WORSE_SHOWN = 1.1, 1.5, 3
 """Factor from which a condition, and a channel in a phase, has got worse; how many of each are reported."""
@@ -150,8 +151,10 @@ def size_sentences(diagnosis: Row) -> list[str]:
     if not sizes:
         return []
     most = max(size["signature"] for size in sizes)
-    words = "; ".join(_size_words(size, is_small=_is_small(size, most)) for size in sizes)
-    return [f"How large: {words}. {say('refitted')}"]
+    words = "; ".join(_size_words(size, is_small=_is_small(size, most) and not _carries(size)) for size in sizes)
+    own = [f"{size['effect']} {part}" for size in sizes if (part := _own_words(size.get("own_force")))]
+    carries = f"in the fitted law {' and '.join(own)}. If" if own else "if"
+    return [f"How large: {carries} {say('refitted')} {words}."]
 
 
 def remark_sentences(diagnosis: Row) -> list[str]:
@@ -199,16 +202,39 @@ def small_names(diagnosis: Row) -> dict[str, str]:
     if len(sizes) < 2:
         return {}
     most = max(size["signature"] for size in sizes)
-    return {
-        size["effect"]: f"{100 * size['share']:.2g} % of the {size['channel']}" if size["share"] is not None
-        else f"{size['signature']:.2g} times the noise"
-        for size in sizes if size["signature"] < most and _is_small(size, most)
-    }  # fmt: skip
+    small = [s for s in sizes if s["signature"] < most and _is_small(s, most) and not _carries(s)]
+    return {size["effect"]: _small_words(size) for size in small}
+
+
+def _small_words(size: Row) -> str:
+    """0.1 % of the force at 18 mm, where it is largest; or, of the whole channel, what no other number makes up for."""
+    own = size.get("own_force")
+    if own and own["force_N"]:
+        share = abs(own["force_N"]) / max(abs(own["of_N"]), abs(own["force_N"]))
+        return f"at most {100 * share:.2g} % of the force, at {1e3 * own['depth_m']:.3g} mm"
+    if size["share"] is not None:
+        return f"{100 * size['share']:.2g} % of the {size['channel']}"
+    return f"{size['signature']:.2g} times the noise"
+
+
+def _carries(size: Row) -> bool:
+    """Whether an effect holds much of the force somewhere, although others may take its place."""
+    own = size.get("own_force")
+    return bool(own) and abs(own["force_N"]) > _CARRIES * max(abs(own["of_N"]), abs(own["force_N"]))
 
 
 def _is_small(size: Row, most: float) -> bool:
     share = size["share"]
     return (share is not None and share <= _SMALL_SHARE) or size["signature"] <= _SMALL_BESIDE * most
+
+
+def _own_words(own: Row | None) -> str:
+    """makes 10 N of the 24.3 N at a depth of 18 mm; empty where it has no force of its own."""
+    if not own or not own["force_N"]:
+        return ""
+    verb = "adds" if own["force_N"] > 0 else "takes away"
+    of = "leaving" if own["force_N"] < 0 else "to a total of"
+    return f"{verb} {abs(own['force_N']):.3g} N at a depth of {1e3 * own['depth_m']:.3g} mm, {of} {own['of_N']:.3g} N"
 
 
 def _size_words(size: Row, *, is_small: bool) -> str:

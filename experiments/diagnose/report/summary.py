@@ -127,10 +127,18 @@ def _far_words(bound: Mapping[str, Any]) -> str:
 
 
 def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
-    """How large what is left is, and which numbers absorb a difference in structure; it decides nothing."""
+    """Whether the model predicts, or how large what is left is; which numbers absorb a difference in structure."""
     sentences = []
-    left = diagnosis.get("residue", [])
-    if left and "gap_with_scatter" not in diagnosis:
+    left = diagnosis.get("residue", []) if "gap_with_scatter" not in diagnosis else []
+    held = {row["channel"]: row for row in diagnosis.get("by_channel", []) if row["held_out"]}
+    known = [held[row["channel"]] for row in left if row["channel"] in held]
+    if known:
+        parts = [say("predicts_one", channel=row["channel"], unit=row["unit"], after=row["rms_after"],
+                     before=row["rms_before"], noise=row["noise_after"]) for row in known]  # fmt: skip
+        more = (diagnosis["gap"]["after"]["held_out"] or 0.0) > SMALL
+        judged = say("predicts_more" if more else "predicts_noise")
+        sentences.append(say("predicts", sizes=", ".join(parts), judged=judged))
+    elif left:
         sizes = ", ".join(f"{row['rms']:.2g} {row['unit']} in {row['channel']}" for row in left)
         sentences.append(say("residue", sizes=sizes))
     if far := _strained(diagnosis, "after"):
