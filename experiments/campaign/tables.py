@@ -61,10 +61,10 @@ note: the campaign does not show it."""
 NOTE_WORDS = {
     BASE_NOTE: "K [N/m] and C [N s/m] of the spring-damper alone, by diameter [m]",
     RANGE_NOTE: "the pushes that the model was fitted to",
-    ERRORS_NOTE: "standard errors of the fitted numbers, in the order of `names`, and the correlation of each with each, "
-    "a row for each name",
-    SCATTER_NOTE: "by what trials of one condition differ beyond the sensors, standard deviations: bed relative, of K and "
-    "C; others in their unit",
+    ERRORS_NOTE: "standard errors of the fitted numbers, in the order of `names`, and the correlations of each of "
+    "these with all, a row for each",
+    SCATTER_NOTE: "by what trials of one condition differ beyond the sensors, standard deviations: `bed` relative, of "
+    "K and C; others in their unit",
 }
 """What notes of model.toml mean, as comments above them."""
 

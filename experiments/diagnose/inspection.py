@@ -198,7 +198,8 @@ def _result(
             "finding_count": quantity(len(findings), "1", "diagnose sets aside or models what it can"),
         },
         tables=[{"title": "", "head": head, "rows": rows}],
-        departures={"sentences": said}, trials=trials, recordings=recordings, findings=[{name: vars(f)[name] for name in facts} for f in findings],
+        departures={"sentences": said}, trials=trials, recordings=recordings,
+        findings=[{name: vars(f)[name] for name in facts} for f in findings],
         warnings=[*filter(None, [template_warning(campaign)]), *(finding.what for finding in said_once(findings))],
     )  # fmt: skip
 

@@ -23,6 +23,7 @@ __all__ = ["write_campaign_report", "write_inspection_report"]
 _MOST = 12
 """Trials drawn at most; of a campaign that is checked those with findings first."""
 _MOST_LINES = 60
+_SLIVER = 0.01  # share of a recording below which a finding has a mark above it
 """Recordings in the chart of what is there."""
 #: (sensor, column, factor, label, channel of findings)
 _TUMBLE = (
@@ -226,6 +227,8 @@ def _draw_coverage(result: Result) -> Figure:
                 marked = True
                 wide = max(finding["to_s"] - finding["from_s"], 0.004 * (end - start))
                 axis.barh(place, wide, left=finding["from_s"], height=0.3, color=RED, lw=0)
+                if finding["to_s"] - finding["from_s"] < _SLIVER * (end - start):  # a single reading
+                    axis.plot(finding["from_s"], place - 0.45, "v", color=RED, ms=6, clip_on=False)
     words = [f"{entry['trial']}  {entry['sensor'] if entry['sensor'] != 'data' else ''}".strip() for entry in entries]
     axis.set_yticks(range(len(entries)), words, fontsize=7.5)
     axis.invert_yaxis()

@@ -17,8 +17,8 @@ from experiments.diagnose.fit.gaps import size_words
 from experiments.diagnose.fit.gate import low_modes
 from experiments.diagnose.fit.problem import Array, Finding, Parameter, TrialInfo, Values
 
-__all__ = ["Scatter", "deviations", "exchanged", "find_scatter", "groups_of", "has_replicates", "likeliest_scatter", "odd_trials",
-           "order_chance", "parted", "split_trials", "trends", "with_scatter"]  # fmt: skip
+__all__ = ["Scatter", "deviations", "exchanged", "find_scatter", "groups_of", "has_replicates", "likeliest_scatter",
+           "odd_trials", "order_chance", "parted", "split_trials", "trends", "with_scatter"]  # fmt: skip
 
 _SURE = 1e-4  # chance below which replicates differ
 _FROM_DATA = 0.5  # share of what is known of a trial's number that must come from its data

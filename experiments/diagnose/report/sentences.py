@@ -16,7 +16,8 @@ from vis.diagnose.held_out import worsens_held_out
 from vis.page.sentences import Sentences
 
 __all__ = [
-    "behind_words", "candidate_rows", "findings_in_words", "near_model_sentences", "remark_sentences", "say", "setting_words", "shares_words",
+    "behind_words", "candidate_rows", "findings_in_words", "near_model_sentences", "remark_sentences", "say",
+    "setting_words", "shares_words",
     "size_sentences", "small_names", "spread_sentences", "sure_sentences", "told_tables", "unnamed_sentence",
     "where_sentences", "worse_sentences",
 ]  # fmt: skip
@@ -136,7 +137,8 @@ def _needed(near: Row) -> str:
     if near["needed"] >= LEAD:
         return f"a first name needs {LEAD:.0f} in one of them"
     sure = max(near["evidence_behind"], near.get("left_out_behind") or 0.0) >= LEAD
-    return f"a further name needs {near['needed']:.0f} by evidence" + ("" if sure else ", so it is the less certain one")
+    less = "" if sure else ", so it is the less certain one"
+    return f"a further name needs {near['needed']:.0f} by evidence{less}"
 
 
 def near_model_sentences(diagnosis: Row) -> list[str]:

@@ -124,7 +124,7 @@ def tumble_data(campaign: Campaign) -> TumbleData:
 
 
 def trial_infos(data: TumbleData) -> tuple[TrialInfo, ...]:
-    """The trials with their conditions and settings; those of one condition that last half as long are no replicates."""
+    """The trials with their conditions and settings; of one condition those that last half as long are none of its."""
     settings = [{"torque_N_m": trial.torque, "gravity_m_s2": trial.gravity_sim} for trial in data.trials]
     infos = [TrialInfo(id=t.id, condition=t.condition, settings=s) for t, s in zip(data.trials, settings, strict=True)]
     return parted(infos, {trial.id: (max(trial.end, 1e-9),) for trial in data.trials})

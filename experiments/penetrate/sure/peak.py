@@ -1,4 +1,4 @@
-"""The error of a peak force that a model.toml predicts: that of its fit, and the scatter of beds that it was fitted to."""
+"""The error of a peak force that a model.toml predicts: of its fit, and the scatter of the beds it was fitted to."""
 
 import math
 from collections.abc import Mapping

@@ -154,7 +154,7 @@ def test_without_a_bed_the_spike_the_mass_and_the_load_are_the_models_own(tmp_pa
     assert own.weight == pytest.approx(2.0 * MASS)  # thinner than five grains: there are none
     typed = PenetrateSettings(ground="spring-damper", model=str(path), mass=0.2, tip_diameter=0.02)
     assert (typed.mass, typed.tip_diameter, typed.load) == (0.2, 0.02, None)
-    beside = PenetrateSettings(ground="bed", model=str(path))  # beside a bed its spike is that of the bed's runs, and it is said
+    beside = PenetrateSettings(ground="bed", model=str(path))  # its spike is that of the bed's runs, and it is said
     assert (beside.tip, beside.mass) == ("sphere", 0.1)
     size, tip, mass, speeds, retreat = read_law(path, beside).warnings()
     assert "--tip-diameter 0.003" in size and "--tip cone" in tip and "--mass 0.3" in mass
