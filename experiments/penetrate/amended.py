@@ -83,10 +83,7 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
     springs = tuple(name for name in slots if known.get(name, "").startswith("spring"))
     law = AmendedLaw(settings, model, {}, tuple(own), errors=errors_of(str(path), model), springs=springs)
     stiffer = law.pair[0] / model.surface.stiffness if model.surface.stiffness > 0 else 1.0
-    factors = {
-        name: stiffer if name in springs else size ** _POWERS.get(known.get(name, ""), 0)
-        for name in slots
-    }
+    factors = {name: stiffer if name in springs else size ** _POWERS.get(known.get(name, ""), 0) for name in slots}
     return replace(law, slots={name: value * factors[name] for name, value in slots.items()}, factors=factors)
 
 
@@ -228,7 +225,8 @@ class AmendedLaw:
         deepest = float(covered.get("depth_m", math.inf))
         said = (
             [say("deeper", deepest_mm=1e3 * deepest, own_mm=1e3 * own.depth, more=100 * (own.depth / deepest - 1))]
-            if own.depth > _DEEPER * deepest else []
+            if own.depth > _DEEPER * deepest
+            else []
         )
         return said + ([] if covered.get("withdrawal", True) else [say("way_out_unseen")])
 

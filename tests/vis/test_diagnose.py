@@ -115,7 +115,7 @@ def test_what_the_best_model_leaves_fills_its_panel_and_the_base_model_leaves_it
     one, time = np.ones(50), np.linspace(0.0, 1.0, 50)
     base, best = 300.0 * time, 6.0 * np.sin(9 * time)
     channel = Channel("a", "force", time, 0 * one, -base, -best, one, one, np.array(["in"] * 50))
-    left, right = draw_trajectories([channel], set(), ("base", "best"), "as given").axes
+    _, right = draw_trajectories([channel], set(), ("base", "best"), "as given").axes
     low, high = right.get_ylim()
     assert low < best.min() < best.max() < high < 0.1 * base.max() and np.ptp(best) > 0.5 * (high - low)
     alone = draw_trajectories([channel], set(), ("base", ""), "as given").axes[1]

@@ -82,7 +82,8 @@ def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
         "latent": draw_latent(report.folder, diagnosis, channels),
     }
     return {
-        key: [] if drawing is None else [report.draw(key, drawing, source=source, shown=count)] for key, drawing in drawings.items()
+        key: [] if drawing is None else [report.draw(key, drawing, source=source, shown=count)]
+        for key, drawing in drawings.items()
     }
 
 

@@ -222,7 +222,7 @@ def _small_words(size: Row) -> str:
 def _carries(size: Row) -> bool:
     """Whether an effect holds much of the force somewhere, although others may take its place."""
     own = size.get("own_force")
-    return bool(own) and abs(own["force_N"]) > _CARRIES * max(abs(own["of_N"]), abs(own["force_N"]))
+    return own is not None and abs(own["force_N"]) > _CARRIES * max(abs(own["of_N"]), abs(own["force_N"]))
 
 
 def _is_small(size: Row, most: float) -> bool:

@@ -3,25 +3,50 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupling import Penetration
 from experiments.campaign.model_errors import SHARE, ModelErrors
+from experiments.diagnose.fit.forms import OwnEffect
 from experiments.diagnose.push.law import SLOTS, push, slot_places
 from experiments.runs.types import Json
-
-from ..settings import say
-
-if TYPE_CHECKING:
-    from ..amended import AmendedLaw
+from vis.page.sentences import Sentences
 
 __all__ = ["PeakError", "peak_error", "with_fit_errors"]
 
 Array = NDArray[np.float64]
+say = Sentences(__package__)
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
+
+
+class Law(Protocol):
+    """What is asked of `AmendedLaw`."""
+
+    @property
+    def own(self) -> tuple[OwnEffect, ...]:
+        """Effects from files."""
+
+    @property
+    def factors(self) -> Mapping[str, float]:
+        """Of the law's numbers over the file's."""
+
+    @property
+    def springs(self) -> tuple[str, ...]:
+        """Numbers that scale with K."""
+
+    @property
+    def scatter(self) -> Mapping[str, float] | None:
+        """By what beds differ."""
+
+    @property
+    def own_errors(self) -> ModelErrors | None:
+        """Errors of the fitted numbers."""
+
+    def numbers(self, *, speed: float = 1.0, creep: float = 0.02) -> Array:
+        """One lane of the law, shape [1, slot_count]."""
 
 
 @dataclass(frozen=True)
@@ -45,22 +70,22 @@ class PeakError:
         return say("bed_scatter", scatter=self.scatter, trials=self.of.get("trials", 0))
 
 
-def peak_error(law: "AmendedLaw", like: Penetration) -> PeakError:
+def peak_error(law: Law, like: Penetration) -> PeakError:
     """The error of the peak force on the law along the path of `like`, a driven run."""
     return PeakError(_fit_std(law, like), _scatter_std(law, like), law.scatter or {})
 
 
-def _peaks(law: "AmendedLaw", table: Array, like: Penetration) -> Array:
+def _peaks(law: Law, table: Array, like: Penetration) -> Array:
     """Peak force [N] of each lane of the law, shape [lane_count]."""
     lanes, path = np.zeros(len(table), np.int32), np.array([0, len(like.time)], dtype=np.int32)
     return push(table, lanes, path, like.depth, like.velocity, law.own, like.time).max(axis=1)
 
 
-def _lanes(law: "AmendedLaw", like: Penetration, count: int) -> Array:
+def _lanes(law: Law, like: Penetration, count: int) -> Array:
     return np.repeat(law.numbers(speed=float(np.abs(like.velocity).max())), count, axis=0)
 
 
-def _fit_std(law: "AmendedLaw", like: Penetration) -> float | None:
+def _fit_std(law: Law, like: Penetration) -> float | None:
     errors, places = law.own_errors, slot_places(law.own)
     if errors is None or errors.undetermined:
         return None
@@ -74,7 +99,7 @@ def _fit_std(law: "AmendedLaw", like: Penetration) -> float | None:
     return errors.propagated(peaks[0::2], peaks[1::2])
 
 
-def _scatter_std(law: "AmendedLaw", like: Penetration) -> float | None:
+def _scatter_std(law: Law, like: Penetration) -> float | None:
     """By a bed that is one standard deviation stiffer and softer: K, C and what is added to the spring are scaled, as
     the fit scales them; and what replicates differ by in force, each in its own way."""
     if law.scatter is None:
