@@ -32,6 +32,7 @@ from experiments.diagnose.fit.problem import Array, Form, Values
 from experiments.diagnose.noise.replicates import has_replicates
 from experiments.diagnose.noise.spectrum import line_rows
 from experiments.runs.folder import write_json, write_series, write_text
+from experiments.runs.types import Json
 
 from .gaps import Gaps
 from .sentences import candidate_rows
@@ -274,7 +275,7 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     return diagnosis
 
 
-def _write_model(path: Path, found: Diagnosis) -> dict[str, Any]:
+def _write_model(path: Path, found: Diagnosis) -> Json:
     """Write the best model with its equations in comments, and return the errors of its numbers."""
     errors = found.joint_errors()
     found.problem.write_model(str(path), found.best_values, found.forms, found.base_values, errors, found.known_scatter)
@@ -283,7 +284,7 @@ def _write_model(path: Path, found: Diagnosis) -> dict[str, Any]:
     return errors
 
 
-def _write_near_models(folder: Path, found: Diagnosis, near: Sequence[Near]) -> list[dict[str, Any]]:
+def _write_near_models(folder: Path, found: Diagnosis, near: Sequence[Near]) -> list[Json]:
     """Write the models of other answers within the margin, and return their effects and files."""
     listed = []
     for effects, other in near_models(found, near).items():
@@ -293,7 +294,7 @@ def _write_near_models(folder: Path, found: Diagnosis, near: Sequence[Near]) -> 
     return listed
 
 
-def _equations(found: Diagnosis) -> list[dict[str, Any]]:
+def _equations(found: Diagnosis) -> list[Json]:
     return equations_of(
         found.problem.kind, found.forms,
         lambda form: {name: unit for name, (_, unit) in found.problem.reported(found.best_values, form).items()},
