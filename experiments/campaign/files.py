@@ -29,6 +29,7 @@ from rigid.digests import check_as_written
 from .digests import changed_files, write_digests
 from .recording import Recording, read_recording, write_recording
 from .tables import (
+    NOTE_WORDS,
     PenetrationCampaign,
     PenetrationModel,
     PenetrationTrial,
@@ -344,8 +345,7 @@ def _tables_toml(tables: BaseModel) -> str:
     for name, value in tables:
         if name == "notes":
             if value:
-                pairs = (f"{toml_value(str(key))} = {toml_value(item)}" for key, item in value.items())
-                listed.append("\n".join(["[notes]", *pairs]))
+                listed.append(_notes_toml(value))
         elif isinstance(value, BaseModel):
             nested += _table_toml(name, value)
         elif name in ("trial", "effect"):
@@ -353,6 +353,24 @@ def _tables_toml(tables: BaseModel) -> str:
         elif value is not None:
             plain.append(f"{name} = {toml_value(value)}")
     return "\n\n".join(["\n".join(plain), *nested, *listed]) + "\n"
+
+
+def _notes_toml(notes: Mapping[str, Any]) -> str:
+    """The notes; what a fit leaves is a table of its own, with a comment and a line for each entry."""
+    plain = {key: item for key, item in notes.items() if key not in NOTE_WORDS or not isinstance(item, Mapping)}
+    blocks = ["\n".join(["[notes]", *(f"{toml_value(str(key))} = {toml_value(item)}" for key, item in plain.items())])]
+    for key in notes:
+        if key not in plain:
+            lines = [f"{toml_value(str(name))} = {_rows(item)}" for name, item in notes[key].items()]
+            blocks.append("\n".join([f"# {NOTE_WORDS[key]}", f"[notes.{key}]", *lines]))
+    return "\n\n".join(blocks)
+
+
+def _rows(value: Any) -> str:
+    """A value as TOML, a list of lists with a line for each of these."""
+    if isinstance(value, list | tuple) and value and all(isinstance(row, list | tuple) for row in value):
+        return "\n".join(["[", *(f"  {toml_value(row)}," for row in value), "]"])
+    return toml_value(value)
 
 
 def _table_toml(name: str, table: BaseModel) -> list[str]:

@@ -14,7 +14,9 @@ from rigid.platform.rig import STANDARD_GRAVITY
 
 __all__ = [
     "BASE_NOTE",
+    "NOTE_WORDS",
     "RANGE_NOTE",
+    "SCATTER_NOTE",
     "FORMAT",
     "DepthSensor",
     "EffectTable",
@@ -52,6 +54,19 @@ bending of a frame was subtracted."""
 ERRORS_NOTE = "fitted_errors"
 """A note of model.toml: `names` of the fitted numbers (``stiffness``, ``effect.parameter``), their standard errors
 `std` and `correlation`, rows in the order of `names`; `undetermined`: names of those without a standard error."""
+SCATTER_NOTE = "fitted_scatter"
+"""A note of model.toml of pushes: by what replicates differ beyond the sensors, standard deviations: `bed` and
+`bed damping` relative, of K and C; channels and zeros in their unit. `trials` and `freedom`: what it was found from. No
+note: the campaign does not show it."""
+NOTE_WORDS = {
+    BASE_NOTE: "K [N/m] and C [N s/m] of the spring-damper alone, by diameter [m]",
+    RANGE_NOTE: "the pushes that the model was fitted to",
+    ERRORS_NOTE: "standard errors of the fitted numbers, in the order of `names`, and the correlations of each of "
+    "these with all, a row for each",
+    SCATTER_NOTE: "by what trials of one condition differ beyond the sensors, standard deviations: `bed` relative, of "
+    "K and C; others in their unit",
+}
+"""What notes of model.toml mean, as comments above them."""
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

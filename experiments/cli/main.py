@@ -273,7 +273,9 @@ def _campaign_new(
     with refusing():
         new_campaign(folder, kind=kind)
     print(f"campaign: {folder / 'campaign.toml'}")
-    say(f"fill it in, then `hedgebed campaign check {folder}`")
+    made_up = ", ".join(sorted(str(path.relative_to(folder)) for path in folder.rglob("*.csv")))
+    say(f"example recordings, to delete or replace: {made_up}")
+    say(f"fill in campaign.toml, then `hedgebed campaign check {folder}`")
     return DONE
 
 

@@ -6,7 +6,7 @@ replicates. `hedgebed diagnose` finds the same and sets it aside.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from experiments.check import (
     template_warning,
     without_companions,
 )
-from experiments.check.replicas import condition_of, condition_words, odd_replicates
+from experiments.check.replicas import condition_words, odd_replicates
 from experiments.grains.spells import spells
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -32,8 +32,9 @@ from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 
-from .fit.problem import Finding
-from .report.sentences import findings_in_words
+from .fit.problem import Finding, TrialInfo
+from .noise.replicates import has_replicates
+from .report.sentences import findings_in_words, say
 from .settings import CheckSettings
 
 __all__ = ["check", "find_faults", "resume", "run", "unnamed_files"]
@@ -50,8 +51,11 @@ def check(settings: CheckSettings) -> None:
 def find_faults(campaign: Campaign) -> list[Finding]:
     """What is odd about the recordings, each in a plain sentence that names its trial. Raises ValueError where no
     diagnosis could be made: a sensor stated to have no noise, no trial that can be used."""
-    with threadpool_limits(1):  # matrices are small
-        found = _faults_of_data(campaign)
+    return _all_faults(campaign, _read(campaign)[1])
+
+
+def _all_faults(campaign: Campaign, found: Sequence[Finding]) -> list[Finding]:
+    """The same; `found`: what diagnose finds when it reads the recordings."""
     jumped = {finding.trial for finding in found if _jumps(finding)}
     odd = [finding for finding in odd_replicates(campaign) if finding.trial not in jumped]
     told = [
@@ -80,22 +84,27 @@ def unnamed_files(folder: Path, campaign: Campaign) -> list[Finding]:
     return [Finding(trial="", what=f"{shown}: in the folder, but no trial names {'it' if len(left) == 1 else 'them'}")]
 
 
-def _faults_of_data(campaign: Campaign) -> list[Finding]:
-    """What diagnose finds when it reads the recordings."""
-    if isinstance(campaign.tables, PenetrationCampaign):
-        from experiments.diagnose.push.data import prepare
+def _read(campaign: Campaign) -> tuple[Sequence[TrialInfo], list[Finding]]:
+    """The trials that diagnose would use, each with its condition by the rule of diagnose, and what it finds when it
+    reads the recordings."""
+    with threadpool_limits(1):  # matrices are small
+        if isinstance(campaign.tables, PenetrationCampaign):
+            from experiments.diagnose.push.data import prepare
 
-        return list(prepare(campaign)[1])
-    from experiments.diagnose.tumble.checks import checked
-    from experiments.diagnose.tumble.data import tumble_data
+            prepared, found = prepare(campaign)
+            return [trial.info for trial in prepared], list(found)
+        from experiments.diagnose.tumble.checks import checked
+        from experiments.diagnose.tumble.data import trial_infos, tumble_data
 
-    return findings_in_words(checked(tumble_data(campaign))[1])
+        data, odd = checked(tumble_data(campaign))
+        return trial_infos(data), findings_in_words(odd)
 
 
 def _compute(settings: CheckSettings, folder: RunFolder, progress: Progress) -> Result:
     campaign = read_campaign(settings.campaign)
     progress.stage("check", total=1.0)
-    findings = [*unnamed_files(Path(settings.campaign), campaign), *find_faults(campaign)]
+    infos, read = _read(campaign)
+    findings = [*unnamed_files(Path(settings.campaign), campaign), *_all_faults(campaign, read)]
     recordings = []
     trials: Sequence[Any] = campaign.tables.trial
     for number, trial in enumerate(trials, 1):
@@ -103,7 +112,7 @@ def _compute(settings: CheckSettings, folder: RunFolder, progress: Progress) -> 
             recording = campaign.recordings[trial.id, sensor]
             series = folder.write_series(f"{number:03d}-{sensor}", recording.columns)
             recordings.append({"trial": trial.id, "sensor": sensor, "series": series} | _facts(recording))
-    return _result(campaign, recordings, findings)
+    return _result(campaign, recordings, findings, infos)
 
 
 def _facts(recording: Recording) -> Json:
@@ -121,11 +130,35 @@ def _facts(recording: Recording) -> Json:
     return {"rows": len(time), "rate": rate, **ends, "empty_rows": int(empty.sum()), "gaps": sorted(gaps)}
 
 
-def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding]) -> Result:
+def _words(campaign: Campaign, conditions: Mapping[str, tuple[object, ...]]) -> dict[str, str]:
+    """The condition of each trial in words; with the depth, or the duration, where the rest is the same for several."""
+    words = {trial.id: condition_words(campaign.tables, trial) for trial in campaign.tables.trial}
+    groups: dict[str, dict[tuple[object, ...], list[str]]] = {}
+    for id, condition in conditions.items():
+        groups.setdefault(words[id], {}).setdefault(condition, []).append(id)
+    for several in groups.values():
+        for ids in several.values() if len(several) > 1 else ():
+            size = _size_words([campaign.recordings[key] for key in campaign.recordings if key[0] in ids])
+            words |= {id: f"{words[id]}, {size}" for id in ids}
+    return words
+
+
+def _size_words(recordings: Sequence[Recording]) -> str:
+    """How deep the recorded trials of one condition go, or how long they last; the median."""
+    depths = [1e3 * float(np.nanmax(r["depth_m"])) for r in recordings if "depth_m" in r.columns]
+    if depths:
+        return f"{np.median(depths):.2g} mm deep"
+    return f"{np.median([float(np.ptp(recording.time)) for recording in recordings]):.3g} s long"
+
+
+def _result(
+    campaign: Campaign, recordings: list[Json], findings: list[Finding], infos: Sequence[TrialInfo]
+) -> Result:  # fmt: skip
     tables = campaign.tables
     listed: Sequence[Any] = tables.trial
-    conditions = {trial.id: condition_of(tables, trial) for trial in listed}
-    alike = Counter(conditions.values())
+    conditions = {trial.id: (trial.id,) for trial in listed} | {info.id: info.condition for info in infos}
+    alike, words = Counter(conditions.values()), _words(campaign, conditions)
+    said = [] if has_replicates(infos) else [say(f"no_replicates_{tables.kind}")]
     trials = []
     for trial in listed:
         own = [entry for entry in recordings if entry["trial"] == trial.id]
@@ -133,7 +166,7 @@ def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding])
         trials.append({
             "id": trial.id,
             "kind": trial.mode if isinstance(trial, PenetrationTrial) else "tumble",
-            "condition": condition_words(tables, trial),
+            "condition": words[trial.id],
             "sensors": ", ".join(
                 f"{entry['sensor'] if tables.kind == 'tumble' else ', '.join(trial.needed)} {_rate(entry['rate'])}"
                 for entry in own
@@ -165,7 +198,8 @@ def _result(campaign: Campaign, recordings: list[Json], findings: list[Finding])
             "finding_count": quantity(len(findings), "1", "diagnose sets aside or models what it can"),
         },
         tables=[{"title": "", "head": head, "rows": rows}],
-        trials=trials, recordings=recordings, findings=[{name: vars(f)[name] for name in facts} for f in findings],
+        departures={"sentences": said}, trials=trials, recordings=recordings,
+        findings=[{name: vars(f)[name] for name in facts} for f in findings],
         warnings=[*filter(None, [template_warning(campaign)]), *(finding.what for finding in said_once(findings))],
     )  # fmt: skip
 

@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from coupling import Penetration
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.files import MODEL_COPY, keep_model
-from experiments.campaign.model_errors import SHARE, ModelErrors, errors_of
-from experiments.campaign.tables import BASE_NOTE, RANGE_NOTE, EffectTable
+from experiments.campaign.model_errors import ModelErrors, errors_of
+from experiments.campaign.tables import BASE_NOTE, RANGE_NOTE, SCATTER_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, given_way, push, slot_places, slot_table
@@ -35,9 +35,10 @@ from experiments.runs.whole_runs import publish
 from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
-from .findings import force_gap, mean_of, returned_work, with_fit_errors
+from .findings import force_gap, mean_of, returned_work
 from .on_law import law_step, without_rest
 from .settings import PenetrateSettings, say
+from .sure.peak import peak_error, with_fit_errors
 from .units import Unit, make_run, make_spike, plan_units
 
 __all__ = ["AmendedGround", "AmendedLaw", "kept_law", "read_law", "run_beside", "run_without_bed"]
@@ -79,12 +80,10 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
                 place = {"path": path, "number": number, "id": effect.id, "allowed": ", ".join(sorted(known))}
                 raise ValueError(say("unknown_number", **place, name=name, value=value))
             slots[name] = value
-    law = AmendedLaw(settings, model, {}, tuple(own), errors=errors_of(str(path), model))
+    springs = tuple(name for name in slots if known.get(name, "").startswith("spring"))
+    law = AmendedLaw(settings, model, {}, tuple(own), errors=errors_of(str(path), model), springs=springs)
     stiffer = law.pair[0] / model.surface.stiffness if model.surface.stiffness > 0 else 1.0
-    factors = {
-        name: stiffer if known.get(name, "").startswith("spring") else size ** _POWERS.get(known.get(name, ""), 0)
-        for name in slots
-    }
+    factors = {name: stiffer if name in springs else size ** _POWERS.get(known.get(name, ""), 0) for name in slots}
     return replace(law, slots={name: value * factors[name] for name, value in slots.items()}, factors=factors)
 
 
@@ -126,6 +125,7 @@ class AmendedLaw:
     own: tuple[OwnEffect, ...] = ()
     factors: Mapping[str, float] = field(default_factory=dict)  # of `slots` over the file's numbers
     errors: ModelErrors | None = None  # of the file's numbers
+    springs: tuple[str, ...] = ()  # of `slots` those that scale with K
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -224,7 +224,9 @@ class AmendedLaw:
             return []
         deepest = float(covered.get("depth_m", math.inf))
         said = (
-            [say("deeper", deepest_mm=1e3 * deepest, own_mm=1e3 * own.depth)] if own.depth > _DEEPER * deepest else []
+            [say("deeper", deepest_mm=1e3 * deepest, own_mm=1e3 * own.depth, more=100 * (own.depth / deepest - 1))]
+            if own.depth > _DEEPER * deepest
+            else []
         )
         return said + ([] if covered.get("withdrawal", True) else [say("way_out_unseen")])
 
@@ -274,21 +276,11 @@ class AmendedLaw:
             return self.errors
         return self.errors.at(f"{mine[0]:g}") if mine else None
 
-    def peak_std(self, like: Penetration) -> float | None:
-        """Standard error of the peak force [N] of a driven run along the path of `like`, by the errors of the fit; None
-        where these are not known, or one of the numbers is not determined."""
-        errors, places = self.own_errors, slot_places(self.own)
-        if errors is None or errors.undetermined:
-            return None
-        table = np.repeat(self.numbers(speed=float(np.abs(like.velocity).max())), 2 * len(errors.names), axis=0)
-        for k, (name, std) in enumerate(zip(errors.names, errors.std, strict=True)):
-            slot = name if name in places else name.rpartition(".")[2]  # effects from files have their name in front
-            if slot in places:  # K and C of other diameters are in none
-                step = SHARE * std * self.factors.get(slot, 1.0)
-                table[2 * k : 2 * k + 2, places[slot]] += step, -step
-        lanes, path = np.zeros(len(table), np.int32), np.array([0, len(like.time)], dtype=np.int32)
-        peaks = push(table, lanes, path, like.depth, like.velocity, self.own, like.time).max(axis=1)
-        return errors.propagated(peaks[0::2], peaks[1::2])
+    @property
+    def scatter(self) -> Mapping[str, float] | None:
+        """By what the beds differ that the model was fitted to (`SCATTER_NOTE`); None where that is not known."""
+        note = self.model.notes.get(SCATTER_NOTE)
+        return note if isinstance(note, Mapping) else None
 
     def run(self, unit: Unit, like: Penetration) -> Penetration:
         """The run of `unit` on the law, at the times of `like` (the same run on another ground) and from its start."""
@@ -434,7 +426,7 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
         fitted = [f"The model was fitted to {law.fitted_to}."] if law.fitted_to else []
         which = "compared" if law.has_base else "compared_inflated"
         compared = [say(which, law=law, plain=plain_stiffness)] if law.effects else []
-        errors = {name: law.peak_std(plain[id]) for name, id in _peaked(units).items()}
+        errors = {name: peak_error(law, plain[id]) for name, id in _peaked(units).items()}
         made = Result.make(
             "penetrate",
             ground=settings.ground,

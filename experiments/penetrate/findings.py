@@ -17,7 +17,6 @@ import numpy as np
 
 from coupling import Penetration
 from dem.measure.grading import measure_grading
-from experiments.campaign.model_errors import ModelErrors
 from experiments.grains.graded import graded_quantities
 from experiments.grains.softening import Softening
 from experiments.runs.types import Json
@@ -31,7 +30,7 @@ from .units import Unit, make_run
 
 __all__ = [
     "BedFacts", "Findings", "bed_entry", "bed_quantities", "drop_note", "force_gap", "mean_of", "model_run",
-    "returned_work", "with_fit_errors",
+    "returned_work",
 ]  # fmt: skip
 
 Runs = Mapping[str, Penetration]
@@ -311,21 +310,3 @@ def force_gap(driven: Sequence[str], beds: Runs, others: Runs) -> float | None:
             square += float(np.mean((force[rows] - bed.force[rows]) ** 2))
             drag += float(np.mean(bed.force[rows] ** 2))
     return float(np.sqrt(square / drag)) if drag > 0 else None
-
-
-def with_fit_errors(
-    numbers: Mapping[str, Json], errors: ModelErrors | None, peaks: Mapping[str, float | None]
-) -> dict[str, Json]:
-    """Quantities of a model with the standard errors of its fit: of K and C, and of peak forces as `peaks` has them.
-    Where the fit leaves a number open, the note of a peak force names it."""
-    found = dict(numbers)
-    if errors is None:
-        return found
-    open_ones = ", ".join(errors.undetermined)
-    note = say("no_fit_error", names=open_ones) if open_ones else say("fit_error")
-    for name in ("stiffness", "damping"):
-        if (std := errors.of(name)) is not None:
-            found[name] = {**found[name], "std": std, "note": f"{found[name]['note']}; {say('fit_error')}"}
-    for name, std in peaks.items():
-        found[name] = {**found[name], "std": std, "note": f"{found[name]['note']}; {note}"}
-    return found

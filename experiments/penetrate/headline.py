@@ -12,6 +12,7 @@ from experiments.runs.headline import headline_of_tiles
 from experiments.runs.registry import Headline, findings_shown
 from vis.page.numbers import foldable
 from vis.penetrate.answer import answer_tiles
+from vis.penetrate.errors import error_words
 from vis.penetrate.summary_parts import as_foot
 
 __all__ = ["penetrate_headline"]
@@ -20,8 +21,10 @@ __all__ = ["penetrate_headline"]
 def penetrate_headline(result: Mapping[str, Any]) -> Headline | None:
     """The short form of a result; None where it has no rows."""
     shown = headline_of_tiles(answer_tiles(result), result)
-    if shown is None or result.get("ground", "bed") != "bed":
-        return shown
+    if shown is None:
+        return None
+    if result.get("ground", "bed") != "bed":
+        return shown if "ground_file" in result else replace(shown, notes=(*shown.notes, error_words(result)))
     warnings, said = list(result.get("warnings", [])), list(result.get("departures", {}).get("sentences", []))
     rest = list(result.get("rest", {}).get("sentences", []))
     changes = result.get("reference", {}).get("moved", {})

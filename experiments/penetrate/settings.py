@@ -170,6 +170,8 @@ class PenetrateSettings(StrictSettings):
             return given
         if given.get("drop_speeds", True) in ((), []):
             given = {"other_drop_speeds": ()} | given
+        if given.get("model") and not (given.get("ground") or given.get("bed")):
+            raise ValueError(say("model_on_what", model=given["model"]))
         if given.get("ground") == "spring-damper" and given.get("model"):
             given = settings_of_model(given)
         if is_ground_file(str(given.get("ground", ""))):

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from vis.diagnose.campaign import _draw_coverage
 from vis.diagnose.figures import Channel, draw_trajectories, read_channel, source_of, worst
 from vis.diagnose.report import write_diagnosis_report
 from vis.page.plots import line_handles, line_styles
@@ -118,6 +119,30 @@ def test_the_force_of_a_push_is_drawn_over_its_depth_and_what_is_left_too_where_
     left, right = drawing.axes
     assert (left.get_xlabel(), right.get_xlabel()) == ("depth [mm]", over)
     assert left.lines[0].get_xdata() == pytest.approx(1e3 * depth)
+
+
+def test_what_the_best_model_leaves_fills_its_panel_and_the_base_model_leaves_it():
+    one, time = np.ones(50), np.linspace(0.0, 1.0, 50)
+    base, best = 300.0 * time, 6.0 * np.sin(9 * time)
+    channel = Channel("a", "force", time, 0 * one, -base, -best, one, one, np.array(["in"] * 50))
+    _, right = draw_trajectories([channel], set(), ("base", "best"), "as given").axes
+    low, high = right.get_ylim()
+    assert low < best.min() < best.max() < high < 0.1 * base.max() and np.ptp(best) > 0.5 * (high - low)
+    alone = draw_trajectories([channel], set(), ("base", ""), "as given").axes[1]
+    assert alone.get_ylim()[1] > base.max()
+
+
+def test_a_report_says_how_many_of_the_recordings_it_draws(tmp_path):
+    write_folder(tmp_path, trials={name: float(size) for name, size in zip("abcdefgh", range(9, 1, -1), strict=True)})
+    assert "6 of 8" in write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
+
+
+def test_a_finding_of_one_reading_has_a_mark_that_is_seen():
+    entry = {"trial": "a", "sensor": "data", "from_s": 0.0, "to_s": 4.0, "gaps": []}
+    finding = {"trial": "a", "channel": "depth", "what": "one reading", "from_s": 1.0}
+    for end, marks in ((1.0, 1), (2.0, 0)):
+        drawing = _draw_coverage({"recordings": [entry], "findings": [finding | {"to_s": end}]})
+        assert len([line for line in drawing.axes[0].lines if line.get_marker() == "v"]) == marks
 
 
 def test_a_trial_that_was_set_aside_has_a_table_of_its_own_and_no_curve(tmp_path, monkeypatch):

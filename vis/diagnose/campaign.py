@@ -23,6 +23,7 @@ __all__ = ["campaign_tiles", "inspection_tiles", "write_campaign_report", "write
 _MOST = 12
 """Trials drawn at most; of a campaign that is checked those with findings first."""
 _MOST_LINES = 60
+_SLIVER = 0.01  # share of a recording below which a finding has a mark above it
 """Recordings in the chart of what is there."""
 #: (sensor, column, factor, label, channel of findings)
 _TUMBLE = (
@@ -100,9 +101,10 @@ def write_inspection_report(report: Report) -> Path:
     (trials,) = result["tables"]
     head = ("recording", "rows", "rate [Hz]", "from [s]", "to [s]", "rows with gaps", "longest gap [s]")
     found = [capital(what) + "." for what in result["warnings"]]
+    said = [text(words) for words in result.get("departures", {}).get("sentences", [])]
     rows = [[str(cell) for cell in row] for row in trials["rows"]]
     sections = [
-        Section("Findings", [listing(found) if found else text("Nothing odd was found in the recordings.")]),
+        Section("Findings", [listing(found) if found else text("Nothing odd was found in the recordings."), *said]),
         Section("", [table(trials["head"], rows, title="Trials", words=True)]),
         Section("The recordings", [*drawn, table(head, [_row(entry) for entry in result["recordings"]])]),
         again("hedgebed campaign check run.toml", ""),
@@ -237,6 +239,8 @@ def _draw_coverage(result: Result) -> Figure:
                 marked = True
                 wide = max(finding["to_s"] - finding["from_s"], 0.004 * (end - start))
                 axis.barh(place, wide, left=finding["from_s"], height=0.3, color=RED, lw=0)
+                if finding["to_s"] - finding["from_s"] < _SLIVER * (end - start):  # a single reading
+                    axis.plot(finding["from_s"], place - 0.45, "v", color=RED, ms=6, clip_on=False)
     words = [f"{entry['trial']}  {entry['sensor'] if entry['sensor'] != 'data' else ''}".strip() for entry in entries]
     axis.set_yticks(range(len(entries)), words, fontsize=7.5)
     axis.invert_yaxis()

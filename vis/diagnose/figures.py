@@ -203,6 +203,8 @@ def draw_trajectories(
             left.plot(place, factor * c.model(stage), color=colour, ls=dash, lw=1.4, zorder=3)
             right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
         left.plot(place[::step], factor * c.measured[::step], ".", color=INK, ms=2.6, zorder=4)
+        if len(models) > 1:  # the base model leaves so much that the other line would lie on 0
+            right.set_ylim(*_range_of(c))
         for axis in (left, right):
             low, high = axis.get_ylim()
             axis.set_ylim(low, high + 0.07 * (high - low))  # the band along the top hides nothing
@@ -221,6 +223,16 @@ def draw_trajectories(
     handles += _phase_handles(phase for c in channels for phase in c.phase)
     legend_above(drawing, handles, 4, fontsize=8)
     return drawing
+
+
+def _range_of(channel: Channel) -> tuple[float, float]:
+    """What the better model leaves of a channel, over the noise, with the band of the sensor and of replicates."""
+    wide = 2.0 if channel.scatter is None else float(np.nanmax(2 * np.hypot(1.0, channel.scatter / channel.std_after)))
+    rest = channel.residual("after")
+    known = rest[np.isfinite(rest)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+    low, high = min(low, -wide), max(high, wide)
+    return low - 0.15 * (high - low), high + 0.15 * (high - low)
 
 
 def _strip(axis: Axes, time: Array, phase: NDArray[np.str_]) -> None:

@@ -91,7 +91,9 @@ def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
     held, labels = set(diagnosis["gap"]["held_out_trials"]), _labels(diagnosis)
     source, report.about = source_of(report.folder), trials_of(report.folder)
     aside = {row["trial"] for row in diagnosis.get("set_aside", [])}
-    shown = worst([channel for channel in channels if len(channel.time) and channel.trial not in aside], held)
+    used = [channel for channel in channels if len(channel.time) and channel.trial not in aside]
+    shown = worst(used, held)
+    count = f"{len(shown)} of {len(used)} recordings" if len(shown) < len(used) else f"All {len(used)} recordings"
     drawings = {
         "trajectories": draw_trajectories(shown, held, labels, source),
         "residuals": draw_phases(diagnosis.get("by_phase", []), labels),
@@ -99,7 +101,8 @@ def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
         "latent": draw_latent(report.folder, diagnosis, channels),
     }
     return {
-        key: [] if drawing is None else [report.draw(key, drawing, source=source)] for key, drawing in drawings.items()
+        key: [] if drawing is None else [report.draw(key, drawing, source=source, shown=count)]
+        for key, drawing in drawings.items()
     }
 
 

@@ -96,8 +96,10 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
         return (say("of_fit"), *_ERRORS[1:]), keys
     if experiment == "ground":
         return (say("of_std"), *_ERRORS[1:]), keys
-    if "ground_file" in result or (experiment == "penetrate" and result.get("ground", "bed") != "bed"):
+    if "ground_file" in result:
         return (say("of_the_law"), *_ERRORS[1:]), keys
+    if experiment == "penetrate" and result.get("ground", "bed") != "bed":
+        return (say("of_model"), *_ERRORS[1:]), keys
     if experiment == "penetrate" or "beds" in result:
         return (say("of_95"), *_ERRORS[1:]), keys
     if not on_grains and "sure" in result:

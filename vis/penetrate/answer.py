@@ -233,7 +233,7 @@ def _on_law(numbers: Entries, name: str, unit: str | None = None) -> str:
 
 def _of_model(result: Entries) -> list[Tile]:
     """What was asked of the law of a model.toml: peaks of pushes, sinkages, K and C, beside the spring-damper's."""
-    numbers = result["quantities"]
+    numbers = in_95(result)
     pushes = [name for name in numbers if name.startswith("peak_force_amended")]
     rows: list[tuple[str, str, str, str | None]] = [
         (f"Peak force, {_path(numbers[name])}", name, name.replace("amended", "spring_damper"), None)

@@ -14,7 +14,7 @@ from rigid.intervals import NORMAL, half_width, student
 from vis.page.numbers import quantity, quote
 from vis.penetrate.summary_parts import fit_error, joined, list_of, mapping_of, say, std_of, value_of
 
-__all__ = ["fit_part", "fitted", "half_of_fit", "in_95"]
+__all__ = ["error_words", "fit_part", "fitted", "half_of_fit", "in_95"]
 
 _UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 
@@ -43,6 +43,13 @@ def in_95(result: Mapping[str, Any]) -> dict[str, Any]:
         if (error := value_of(quantities, f"{key}_error")) is not None:
             found[f"{key}_error"]["value"] = _of_runs(error, _run_count(result, fits[0] if len(fits) == 1 else {}))
     return found
+
+
+def error_words(result: Mapping[str, Any]) -> str:
+    """What ± is in a result on the law of a model: half of a 95 % interval, with or without the scatter of beds."""
+    peaks = [entry for name, entry in mapping_of(result.get("quantities")).items() if name.startswith("peak_force_am")]
+    known = any("scatter of the beds" in str(mapping_of(entry).get("note", "")) for entry in peaks)
+    return say("half_of_95_with_beds" if known else "half_of_95")
 
 
 def fitted(numbers: Mapping[str, Any], key: str) -> str:

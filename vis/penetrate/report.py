@@ -22,6 +22,7 @@ from vis.page.page import Block, Section, Tile, figure, table, text, write_templ
 from vis.page.plots import AMENDED, BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
 from vis.page.report import Progress, Report, again, report_of, title_of
 from vis.penetrate.answer import answer_tiles, words_of_effects
+from vis.penetrate.errors import error_words
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
@@ -181,10 +182,12 @@ def _write_law_report(report: Report) -> Path:
         (name.replace("_", " "), quote(entry["value"], entry["std"], entry["unit"]), str(entry.get("note", "")))
         for name, entry in numbers.items()
     ]
+    head = "value" if of_file else "value ± standard error"
+    meant = [] if of_file else [text(f"At the top, {error_words(report.result)}", small=True)]
     whose = f"no bed: the law of {'a ground file' if of_file else 'the model'} only"
     sections = [
         Section("", blocks),
-        Section("Numbers", [table(("quantity", "value", "note"), rows, words=True)]),
+        Section("Numbers", [table(("quantity", head, "note"), rows, words=True), *meant]),
         again("hedgebed penetrate THIS_FOLDER/run.toml", "From where it was started:"),
     ]
     return report.write(sections, lead=["penetrate", whose], tiles=answer_tiles(report.result))

@@ -280,7 +280,7 @@ class _Course:
                 found.append((scatter, renoised.rescattered(renoised.plain(self.base), scatter)))
         # Zeros of depth and force are next to the same in a stiff bed: the likeliest is asked first.
         for scatter, beside in sorted(found, key=lambda one: one[1].objective):
-            self.tell("trials are found to differ without a rule: choosing again", 0.0)
+            self.tell("trials differ at random and none repeats another: searching again with that as noise", 0.0)
             if choice.left.passed:
                 other = self._without_name(scatter, choice, beside)
             else:

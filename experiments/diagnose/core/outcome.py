@@ -16,6 +16,7 @@ from experiments.diagnose.fit.localise import Place, depends_on, latent_table, p
 from experiments.diagnose.fit.problem import Array, Finding, Form, Planned, Problem
 from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
+from experiments.diagnose.noise.replicates import groups_of
 from experiments.diagnose.noise.spectrum import Line, lines_of
 from vis.page.sentences import Sentences
 
@@ -191,15 +192,27 @@ class Diagnosis(Known):
         named, from the nearest rival."""
         if self.choice is None:
             return None
-        if self.verdict == "ambiguous":
-            other = smallest(self.choice)[0].fit
-            return self.problem.planned(self.best, other, inflation=_inflations(self.best, other))
-        near = self._nearest_model
-        return (
-            None
-            if near is None
-            else self.problem.planned(self.best, near.fit, inflation=_inflations(self.best, near.fit))
-        )
+        near = smallest(self.choice)[0] if self.verdict == "ambiguous" else self._nearest_model
+        if near is None:
+            return None
+        plan = self.problem.planned(self.best, near.fit, inflation=_inflations(self.best, near.fit))
+        if plan is None or plan.apart is None or self.known_scatter is None:
+            return plan
+        bed = self.known_scatter.get("bed", 0.0)  # a bed that is stiffer makes both forces as much larger
+        wide = {f"{key}_std_N": math.hypot(plan.apart[f"{key}_std_N"], bed * plan.apart[f"{key}_N"])
+                for key in ("one", "other")}  # fmt: skip
+        return replace(plan, apart={**plan.apart, **wide})
+
+    @cached_property
+    def known_scatter(self) -> dict[str, float] | None:
+        """By what trials of one condition differ beyond the sensors, by kind, with the number of `trials` and the
+        degrees of `freedom` it was found from; None where no trial repeats another and none was found without."""
+        used = [trial for trial in self.problem.trials if trial.id in (*self.fitted, *self.held_out)]
+        groups = [len(ids) for ids in groups_of(used).values() if len(ids) > 1]
+        if not (groups or self.model_std):
+            return None
+        trials = sum(groups) or len(used)
+        return {**self.model_std, "trials": trials, "freedom": trials - (len(groups) or 1)}
 
     def ordered(self, other: Hypothesis) -> tuple[str, ...]:
         """The effects of another answer, those it has in common with this one first."""
@@ -281,7 +294,9 @@ class Diagnosis(Known):
         way = ways[float(np.sign(apart["speed_m_s"]))]
         errors = {key: _with_error(apart[f"{key}_N"], apart[f"{key}_std_N"]) for key in ("one", "other")}
         rival, depth_mm = " + ".join(self.ordered(near)), 1e3 * apart["depth_m"]
-        return " " + say("confirming", plan=plan, first=first, rival=rival, depth_mm=depth_mm, way=way, **errors)
+        beds = say("without_beds" if self.known_scatter is None else "with_beds")
+        told = {"first": first, "rival": rival, "depth_mm": depth_mm, "way": way, "beds": beds}
+        return " " + say("confirming", plan=plan, **told, **errors)
 
     def base_parameters(self, one: Fit) -> dict[str, Estimated]:
         """The base model's shared numbers in one of the fits: name -> value, std (standard error; None where data and

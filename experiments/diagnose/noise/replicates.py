@@ -17,8 +17,8 @@ from experiments.diagnose.fit.gaps import size_words
 from experiments.diagnose.fit.gate import low_modes
 from experiments.diagnose.fit.problem import Array, Finding, Parameter, TrialInfo, Values
 
-__all__ = ["Scatter", "deviations", "exchanged", "find_scatter", "groups_of", "likeliest_scatter", "odd_trials",
-           "order_chance", "parted", "split_trials", "trends", "with_scatter"]  # fmt: skip
+__all__ = ["Scatter", "deviations", "exchanged", "find_scatter", "groups_of", "has_replicates", "likeliest_scatter",
+           "odd_trials", "order_chance", "parted", "split_trials", "trends", "with_scatter"]  # fmt: skip
 
 _SURE = 1e-4  # chance below which replicates differ
 _FROM_DATA = 0.5  # share of what is known of a trial's number that must come from its data
@@ -36,6 +36,11 @@ def groups_of(trials: Sequence[TrialInfo]) -> dict[tuple[object, ...], list[str]
     for trial in trials:
         found.setdefault(trial.condition, []).append(trial.id)
     return found
+
+
+def has_replicates(trials: Sequence[TrialInfo]) -> bool:
+    """Whether some condition has more than one trial: only then replicates show how much beds, or runs, differ."""
+    return any(len(ids) > 1 for ids in groups_of(trials).values())
 
 
 def parted(trials: Sequence[TrialInfo], sizes: Mapping[str, Sequence[float]]) -> tuple[TrialInfo, ...]:

@@ -35,6 +35,7 @@ _AS_TAKEN = 3.0  # standard errors within which what is left is what it was take
 _OF_MEDIAN = 1.8
 """Relative standard error of a median of n absolute third differences, times the root of n: 1.17 of independent normal
 numbers, and sqrt(1 + 2 (0.75^2 + 0.3^2 + 0.05^2)) for those of neighbours."""
+_SIDE = 3  # rows on each side by which a turning point is told from a lone reading
 _OUTLIER = 8.0  # noise standard deviations beyond which a lone reading is a fault (once in 1e15 by chance)
 
 
@@ -385,9 +386,19 @@ def _lone_readings(values: Array, std: float) -> NDArray[np.int64]:
     for low, high in spells(suspect):
         # A touch or a turn is sharp as well, but what is before it and after it differs.
         alike = low > 0 and high < len(v) and abs(v[low - 1] - v[high]) < 0.3 * away[low:high].min()
-        if high - low > 3 or not alike:
+        if high - low > 3 or not alike or _turns(v, low, high, away[low:high].min()):
             suspect[low:high] = False
     return known[suspect] if suspect.sum() <= 0.05 * len(v) else known[:0]
+
+
+def _turns(values: Array, low: int, high: int, away: float) -> bool:
+    """Whether rows `low` to `high` are where the curve turns: both sides, going on as they came, lead to them."""
+    if low < _SIDE or high + _SIDE > len(values):
+        return False
+    left, right = (np.polyfit(np.arange(_SIDE), values[k : k + _SIDE], 1) for k in (low - _SIDE, high))
+    ahead = left[1] + left[0] * np.arange(_SIDE, _SIDE + high - low)
+    back = right[1] - right[0] * np.arange(high - low, 0, -1)
+    return all(bool((np.abs(values[low:high] - line) < 0.5 * away).all()) for line in (ahead, back))
 
 
 def _step(time: Array, depth: Array, std: float, *, after: int = 0) -> int | None:

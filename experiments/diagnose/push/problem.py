@@ -413,7 +413,7 @@ class PenetrationProblem(Problem):
 
     def write_model(
         self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
-        errors: Mapping[str, object] | None = None,
+        errors: Mapping[str, object] | None = None, scatter: Mapping[str, float] | None = None,
     ) -> None:  # fmt: skip
         """See `Problem`. Of several diameters the middle one stands in [surface] and [spike], all in [notes]. A trial
         without a diameter gets that of the campaign's [spike]."""
@@ -424,9 +424,9 @@ class PenetrationProblem(Problem):
             }, file=self._file(form))
             for form in forms
         )  # fmt: skip
-        plain = self._pairs(base) if forms and base is not None else {}
-        numbers = self._pairs(values)
-        write_model(Path(path), model_of(self.tables, self._middle, numbers, plain, effects, self.covered, errors))
+        pairs = (self._pairs(values), self._pairs(base) if forms and base is not None else {})
+        model = model_of(self.tables, self._middle, *pairs, effects, self.covered, errors, scatter)
+        write_model(Path(path), model)
 
     def _pairs(self, values: Values) -> Pairs:
         """Diameter [m] as text -> K [N/m] and C [N s/m]."""

@@ -104,10 +104,12 @@ def _stiffness(pushes: Sequence[Push], *, is_open: bool) -> list[str]:
     parts = []
     for size, found in sorted(by_size.items()):
         spread = f" ± {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
-        parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m at {1e3 * size:g} mm ({len(found)})")
+        several = f"{len(found)} push{'es' if len(found) > 1 else ''}"
+        parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m for {1e3 * size:g} mm of diameter ({several})")
     sentences = [
-        f"K of a straight spring, fitted to each push alone{'' if is_open else ' with C of the model'} (number of "
-        f"pushes): {', '.join(parts)}. It shows by how much pushes differ; where an effect is named, use the model's K."
+        f"K of a straight spring, fitted to each push alone{'' if is_open else ' with C of the model'} (±: standard "
+        f"deviation between pushes): {', '.join(parts)}. Pushes to other depths differ in it where the ground is no "
+        f"straight spring; where an effect is named, use the model's K."
     ]
     if len(by_size) > 2:
         sizes = np.log(sorted(by_size))

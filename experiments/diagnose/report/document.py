@@ -11,7 +11,7 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
+from experiments.diagnose.core.near import Near, near_models, nearest_each
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
 from experiments.diagnose.core.rivals import LEAD, Rival
 from experiments.diagnose.core.scatter_gap import scatter_std
@@ -28,8 +29,10 @@ from experiments.diagnose.fit.fitting import Fit, fit
 from experiments.diagnose.fit.gaps import si_unit_of, unit_of
 from experiments.diagnose.fit.localise import phases_of
 from experiments.diagnose.fit.problem import Array, Form, Values
+from experiments.diagnose.noise.replicates import has_replicates
 from experiments.diagnose.noise.spectrum import line_rows
 from experiments.runs.folder import write_json, write_series, write_text
+from experiments.runs.types import Json
 
 from .gaps import Gaps
 from .sentences import candidate_rows
@@ -41,8 +44,8 @@ _ROUNDS = 8  # of refits without one of the effects
 _SIGNALS = ("force", "accel", "ax", "ay")  # channels that read 0 where nothing pushes: a change is a share of these
 
 
-def document(found: Diagnosis) -> dict[str, Any]:
-    """diagnosis.json."""
+def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, Any]:
+    """diagnosis.json. `near`: the nearest other answers, where they are known already."""
     effects = [{"id": effect, "parameters": _numbers(found.parameters(effect))} for effect in found.effects]
     settings = {trial.id: dict(trial.settings) for trial in found.problem.trials}
     diagnosis: dict[str, Any] = {
@@ -79,6 +82,11 @@ def document(found: Diagnosis) -> dict[str, Any]:
     if (near_answer := found.nearest_answer) is not None and found.choice is not None:
         behind = found.choice.best.score - near_answer.score
         diagnosis["nearest_answer"] = {"effects": list(found.ordered(near_answer)), "evidence_behind": behind}
+    diagnosis["nearest_each"] = [
+        {"effect": one.effect, "instead": list(found.ordered(one.hypothesis)), "evidence_behind": one.behind,
+         "left_out_behind": one.behind_left_out, "needed": one.needed}
+        for one in (nearest_each(found) if near is None else near)
+    ]  # fmt: skip
     diagnosis["base"] = {"before": _base(found, found.base), "after": _base(found, found.best)}
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
     diagnosis["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
@@ -88,15 +96,13 @@ def document(found: Diagnosis) -> dict[str, Any]:
     diagnosis["evidence_base"] = _evidence_base(found)
     diagnosis["sizes"] = _sizes(found)
     diagnosis["remarks"], diagnosis["facts"] = list(found.remarks), list(found.facts)
-    diagnosis["equations"] = equations_of(
-        found.problem.kind, found.forms,
-        lambda form: {name: unit for name, (_, unit) in found.problem.reported(found.best_values, form).items()},
-    )  # fmt: skip
+    diagnosis["equations"] = _equations(found)
     diagnosis["symbols"] = SYMBOLS if found.problem.kind == "penetration" and found.forms else ""
     diagnosis["equivalence"] = _equivalence(found)
     diagnosis["candidates"] = candidate_rows(diagnosis)
     diagnosis["noise"] = _noise(found)
     diagnosis["model_std"] = dict(found.model_std)
+    diagnosis["has_replicates"] = has_replicates(found.problem.trials)
     diagnosis["findings"] = [asdict(finding) for finding in found.findings]
     diagnosis["next_experiment"] = found.next_experiment
     if (plan := found.planned) is not None:
@@ -221,14 +227,12 @@ def _size(found: Diagnosis, values: Values, rest: tuple[Form, ...]) -> dict[str,
 
 def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     """Write all files into `folder` and return diagnosis.json."""
-    problem = found.problem
-    diagnosis = document(found)
+    problem, near = found.problem, nearest_each(found)
+    diagnosis = document(found, near)
     if found.verdict == "unknown":
         write_series(folder / "latent.csv", found.latent())
-    path = folder / "model.toml"
-    diagnosis["errors"] = found.joint_errors()
-    problem.write_model(str(path), found.best_values, found.forms, found.base_values, diagnosis["errors"])
-    write_text(path, with_comments(path.read_text(encoding="utf-8"), diagnosis["equations"], problem.kind))
+    diagnosis["errors"] = _write_model(folder / "model.toml", found)
+    diagnosis["near_models"] = _write_near_models(folder, found, near)
     if rows := diagnosis["evidence"]:
         write_series(folder / "evidence.csv", {
             "candidate": [r["candidate"] for r in rows], "effects": [" + ".join(r["effects"]) for r in rows],
@@ -269,6 +273,32 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     diagnosis["residue"], diagnosis["set_aside"] = gaps.residue, aside
     write_json(folder / "diagnosis.json", diagnosis)
     return diagnosis
+
+
+def _write_model(path: Path, found: Diagnosis) -> Json:
+    """Write the best model with its equations in comments, and return the errors of its numbers."""
+    errors = found.joint_errors()
+    found.problem.write_model(str(path), found.best_values, found.forms, found.base_values, errors, found.known_scatter)
+    text = with_comments(path.read_text(encoding="utf-8"), _equations(found), found.problem.kind)
+    write_text(path, text)
+    return errors
+
+
+def _write_near_models(folder: Path, found: Diagnosis, near: Sequence[Near]) -> list[Json]:
+    """Write the models of other answers within the margin, and return their effects and files."""
+    listed = []
+    for effects, other in near_models(found, near).items():
+        file = f"model-{'-and-'.join(effects)}.toml"
+        _write_model(folder / file, other)
+        listed.append({"effects": list(effects), "file": file})
+    return listed
+
+
+def _equations(found: Diagnosis) -> list[Json]:
+    return equations_of(
+        found.problem.kind, found.forms,
+        lambda form: {name: unit for name, (_, unit) in found.problem.reported(found.best_values, form).items()},
+    )  # fmt: skip
 
 
 def _set_aside(trial: str, channel: str, before: Array, after: Array) -> dict[str, Any]:

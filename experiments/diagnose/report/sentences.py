@@ -16,7 +16,8 @@ from vis.diagnose.held_out import worsens_held_out
 from vis.page.sentences import Sentences
 
 __all__ = [
-    "behind_words", "candidate_rows", "findings_in_words", "remark_sentences", "say", "setting_words", "shares_words",
+    "behind_words", "candidate_rows", "findings_in_words", "near_model_sentences", "remark_sentences", "say",
+    "setting_words", "shares_words",
     "size_sentences", "small_names", "spread_sentences", "sure_sentences", "told_tables", "unnamed_sentence",
     "where_sentences", "worse_sentences",
 ]  # fmt: skip
@@ -31,6 +32,7 @@ _WORTH_SAYING = 1.0  # nats by which a candidate must beat what is named to be m
 _UNITS = {"N_m": "N m", "m_s2": "m/s2", "m_s": "m/s", "m": "m"}
 _OTHER = 0.01  # relative difference from which on two settings are two
 _SMALL_SHARE, _SMALL_BESIDE = 0.05, 0.2  # of the force, and of the largest signature, up to which an effect is small
+_CARRIES = 0.2  # of the force where it is largest, from which on an effect is not called small
 _STANDING = 2.0  # chi-square per sample of a platform that stands from which on it is explained
 _WORSE_OF_ALL, _WORSE_CELL, _WORSE_SHOWN = 1.1, 1.5, 3
 """Factor from which a condition, and a channel in a phase, has got worse; how many of each are reported."""
@@ -62,17 +64,16 @@ def sure_sentences(diagnosis: Row) -> list[str]:
         parts.append(f"on held-out trials it changes the gap from {numeral(before)} to {numeral(after)} "
                      "(1 is noise)")  # fmt: skip
     sure = f"Confidence: {'; '.join(parts)}" if parts else ""
-    if answer := diagnosis.get("nearest_answer"):
-        sure += say(
-            "nearest_answer", names=" + ".join(answer["effects"]), behind=answer["evidence_behind"], needed=LEAD
-        )
+    nearest = diagnosis.get("nearest_each", []) if len(names) > 1 else []
+    if nearest:
+        sure += say("nearest_answers", each="; ".join(map(_near_words, nearest)))
     elif rivals := diagnosis["equivalence"][1:]:
         near = min(rivals, key=lambda row: row.get("lead", row["evidence_behind"]))
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         if near.get("same_meaning"):
             apart = "at the fitted numbers both names mean the same"
         if sure:
-            sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)}, "
+            sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)} ({LEAD:.0f} are needed), "
         sure += f"and its change of the data is {near['angle_deg']:.0f} degrees away (0: the same): {apart}"
     return [*sentences, *size_sentences(diagnosis), *remark_sentences(diagnosis), *([f"{sure}."] if sure else []),
             *_how_often(diagnosis), *unnamed_sentence(diagnosis)]  # fmt: skip
@@ -119,14 +120,31 @@ def spread_sentences(model_std: Mapping[str, float], *, granular: bool) -> list[
 
 
 def behind_words(rival: Row) -> str:
-    """33 nats behind; where prediction says more, both numbers, since the larger of the two decides."""
+    """33 nats behind; where prediction was compared, both numbers, since the larger of the two decides."""
     evidence, left_out = rival["evidence_behind"], rival.get("left_out_behind")
-    if left_out is None or left_out <= evidence:
-        return f"{evidence:.0f} nats behind"
-    return (
-        f"{evidence:.0f} nats behind by evidence and {left_out:.0f} in predicting conditions left out (the larger "
-        f"decides; {LEAD:.0f} are needed)"
-    )
+    if left_out is None:
+        return f"{evidence:.0f} nats behind by evidence"
+    return f"{evidence:.0f} nats behind by evidence and {left_out:.0f} in predicting conditions left out"
+
+
+def _near_words(near: Row) -> str:
+    """for depth-hardening: plastic-sinkage + layering, 4 nats behind by evidence"""
+    return f"for {near['effect']}: {' + '.join(near['instead'])}, {behind_words(near)} ({_needed(near)})"
+
+
+def _needed(near: Row) -> str:
+    """What the rule for verdicts asks of this one."""
+    if near["needed"] >= LEAD:
+        return f"a first name needs {LEAD:.0f} in one of them"
+    sure = max(near["evidence_behind"], near.get("left_out_behind") or 0.0) >= LEAD
+    less = "" if sure else ", so it is the less certain one"
+    return f"a further name needs {near['needed']:.0f} by evidence{less}"
+
+
+def near_model_sentences(diagnosis: Row) -> list[str]:
+    """Which files have the models of near rivals, and the command that predicts with them."""
+    files = [row["file"] for row in diagnosis.get("near_models", [])]
+    return [say(f"near_models_{diagnosis['kind']}", files=" and ".join(files), file=files[0])] if files else []
 
 
 def size_sentences(diagnosis: Row) -> list[str]:
@@ -135,8 +153,10 @@ def size_sentences(diagnosis: Row) -> list[str]:
     if not sizes:
         return []
     most = max(size["signature"] for size in sizes)
-    words = "; ".join(_size_words(size, is_small=_is_small(size, most)) for size in sizes)
-    return [f"How large: {words}. {say('refitted')}"]
+    words = "; ".join(_size_words(size, is_small=_is_small(size, most) and not _carries(size)) for size in sizes)
+    own = [f"{size['effect']} {part}" for size in sizes if (part := _own_words(size.get("own_force")))]
+    carries = f"in the fitted law {' and '.join(own)}. If" if own else "if"
+    return [f"How large: {carries} {say('refitted')} {words}."]
 
 
 def remark_sentences(diagnosis: Row) -> list[str]:
@@ -184,16 +204,39 @@ def small_names(diagnosis: Row) -> dict[str, str]:
     if len(sizes) < 2:
         return {}
     most = max(size["signature"] for size in sizes)
-    return {
-        size["effect"]: f"{100 * size['share']:.2g} % of the {size['channel']}" if size["share"] is not None
-        else f"{size['signature']:.2g} times the noise"
-        for size in sizes if size["signature"] < most and _is_small(size, most)
-    }  # fmt: skip
+    small = [s for s in sizes if s["signature"] < most and _is_small(s, most) and not _carries(s)]
+    return {size["effect"]: _small_words(size) for size in small}
+
+
+def _small_words(size: Row) -> str:
+    """0.1 % of the force at 18 mm, where it is largest; or, of the whole channel, what no other number makes up for."""
+    own = size.get("own_force")
+    if own and own["force_N"]:
+        share = abs(own["force_N"]) / max(abs(own["of_N"]), abs(own["force_N"]))
+        return f"at most {100 * share:.2g} % of the force, at {1e3 * own['depth_m']:.3g} mm"
+    if size["share"] is not None:
+        return f"{100 * size['share']:.2g} % of the {size['channel']}"
+    return f"{size['signature']:.2g} times the noise"
+
+
+def _carries(size: Row) -> bool:
+    """Whether an effect holds much of the force somewhere, although others may take its place."""
+    own = size.get("own_force")
+    return own is not None and abs(own["force_N"]) > _CARRIES * max(abs(own["of_N"]), abs(own["force_N"]))
 
 
 def _is_small(size: Row, most: float) -> bool:
     share = size["share"]
     return (share is not None and share <= _SMALL_SHARE) or size["signature"] <= _SMALL_BESIDE * most
+
+
+def _own_words(own: Row | None) -> str:
+    """makes 10 N of the 24.3 N at a depth of 18 mm; empty where it has no force of its own."""
+    if not own or not own["force_N"]:
+        return ""
+    verb = "adds" if own["force_N"] > 0 else "takes away"
+    of = "leaving" if own["force_N"] < 0 else "to a total of"
+    return f"{verb} {abs(own['force_N']):.3g} N at a depth of {1e3 * own['depth_m']:.3g} mm, {of} {own['of_N']:.3g} N"
 
 
 def _size_words(size: Row, *, is_small: bool) -> str:

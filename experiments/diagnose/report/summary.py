@@ -13,6 +13,7 @@ from vis.page.numbers import foldable, quote
 
 from .sentences import (
     behind_words,
+    near_model_sentences,
     remark_sentences,
     say,
     shares_words,
@@ -103,7 +104,8 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
     use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
     return [*_doubts(diagnosis), *_stated_far(diagnosis), *use, *apart, *first,
-            *scatter_sentence(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
+            *scatter_sentence(diagnosis), *_no_replicates(diagnosis),
+            *near_model_sentences(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
 
 
 def _stated_far(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -125,10 +127,18 @@ def _far_words(bound: Mapping[str, Any]) -> str:
 
 
 def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
-    """How large what is left is, and which numbers absorb a difference in structure; it decides nothing."""
+    """Whether the model predicts, or how large what is left is; which numbers absorb a difference in structure."""
     sentences = []
-    left = diagnosis.get("residue", [])
-    if left and "gap_with_scatter" not in diagnosis:
+    left = diagnosis.get("residue", []) if "gap_with_scatter" not in diagnosis else []
+    held = {row["channel"]: row for row in diagnosis.get("by_channel", []) if row["held_out"]}
+    known = [held[row["channel"]] for row in left if row["channel"] in held]
+    if known:
+        parts = [say("predicts_one", channel=row["channel"], unit=row["unit"], after=row["rms_after"],
+                     before=row["rms_before"], noise=row["noise_after"]) for row in known]  # fmt: skip
+        more = (diagnosis["gap"]["after"]["held_out"] or 0.0) > SMALL
+        judged = say("predicts_more" if more else "predicts_noise")
+        sentences.append(say("predicts", sizes=", ".join(parts), judged=judged))
+    elif left:
         sizes = ", ".join(f"{row['rms']:.2g} {row['unit']} in {row['channel']}" for row in left)
         sentences.append(say("residue", sizes=sizes))
     if far := _strained(diagnosis, "after"):
@@ -167,6 +177,11 @@ def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
         after=_both(weighed["after"], weighed.get("after_std", {})),
         rests_on=f"; the scatter has {freedom} degree{s} of freedom" if freedom else "",
     )]  # fmt: skip
+
+
+def _no_replicates(diagnosis: Mapping[str, Any]) -> list[str]:
+    """That no trial repeats another, so that the scatter between trials is unknown."""
+    return [] if diagnosis.get("has_replicates", True) else [say(f"no_replicates_{diagnosis['kind']}")]
 
 
 def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -> str:

@@ -46,12 +46,12 @@ def _in_series(covered: Mapping[str, Any]) -> str:
 
 
 def _bound(name: str, bound: float) -> str:
-    """; it is at most 1.2 N s/m at 60 mm"""
+    """; it is at most 1.2 N s/m for 60 mm of diameter"""
     return say("c_at_most", at_most=numeral(bound, 2), at=_at(name))
 
 
 def _words(name: str, entry: Mapping[str, Any]) -> str:
-    """K = 5932 ± 7 N/m at 60 mm"""
+    """K = 5932 ± 7 N/m for 60 mm of diameter"""
     return f"K = {number_words(entry)}{_at(name)}"
 
 
@@ -95,4 +95,4 @@ def _correlated(errors: Mapping[str, Any]) -> list[str]:
 
 def _at(name: str) -> str:
     _, _, diameter = name.partition("@")
-    return f" at {1e3 * float(diameter):g} mm" if diameter else ""
+    return f" for {1e3 * float(diameter):g} mm of diameter" if diameter else ""

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, TumbleCampaign
-from experiments.diagnose.fit.problem import Array
+from experiments.diagnose.fit.problem import Array, TrialInfo
+from experiments.diagnose.noise.replicates import parted
 
-__all__ = ["CHANNELS", "LOST", "ZERO_STD", "TrialData", "TumbleData", "thinned", "tumble_data", "whiten"]
+__all__ = ["CHANNELS", "LOST", "ZERO_STD", "TrialData", "TumbleData", "thinned", "trial_infos", "tumble_data", "whiten"]
 
 CHANNELS = ("x", "y", "theta", "gyro", "ax", "ay", "wheel")
 """Channels of a diagnosis, in the order of a trial's samples."""
@@ -120,6 +121,13 @@ def tumble_data(campaign: Campaign) -> TumbleData:
             time=time, value=value, std=std, channel=channel,
         ))  # fmt: skip
     return TumbleData(tables=tables, trials=tuple(trials))
+
+
+def trial_infos(data: TumbleData) -> tuple[TrialInfo, ...]:
+    """The trials with their conditions and settings; of one condition those that last half as long are none of its."""
+    settings = [{"torque_N_m": trial.torque, "gravity_m_s2": trial.gravity_sim} for trial in data.trials]
+    infos = [TrialInfo(id=t.id, condition=t.condition, settings=s) for t, s in zip(data.trials, settings, strict=True)]
+    return parted(infos, {trial.id: (max(trial.end, 1e-9),) for trial in data.trials})
 
 
 def thinned(data: TumbleData, channel: str, every: int) -> TumbleData:

@@ -18,14 +18,13 @@ from experiments.campaign.tables import ERRORS_NOTE
 from experiments.diagnose.core.effect_texts import advice
 from experiments.diagnose.fit.fitting import SCAN
 from experiments.diagnose.fit.forms import OwnEffect, shapes_of
-from experiments.diagnose.fit.problem import Array, Finding, Form, Parameter, Problem, Samples, TrialInfo, Values
+from experiments.diagnose.fit.problem import Array, Finding, Form, Parameter, Problem, Samples, Values
 from experiments.diagnose.fit.together import each
 from experiments.diagnose.noise.jitter import Shaken
-from experiments.diagnose.noise.replicates import parted
 from rigid.planar.trajectory import STATES
 from rigid.terms import EFFECTS
 
-from .data import CHANNELS, LOST, ZERO_STD, TumbleData, thinned, tumble_data, whiten
+from .data import CHANNELS, LOST, ZERO_STD, TumbleData, thinned, trial_infos, tumble_data, whiten
 from .forms import physical_at, tumble_forms
 from .forward import OWN_TO_A_TRIAL, SHARED, Forward, Prediction
 from .guess import Guesser
@@ -68,7 +67,7 @@ class TumbleProblem(Problem):
         self.own = {effect.id: effect for effect in own}
         self.forward = Forward(data, **({"time_step": _COARSE} if coarse else {}), threads=threads, own=own)
         self.findings = tuple(findings)
-        self.trials = self._trials()
+        self.trials = trial_infos(data)
         self.base = self._base()
         self.scatter = {
             kind: Parameter(
@@ -87,12 +86,6 @@ class TumbleProblem(Problem):
         if not coarse:
             few = thinned(data, "wheel", _THIN)
             self.contacts = Guesser(TumbleProblem(few, threads=threads, own=own, coarse=True), self.forms)
-
-    def _trials(self) -> tuple[TrialInfo, ...]:
-        trials = self.data.trials
-        settings = [{"torque_N_m": trial.torque, "gravity_m_s2": trial.gravity_sim} for trial in trials]
-        infos = [TrialInfo(id=t.id, condition=t.condition, settings=s) for t, s in zip(trials, settings, strict=True)]
-        return parted(infos, {trial.id: (max(trial.end, 1e-9),) for trial in trials})
 
     def _base(self) -> tuple[Parameter, ...]:
         """Shared numbers that are uncertain, and each trial's gravity."""
@@ -292,7 +285,7 @@ class TumbleProblem(Problem):
 
     def write_model(
         self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
-        errors: Mapping[str, object] | None = None,
+        errors: Mapping[str, object] | None = None, scatter: Mapping[str, float] | None = None,
     ) -> None:  # fmt: skip
         """model.toml, which `hedgebed tumble --model` runs."""
         tables = self.data.tables

@@ -1,6 +1,8 @@
-"""How sure the numbers of a spike or foot are: an interval for real grains from its beds and from kept runs.
+"""How sure the numbers of a spike or foot are: an interval for real grains from its beds and from kept runs; the error
+of a peak force on the law of a model.
 
-Imports `rigid`, `vis`.
+Imports `coupling`, `experiments.campaign`, `experiments.diagnose.fit`, `experiments.diagnose.push`, `experiments.runs`,
+`rigid`, `vis`.
 """
 
 from .interval import (

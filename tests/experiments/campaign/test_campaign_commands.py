@@ -63,6 +63,9 @@ def test_a_template_never_overwrites(tmp_path, kind, capsys):
 
 def test_a_new_campaign_is_checked_with_a_report(tmp_path, capsys):
     assert main(["campaign", "new", str(tmp_path / "c"), "--kind", "penetration"]) == 0
+    told = " ".join("".join(capsys.readouterr()).split())
+    assert "001.csv, 002.csv, 003.csv" in told and "to delete or" in told
+    assert "starting values" in (tmp_path / "c" / "campaign.toml").read_text()
     assert main(["campaign", "check", str(tmp_path / "c"), "--out", str(tmp_path / "run"), "--quiet"]) == 0
     said = capsys.readouterr().out
     assert "drop 0.4 m/s" in said and "nothing found" in " ".join(said.split())

@@ -13,6 +13,7 @@ from experiments.diagnose.core.scatter_gap import weighed_residuals
 from experiments.diagnose.fit.bounds import is_strained
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
 from experiments.diagnose.fit.localise import depends_on
+from experiments.diagnose.push.data import prepare
 from experiments.diagnose.push.depth import smooth_depth
 from experiments.diagnose.push.law import SLOTS, fall, push, slot_table
 from experiments.diagnose.push.problem import make_problem
@@ -364,6 +365,23 @@ def test_lone_readings_and_gaps_are_left_out_and_a_clock_that_jumps_ends_the_tri
     assert len(problem.samples("d").time) == 300 - 10 - 1
     said = " ".join(finding.what for finding in problem.findings)
     assert "clock jumps" in said and "neighbours" in said and "gaps" in said
+
+
+@pytest.mark.parametrize("late", [0.0, 0.3, 0.5])
+def test_a_fast_turning_point_is_no_lone_reading_and_a_lone_reading_beside_it_is_one(late):
+    """20 mm/s at 200 Hz, 0.1 mm a row with a noise of 0.02 mm; the turn is `late` rows after one."""
+    time = np.arange(180) / 200.0
+    for seed in range(20):
+        noise = np.random.default_rng(seed).normal(0.0, 2e-5, 180)
+        depth = 0.02 * (80 - np.abs(np.arange(180) - 90 - late)) / 200.0 + noise
+        force = np.maximum(900.0 * depth, 0.0) + np.random.default_rng(seed).normal(0.0, 0.02, 180)
+        for place, found in ((None, False), (40, True)):
+            own = depth.copy()
+            if place is not None:
+                own[place] += 2e-3
+            trial = ("t", "driven", 0.02, Recording({"t_s": time, "depth_m": own, "force_N": force}))
+            said = [finding.what for finding in prepare(campaign_of([trial], depth_std=2e-5))[1]]
+            assert any("from its neighbours" in what for what in said) is found, (seed, said)
 
 
 def test_a_drop_without_an_accelerometer_has_its_latent_force_from_the_depth():

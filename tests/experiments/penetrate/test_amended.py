@@ -10,7 +10,7 @@ from golden import golden
 
 from dem.grains.materials import Material
 from experiments.campaign import read_campaign
-from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE
+from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, SCATTER_NOTE
 from experiments.cli.main import main
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
@@ -140,7 +140,7 @@ def test_what_is_no_model_of_penetration_is_refused_by_name(law):
     with pytest.raises(ValueError, match="crater_shape = 0"):
         law(CRATER.replace("crater_share", "crater_shape"))
     with pytest.raises(ValueError, match="there is no such file"):
-        penetrate.check(PenetrateSettings(**QUICK, model="nowhere.toml"))
+        penetrate.check(PenetrateSettings(**QUICK, ground="bed", model="nowhere.toml"))
     with pytest.raises(ValueError, match="needs model"):
         PenetrateSettings(**QUICK, ground="spring-damper")
 
@@ -155,7 +155,7 @@ def test_without_a_bed_the_spike_the_mass_and_the_load_are_the_models_own(tmp_pa
     assert own.weight == pytest.approx(2.0 * MASS)  # thinner than five grains: there are none
     typed = PenetrateSettings(ground="spring-damper", model=str(path), mass=0.2, tip_diameter=0.02)
     assert (typed.mass, typed.tip_diameter, typed.load) == (0.2, 0.02, None)
-    beside = PenetrateSettings(model=str(path))  # beside a bed its spike is that of the bed's runs, and it is said
+    beside = PenetrateSettings(ground="bed", model=str(path))  # its spike is that of the bed's runs, and it is said
     assert (beside.tip, beside.mass) == ("sphere", 0.1)
     size, tip, mass, speeds, retreat = read_law(path, beside).warnings()
     assert "--tip-diameter 0.003" in size and "--tip cone" in tip and "--mass 0.3" in mass
@@ -214,9 +214,36 @@ def test_one_push_is_predicted_alone_as_it_was_asked_for(tmp_path, capsys):
     shown, result = capsys.readouterr().out, json.loads((tmp_path / "run" / "result.json").read_text())
     assert [run["kind"] for run in result["runs"]] == ["driven"] and result["warnings"] == []
     assert not any(name.startswith("sinkage") for name in result["quantities"])
-    assert re.search(r"1\.22 N\s+0\.12", shown)  # K z + C v, and z times the error of K
+    assert re.search(r"1\.2 N\s+0\.2 N", shown)  # K z + C v, and 1.96 z times the error of K, 0.12 N
+    assert "95 % interval" in shown and "not in it" in " ".join(shown.split())
+    assert "0.2&nbsp;N" in (page := (tmp_path / "run" / "report.html").read_text()) or "0.2\xa0N" in page
     again = PenetrateSettings(ground="spring-damper", model=str(tmp_path / "model.toml"), speeds=(0.02,), load=0.1)
     assert again.retreat_speed == 0.02 and {unit.kind for unit in plan_units(again)} == {"driven", "set_down"}
+
+
+def test_the_scatter_of_beds_is_in_the_error_of_a_peak_where_the_model_knows_it(tmp_path):
+    """A bed that is 5 % stiffer has 5 % more of K z (1 + a (z / D)) + C v: 0.05 F, beside the error z sK of the fit."""
+    note = f'[notes.{ERRORS_NOTE}]\nnames = ["stiffness"]\nstd = [2.0]\ncorrelation = [[1.0]]\nundetermined = []\n'
+    scatter = f"[notes.{SCATTER_NOTE}]\nbed = 0.05\ntrials = 9\nfreedom = 6\n"
+    hardening = '[[effect]]\nid = "depth-hardening"\nparameters = {reference = 0.01, hardening_quadratic = 0.5}\n'
+    found = {}
+    for name, notes in (("known", note + scatter), ("not", note)):
+        (tmp_path / f"{name}.toml").write_text(MODEL + notes + hardening)
+        settings = PenetrateSettings(
+            ground="spring-damper", model=str(tmp_path / f"{name}.toml"), depth=0.01, speeds=(0.1,), frame_count=0
+        )
+        found[name] = penetrate.run(settings, tmp_path / name)["quantities"]["peak_force_amended"]
+    fit, both = found["not"]["std"], found["known"]["std"]
+    assert fit == pytest.approx(2.0 * 0.01 * 1.5, rel=1e-2)
+    assert both == pytest.approx(np.hypot(fit, 0.05 * found["known"]["value"]), rel=1e-3)
+    assert "not in it" in found["not"]["note"] and "from 9 trials" in found["known"]["note"]
+
+
+def test_a_model_without_a_ground_is_refused_with_what_to_add(tmp_path, capsys):
+    (tmp_path / "model.toml").write_text(MODEL)
+    assert main(["penetrate", "--model", str(tmp_path / "model.toml"), "--out", str(tmp_path / "run")]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "--ground spring-damper" in said and "--ground bed" in said and not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize("wrong", ["std = [1.0]", "correlation = [[1.0, 0.0]]", 'std = ["a", "b"]', "names = 3"])
@@ -289,7 +316,7 @@ def test_beside_a_bed_that_does_not_spring_back_the_amended_law_closes_the_gap(t
     monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
     (tmp_path / "model.toml").write_text(MODEL + CRATER)
     settings = PenetrateSettings(
-        **QUICK, model=str(tmp_path / "model.toml"), campaign=str(tmp_path / "c"), campaign_force_std=0.01
+        **QUICK, ground="bed", model=str(tmp_path / "model.toml"), campaign=str(tmp_path / "c"), campaign_force_std=0.01
     )
     result = penetrate.run(settings, tmp_path / "run")
     numbers = {name: entry["value"] for name, entry in result["quantities"].items()}

@@ -81,7 +81,12 @@ def test_a_pair_is_said_with_the_count_of_pairs_and_the_nearest_whole_answer():
         "verdict": "named", "effects": [{"id": "plastic-sinkage"}, {"id": "depth-hardening"}], "equivalence": [],
         "evidence": [{"effects": ["plastic-sinkage", "depth-hardening"], "score": 54.0}], "sizes": [],
         "gap": {"before": {"held_out": 1200.0}, "after": gap},
-        "nearest_answer": {"effects": ["plastic-sinkage", "layering"], "evidence_behind": 20.1},
+        "nearest_each": [
+            {"effect": "plastic-sinkage", "instead": ["depth-hardening", "shaft-friction"], "evidence_behind": 49.1,
+             "left_out_behind": None, "needed": 10.0},
+            {"effect": "depth-hardening", "instead": ["plastic-sinkage", "layering"], "evidence_behind": 4.3,
+             "left_out_behind": 5.8, "needed": 4.0},
+        ],
         "counted": {"of": "pushes", "seed": 981, "named": 15, "right": 15, "pairs": COUNTS["pairs"]["pushes"]},
     }  # fmt: skip
     golden("diagnose/sure_of_a_pair", sure_sentences(said)[2:])

@@ -11,13 +11,17 @@ from golden import golden
 from penetration_campaigns import FORCE_STD, campaign_of, saved
 
 from experiments.campaign import Recording, read_campaign, read_model
-from experiments.campaign.tables import ERRORS_NOTE
+from experiments.campaign.tables import ERRORS_NOTE, SCATTER_NOTE
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose import experiment
+from experiments.diagnose.core.near import nearest_each
+from experiments.diagnose.core.rivals import folds_of, predict
 from experiments.diagnose.experiment import diagnose_campaign
+from experiments.diagnose.fit.evidence import Hypothesis
+from experiments.diagnose.fit.fitting import fit, settled
 from experiments.diagnose.push.remarks import Push, contradict, highest_damping
-from experiments.diagnose.report.document import COUNTS, document
+from experiments.diagnose.report.document import COUNTS, _write_near_models, document
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
 from experiments.diagnose.report.summary import summary_sentences
@@ -236,6 +240,49 @@ def test_a_rival_is_distinguished_where_evidence_or_prediction_leads_by_ten_nats
         assert row["told_apart"] is apart and row["lead"] == max(evidence, left_out or 0.0)
     golden("diagnose/behind", [behind_words({"evidence_behind": e, "left_out_behind": p}) for e, p in
                                ((33.0, None), (33.0, 12.0), (5.9, 10.4))])  # fmt: skip
+
+
+def test_a_near_rival_has_a_model_of_its_own_and_a_far_one_has_none(diagnosed, tmp_path):
+    *_, found = diagnosed
+    rival = found.choice.rivals[0]
+    for evidence, left_out, written in ((5.9, 7.0, True), (5.9, 10.4, False), (12.0, None, False)):
+        other = replace(rival, behind=evidence, behind_left_out=left_out)
+        one = replace(found, choice=replace(found.choice, rivals=(other,)))
+        rows = _write_near_models(tmp_path, one, nearest_each(one))
+        assert bool(rows) is written
+        for row in rows:
+            model = read_model(tmp_path / row["file"])
+            assert [effect.id for effect in model.effect] == row["effects"] == list(rival.hypothesis.effects)
+            stiffness = model.notes["fitted_by_diameter"]["0.06"]["stiffness"]
+            again = settled(fit(rival.hypothesis.fit.model, rival.hypothesis.fit.values))
+            assert stiffness == pytest.approx(again.values["stiffness@0.06"], rel=1e-6)
+
+
+def test_of_a_second_name_the_nearest_in_its_place_is_compared_by_prediction_too(diagnosed):
+    *_, found = diagnosed
+
+    def with_rival(place):
+        forms = (*found.forms, *found.choice.rivals[place].hypothesis.forms)
+        return Hypothesis.of(fit(found.best.model.with_forms(forms), found.best.values))
+
+    best, other = with_rival(0), with_rival(1)
+    best = replace(best, score=other.score + 5.0)
+    choice = replace(found.choice, best=best, rivals=(), table=(best, other, found.choice.best))
+    one = replace(found, verdict="named", best=best.fit, effects=best.effects, choice=choice)
+    (near,) = nearest_each(one)
+    assert near.effect == best.effects[1] and near.hypothesis is other and near.behind == pytest.approx(5.0)
+    folds = folds_of(best.fit.model.infos)
+    apart = predict(best.fit, folds).score - predict(other.fit, folds).score
+    assert near.behind_left_out == pytest.approx(apart, abs=0.01) and near.needed < 10
+
+
+def test_the_model_file_notes_the_scatter_of_replicates_and_what_it_was_found_from(diagnosed):
+    """Three pushes of one plate and two of the other, one being set aside; no note is one long line."""
+    folder, _, found = diagnosed
+    note = read_model(folder / "model.toml").notes[SCATTER_NOTE]
+    assert note == pytest.approx({**found.model_std, "trials": 5, "freedom": 3})
+    lines = (folder / "model.toml").read_text().splitlines()
+    assert "# standard errors" in " ".join(lines) and max(map(len, lines)) < 240
 
 
 def test_a_push_without_a_clock_is_refused_with_how_to_make_its_time(tmp_path):

@@ -1,0 +1,71 @@
+"""The nearest other answers of a diagnosis, one for each effect that is named, by evidence and by prediction."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from experiments.diagnose.fit.evidence import Hypothesis
+from experiments.diagnose.fit.fitting import fit, settled
+
+from .deciding import smallest, values_of_all
+from .outcome import Diagnosis
+from .rivals import CLOSE, LEAD, folds_of, predict
+
+__all__ = ["Near", "near_models", "nearest_each"]
+
+
+@dataclass(frozen=True)
+class Near:
+    """The likeliest answer that has another effect in the place of a named one."""
+
+    effect: str  # the named one
+    hypothesis: Hypothesis
+    behind: float  # evidence [nats]
+    behind_left_out: float | None  # in predicting conditions left out [nats]; None where that was not compared
+    needed: float
+    """Nats by which the rule for verdicts wants the named effect ahead: the first in either, a further one in
+    evidence."""
+
+
+def nearest_each(found: Diagnosis) -> tuple[Near, ...]:
+    """Of each named effect the nearest other answer; none of other verdicts, and where no such answer was fitted.
+
+    Predictions are compared where evidence leaves less than `LEAD`: refits, in the weights of the last fit.
+    """
+    choice = found.choice
+    if choice is None or found.verdict != "named":
+        return ()
+    first, *further = found.effects
+    nearest = []
+    if choice.rivals:
+        rival = min(choice.rivals, key=lambda rival: rival.lead)
+        nearest.append(Near(first, rival.hypothesis, rival.behind, rival.behind_left_out, LEAD))
+    own, mine = set(found.effects), None
+    for effect in further:
+        rest = own - {effect}
+        others = [h for h in choice.table if rest < set(h.effects) and effect not in h.effects]
+        if not others:
+            continue
+        other = max(others, key=lambda h: h.score)
+        behind, left_out = choice.best.score - other.score, None
+        folds = folds_of(found.best.model.infos) if behind < LEAD else []
+        if folds:
+            mine = mine or predict(found.best, folds)
+            theirs = predict(other.fit, folds)
+            left_out = None if mine is None or theirs is None else mine.score - theirs.score
+        nearest.append(Near(effect, other, behind, left_out, CLOSE))
+    return tuple(nearest)
+
+
+def near_models(found: Diagnosis, nearest: Sequence[Near]) -> dict[tuple[str, ...], Diagnosis]:
+    """Other answers in the place of the best: effects -> the diagnosis with that fit. Of an ambiguous one those that
+    trials cannot distinguish; of a named one the `nearest` that are less than `LEAD` behind, by evidence and by
+    prediction."""
+    if found.choice is None:
+        return {}
+    close = [near.hypothesis for near in nearest if max(near.behind, near.behind_left_out or 0.0) < LEAD]
+    close += smallest(found.choice) if found.verdict == "ambiguous" else ()
+    models = {}
+    for one in close:
+        again = settled(fit(one.fit.model, one.fit.values))  # in the weights of the best model's last fit
+        models[found.ordered(one)] = replace(found, best=again, best_values=values_of_all(again, found.held_out))
+    return models

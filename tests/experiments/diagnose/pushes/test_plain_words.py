@@ -1,0 +1,49 @@
+"""What a diagnosis of pushes says to one who predicts: shares of the force, misfit held out, the foot's size."""
+
+import numpy as np
+import pytest
+
+from experiments.diagnose.push.remarks import Push, facts
+from experiments.diagnose.report.sentences import size_sentences
+from experiments.diagnose.report.summary import summary_sentences, title_words
+
+SIZE = {"channel": "force", "unit": "N", "rms": 0.66, "most": 2.6, "share": 0.083}
+LARGE = SIZE | {"effect": "plastic-sinkage", "signature": 68.0, "own_force": None}
+
+
+def hardening(own, of=24.3):
+    force = {"trial": "09", "depth_m": 0.018, "force_N": own, "of_N": of}
+    return SIZE | {"effect": "depth-hardening", "signature": 12.0, "own_force": force}
+
+
+@pytest.mark.parametrize(("own", "small"), [(10.0, False), (0.5, True)])
+def test_an_effect_that_holds_much_of_the_force_is_not_called_small_though_a_refit_replaces_it(own, small):
+    sizes = [LARGE, hardening(own)]
+    title = title_words({"verdict": "named", "effects": [{"id": s["effect"]} for s in sizes], "sizes": sizes})
+    (words,) = size_sentences({"sizes": sizes})
+    assert ("small" in title) is ("is small" in words) is small
+    assert f"adds {own:g} N" in words and "of 18 mm" in words and "24.3 N" in words
+    if small:
+        assert "2.1 %" in title and "at 18 mm" in title
+
+
+@pytest.mark.parametrize(("gap", "predicts"), [(14.2, "not to within the noise"), (1.1, "is the noise of the sensors")])
+def test_what_held_out_trials_say_of_a_prediction_is_in_newtons(gap, predicts):
+    row = {"channel": "force", "unit": "N", "held_out": True}
+    row |= {"rms_before": 3.91, "rms_after": 0.232, "noise_after": 0.06}
+    both = {"fit": gap, "held_out": gap}
+    found = {
+        "verdict": "none", "kind": "penetration", "effects": [], "at_bounds": {"before": [], "after": []},
+        "gap": {"before": both, "after": both}, "next_experiment": "none", "base": {"before": {}, "after": {}},
+        "residue": [{"channel": "force", "unit": "N", "rms": 0.14}], "by_channel": [row],
+    }  # fmt: skip
+    (words,) = [sentence for sentence in summary_sentences(found) if sentence.startswith("How well it predicts")]
+    assert "0.23 N" in words and "by 3.9" in words and predicts in words
+    assert "decides nothing" not in " ".join(summary_sentences(found))
+
+
+def test_a_foots_diameter_is_not_said_like_a_depth():
+    z = np.linspace(0.0, 0.01, 20)
+    pushes = [Push(0.02, z, np.full(20, 0.01), k * z, k * z) for k in (900.0, 1000.0)]
+    (said,) = facts(pushes, [], is_open=False)
+    assert "of diameter" in said and "how much pushes" not in said
