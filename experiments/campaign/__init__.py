@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from experiments.runs.registry import EXPERIMENTS, face
 
-from .files import Campaign, read_campaign, read_model, write_campaign, write_model
+from .files import Campaign, keep_digests, read_campaign, read_model, write_campaign, write_model
 from .recording import Recording
 from .tables import EffectTable, PenetrationCampaign, PenetrationModel, TumbleCampaign, TumbleModel
 
@@ -24,6 +24,7 @@ __all__ = [
     "TumbleCampaign",
     "TumbleModel",
     "check",
+    "keep_digests",
     "read_campaign",
     "read_model",
     "resume",

@@ -38,7 +38,7 @@ def changed_files(folder: Path, names: Iterable[str]) -> list[str]:
         return [f"{keeper}: is damaged; a table of digests was expected; {way}"]
     there = ((folder / name, digests[name]) for name in names if name in digests)
     return [
-        f"{path}: has changed since hedgebed wrote it (its digest differs from that in {keeper}): restore it, or {way}"
+        f"{path}: has changed since its digest was written (it differs from that in {keeper}): restore it, or {way}"
         for path, digest in there
         if path.is_file() and digest_of(path) != digest
     ]

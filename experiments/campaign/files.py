@@ -44,6 +44,7 @@ __all__ = [
     "MODEL_COPY",
     "TEMPLATES",
     "check_target",
+    "keep_digests",
     "keep_model",
     "new_campaign",
     "place_campaign",
@@ -115,7 +116,6 @@ def write_campaign(folder: str | Path, campaign: Campaign) -> Path:
     where the folder is in use or a file that a trial names has no recording."""
     folder = Path(folder)
     _refuse_used(folder)
-    names = [name for trial in campaign.tables.trial for name in trial.files.values()]
     for trial in campaign.tables.trial:
         for sensor, name in trial.files.items():
             recording = campaign.recordings.get((trial.id, sensor))
@@ -123,8 +123,14 @@ def write_campaign(folder: str | Path, campaign: Campaign) -> Path:
                 raise ValueError(f"trial {trial.id!r} names {sensor} = {name!r}, but there is no recording of it")
             write_recording(folder / name, recording)
     write_text(folder / "campaign.toml", _tables_toml(campaign.tables))  # without it there is no campaign
-    write_digests(folder, ["campaign.toml", *names])
+    keep_digests(folder, campaign)
     return folder
+
+
+def keep_digests(folder: str | Path, campaign: Campaign) -> None:
+    """Write the digests of the campaign in `folder`, so that `read_campaign` refuses a file that changes later."""
+    names = [name for trial in campaign.tables.trial for name in trial.files.values()]
+    write_digests(Path(folder), ["campaign.toml", *names])
 
 
 def _used(path: Path) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from experiments.campaign import Campaign, PenetrationCampaign, Recording, read_campaign
+from experiments.campaign import Campaign, PenetrationCampaign, Recording, keep_digests, read_campaign
 from experiments.campaign.tables import PenetrationTrial
 from experiments.check import (
     find_implausible,
@@ -112,6 +112,8 @@ def _compute(settings: CheckSettings, folder: RunFolder, progress: Progress) -> 
             recording = campaign.recordings[trial.id, sensor]
             series = folder.write_series(f"{number:03d}-{sensor}", recording.columns)
             recordings.append({"trial": trial.id, "sensor": sensor, "series": series} | _facts(recording))
+    if settings.keep_digests:
+        keep_digests(settings.campaign, campaign)
     return _result(campaign, recordings, findings, infos)
 
 

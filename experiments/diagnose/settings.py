@@ -28,3 +28,5 @@ class CheckSettings(StrictSettings):
     """What is checked."""
 
     campaign: str = Field(min_length=1, description="Folder of the measured trials, with campaign.toml.")
+    keep_digests: bool = False
+    """Write digests.json into the folder of the campaign: later, a file that has changed is refused by name."""

@@ -70,7 +70,8 @@ def _with_error(result: Mapping[str, Any], name: str, law: bool) -> tuple[str, s
         if error:
             return value, error
     if law and name in (result.get("law_spread") or {}).get("absent", ()):
-        return cell_of(entry["value"], None, entry["unit"]), say(_ABSENT.get(name.rpartition("_")[2], "not_there"))
+        last = name.split("_")[-1]
+        return cell_of(entry["value"], None, entry["unit"]), say(_ABSENT.get(last, "not_there"))
     if std is not None and (result.get("law_spread") or {}).get("parameters"):
         return cell_of(entry["value"], None, entry["unit"]), cell_of(0.0, None, entry["unit"])
     return cell_of(entry["value"], None, entry["unit"]), say("not_known" if law else "no_chance")

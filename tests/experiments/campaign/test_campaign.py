@@ -165,7 +165,7 @@ def test_every_changed_digit_of_a_written_campaign_is_found_and_may_be_intended(
     for path in files * 5:
         whole = path.read_bytes()
         one_digit_other(path, chance)
-        with pytest.raises(ValueError, match="has changed since hedgebed wrote it") as refused:
+        with pytest.raises(ValueError, match="has changed since its digest") as refused:
             read_campaign(folder)
         assert f"{path}: " in str(refused.value) and f"delete {folder / DIGESTS}" in str(refused.value)
         path.write_bytes(whole)

@@ -302,3 +302,22 @@ def test_only_a_finished_run_of_penetrate_becomes_a_campaign(grains, tmp_path):
         campaign_of_run(tmp_path)
     with pytest.raises(ValueError, match="use a higher rate"):
         campaign_of_run(grains, sensors=SpikeSensors(rate=5))
+
+
+@BOTH
+def test_a_changed_digit_of_ones_own_campaign_is_named_once_its_digests_are_kept(tmp_path, kind, capsys):
+    """Without digests.json the changed number is a valid one."""
+    folder = new_campaign(tmp_path / "c", kind=kind)
+    reading = next(iter(read_campaign(folder).tables.trial[0].files.values()))
+    whole = (folder / reading).read_text()
+    digit = next(k for k in range(len(whole) - 9, 0, -1) if whole[k] in "12345678")
+    changed = whole[:digit] + chr(ord(whole[digit]) + 1) + whole[digit + 1 :]
+    check = ["campaign", "check", str(folder), "--quiet", "--out"]
+    assert main([*check, str(tmp_path / "first")]) == 0 and not (folder / "digests.json").exists()
+    assert main([*check, str(tmp_path / "kept"), "--keep-digests"]) == 0
+    (folder / reading).write_text(changed)
+    capsys.readouterr()
+    assert main([*check, str(tmp_path / "again")]) == 2
+    assert reading in (said := capsys.readouterr().err) and "digest" in said
+    (folder / "digests.json").unlink()
+    assert main([*check, str(tmp_path / "last")]) == 0
