@@ -413,5 +413,7 @@ def test_the_line_of_the_surface_is_named_in_the_upper_corner_and_hides_no_grain
     drawn = []
     monkeypatch.setattr(canvas, "pixels", lambda figure, over=None: drawn.append(figure))
     Sheet([Reel(folder)], (640, 360), by="displacement", opengl=False).draw(0.5)
-    words = [text for axis in drawn[-1].axes for text in axis.texts if text.get_text() == "undisturbed surface"]
+    words = [
+        text for axis in drawn[-1].axes for text in axis.texts if text.get_text() == "undisturbed surface at the cut"
+    ]
     assert len(words) == 2 and all(text.get_position()[1] > 0.9 for text in words)
