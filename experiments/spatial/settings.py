@@ -72,7 +72,7 @@ class SpatialSettings(GrainsSettings):
     """Initial attitude: rotation vector from level; its direction is the axis, its length the angle [rad]."""
     velocity: Vector = Field(ZERO, description="Initial velocity of the centre of mass [m/s].")
     angular_velocity: Vector = Field(ZERO, description="Initial angular velocity, in axes of the ground [rad/s].")
-    height: NotNegative | None = None
+    height: NotNegative | None = Field(None, le=1e9)
     """Initial height of the lowest tip above the surface, from which the platform falls [m]. If not given, it starts
     just above the ground; without an initial motion it is first lowered slowly until it rests."""
     duration: Positive = Field(1.0, le=3600, description="Simulated time [s].")
