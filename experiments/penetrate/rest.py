@@ -108,9 +108,9 @@ def _stuck(settings: PenetrateSettings, material: Any) -> Json | None:
 def _by_terzaghi(settings: PenetrateSettings, material: Any) -> tuple[Json, Json]:
     """The cohesion that a material has and needs, and the depths [m] where K carries the rest of the load.
 
-    The ends are those of the 95 % interval of the cohesion, which is not below 0, with `UNSURE` times the K expected of
-    the material at the upper and the inverse at the lower end. Returns the numbers, and what the sentences on them
-    take, with "verdict": holds, sinks or open.
+    The ends are those of the 95 % interval of the cohesion, which is not below 0. K is the one expected of the
+    material, times `UNSURE` at the lower end and over it at the upper. Returns the numbers, and what the sentences on
+    them take, with "verdict": holds, sinks or open.
     """
     recipe, area = recipe_of(material), math.pi * settings.tip_diameter**2 / 4
     assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
