@@ -37,6 +37,11 @@ def generation() -> int:
     return _generation
 
 
+def _on_gpu() -> bool:
+    """Whether Taichi runs on a GPU."""
+    return _current is not None and _current.arch == "cuda"
+
+
 def _free_on_gpu() -> int | None:
     """Bytes that the GPU with most of them has free; None if unknown."""
     query = ["nvidia-smi", "--query-gpu=memory.free", "--format=csv,noheader,nounits"]
@@ -49,7 +54,7 @@ def _free_on_gpu() -> int | None:
 
 def free_memory() -> int | None:
     """Bytes that beds may still take: of the GPU if Taichi runs there, else of this process; None if unknown."""
-    if _current is not None and _current.arch == "cuda":
+    if _on_gpu():
         return _free_on_gpu()
     found = []
     try:
@@ -70,7 +75,7 @@ def refuse_memory(needed: int) -> None:
     """Raise MemoryError, with numbers, where so many bytes cannot be had."""
     free = free_memory()
     if free is not None and needed > free:
-        where = " on the GPU" if _current is not None and _current.arch == "cuda" else ""
+        where = " on the GPU" if _on_gpu() else ""
         raise MemoryError(f"needs {needed / 2**30:.3g} GiB of memory, {free / 2**30:.3g} GiB are free{where}")
 
 

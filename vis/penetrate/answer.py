@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rigid.intervals import half_width
-from vis.page.numbers import between, plain, quantity, quote, within
+from vis.page.numbers import between, plain, quantity, quote, split_spread, within
 from vis.page.page import Tile
 from vis.penetrate import summary_parts as words
 from vis.penetrate.errors import in_95
@@ -104,8 +104,8 @@ def _sinkage(result: Entries, numbers: Entries) -> list[Tile]:
     entry = _sure(result, "sinkage_dem")
     if not entry:
         return [first]
-    value = quote(entry["value"], None, "m", significant=2) if entry["value"] >= 0 else first.value.split("±")[0]
-    value = value if value.endswith("m") else f"{value.strip()}{NBSP}mm"
+    above = entry["value"] < 0
+    value = split_spread(first.value)[0] if above else quote(entry["value"], None, "m", significant=2)
     return [replace(first, value=value, errors=_errors(entry)), _among_real_grains(result, entry)]
 
 
