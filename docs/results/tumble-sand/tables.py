@@ -1,6 +1,7 @@
 """Prints the tables of docs/experiments.md from runs.csv: `python docs/results/tumble-sand/tables.py` from the root.
 
-`... tables.py RUNS` first reads finished run folders below RUNS, named <case>-w<width>-g<grain>-s<seed>, into runs.csv.
+`... tables.py RUNS` first adds finished run folders below RUNS to runs.csv. They are named
+<case>-w<width>-g<grain>-s<seed>, width and grain in m; a run of the same case, width, grain and seed is replaced.
 """
 
 import csv
@@ -60,6 +61,16 @@ def kept() -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def as_text(row: dict[str, object]) -> dict[str, str]:
+    """A row as it is read from runs.csv."""
+    return {name: str(value) for name, value in row.items()}
+
+
+def key_of(row: dict[str, str]) -> tuple[str, float, float, int]:
+    """What tells runs apart, in the order of the file."""
+    return row["case"], float(row["width_mm"]), float(row["grain_mm"]), int(row["seed"])
+
+
 def values(rows: list[dict[str, str]], name: str, **where: float | str) -> list[float]:
     """The numbers of a column, of the rows whose other columns are as `where` says."""
     chosen = [
@@ -89,14 +100,14 @@ def table(title: str, columns: dict[str, dict[str, float | str]]) -> None:
 
 
 def main() -> None:
-    """Write runs.csv where a folder is given, then print the tables."""
+    """Add to runs.csv where a folder is given, then print the tables."""
     if len(sys.argv) > 1:
         folders = [path.parent for path in sorted(Path(sys.argv[1]).glob("*/result.json"))]
-        found = [read(folder) for folder in folders]
+        rows = {key_of(row): row for row in [*kept(), *(as_text(read(folder)) for folder in folders)]}
         with KEPT.open("w", newline="") as file:
-            writer = csv.DictWriter(file, list(found[0]), lineterminator="\n")
+            writer = csv.DictWriter(file, list(next(iter(rows.values()))), lineterminator="\n")
             writer.writeheader()
-            writer.writerows(found)
+            writer.writerows(rows[key] for key in sorted(rows))
     rows = kept()
     motor: dict[str, float | str] = {"case": "0.22", "grain_mm": 4.0}
     table("Width", {f"{w:g} mm": motor | {"width_mm": w} for w in (36.0, 72.0, 153.0)})
