@@ -87,6 +87,6 @@ def test_a_pair_is_said_with_the_count_of_pairs_and_the_nearest_whole_answer():
             {"effect": "depth-hardening", "instead": ["plastic-sinkage", "layering"], "evidence_behind": 4.3,
              "left_out_behind": 5.8, "needed": 4.0},
         ],
-        "counted": {"of": "pushes", "seed": 981, "named": 15, "right": 15, "pairs": COUNTS["pairs"]["pushes"]},
+        "counted": {"of": "pushes", **COUNTS["pushes"], "pairs": COUNTS["pairs"]["pushes"]},
     }  # fmt: skip
     golden("diagnose/sure_of_a_pair", sure_sentences(said)[2:])

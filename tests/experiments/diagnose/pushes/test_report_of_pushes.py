@@ -313,24 +313,29 @@ def test_the_push_that_confirms_a_name_is_stated_with_both_predictions(result):
     assert abs(apart["one_N"] - truth) < 4 * error < abs(apart["one_N"] - apart["other_N"])
 
 
-@pytest.mark.parametrize(("name", "of"), [("push-981", "pushes"), ("rig-981", "rig"), ("tumble-981", "tumbles")])
-def test_how_often_a_name_is_right_is_what_the_kept_count_has(name, of):
-    path = Path(__file__).parents[4] / "docs" / "results" / "diagnose-second" / name / "cases.jsonl"
-    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+def _counted(kind, seeds):
+    rows = []
+    for seed in seeds:
+        path = Path(__file__).parents[4] / "docs" / "results" / "diagnose-second" / f"{kind}-{seed}" / "cases.jsonl"
+        own = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        assert {row["case"]["seed"] // 1000 for row in own} == {seed} and len(own) == 40
+        rows += own
     named = [row for row in rows if row["verdict"] == "named"]
     right = [row for row in named if row["outside"] is None and set(row["effects"]) == set(row["truth"])]
-    assert COUNTS[of] == {"named": len(named), "right": len(right)}
-    assert {row["case"]["seed"] // 1000 for row in rows} == {COUNTS["seed"]}
+    return rows, named, right
+
+
+@pytest.mark.parametrize(("kind", "of"), [("push", "pushes"), ("rig", "rig"), ("tumble", "tumbles")])
+def test_how_often_a_name_is_right_is_what_the_kept_counts_have(kind, of):
+    _, named, right = _counted(kind, COUNTS[of]["seeds"])
+    assert COUNTS[of] == {"seeds": COUNTS[of]["seeds"], "named": len(named), "right": len(right)}
 
 
 @pytest.mark.parametrize(("kind", "of"), [("push", "pushes"), ("rig", "rig"), ("tumble", "tumbles")])
 def test_how_often_two_names_are_right_is_what_the_kept_counts_have(kind, of):
-    counted, rows = COUNTS["pairs"][of], []
-    for seed in counted["seeds"]:
-        path = Path(__file__).parents[4] / "docs" / "results" / "diagnose-second" / f"{kind}-{seed}" / "cases.jsonl"
-        rows += [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    named = [row for row in rows if row["verdict"] == "named" and len(row["effects"]) > 1]
-    right = [row for row in named if row["outside"] is None and set(row["effects"]) == set(row["truth"])]
+    counted = COUNTS["pairs"][of]
+    rows, *verdicts = _counted(kind, counted["seeds"])
+    named, right = ([row for row in found if len(row["effects"]) > 1] for found in verdicts)
     hidden = [row for row in rows if row["outside"] is None and len(row["truth"]) > 1]
     found = {"named": len(named), "right": len(right), "hidden": len(hidden)}
     assert counted == {"seeds": counted["seeds"]} | found
