@@ -98,7 +98,8 @@ def column(
     scale, shown = _scale(max(known, default=1.0), unit)
     dash = "\N{EN DASH}"
     return shown, [
-        dash if value is None or not math.isfinite(value) else plain(value / scale, significant) for value in values
+        dash if value is None or not math.isfinite(value) else (short if exact else plain)(value / scale, significant)
+        for value in values
     ]
 
 

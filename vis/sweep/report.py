@@ -69,7 +69,7 @@ def _over(report: Report, table: Mapping[str, NDArray], entry: Result) -> Block:
         if x.dtype.kind not in "fiu":
             axis.tick_params(axis="x", labelrotation=30)
     axes[0].set_ylabel(fill(label, _WIDTH))
-    varied = next((factor for factor in factors if factor["key"] == by), {})
+    varied: Result = next((factor for factor in factors if factor["key"] == by), {})
     if by:
         shown, under = _on_axis(np.array(groups), varied, by)
         marks = [handle(f"{under}: {_plain(one)}", colour, marker="o", ls="")
