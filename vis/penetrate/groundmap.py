@@ -41,6 +41,6 @@ def answer_tiles(result: Result) -> list[Tile]:
     return [*rows, *(Tile(words, quantity(numbers[key])) for key, words in _OF_THE_BED.items() if key in numbers)]
 
 
-def _in_95(entry: Mapping[str, Any]) -> dict[str, Any]:
+def _in_95(entry: Mapping[str, Any]) -> Mapping[str, Any]:
     """A quantity with half of the 95 % interval of a normal distribution in place of its standard deviation."""
-    return dict(entry) | ({"std": NORMAL * entry["std"]} if entry["std"] is not None else {})
+    return entry if entry["std"] is None else {**entry, "std": NORMAL * entry["std"]}
