@@ -47,8 +47,8 @@ def test_few_runs_are_listed_one_by_one_and_many_by_their_spread_with_angles_in_
     assert sweep("many", "--over", "torque=0.06:0.22:0.02") == 0
     few, many = (json.loads((tmp_path / name / "result.json").read_text())["tables"][0] for name in ("few", "many"))
     rows = {row[0]: row[1:] for row in few["rows"]}
-    assert rows["torque on the platform while a spike is in contact"] == ["N m", "0.15", "0.15", "0.6", "0.6"]
-    assert rows["coefficient of static friction"] == ["", "0.4", "0.5", "0.4", "0.5"]
+    torque, friction = (row[1:] for row in few["rows"] if row[0].startswith(("torque on", "coefficient")))
+    assert torque == ["N m", "0.15", "0.15", "0.6", "0.6"] and friction == ["", "0.4", "0.5", "0.4", "0.5"]
     speeds = table(tmp_path / "few")["max_speed_m_s"]
     assert [float(cell) for cell in rows["max speed"][1:]] == pytest.approx(speeds, rel=1e-3)
     assert rows["sinkage largest"][0] == "mm"
