@@ -214,8 +214,8 @@ def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_th
     flagship = kept("converge-flagship")["quantities"]  # its sum of all errors, of 95 %, is that of the map
     k, depth = (flagship[name] for name in ("stiffness", "sinkage"))
     assert "± all" in shown and "(95" in shown
-    assert f"Stiffness K {k['value']:.0f} N/m {k['total']:.0f} N/m" in shown
-    assert f"{1e3 * depth['value']:.1f} mm {1e3 * depth['total']:.0f} mm" in shown
+    assert re.search(rf"K {k['value']:.0f} N/m {k['total']:.0f} N/m", shown)
+    assert re.search(rf"{1e3 * depth['value']:.1f} mm {1e3 * depth['total']:.0f} mm", shown)
     assert "threads = 1" in told.err
     page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert "D / D" not in page and "0.16" in page
