@@ -195,8 +195,8 @@ class EnergyBalance:
     def balance_numbers(self) -> dict[str, tuple[float, str]]:
         """Numbers of the balance that a result quotes, each the largest: name -> value and unit.
 
-        The residual of body and exchange, and of the exchange alone, over `energy_scale`; what the ground made, by how
-        much the momenta of all are off, and what a bed lost by the end.
+        The first two are the residuals of body and exchange, and of the exchange alone, over `energy_scale`. The others
+        are the energy that the ground made, the errors of the momenta of all, and what a bed lost by the end.
         """
         gap, errors = self.columns["given"] - self.columns["taken"], self.samples
         return {

@@ -43,9 +43,10 @@ def guide(
     """Move `spike` along `legs` from the surface of `ground` (or a bed), and return a row for each macro step.
 
     Columns, shape [row_count]: "leg" (number of the leg), "t_s", "depth_m", "along_m" (at the middle of the step),
-    "velocity_m_s" (positive downwards), "force_N" (upwards) and "side_force_N" (against the motion along x), both the
-    mean of the step. The spike comes from just clear of the grains at the speed of the first leg; those rows are left
-    out. The last step of each leg ends where the leg ends. `on_step` is called with the share that is done [1].
+    "velocity_m_s" (positive downwards), "force_N" (upwards) and "side_force_N" (against the motion along x). Both
+    forces are means of the step. The spike comes from just clear of the grains at the speed of the first leg; those
+    rows are left out. The last step of each leg ends where the leg ends. `on_step` is called with the share that is
+    done [1].
 
     Raises ValueError for a leg without length or speed, and for a depth below what the ground allows.
     """

@@ -419,8 +419,9 @@ def drive(spike: Spike, *, into: Any, speed: float, depth: float, **options: Any
     """Drive `spike` straight down `into` a ground (or a bed) at `speed` [m/s] to `depth` [m], hold it, pull it out.
 
     Options: hold [s] (0.02); retreat (True); retreat_speed [m/s] (as speed); substeps of the ground in a macro step
-    (10); start_depth [m, negative] (just clear of the grains); and `on_step`, `on_frame`, `frame_interval`, `progress`
-    of `Stepper.follow`. Raises ValueError, naming key and value, for what cannot be; and what the ground raises.
+    (10); start_depth [m, negative] (just clear of the grains). `on_step`, `on_frame`, `frame_interval` and `progress`
+    are those of `Stepper.follow`. Raises ValueError, naming key and value, for what cannot be, and what the ground
+    raises.
 
     On the spring-damper, the force is K z + C v while the spike goes in:
 

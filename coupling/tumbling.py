@@ -53,8 +53,8 @@ class CoupledTumble(PlatformRun):
     energy_interval : between measurements of what the ground holds [s].
     options : those of `Master`.
 
-    Raises ValueError for a start in overlap with grains, and for a gravity to be lowered where there is no placement,
-    no bed or a rig. It also raises the errors of `Master`, `PlanarBody` and `LoweredGravity`.
+    Raises ValueError for a start in overlap with grains. The same is raised for a gravity to be lowered where there is
+    no placement, no bed or a rig. It also raises the errors of `Master`, `PlanarBody` and `LoweredGravity`.
     """
 
     COLUMNS, _prefix = COLUMNS, "tumble"

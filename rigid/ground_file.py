@@ -188,8 +188,8 @@ def is_ground_file(name: str) -> bool:
 def read_ground(path: str | Path) -> GroundFile:
     """The ground file at `path`.
 
-    Raises ValueError naming the file and, a line for each fault, the key, what was found and what was expected; and for
-    the file of a run that is not as the run wrote it.
+    Raises ValueError naming the file and, a line for each fault, the key, what was found and what was expected. The
+    same is raised for the file of a run that is not as the run wrote it.
     """
     path = Path(path)
     check_as_written(path)

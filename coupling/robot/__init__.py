@@ -1,7 +1,7 @@
 """Robots of MuJoCo on any ground: named geoms are feet, MuJoCo keeps joints, motors and controllers.
 
-`MujocoRobot` is a body for `coupling.Master`; its grounds are `LawFeet` (a surface law under every point of contact),
-`BedFeet` (a bed of grains) and `LammpsFeet` (grains in LAMMPS); `RobotRun` follows it with its energy balance. MuJoCo
+`MujocoRobot` is a body for `coupling.Master`. Its grounds are `LawFeet` (a surface law under every point of contact),
+`BedFeet` (a bed of grains) and `LammpsFeet` (grains in LAMMPS). `RobotRun` follows it with its energy balance. MuJoCo
 itself is an extra: `pip install hedgebed[mujoco]`.
 
 Imports `coupling`, `coupling.lammps`, `dem`, `rigid`.

@@ -52,8 +52,8 @@ class MujocoRobot:
 
     Its world has z upwards and the undisturbed surface at z = 0. Planes and height fields of MuJoCo's world no longer
     touch anything (`floors`): the ground here takes their place. Raises ValueError, naming what is wrong: a missing
-    foot; gravity that is not straight down; the integrator RK4; a height where the robot has neither a free joint nor
-    an upright rail.
+    foot, gravity that is not straight down, or the integrator RK4. It also refuses a height where the robot has neither
+    a free joint nor an upright rail.
     """
 
     def __init__(

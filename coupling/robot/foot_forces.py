@@ -62,17 +62,17 @@ class FootForces(AbstractContextManager["FootForces"]):
         for the gravity of `model` and the shape and size of each foot in the posture of `data`, as in `hedgebed
         mujoco`.
     depths, speeds : name of a part -> largest depth of its parameters [m], and largest speed into the ground at which
-        its law was compared with grains [m/s]; the first part that is deeper, and the first that is faster, warns,
-        once.
+        its law was compared with grains [m/s]. The first part that is deeper warns once, and so does the first that is
+        faster.
     mu_d : friction of sliding [1].
     slip_speed : below which friction falls with the slip [m/s]; a step of dt needs mu_d g dt at least.
 
     Several may be entered at once, one for each model; they take the place of any other ``mjcb_passive``. `points`
     counts the points evaluated. Each MjData of the model has its own deepest depths. They are forgotten where its time
-    goes back or jumps by more than a step (``mj_resetData``, another state); a second call at the same time does not
+    goes back or jumps by more than a step (``mj_resetData``, another state). A second call at the same time does not
     count. It keeps the last MjData alive. Raises ValueError for an unknown law and for impossible numbers. It also does
-    so for numbers of one foot or gravity that are neither given nor known, such as K of spring-damper; on entry also
-    for a step at which the exchange of a run would be unstable.
+    so for numbers of one foot or gravity that are neither given nor known, such as K of spring-damper. On entry it also
+    refuses a step at which the exchange of a run would be unstable.
     """
 
     def __init__(

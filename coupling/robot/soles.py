@@ -97,7 +97,7 @@ def law_under_feet(
 
     ``matrices``: rotation of each foot from its own axes to the world's, shape (foot, 3, 3), as `foot_matrices` returns
     them. The size of a foot is taken in this posture. ``parameters``, ``given``: as `rigid.ground.soles.sized_law` has
-    them. ``depth``: to which the parameters hold under the tip [m], such as ``range["depth"][1]`` of a ground file; of
+    them. ``depth``: to which the parameters hold under the tip [m], such as ``range["depth"][1]`` of a ground file. Of
     a foot it is as many of its diameters. Raises ValueError as `sized_law`, and where the law takes a gravity that is
     not in ``parameters``.
 

@@ -8,6 +8,7 @@ from experiments.runs.result import Result, quantity
 from experiments.runs.whole_runs import computed_run
 from rigid.ground.flat_foot import DEPTHS, OVER_BALL
 from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
+from rigid.intervals import NORMAL
 from rigid.platform.files import find_platform
 
 from .answers import Answer, Number, TooDeepError
@@ -48,8 +49,8 @@ def _as_deep_as_known(settings: GroundSettings) -> tuple[Map, Answer, bool]:
         return *_answer(settings.model_copy(update={"load": None})), True
 
 
-def _interval(number: Number) -> tuple[float, float]:
-    """The 90 % interval of a normal distribution, in the unit of the number; it may begin below zero."""
+def _in_file(number: Number) -> tuple[float, float]:
+    """The 90 % interval of a normal distribution, as ground files have it; it may begin below zero."""
     return number.value - TO_90 * number.std, number.value + TO_90 * number.std
 
 
@@ -57,7 +58,7 @@ def ground_file(settings: GroundSettings, table: Map, answer: Answer) -> GroundF
     """The spring-damper of the answer."""
 
     def estimate(number: Number) -> Estimate:
-        low, high = _interval(number)
+        low, high = _in_file(number)
         return Estimate(value=number.value, std=number.std, interval=(max(0.0, low), high))
 
     depth = table.deepest * settings.tip_diameter
@@ -82,7 +83,7 @@ def _of_no_platform(settings: GroundSettings, table: Map, answer: Answer) -> lis
         return []
     try:
         _, heavier = _answer(settings.model_copy(update={"load": weight}))
-        then = say("at_weight", mm=1e3 * heavier.sinkage.value, std=1e3 * heavier.sinkage.std)
+        then = say("at_weight", mm=1e3 * heavier.sinkage.value, half=1e3 * NORMAL * heavier.sinkage.std)
     except ValueError:
         then = say("too_heavy", mm=1e3 * table.deepest * settings.tip_diameter)
     where = say("in_rig" if in_rig else "on_its_own")
@@ -112,7 +113,7 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
     words = table.words(answer, gravity=settings.gravity, diameter=settings.tip_diameter)
     unknown = [say("too_deep", load=load, deepest=1e3 * table.deepest * settings.tip_diameter)] if too_deep else []
     warnings = [*unknown, *_of_no_platform(settings, table, answer), *words]
-    low, high = _interval(c)
+    low, high = c.value - NORMAL * c.std, c.value + NORMAL * c.std
     if low <= 0:
         warnings.append(say("unidentified", low=low, high=high))
     if answer.ratio < table.finest:

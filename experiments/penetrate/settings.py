@@ -26,6 +26,7 @@ say = Sentences(__package__)
 _MATERIALS = "sand, sand-weak, jsc-1a-loose-cut, another that ships (docs/materials.md), or a material.toml"
 _SOFTENED = "Young's modulus of the grains [Pa]; if not given, as soft as max_overlap allows."
 _STEP = "Time step of the grains [s]; a share of the contact time if not given."
+_TIPS = {"sphere": "ball tip", "cone": "cone tip", "flat": "flat foot"}
 GrainMaterial = Annotated[str, Field(description=f"Grain material: {_MATERIALS}.")]
 Grain = Annotated[Positive, Field(description="Mean grain diameter [m].")]
 Spread = Annotated[
@@ -369,8 +370,8 @@ class PenetrateSettings(StrictSettings):
 
     @property
     def body_words(self) -> str:
-        """The body in words, as in titles: "12 mm spike", or "16 mm flat foot"."""
-        return f"{1e3 * self.tip_diameter:g} mm {'flat foot' if self.tip == 'flat' else 'spike'}"
+        """The body in words, as in titles: "12 mm ball tip", "12 mm cone tip" or "16 mm flat foot"."""
+        return f"{1e3 * self.tip_diameter:g} mm {_TIPS[self.tip]}"
 
     @property
     def foot(self) -> float:

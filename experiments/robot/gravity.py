@@ -17,6 +17,7 @@ from experiments.groundmap.answers import Answer, Number
 from experiments.groundmap.cohesive import CohesiveMap
 from experiments.groundmap.maps import POWERS, read_map
 from experiments.platform.surfaces import Surface
+from rigid.intervals import NORMAL
 from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
@@ -121,8 +122,8 @@ class GravityRule:
 
 
 def _quoted(symbol: str, number: Number, unit: str) -> str:
-    """A number of a map with its standard deviation in two digits: 390, not 3.9e+02."""
-    return f"{symbol} = {number.value:.3g} ± {float(f'{number.std:.2g}'):g} {unit}"
+    """A number of a map with half of its 95 % interval in two digits: 390, not 3.9e+02."""
+    return f"{symbol} = {number.value:.3g} ± {float(f'{NORMAL * number.std:.2g}'):g} {unit}"
 
 
 def gravity_rule(

@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +14,10 @@ from experiments.runs.reading import nearest
 from experiments.runs.strict import plain_kinds
 from experiments.runs.units import find_unit, has_unit
 
-__all__ = ["Factor", "parse_fixed", "parse_over", "read_table", "unit_of"]
+__all__ = ["Factor", "parse_fixed", "parse_over", "read_table", "unit_of", "words_of"]
 
 MOST_VALUES = 100_000
+_LONGEST = 60  # letters of a name in a table or on an axis
 _ACCEPTED = "[VALUE, VALUE], FROM:TO:STEP, FROM:TO or FROM:TO:log are accepted"
 
 
@@ -95,6 +97,18 @@ def unit_of(key: str, settings_class: type[BaseModel]) -> str:
     described = settings_class.model_fields[key].description or ""
     last = described.rpartition("[")[2].partition("]")[0] if "[" in described else ""
     return "" if last == "1" else last
+
+
+def words_of(key: str, settings_class: type[BaseModel]) -> str:
+    """A setting as tables and plots name it: the start of its help, "friction coefficient between spike and grains".
+
+    Without a unit in its help, or where that is long, it is the key with blanks.
+    """
+    words, unit, _ = (settings_class.model_fields[key].description or "").replace("\n", " ").partition(" [")
+    words = re.split("[;,]", re.sub(r"^[A-Z][\w ,]*: ", "", words))[0]
+    if not unit or len(words) > _LONGEST:
+        return key.replace("_", " ")
+    return words if words.startswith("Young") else words[:1].lower() + words[1:]
 
 
 def _pair(where: str, text: str, settings_class: type[BaseModel]) -> tuple[str, object]:

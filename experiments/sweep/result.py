@@ -15,15 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from experiments.pool.tasks import Outcome, Task
 from experiments.pool.tools import required
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.result import Result, Table, quantity
 from rigid.series import replacing
+from vis.page.numbers import column as in_one_unit
+from vis.page.sentences import label_of
 
 from .design import Design, problem_of
-from .factors import unit_of
+from .factors import unit_of, words_of
 from .settings import SweepSettings
 
 __all__ = ["FEWEST_SAMPLES", "conclude", "shared_title"]
@@ -79,16 +82,19 @@ def conclude(
     failed = sum(bool(fault) for fault in faults)
     if failed:
         warnings.append(f"{failed} of {len(tasks)} runs failed: table.csv says why, and plots leave them out")
-    title = f"{len(tasks)} runs of {settings.experiment} over {', '.join(design.keys)}"
+    own = design.experiment.settings_class()
+    title = f"{len(tasks)} runs of {settings.experiment} over {', '.join(words_of(key, own) for key in design.keys)}"
     return Result.make(
         "sweep", title=title,
         quantities={"runs": quantity(len(tasks), "1"), "failed": quantity(failed, "1")},
         tables=[_each_run(design, columns) if len(tasks) <= FEW else _spreads(columns),
-                *([_sensitivity_table(sensitive)] if sensitive else [])],
+                *([_sensitivity_table(sensitive, own)] if sensitive else [])],
         of=settings.experiment, each=shared_title(one.result for one in outcomes.values()), factors=[
-            {"key": key, "unit": unit_of(key, design.experiment.settings_class())} for key in design.keys
+            {"key": key, "unit": unit_of(key, own), "words": words_of(key, own)} for key in design.keys
         ],
-        columns=[{"name": column.name, "unit": column.unit, "head": column.head} for column in drawn],
+        columns=[
+            {"name": one.name, "unit": one.unit, "head": one.head, "words": label_of(one.name)} for one in drawn
+        ],
         sensitivities=sensitive, warnings=warnings,
     )  # fmt: skip
 
@@ -175,10 +181,13 @@ def _each_run(design: Design, columns: Sequence[_Column]) -> Table:
     """A column for each run: what is varied, then what came out."""
     settings_class = design.experiment.settings_class()
     varied = [
-        [key, unit_of(key, settings_class), *(str(point.values.get(key, "")) for point in design.points)]
+        [
+            words_of(key, settings_class),
+            *_typed(unit_of(key, settings_class), [one.values.get(key) for one in design.points]),
+        ]
         for key in design.keys
     ]
-    rows = [[column.name, *_cells(column.unit, column.values)] for column in columns]
+    rows = [[label_of(column.name), *_cells(column.unit, column.values)] for column in columns]
     numbers = [str(place + 1) for place in range(len(design.points))]
     return Table(
         title="Each run, in the order of table.csv", head=["quantity", "unit", *numbers], rows=[*varied, *rows]
@@ -191,14 +200,23 @@ def _spreads(columns: Sequence[_Column]) -> Table:
     for column in columns:
         there = column.values[np.isfinite(column.values)]
         three = np.array([np.min(there), np.median(there), np.max(there)] if there.size else [math.nan] * 3)
-        rows.append([column.name, *_cells(column.unit, three)])
+        rows.append([label_of(column.name), *_cells(column.unit, three)])
     return Table(title="Over all runs", head=["quantity", "unit", "least", "median", "largest"], rows=rows)
 
 
-def _cells(unit: str, values: Array) -> list[str]:
-    """The unit and numbers of a table for reading: angles in degrees, "-" where there is none."""
-    shown, values = ("degrees", np.degrees(values)) if unit == "rad" else (unit, values)
-    return ["" if shown == "1" else shown, *(f"{number:.4g}" if math.isfinite(number) else "-" for number in values)]
+def _typed(unit: str, values: Sequence[object]) -> list[str]:
+    """The unit and the values of a setting: numbers as those of quantities, other values as they were given."""
+    numbers = [float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    if len(numbers) == len(values):
+        return _cells(unit, np.array(numbers), exact=True)
+    return [unit, *("" if value is None else str(value) for value in values)]
+
+
+def _cells(unit: str, values: Array, *, exact: bool = False) -> list[str]:
+    """The unit and numbers of a table for reading, as in other reports: lengths in mm, angles in degrees."""
+    unit, values = ("degrees", np.degrees(values)) if unit == "rad" else (unit, values)
+    shown, numbers = in_one_unit(values.tolist(), unit or "1", significant=6 if exact else 4, exact=exact)
+    return [shown, *numbers]
 
 
 def _sensitivities(
@@ -243,11 +261,14 @@ def _sensitivities(
     return found, warnings
 
 
-def _sensitivity_table(sensitive: Sequence[Mapping[str, object]]) -> Table:
+def _sensitivity_table(sensitive: Sequence[Mapping[str, object]], settings_class: type[BaseModel]) -> Table:
     def cell(entry: Mapping[str, object], name: str) -> str:
         value, conf = entry[name], entry[f"{name}_conf"]
         return "-" if value is None else f"{value:.2f} ± {conf:.2f}"
 
-    rows = [[e["quantity"], e["key"], cell(e, "first"), cell(e, "total")] for e in sensitive]
+    rows = [
+        [label_of(str(e["quantity"])), words_of(str(e["key"]), settings_class), cell(e, "first"), cell(e, "total")]
+        for e in sensitive
+    ]
     head = ["quantity", "setting", "first order", "total"]
     return Table(title="Share of the variance [1], ± 95 % of its estimate", head=head, rows=rows)

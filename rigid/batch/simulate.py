@@ -1,7 +1,7 @@
 """Thousands of planar trials at once, compiled by Taichi: `simulate_batch`.
 
-The terms are those of the accurate integrator. Parameters differ from trial to trial; all have the same effects, law of
-the ground and number of spikes, since the kernel is compiled for these (once; it is kept).
+The terms are those of the accurate integrator. Parameters differ from trial to trial. All have the same effects, law of
+the ground and number of spikes: the kernel is compiled for these, once, and kept.
 """
 
 import math
@@ -82,7 +82,7 @@ def simulate_batch(
         times: sample times [s] within 0 to `duration`, rising, shape [sample_count] or [trial_count, sample_count].
         sample_every: record every so many steps instead. Without `times` and `sample_every` only the summary is kept.
         threads: CPU threads where Taichi is not running yet.
-        start_depth: depth of the tips at t = 0 over that in equilibrium [1]; other than 1 needs level ground and
+        start_depth: depth of the tips at t = 0 over that in equilibrium [1]. Other than 1 needs level ground and
             pointed tips (no `slope`, `com-offset`, `tip-radius`).
 
     Raises ValueError: trials that do not go together, a number that cannot be, a time step too long for a ground.

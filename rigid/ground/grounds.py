@@ -103,7 +103,7 @@ class _LawGround(Coulomb):
         """Mean reaction over `dt` [s] on a body whose tip starts at `position` [m], at constant `velocity` [m/s].
 
         Both have shape (3,), z up; the body is a point, so that `turn` and `spin` are of no effect. The mean is taken
-        exactly over the path, so force * dt is the exact impulse and force * displacement the exact change of the
+        exactly over the path, so force * dt is the exact impulse. Force * displacement is the exact change of the
         stored energy plus what is dissipated.
         """
         at, rate = np.asarray(position, dtype=float), np.asarray(velocity, dtype=float)

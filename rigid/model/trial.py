@@ -95,9 +95,9 @@ class Ground:
 class Trial(Coulomb):
     """One tumble. The names are those of a measured trial; SI units; stiffness and damping are a row's.
 
-    Raises ValueError, naming the key, the value found and what was expected: for mass or inertia that no body can have
-    (above m l^2, or not above J_w); a counterweight that is not lighter than the platform; friction with mu_d above
-    mu_s; and a brake without a spinning wheel.
+    Raises ValueError, naming the key, the value found and what was expected. Refused are mass or inertia that no body
+    can have (above m l^2, or not above J_w) and a counterweight that is not lighter than the platform. So are friction
+    with mu_d above mu_s and a brake without a spinning wheel.
     """
 
     mass: float = 5.3  # m [kg], wheels included

@@ -87,7 +87,7 @@ def longest_step(trial: Trial) -> float:
     """The longest step [s] that resolves the stiffest motion of the ground: 0.2 sqrt(M / K) of the heaviest load.
 
     K is the law's own slope at the depth where it carries the weight, M the least inertia that a row's tip offers.
-    A fifth of sqrt(M / K), a thirtieth of the period, keeps the error of order 2 below half a percent; a damper adds
+    A fifth of sqrt(M / K), a thirtieth of the period, keeps the error of order 2 below half a percent. A damper adds
     the bound M / C (explicit steps are stable to 2 M / C). The same holds for a spring and a damper that a term has of
     its own, between its inertia and the platform's mass.
     """

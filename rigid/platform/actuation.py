@@ -37,8 +37,8 @@ class Flywheel:
 class TorqueHistory:
     """Torque on the platform about one wheel's axis, piecewise constant in time, and what the wheel makes of it.
 
-    Raises ValueError for a torque beyond that of motor or brake; a brake without a wheel speed; a wheel beyond its
-    limit; and times that do not increase.
+    Raises ValueError for a torque beyond that of motor or brake, and for a brake without a wheel speed. The same is
+    raised for a wheel beyond its limit, and for times that do not increase.
     """
 
     wheel: Flywheel

@@ -12,7 +12,7 @@ from small_cases import GRAINS
 
 pytestmark = pytest.mark.slow
 FILES = {
-    "spike.toml": GRAINS + "grain = 0.004\nseeds = [1]\nspeeds = [0.4]\ndrop_speeds = [0.2]\nyoung = 2e7\n",
+    "spike.toml": GRAINS + "grain = 0.004\nseeds = [1, 2]\nspeeds = [0.4]\ndrop_speeds = [0.2]\nyoung = 2e7\n",
     "sweep.toml": 'experiment = "tumble"\n[over]\ntorque = [0.2, 0.22]\n',
 }
 # All but bench, which needs a checkout, and converge, paper, bed calibrate and bed test, which take long.
@@ -26,6 +26,7 @@ COMMANDS = (
     "fmu hedgehog.fmu",
     "hop --out runs/hop",
     "tumble --out runs/tumble",
+    "tumble --torque 0.2 --out runs/slow",
     "tumble spatial --duration 0.1 --out runs/spatial",
     "experiments list",
     "campaign new mine --kind penetration",
@@ -33,7 +34,7 @@ COMMANDS = (
     "campaign from-run runs/spike pushes",
     "diagnose mine --out runs/diagnosis",
     "effects",
-    "compare runs/tumble runs/tumble --out runs/both",
+    "compare runs/tumble runs/slow --out runs/both",
     "validate --only free-fall --out runs/validate --document runs/validation.md",
     "bed make --stages rain --size 0.024 0.024 0.02 --threads 1 --out runs/bed",
     "bed list",

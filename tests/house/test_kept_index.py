@@ -29,8 +29,8 @@ def test_a_line_follows_the_files_of_a_folder(tmp_path):
     shutil.copytree(FOLDER / "converge-flagship", tmp_path / "run")
     assert cells()[:3] == ["[run](run)", "`hedgebed converge`", "2026-11-26"]
     result = tmp_path / "run/result.json"
-    result.write_text(result.read_text(encoding="utf-8").replace("A 12 mm spike", "A spike of 12 mm", 1))
-    shown = "A spike of 12 mm in sand, with its errors; `stiffness` 38.9 ± 40 N/m"
+    result.write_text(result.read_text(encoding="utf-8").replace("A 12 mm ball", "A ball of 12 mm", 1))
+    shown = "A ball of 12 mm tip in sand, with its errors; `stiffness` 38.9 ± 40 N/m"
     assert cells()[3] == shown
     (tmp_path / "run/README.md").write_text("# Two pushes\n\nCommand: `make a|b`\n\nDate: 2026-11-27\n")
     assert cells() == ["[run](run/README.md)", "`make a\\|b`", "2026-11-27", "Two pushes"]

@@ -34,6 +34,16 @@ def test_three_known_errors_stand_in_their_columns():
     assert numbers.rows == (("K", "38.9 N/m", "5.2 N/m", "17 N/m", "18 N/m", "95 %"),)
 
 
+def test_a_one_sided_error_has_its_sign_at_the_number_and_none_in_the_head():
+    """The other numbers of that column have ± themselves; columns without a sign stay as they are."""
+    tiles = [Tile("sinkage", "2 mm", "", ("1.9 mm", "+5.9 mm", "not known")),
+             Tile("K", "38 N/m", "", ("−17 +31 N/m", "17 N/m", "3 N/m"))]  # fmt: skip
+    numbers = answer(tiles, ON_GRAINS)[0]
+    assert [head[:1] for head in numbers.head[2:5]] == ["c", "g", "±"]
+    assert numbers.rows[0][2:5] == ("± 1.9 mm", "+5.9 mm", "not known")
+    assert numbers.rows[1][2:5] == ("−17 +31 N/m", "± 17 N/m", "3 N/m")
+
+
 def test_a_law_alone_has_no_columns_of_errors_that_it_cannot_have():
     (numbers,) = answer([Tile("launch", "0.1 m/s")], {"experiment": "hop"})
     assert numbers.head == ("", "value", "")

@@ -170,10 +170,7 @@ class SpaceReel(_Filmed):
         """The foot or spike with the largest force of all pictures; where there is none, the lowest at the end."""
         seen, last = self._seen, int(np.argmax(self.loads)) if self.loads.any() else len(self) - 1
         points, touched = seen.feet[last], _most_pushed(seen, last)
-        faces = self.frames[0].bodies[_feet_of(self.frames[0])][1]
-        sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-        links = coo_array((np.ones(len(sides)), (sides[:, 0], sides[:, 1])), shape=(len(points), len(points)))
-        parts = connected_components(links, directed=False)[1]
+        parts = self._parts
         own = points[parts == parts[int(np.argmin(np.linalg.norm(points - touched, axis=1)))]]
         (left, front, _), (right, back, _) = own.min(axis=0), own.max(axis=0)
         cut, half = 0.5 * float(front + back), 0.5 * float(back - front) + 1e-6
@@ -184,6 +181,26 @@ class SpaceReel(_Filmed):
             low.append(float(near[:, 2].min()))
             x.append(float(near[near[:, 2] <= low[-1] + _LEVEL * self.reach, 0].mean()))
         return Foot(cut, float(right - left), np.array(x), np.array(low))
+
+    @cached_property
+    def _parts(self) -> NDArray[np.int32]:
+        """Which foot or spike each point of their mesh belongs to, shape (points,)."""
+        points, faces = self.frames[0].bodies[_feet_of(self.frames[0])]
+        sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+        links = coo_array((np.ones(len(sides)), (sides[:, 0], sides[:, 1])), shape=(len(points), len(points)))
+        return np.asarray(connected_components(links, directed=False)[1])
+
+    @cached_property
+    def _on_points(self) -> bool:
+        """Whether the ground pushes on the ends of spikes alone, as a surface law does under a platform."""
+        return not self.on_grains and self.what == "platform" and "spikes" in self.frames[0].bodies
+
+    @cached_property
+    def _tips(self) -> NDArray[np.intp]:
+        """Number of the point of the mesh at the end of each spike: its farthest from the middle of the hull."""
+        away = np.linalg.norm(self._seen.feet[0] - self.centres[0], axis=1)
+        own = (np.flatnonzero(self._parts == part) for part in range(self._parts.max() + 1))
+        return np.array([points[np.argmax(away[points])] for points in own])
 
     @cached_property
     def _seen(self) -> _Seen:
@@ -227,11 +244,13 @@ class SpaceReel(_Filmed):
     def lowest(self, frame: Frame) -> Array | None:
         """The lowest point of the feet or spikes of a frame [m], shape (3,), of the body where they are points.
 
-        None where the height of the surface is not known.
+        Under a platform on a law it is the lowest end of a spike: the law takes its depth from there. The ball that is
+        drawn goes deeper where the spike is tilted. None where the height of the surface is not known.
         """
         if self.surface is None:
             return None
         points = frame.bodies[_feet_of(frame)][0]
+        points = points[self._tips] if self._on_points else points
         return np.asarray(points[int(np.argmin(points[:, 2]))], dtype=float)
 
     @cached_property
@@ -260,7 +279,7 @@ class SpaceReel(_Filmed):
         if lowest is None or self.surface is None:
             return ""
         height, foot = 1e3 * (float(lowest[2]) - self.surface), "foot" if self.what == "robot" else "spike"
-        foot = foot if "spikes" in frame.bodies else "point"
+        foot = "tip" if self._on_points else foot if "spikes" in frame.bodies else "point"
         if abs(height) < _TOUCHES:
             return f"    lowest {foot} at the undisturbed surface"
         return f"    lowest {foot} {abs(height):.3g} mm {'above' if height > 0 else 'below'} the undisturbed surface"

@@ -15,6 +15,7 @@ from vis.page.sentences import Sentences
 __all__ = ["MOST_ROWS", "answer", "without_unknown", "write_page"]
 
 say = Sentences(__package__)
+MINUS, NBSP = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 MOST_ROWS = 6
 _FINDINGS = 3
 _ERRORS = ("± chance", "± grain size", "± bed, softness, speed")
@@ -52,6 +53,7 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
     values = (
         say("two_values") + (f", over {end:.3g}\N{NO-BREAK SPACE}s" if end is not None else "") if compared else "value"
     )
+    errors, rows = _signs(errors, rows)
     head = ("", values, *(errors[k] for k in shown), *beside, "")
     cells = [
         (*row[:2], *(row[2 + k] or "\N{EN DASH}" for k in shown), *([tile.beside] if beside else []), row[-1])
@@ -81,6 +83,21 @@ def without_unknown(numbers: Block, notes: Sequence[Block]) -> tuple[Block, list
     return replace(numbers, head=head, rows=tuple(rows)), [text(say("unknown", names=names), small=True), *left]
 
 
+def _signs(heads: Sequence[str], rows: Sequence[tuple[str, ...]]) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Heads and rows where a column with a one-sided error, such as +5.9 mm, has its signs at the numbers.
+
+    The head of such a column has no ±, which the other numbers of the column have instead.
+    """
+    found, cells = list(heads), [list(row) for row in rows]
+    for k, head in enumerate(heads):
+        own = [row[2 + k] for row in rows]
+        if head.startswith("± ") and any(error.startswith(("+", MINUS)) for error in own):
+            found[k] = head.removeprefix("± ")
+            for row in cells:
+                row[2 + k] = f"±{NBSP}{row[2 + k]}" if row[2 + k][:1].isdigit() else row[2 + k]
+    return found, [tuple(row) for row in cells]
+
+
 def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], list[str]]:
     """The heads of the three errors of this result, and the keys of the sentences below the table."""
     experiment = result.get("experiment")
@@ -95,7 +112,7 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
     if experiment == "diagnose":
         return (say("of_fit"), *_ERRORS[1:]), keys
     if experiment == "ground":
-        return (say("of_std"), *_ERRORS[1:]), keys
+        return (say("of_map"), *_ERRORS[1:]), ["sum_of_map"]
     if "ground_file" in result:
         return (say("of_the_law"), *_ERRORS[1:]), keys
     if experiment == "penetrate" and result.get("ground", "bed") != "bed":

@@ -86,16 +86,20 @@ def short(value: float, significant: int = 4) -> str:
     return f"{value:.{significant}g}".replace("-", _MINUS) if math.isfinite(value) else plain(value)
 
 
-def column(values: Sequence[float | None], unit: str, *, significant: int = 3) -> tuple[str, list[str]]:
+def column(
+    values: Sequence[float | None], unit: str, *, significant: int = 3, exact: bool = False
+) -> tuple[str, list[str]]:
     """Numbers of a table's column in one unit: the unit with the prefix that fits the largest, and the numbers.
 
-    What is None or not finite is shown as a dash.
+    What is None or not finite is shown as a dash. ``exact``: Whether they are without zeros at their ends, as what was
+    chosen is.
     """
     known = [abs(value) for value in values if value is not None and math.isfinite(value)]
     scale, shown = _scale(max(known, default=1.0), unit)
     dash = "\N{EN DASH}"
     return shown, [
-        dash if value is None or not math.isfinite(value) else plain(value / scale, significant) for value in values
+        dash if value is None or not math.isfinite(value) else (short if exact else plain)(value / scale, significant)
+        for value in values
     ]
 
 

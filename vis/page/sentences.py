@@ -12,7 +12,7 @@ from functools import cached_property
 from importlib.resources import files
 from typing import Any
 
-__all__ = ["Sentences"]
+__all__ = ["Sentences", "label_of"]
 
 
 class Sentences:
@@ -39,3 +39,11 @@ class Sentences:
 
     def __repr__(self) -> str:
         return f"Sentences({self.package!r})"
+
+
+_labels = Sentences(__package__, "labels.toml")
+
+
+def label_of(key: str) -> str:
+    """The name of a quantity or fact of result.json, as a person reads it: of labels.toml, else the key with blanks."""
+    return _labels.templates.get(key, key.replace("_", " "))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+from rigid.intervals import NORMAL
 from vis.page.numbers import in_two_digits, quantity
 from vis.page.page import Section, Tile, text
 from vis.page.report import Report, Result, report_of
@@ -28,11 +31,16 @@ def write_ground_report(report: Report) -> Path:
 
 
 def answer_tiles(result: Result) -> list[Tile]:
-    """Rows of the table at the top of the report: K, C and sinkage, and the bed that they are of."""
+    """Rows of the answer: K, C and sinkage, each with half of its 95 % interval, and the bed that they are of."""
     numbers = result["quantities"]
     under = f"Sinkage under {quantity(numbers['load'])}"
     rows = [
-        Tile(name, in_two_digits(numbers[key]), "one standard deviation")
+        Tile(name, in_two_digits(_in_95(numbers[key])))
         for name, key in (("Stiffness K", "stiffness"), ("Damping C", "damping"), (under, "sinkage"))
     ]
     return [*rows, *(Tile(words, quantity(numbers[key])) for key, words in _OF_THE_BED.items() if key in numbers)]
+
+
+def _in_95(entry: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A quantity with half of the 95 % interval of a normal distribution in place of its standard deviation."""
+    return entry if entry["std"] is None else {**entry, "std": NORMAL * entry["std"]}

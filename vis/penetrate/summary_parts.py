@@ -13,18 +13,18 @@ import numpy as np
 
 from vis.page.folder import PYTHON_RUNS, Run, RunFolder, Setting
 from vis.page.numbers import column, plain, quantity, quote, short, with_squares
-from vis.page.sentences import Sentences
+from vis.page.sentences import Sentences, label_of
 
 __all__ = [
     "as_foot", "bed_part", "cell_text", "Departure", "departure_rows", "departures_part", "facts_table",
-    "fit_error", "joined", "label_of", "list_of", "mapping_of", "MINUS",
+    "fit_error", "joined", "list_of", "mapping_of", "MINUS",
     "more_or_less", "NBSP", "numbers_table", "percent", "plain_value", "reference_part", "reproduce_part",
     "rest_part", "run_words", "runs_table", "sentence", "setting_of", "settings_table", "SHARES", "signed_percent",
     "std_of", "Table", "value_of",
 ]  # fmt: skip
 
 NBSP, MINUS = "\N{NO-BREAK SPACE}", "\N{MINUS SIGN}"
-say, labels = Sentences(__package__), Sentences(__package__, "labels.toml")
+say = Sentences(__package__)
 _UNITS = {
     "size": "m", "grain": "m", "grain_diameter": "m", "surface": "m", "gravity": "m/s2", "young": "Pa", "real": "Pa",
     "pressure": "Pa", "time_step": "s",
@@ -122,11 +122,6 @@ def as_foot(value: Any) -> Any:
 
 def _foot(found: re.Match[str]) -> str:
     return "Foot" if found[1] == "S" else "foot"
-
-
-def label_of(key: str) -> str:
-    """The name of a key, as a person reads it."""
-    return labels.templates.get(key, key.replace("_", " "))
 
 
 def mapping_of(value: Any) -> Mapping[str, Any]:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import fill
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigid.series import read_series
-from vis.page.numbers import typeset
+from vis.page.numbers import column, typeset
 from vis.page.page import Block, Section, Tile, text
 from vis.page.plots import BED, GREY, MODEL, handle, legend_above, new_panels, shades
-from vis.page.report import Report, Result, again, report_of, tables, unit_text
+from vis.page.report import Report, Result, again, capital, report_of, tables
+from vis.page.sentences import label_of
 
 __all__ = ["answer_tiles", "write_sweep_report"]
 
 MOST_DRAWN = 8
 """Quantities that have a figure."""
+_WIDTH = 40  # letters of a line of a label
 _MOST_COLOURS = 6  # values that are told apart by colour
 
 
@@ -46,11 +50,9 @@ def answer_tiles(result: Result) -> list[Tile]:
     return [Tile(name.capitalize(), f"{result['quantities'][name]['value']}") for name in ("runs", "failed")]
 
 
-def _over(report: Report, table: Mapping[str, NDArray], column: Result) -> Block:
+def _over(report: Report, table: Mapping[str, NDArray], entry: Result) -> Block:
     """One quantity over each factor, coloured by the factor of fewest values."""
-    factors, values, unit = report.result["factors"], table[column["head"]], unit_text(column["unit"])
-    if column["unit"] == "rad":
-        values, unit = np.degrees(values), "degrees"
+    factors, (values, label) = report.result["factors"], _on_axis(table[entry["head"]], entry, entry["name"])
     counts = {factor["key"]: len(np.unique(table[factor["key"]])) for factor in factors}
     by = min(counts, key=lambda key: counts[key]) if len(factors) > 1 else ""
     if by and counts[by] > _MOST_COLOURS:
@@ -59,22 +61,48 @@ def _over(report: Report, table: Mapping[str, NDArray], column: Result) -> Block
     colours = shades(len(groups)) if by else [BED]
     drawing, axes = new_panels(len(factors), height=2.8, sharey=True)
     for axis, factor in zip(axes, factors, strict=True):
-        x = table[factor["key"]]
+        x, under = _on_axis(table[factor["key"]], factor, factor["key"])
         for group, colour in zip(groups, colours, strict=True):
             own = np.ones(len(x), bool) if group is None else table[by] == group
             axis.plot(x[own], values[own], color=colour, marker="o", ms=4, ls="")
-        axis.set_xlabel(f"{factor['key']} [{factor['unit']}]" if factor["unit"] else factor["key"])
+        axis.set_xlabel(fill(under, _WIDTH))
         if x.dtype.kind not in "fiu":
             axis.tick_params(axis="x", labelrotation=30)
-    axes[0].set_ylabel(f"{column['name'].replace('_', ' ')}{f' [{unit}]' if unit else ''}")
+    axes[0].set_ylabel(fill(label, _WIDTH))
+    varied: Result = next((factor for factor in factors if factor["key"] == by), {})
     if by:
-        marks = [
-            handle(f"{by} = {group}", colour, marker="o", ls="") for group, colour in zip(groups, colours, strict=True)
-        ]
+        shown, under = _on_axis(np.array(groups), varied, by)
+        marks = [handle(f"{under}: {_plain(one)}", colour, marker="o", ls="")
+                 for one, colour in zip(shown.tolist(), colours, strict=True)]  # fmt: skip
         legend_above(drawing, marks)
-    name = column["name"].replace("_", " ").capitalize()
-    key = "over" if by else "over_plain"
-    return report.draw(key, drawing, name=f"over-{column['name']}", quantity=name, colour=by)
+    name, key = capital(_words(entry, entry["name"])), "over" if by else "over_plain"
+    return report.draw(
+        key, drawing, name=f"over-{entry['name']}", quantity=name, colour=_words(varied, by) if by else ""
+    )
+
+
+def _words(entry: Result, name: str) -> str:
+    """How tables call a quantity or a setting; an older folder has only its `name`."""
+    return str(entry.get("words") or label_of(name))
+
+
+def _on_axis(values: NDArray, entry: Result, name: str) -> tuple[NDArray, str]:
+    """Numbers of a quantity or a setting in the unit of other reports (mm, degrees), and their label with that unit."""
+    unit = str(entry["unit"] or "1")
+    if unit == "rad":
+        values, unit = np.degrees(values), "degrees"
+    if values.dtype.kind in "fiu":
+        known = np.abs(values[np.isfinite(values)])
+        largest = float(known.max(initial=0.0))
+        shown = column([largest], unit)[0]
+        if unit == "m" and shown == "mm":
+            values = 1e3 * values
+        unit = shown if unit in ("m", "m/s2") else unit
+    return values, f"{_words(entry, name)}{f' [{typeset(unit)}]' if unit != '1' else ''}"
+
+
+def _plain(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _sensitivities(report: Report, entries: list[Result]) -> Block:
@@ -92,8 +120,10 @@ def _sensitivities(report: Report, entries: list[Result]) -> Block:
                     yerr=[entry[f"{kind}_conf"] for _, entry in known], color=colour, marker="o", ms=5, ls="",
                 )  # fmt: skip
         axis.axhline(0.0, color=GREY, lw=0.8)
-        axis.set_xticks(places, [entry["key"] for entry in own], rotation=30)
-        axis.set(title=name.replace("_", " "), xlim=(-0.6, len(own) - 0.4))
+        words = {factor["key"]: _words(factor, factor["key"]) for factor in report.result["factors"]}
+        under = [fill(words.get(entry["key"], label_of(entry["key"])), _WIDTH // 2) for entry in own]
+        axis.set_xticks(places, under, rotation=30)
+        axis.set(title=fill(label_of(name), _WIDTH), xlim=(-0.6, len(own) - 0.4))
     axes[0].set_ylabel("share of the variance [1]")
     marks = [handle("first order", BED, marker="o", ls=""), handle("total", MODEL, marker="o", ls="")]
     legend_above(drawing, marks if any(entry["total"] is not None for entry in entries) else marks[:1])

@@ -120,8 +120,8 @@ def test_under_a_flat_tip_grains_are_made_twice_as_stiff(monkeypatch):
     assert peak < 0.9 * 0.05 < 0.05 < peak * (flat / ball) ** (2 / 3)
 
 
-@pytest.mark.parametrize(("tip", "named"), [("flat", "flat foot"), ("sphere", "spike"), ("cone", "spike")])
-def test_titles_call_a_flat_tip_a_foot(tip, named):
+@pytest.mark.parametrize(("tip", "named"), [("flat", "flat foot"), ("sphere", "ball tip"), ("cone", "cone tip")])
+def test_titles_have_the_words_of_the_tip(tip, named):
     assert PenetrateSettings(**FOOT | {"tip": tip}).body_words.split(" mm ") == ["16", named]
 
 

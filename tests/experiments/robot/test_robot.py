@@ -161,8 +161,9 @@ def test_k_and_c_of_sand_and_their_errors_are_those_that_hedgebed_ground_states_
         assert plan.numbers[name].value == pytest.approx(
             getattr(map_, name).value, rel=2e-3
         )  # the surface's are rounded
-    (said,) = [said for said in plan.warnings if "standard deviations" in said]
-    assert f"± {map_.stiffness.std:.2g} N/m" in said and f"± {map_.damping.std:.2g} N s/m" in said
+    (said,) = [said for said in plan.warnings if "same relative errors" in said]
+    k, c = (float(f"{1.96 * getattr(map_, name).std:.2g}") for name in ("stiffness", "damping"))
+    assert f"± {k:g} N/m" in said and f"± {c:g} N s/m" in said and "(95" in said
 
 
 def test_k_of_sand_stays_that_of_one_g_where_the_map_of_gravity_does_not_reach(tmp_path):

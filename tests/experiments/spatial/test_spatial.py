@@ -20,6 +20,7 @@ from experiments.tumble.settings import TumbleSettings
 from experiments.tumble.trial import plan_tumble
 from rigid import find_platform
 from rigid.platform.rig import STANDARD_GRAVITY
+from vis.film.reel import SpaceReel
 from vis.page.folder import read_columns
 from vis.page.law_rows import answer_rows
 
@@ -122,6 +123,10 @@ def test_set_down_by_the_hand_on_the_spring_damper_it_stands_as_deep_as_its_load
     inertia = 1.2e-3
     assert motion["wheel_x_rad_s"][-1] == pytest.approx(-0.05 * 0.1 / inertia, rel=1e-6)
     assert len(list((out / "frames").glob("tumble_hull_*.vtu"))) == 4
+    reel = SpaceReel(out)  # the depth in its pictures is that of the curve: of the tips, which the law sees
+    depths = [-reel.lowest(frame)[2] for frame in reel.frames]
+    assert depths == pytest.approx(motion["sinkage_m"][[reel.row(index) for index in range(4)]], rel=1e-3)
+    assert f"lowest tip {1e3 * depths[0]:.3g} mm below" in reel.line(0)
 
 
 def test_a_drop_tells_its_impact_and_a_hop(tmp_path, monkeypatch, cube):

@@ -47,12 +47,16 @@ def test_few_runs_are_listed_one_by_one_and_many_by_their_spread_with_angles_in_
     assert sweep("many", "--over", "torque=0.06:0.22:0.02") == 0
     few, many = (json.loads((tmp_path / name / "result.json").read_text())["tables"][0] for name in ("few", "many"))
     rows = {row[0]: row[1:] for row in few["rows"]}
-    assert rows["torque"] == ["N m", "0.15", "0.15", "0.6", "0.6"] and rows["mu_s"] == ["", "0.4", "0.5", "0.4", "0.5"]
-    assert rows["max_speed"][1:] == [f"{value:.4g}" for value in table(tmp_path / "few")["max_speed_m_s"]]
+    torque, friction = (row[1:] for row in few["rows"] if row[0].startswith(("torque on", "coefficient")))
+    assert torque == ["N m", "0.15", "0.15", "0.6", "0.6"] and friction == ["", "0.4", "0.5", "0.4", "0.5"]
+    speeds = table(tmp_path / "few")["max_speed_m_s"]
+    assert [float(cell) for cell in rows["max speed"][1:]] == pytest.approx(speeds, rel=1e-3)
+    assert rows["sinkage largest"][0] == "mm"
     angles = np.degrees(table(tmp_path / "few")["transition_angle_hop_rad"])
     assert np.nanmax(angles) > 1
-    found = rows["transition_angle_hop"]
-    assert found == ["degrees", *("-" if np.isnan(angle) else f"{angle:.4g}" for angle in angles)]
+    unit, *found = rows["θ at the first hop"]
+    assert unit == "degrees" and [cell == "–" for cell in found] == np.isnan(angles).tolist()
+    assert [float(cell) for cell in found if cell != "–"] == pytest.approx(angles[~np.isnan(angles)], rel=1e-3)
     assert len(many["head"]) == 5 and len(many["rows"]) < len(few["rows"])
 
 
