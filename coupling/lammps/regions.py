@@ -51,8 +51,9 @@ def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
         return [piece for part in parts for piece in _alone(part)]
     ordered = sorted((_known(part) for part in parts), key=_bottom)
     seams = [_seam(below, above) for below, above in pairwise(ordered)]
-    if isinstance(tip := ordered[0], Cone) and tip.bottom_radius == 0:
-        return polyhedron_pieces(pyramid_corners(tip, ordered[-1].top))
+    tip, shaft = ordered[0], ordered[-1]
+    if isinstance(tip, Cone) and tip.bottom_radius == 0 and isinstance(shaft, Cylinder):
+        return polyhedron_pieces(pyramid_corners(tip, shaft.top))
     ends = [-math.inf, *seams, math.inf]
     return [Primitive(part, ends[k], ends[k + 1]) for k, part in enumerate(ordered)]
 
