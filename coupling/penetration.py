@@ -25,7 +25,7 @@ from rigid.platform.spike import Spike
 from .bed_ground import BedGround, GrainBed
 from .ground import Described, Ground, part_of, prefixed
 from .planar_body import PLACEMENT_TIME
-from .stepper import Reporting, Stepper
+from .stepper import LastRows, Reporting, Stepper
 from .trajectory import PHASES, Penetration
 
 __all__ = ["Drive", "Drop", "Run", "SetDown", "drive", "drop", "overdamped_below", "set_down"]
@@ -68,7 +68,6 @@ class Run(Stepper):
         self.expected_time = self.max_time  # How long it may well take [s], for those who show progress
         self._rows: list[tuple[float, float, float, float]] = []
         self._phases: list[int] = []
-        self._table, self._copied = np.empty((0, 4)), 0  # The rows as an array, and how many of them it has
 
     def __repr__(self) -> str:
         where = f"{1e3 * self.depth:.3g} mm deep at {self.time:.4g} s"
@@ -124,7 +123,6 @@ class Run(Stepper):
         elif self.lets_go_at_touch and force > 0 and steps_left > 0:
             sooner = steps_left * self.macro_step
             self._rows = [(when + sooner, depth, rate, push) for when, depth, rate, push in self._rows]
-            self._copied = 0
             self._approach = self.count
             self._after(held, force)
         if not self.done and self.time >= self.max_time - 0.5 * self.macro_step:
@@ -178,7 +176,6 @@ class Run(Stepper):
         self._recall(memory)
         self.ended = str(own["ended"])
         self._rows = [tuple(row) for row in np.asarray(own["rows"]).tolist()]
-        self._copied = 0
         self._phases = [int(code) for code in own["phases"]]
         self.ground.restore(part_of(state, "ground"))
 
@@ -197,17 +194,13 @@ class Run(Stepper):
         pass
 
     def _last(self, seconds: float) -> np.ndarray | None:
-        """Rows of the last `seconds` [s], shape [n, 4], to be read; None while fewer have passed since the surface."""
-        count = max(2, round(seconds / self.macro_step))
-        if self.count - self._approach < count:
-            return None
-        end = len(self._rows)
-        if end > len(self._table):
-            self._table, self._copied = np.empty((2 * end, 4)), 0
-        if end > self._copied:
-            self._table[self._copied : end] = self._rows[self._copied :]
-            self._copied = end
-        return self._table[end - count : end]
+        """Rows of the last `seconds` [s], shape [n, 4]; None while fewer have passed since the surface."""
+        count = self._row_count(seconds)
+        return np.array(self._rows[-count:]) if self.count - self._approach >= count else None
+
+    def _row_count(self, seconds: float) -> int:
+        """Rows in which that time passes, at least two."""
+        return max(2, round(seconds / self.macro_step))
 
 
 class Drive(Run):
@@ -313,6 +306,7 @@ class Drop(Run):
         self.after_stop = float(after_stop)
         self._force = 0.0
         self._stopped_at = math.inf
+        self._at_rest: LastRows | None = None  # Not of its state: made anew from the rows
 
     @property
     def at_bottom(self) -> bool:
@@ -334,14 +328,28 @@ class Drop(Run):
         self._force = force
         if self.velocity <= 0:
             self._stopped_at = min(self._stopped_at, self.time)
-        last = self._last(self.rest_time)
         if self.depth > self.max_depth:
             self.ended = "max_depth"
-        elif last is not None and self._rests(last):
+        elif self._may_rest() and (last := self._last(self.rest_time)) is not None and self._rests(last):
             self.ended = "rest"
             self._phases[-len(last) :] = [REST] * len(last)
         elif self.time - self._stopped_at >= self.after_stop:
             self.ended = "stopped"
+
+    def _followed(self) -> LastRows:
+        """The rows of the last `rest_time`."""
+        count = self._row_count(self.rest_time)
+        if self._at_rest is None or not self._at_rest.is_of(self._rows, count):
+            self._at_rest = LastRows(self._rows, count, bounded=1, summed=(2, 3))
+        self._at_rest.follow()
+        return self._at_rest
+
+    def _may_rest(self) -> bool:
+        """False where `_rests` would be, at the cost of one row."""
+        last = self._followed()
+        least, most = last.extremes
+        still = most - least <= self.rest_tolerance * max(self.depth, most)
+        return still and last.may_be(3, self.load, 0.05 * self.load)
 
     def _rests(self, last: np.ndarray) -> bool:
         deepest = max(self.depth, float(last[:, 1].max()))
@@ -404,6 +412,10 @@ class SetDown(Drop):
         super()._after(held, force)
         step = self.macro_step
         self.velocity = (self.mass * before + step * (self.load - force)) / (self.mass + step * self.drag)
+
+    def _may_rest(self) -> bool:
+        last = self._followed()
+        return last.may_be(2, 0.0, AT_REST * self.speed) and last.may_be(3, self.load, AT_REST * self.load)
 
     def _rests(self, last: np.ndarray) -> bool:
         slow = abs(float(last[:, 2].mean())) <= AT_REST * self.speed

@@ -1,9 +1,10 @@
 """What all runs share: they go on in macro steps to an end, and report on the way."""
 
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol, TypedDict
 
-__all__ = ["Progress", "Reporters", "Reporting", "Stepper"]
+__all__ = ["LastRows", "Progress", "Reporters", "Reporting", "Stepper"]
 
 Reporters = Callable[[Any], None] | Iterable[Callable[[Any], None]] | None  # Called with the run
 
@@ -105,3 +106,54 @@ def _listed(reporters: Reporters) -> list[Callable[[Any], None]]:
     if reporters is None:
         return []
     return [reporters] if callable(reporters) else list(reporters)
+
+
+class LastRows:
+    """The last `count` of the rows of a run, which grow at their end: between which bounds a column is, and about its
+    mean, at a cost that does not grow with `count`. A time at rest may be hundreds of thousands of rows.
+
+    `extremes` are of the column `bounded`, exact; `may_be` is of the columns `summed`.
+    """
+
+    def __init__(self, rows: Sequence[Sequence[float]], count: int, *, bounded: int, summed: Sequence[int]) -> None:
+        self._rows, self._count, self._bounded = rows, count, bounded
+        self._next = max(0, len(rows) - count)  # The first row that is not taken in
+        self._first = self._next
+        self._lows: deque[tuple[int, float]] = deque()  # What may yet be the least: rising, each later than the last
+        self._highs: deque[tuple[int, float]] = deque()
+        self._sums = dict.fromkeys(summed, 0.0)
+        self._errors = dict.fromkeys(summed, 0.0)  # No sum is further off
+
+    def is_of(self, rows: Sequence[Sequence[float]], count: int) -> bool:
+        """Whether it follows these very rows."""
+        return self._rows is rows and self._count == count
+
+    def follow(self) -> None:
+        """Take in the rows since the last time."""
+        for index in range(self._next, len(self._rows)):
+            row = self._rows[index]
+            left = self._rows[index - self._count] if index - self._count >= self._first else None
+            value = row[self._bounded]
+            while self._lows and self._lows[-1][1] >= value:
+                self._lows.pop()
+            while self._highs and self._highs[-1][1] <= value:
+                self._highs.pop()
+            for ends in (self._lows, self._highs):
+                ends.append((index, value))
+                if ends[0][0] <= index - self._count:
+                    ends.popleft()
+            for column in self._sums:
+                change = row[column] - (left[column] if left is not None else 0.0)
+                self._sums[column] += change
+                self._errors[column] += 2.0**-52 * (abs(self._sums[column]) + abs(change))
+        self._next = len(self._rows)
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the largest value."""
+        return self._lows[0][1], self._highs[0][1]
+
+    def may_be(self, column: int, value: float, within: float) -> bool:
+        """Whether the mean of `column` may be `within` so much of `value`: False only where it is not."""
+        room = within + self._errors[column] / self._count + 1e-9 * (abs(value) + within)
+        return not abs(self._sums[column] / self._count - value) > room

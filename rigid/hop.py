@@ -30,6 +30,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from rigid.checks import Coulomb, check_above_zero, check_friction, check_not_negative
+from rigid.checks.unfit import UnfitSettingsError
 
 __all__ = [
     "Flight", "Launch", "Tumbler", "brake_launch", "escape_speed", "flight", "impulsive_launch", "launch",
@@ -125,7 +126,7 @@ def launch(tumbler: Tumbler, torque: float, until: float = math.inf) -> Launch |
 
     None where it does not leave the ground before the next tips come down: it tumbles, falls back, or does not tip at
     all. Raises ValueError for a torque or a time of 0 or less. Raises RuntimeError where sliding on rigid ground has no
-    solution because friction is too high (above about 2, in a rig).
+    solution because friction is too high (above about 2, in a rig), UnfitSettingsError for too large a torque.
     """
     check_above_zero(torque=torque, **({"until": until} if until != math.inf else {}))
     if torque <= tumbler.tipping_torque:
@@ -226,10 +227,15 @@ class _Contact:
         for event in events:
             vars(event).update(terminal=True, direction=1 if event is change else -1)  # as scipy has it
         stop = end if math.isfinite(end) else start + self._long(torque)
-        solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=events, rtol=1e-10, atol=1e-13)
+        with np.errstate(over="ignore", invalid="ignore"):  # it fails then
+            solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=events, rtol=1e-10, atol=1e-13)
         at, y = float(solved.t[-1]), solved.y[:, -1]
         if mode == 0:
             y[2] = self.t.spike_length * math.cos(y[0]) * y[1]
+        if solved.status < 0:
+            raise UnfitSettingsError(
+                f"a torque of {torque:g} N m: the motion cannot be followed beyond {at:.3g} s ({solved.message})"
+            )
         if solved.status == 0:
             return at, y, "torque ends" if math.isfinite(end) else "down"
         which = next(k for k, times in enumerate(solved.t_events) if len(times))

@@ -21,7 +21,8 @@ class LammpsGround(BedGround):
     Only explicit coupling is possible, because a step cannot be taken back. LAMMPS reports the kinetic energy. The
     energies of height and of the normal springs, with DMT's cohesion, follow from the grains' places. The energy of
     friction's springs and the losses are not reported. With JKR neither are the normal springs: whether a stretched
-    contact holds depends on its history.
+    contact holds depends on its history. Nor are they under a spike with a cone, which is a pyramid in LAMMPS
+    (`polyhedra.pyramid_corners`), not the cone whose distance to the grains is known; `pushes` are then refused.
     """
 
     bed: LammpsBed
@@ -40,14 +41,14 @@ class LammpsGround(BedGround):
         )
 
     def energies(self) -> dict[str, float]:
-        """Kinetic energy, height and, but for JKR, normal springs of the grains, `copies` times [J]."""
+        """Kinetic energy, height and, but for JKR and a cone, normal springs of the grains, `copies` times [J]."""
         bed = self.bed
         grains = bed.grains(contacts=False)
         moving = kinetic_energy(grains.mass, grains.radius, grains.velocity, grains.spin)
         height = -float(grains.mass @ (grains.position @ np.array(bed.gravity)))
         found = {"kinetic": moving, "potential": height}
         law = bed.material.cohesion
-        if law != "jkr":
+        if law != "jkr" and not self._is_cone:
             found["normal"] = bed.spring_energy(grains.position)
             for body, surface in self._pieces():
                 distance, _, curvature = surface(grains.position.copy())
@@ -55,6 +56,10 @@ class LammpsGround(BedGround):
                 radius = grains.radius / (1 + grains.radius * curvature)
                 found["normal"] += spring_energy(bed.pair_of(body), law, pressed, radius)
         return {name: self.copies * value for name, value in found.items()}
+
+    @property
+    def _is_cone(self) -> bool:
+        return self.spike is not None and self.spike.tip == "cone"
 
     def _pieces(self) -> list[tuple[int, Any]]:
         """Bodies and their surfaces, several of a body where a grain can touch several at once."""
@@ -65,7 +70,14 @@ class LammpsGround(BedGround):
         return {}
 
     def pushes(self) -> tuple[Vector, Vector]:
-        """As `BedGround.pushes`, from the grains' places, with the cohesion of grains that touch."""
+        """As `BedGround.pushes`, from the grains' places, with the cohesion of grains that touch.
+
+        Raises ValueError for a spike with a cone.
+        """
+        if self._is_cone:
+            raise ValueError(
+                f"{self.spike}: in LAMMPS a cone is a pyramid, on which the pushes of grains are not known"
+            )
         bed, grains = self.bed, self.bed.grains(contacts=False)
         points, forces = [np.zeros((0, 3))], [np.zeros((0, 3))]
         for body, surface in self._pieces():

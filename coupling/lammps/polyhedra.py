@@ -18,12 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dem.shapes.basic import Cone
 from dem.shapes.mesh import Mesh, Polyhedron
 
 from .pieces import HalfSpace, OutOfPlaneError, Piece, Seat, about_y
 from .words import digits
 
-__all__ = ["Facet", "Sheet", "convex_corners", "polyhedron_pieces"]
+__all__ = ["NEARER", "WIDER", "Facet", "Sheet", "convex_corners", "polyhedron_pieces", "pyramid_corners"]
 
 Vector = np.ndarray
 THIN = 1e-9
@@ -31,6 +32,11 @@ THIN = 1e-9
 FLAT = 1e-6
 """Distance from a face within which corners belong to it, over the size of the polyhedron [1]. MuJoCo keeps meshes in
 single precision, 6e-8."""
+PYRAMID_SIDES = 9  # Of what stands for a pointed cone; with a shaft 28 pieces
+WIDER = math.sqrt(2 * math.pi / PYRAMID_SIDES / math.sin(2 * math.pi / PYRAMID_SIDES))
+"""Radius of its edges over that of the cone [1]: its sections are as large."""
+NEARER = WIDER * math.cos(math.pi / PYRAMID_SIDES)
+"""Radius to the middle of its sides over that of the cone [1]."""
 _STRAIGHT = 1e-7  # Share of a side that counts as none [1]
 
 
@@ -159,6 +165,18 @@ def convex_corners(shape: Polyhedron | Mesh) -> Vector:
             f"more volume; in LAMMPS a body is a convex mesh, a Polyhedron, Ball, Capsule, Cylinder, Cone or Box"
         )
     return shape.vertices
+
+
+def pyramid_corners(cone: Cone, end: float | None = None) -> Vector:
+    """Corners of the pyramid that stands for a cone that ends in a point, in its axes [m], shape [n, 3].
+
+    Its sections are as large as those of the cone; ``end``: up to where a shaft as thick goes on from the top [m].
+    """
+    angle = 2 * math.pi * np.arange(PYRAMID_SIDES) / PYRAMID_SIDES
+    ring = WIDER * max(cone.bottom_radius, cone.top_radius) * np.column_stack([np.cos(angle), np.sin(angle)])
+    point, wide = (cone.bottom, cone.top) if cone.bottom_radius == 0 else (cone.top, cone.bottom)
+    rings = [np.column_stack([ring, np.full(PYRAMID_SIDES, z)]) for z in (wide, end) if z is not None]
+    return np.concatenate([[[0.0, 0.0, point]], *rings])
 
 
 def polyhedron_pieces(points: Vector) -> list[Piece]:

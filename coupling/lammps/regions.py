@@ -23,7 +23,7 @@ from dem.shapes.solids import Box, Capsule, Placed
 from rigid.spatial.quaternions import multiply, to_matrix
 
 from .pieces import IN_PLANE, JUMP, OutOfPlaneError, Piece, Primitive, Seat
-from .polyhedra import convex_corners, polyhedron_pieces
+from .polyhedra import convex_corners, polyhedron_pieces, pyramid_corners
 from .words import digits
 
 __all__ = ["MOST_PIECES", "MovingBody", "check_count", "check_plane", "check_thickness", "pieces_of"]
@@ -33,13 +33,15 @@ MOST_PIECES = 30  # Of all bodies: each takes one of LAMMPS' 32 groups
 _ARM = 0.1  # Over which a larger change of angle than JUMP is no motion [m]
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 _NO_POINT = (
-    "LAMMPS gives no right force on a cone where it is thinner than a grain: use a Ball as tip, a wider end, or the "
-    "ground `bed`"
+    "LAMMPS gives no right force on a cone where it is thinner than a grain: use a Ball as tip, a wider end, one that "
+    "is a point, or the ground `bed`"
 )
 
 
 def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
     """A body's pieces: a ball or a cone and the shaft on it from the lowest to the highest, others as they are given.
+
+    A cone that ends in a point is a pyramid (`pyramid_corners`), with the shaft on it.
 
     Raises ValueError, naming it, for what LAMMPS cannot have.
     """
@@ -49,6 +51,9 @@ def pieces_of(shapes: Shape | Sequence[Shape]) -> list[Piece]:
         return [piece for part in parts for piece in _alone(part)]
     ordered = sorted((_known(part) for part in parts), key=_bottom)
     seams = [_seam(below, above) for below, above in pairwise(ordered)]
+    tip, shaft = ordered[0], ordered[-1]
+    if isinstance(tip, Cone) and tip.bottom_radius == 0 and isinstance(shaft, Cylinder):
+        return polyhedron_pieces(pyramid_corners(tip, shaft.top))
     ends = [-math.inf, *seams, math.inf]
     return [Primitive(part, ends[k], ends[k + 1]) for k, part in enumerate(ordered)]
 
@@ -97,6 +102,8 @@ def _alone(part: Shape) -> list[Piece]:
         part = part.bare
     if isinstance(part, Polyhedron | Mesh):
         return polyhedron_pieces(at + convex_corners(part) @ axes.T)
+    if isinstance(part, Cone) and min(part.bottom_radius, part.top_radius) == 0:
+        return polyhedron_pieces(at + pyramid_corners(part) @ axes.T)
     return [replace(piece, at=at + axes @ piece.at, axes=axes @ piece.axes) for piece in _primitives(part)]
 
 
@@ -119,9 +126,7 @@ def _upright(axis: Vector) -> Vector:
 
 
 def _known(part: Shape) -> Ball | Cylinder | Cone | Box:
-    """The shape. Raises ValueError for one that LAMMPS has no region for, and for a pointed cone."""
-    if isinstance(part, Cone) and min(part.bottom_radius, part.top_radius) == 0:
-        raise ValueError(f"{part} ends in a point: {_NO_POINT}")
+    """The shape. Raises ValueError for one that LAMMPS has no region for."""
     if isinstance(part, Ball | Cylinder | Cone | Box):
         return part
     raise ValueError(

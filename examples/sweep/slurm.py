@@ -1,11 +1,12 @@
 """A cluster of hedgebed's workers on SLURM, for `hedgebed sweep --scheduler`: a file to start from.
 
     pip install '.[sweep]' dask-jobqueue
-    python examples/sweep/slurm.py scheduler.json &        # on the login node; ends with Ctrl-C
+    python examples/sweep/slurm.py scheduler.json &        # on the login node; `kill %1` ends it and its jobs
     hedgebed sweep sweep.toml --scheduler scheduler.json --out /shared/sweep
 
-Untested: no SLURM was at hand. Queue, account, memory and time are yours to change. Every worker must see the same
-/shared under the same path, and have the same version of hedgebed.
+No SLURM was at hand: tried with dask-jobqueue 0.9.0 and stand-ins for sbatch and scancel on one machine. Queue,
+account, memory and time are yours to change. Every worker must see the same /shared under the same path, and have the
+same version of hedgebed.
 """
 
 import signal
@@ -19,7 +20,9 @@ def main(scheduler_file: str) -> None:
     """Start the scheduler, ask for the jobs and wait."""
     from dask_jobqueue import SLURMCluster  # no dependency of hedgebed
 
-    cluster = SLURMCluster(
+    for ending in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(ending, lambda *given: None)  # it ends the pause; then the jobs are cancelled
+    with SLURMCluster(
         queue="normal",
         cores=1,
         processes=1,
@@ -28,10 +31,10 @@ def main(scheduler_file: str) -> None:
         local_directory="/tmp",
         job_extra_directives=["--requeue"],  # a job that is taken away comes back, and its run goes on
         scheduler_options={"scheduler_file": scheduler_file},
-    )
-    cluster.scale(jobs=JOBS)
-    print(f"scheduler at {cluster.scheduler_address}; Ctrl-C ends it")
-    signal.pause()
+    ) as cluster:
+        cluster.scale(jobs=JOBS)
+        print(f"scheduler at {cluster.scheduler_address}; Ctrl-C or kill ends it", flush=True)
+        signal.pause()
 
 
 if __name__ == "__main__":

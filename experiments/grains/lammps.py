@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from coupling import BedGround
     from experiments.runs.progress import Progress
 
-__all__ = ["ON_GRAINS", "RANKS", "check_lammps", "in_lammps", "lammps_fault", "moved_to_lammps"]
+__all__ = ["ON_GRAINS", "RANKS", "check_lammps", "cone_note", "in_lammps", "lammps_fault", "moved_to_lammps"]
 
 ON_GRAINS = ("bed", "lammps")
 """Grounds made of grains: in this process, and in LAMMPS."""
@@ -26,12 +26,20 @@ def lammps_fault(settings: Any) -> str | None:
     for key, value in wanted.items():
         if given.get(key, value) != value:
             return say("not_in_lammps", key=key, value=given[key], use=value, why=say(f"lammps_{key}"))
-    if given.get("tip") == "cone":
-        return say("cone_in_lammps")
     shaft = given.get("shaft_diameter")
     if shaft is not None and shaft != given["tip_diameter"]:
         return say("shaft_in_lammps", s=settings)
     return None
+
+
+def cone_note(settings: Any) -> str | None:
+    """By how much the pyramid that stands for a conical tip in LAMMPS differs from it; None for another run."""
+    from coupling.lammps.polyhedra import NEARER, WIDER
+
+    if settings.ground != "lammps" or settings.tip != "cone":
+        return None
+    radius = 0.5e3 * settings.tip_diameter
+    return say("cone_in_lammps", nearer=radius * (1 - NEARER), wider=radius * (WIDER - 1))
 
 
 def check_lammps(settings: Any) -> None:

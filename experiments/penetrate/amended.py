@@ -36,7 +36,7 @@ from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
 from .findings import force_gap, mean_of, returned_work
-from .on_law import law_step, without_rest
+from .on_law import StepsOnLaw, law_step, without_rest
 from .settings import PenetrateSettings, say
 from .sure.peak import peak_error, with_fit_errors
 from .units import Unit, make_run, make_spike, plan_units
@@ -282,8 +282,11 @@ class AmendedLaw:
         note = self.model.notes.get(SCATTER_NOTE)
         return note if isinstance(note, Mapping) else None
 
-    def run(self, unit: Unit, like: Penetration) -> Penetration:
-        """The run of `unit` on the law, at the times of `like` (the same run on another ground) and from its start."""
+    def run(self, unit: Unit, like: Penetration, within: StepsOnLaw | None = None) -> Penetration:
+        """The run of `unit` on the law, at the times of `like` (the same run on another ground) and from its start.
+
+        `within` counts the steps of a set-down, which has times of its own.
+        """
         lane, path = np.zeros(1, np.int32), np.array([0, len(like.time)], dtype=np.int32)
         if unit.kind == "driven":
             numbers = self.numbers(speed=float(np.abs(like.velocity).max()))
@@ -302,7 +305,8 @@ class AmendedLaw:
                 phase=np.where(carried, "free", np.array(PHASES)[np.clip(phase.astype(int), 0, 3)]),
             )
         ground = AmendedGround(self, time_step=like.macro_step / self.settings.substeps, speed=unit.speed)
-        return make_run(self.settings, unit, ground, start_depth=like.settings.get("start_depth")).run()
+        own = make_run(self.settings, unit, ground, start_depth=like.settings.get("start_depth"))
+        return own.run() if within is None else within.run(unit, own)
 
 
 class AmendedGround:
@@ -397,10 +401,10 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
         units = plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]}))
         progress.stage("spring-damper", total=float(len(units)))
         plain, runs = {}, {}
-        step = law_step(settings)
+        step, steps = law_step(settings), StepsOnLaw(settings)
         for done, unit in enumerate(units, 1):
-            plain[unit.id] = make_run(settings, unit, law.plain(step)).run()
-            runs[unit.id] = law.run(unit, plain[unit.id])
+            plain[unit.id] = steps.run(unit, make_run(settings, unit, law.plain(step)))
+            runs[unit.id] = law.run(unit, plain[unit.id], steps)
             folder.write_series(unit.id, plain[unit.id].columns())
             folder.write_series(f"{unit.id}.amended", runs[unit.id].columns())
             progress.update(done)

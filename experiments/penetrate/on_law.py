@@ -1,22 +1,26 @@
 """`hedgebed penetrate --ground ground.toml`: the runs of one seed on the law in a ground file, without a bed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
-from coupling import Penetration
+from coupling import Penetration, Run
 from experiments.platform.ground_file import fitted_ground, with_kept_ground
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantities_of
 from experiments.runs.version import __version__
 from experiments.runs.whole_runs import publish
+from rigid.checks.unfit import UnfitSettingsError
 from rigid.ground_file import GroundFile
 
 from .findings import mean_of, returned_work
 from .settings import PenetrateSettings, say
 from .units import Unit, make_run, make_spike, plan_units
 
-__all__ = ["law_step", "run_on_law", "without_rest"]
+__all__ = ["MOST_STEPS_ON_LAW", "StepsOnLaw", "fastest_speed", "law_step", "run_on_law", "without_rest"]
+
+MOST_STEPS_ON_LAW = 2e6
+"""Of the spike on a law, in all runs: some minutes, and 200 MB of rows; no more are made."""
 
 _ROWS = 400
 """Macro steps in which the fastest run passes the driven depth, where no bed says how long a step is."""
@@ -24,14 +28,40 @@ _ROWS = 400
 
 def law_step(settings: PenetrateSettings) -> float:
     """Step of a law that has no step of its own [s]: `time_step`, or so that a run has some hundred rows."""
-    fastest = max(*settings.speeds, *settings.drop_speeds, settings.retreat_speed)
-    return settings.time_step or settings.depth / fastest / _ROWS / settings.substeps
+    return settings.time_step or settings.depth / fastest_speed(settings) / _ROWS / settings.substeps
+
+
+def fastest_speed(settings: PenetrateSettings) -> float:
+    """Of the runs on a law [m/s]: those of one seed."""
+    return max(*settings.speeds, *settings.drop_speeds, settings.retreat_speed)
+
+
+@dataclass
+class StepsOnLaw:
+    """The steps of all runs on a law, as they are made. How long a drop or a set-down lasts is not known before."""
+
+    settings: PenetrateSettings
+    made: int = 0  # In the runs that are over
+
+    def run(self, unit: Unit, run: Run) -> Penetration:
+        """Make a run to its end. Raises UnfitSettingsError past `MOST_STEPS_ON_LAW`."""
+
+        def count(run: Run) -> None:
+            if self.made + run.count > MOST_STEPS_ON_LAW and not run.done:
+                keys = {"drop": "drop_time or after_stop", "set_down": "lowering_speed"}
+                told = {"time": run.time, "step": run.macro_step, "fastest": fastest_speed(self.settings)}
+                by = keys.get(unit.kind, "speeds")
+                raise UnfitSettingsError(say("lasts_on_law", unit=unit, **told, most=MOST_STEPS_ON_LAW, by=by))
+
+        series = run.run(on_step=count)
+        self.made += run.count
+        return series
 
 
 def run_on_law(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     """Drive, drop and set down the spike on the law; write and return the result.
 
-    Raises ValueError for a file that cannot be read.
+    Raises ValueError for a file that cannot be read, UnfitSettingsError for runs that last too long.
     """
     with folder.lock():
         fitted = fitted_ground(with_kept_ground(settings, folder.path).ground)
@@ -39,8 +69,9 @@ def run_on_law(settings: PenetrateSettings, folder: RunFolder, progress: Progres
         units = plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]}))
         progress.stage(fitted.law, total=float(len(units)))
         runs: dict[str, Penetration] = {}
+        steps = StepsOnLaw(settings)
         for done, unit in enumerate(units, 1):
-            runs[unit.id] = make_run(settings, unit, fitted.ground(time_step=law_step(settings))).run()
+            runs[unit.id] = steps.run(unit, make_run(settings, unit, fitted.ground(time_step=law_step(settings))))
             folder.write_series(unit.id, runs[unit.id].columns())
             progress.update(done)
         set_down = [runs[unit.id].resting_depth for unit in units if unit.kind == "set_down"]

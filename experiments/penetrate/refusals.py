@@ -15,7 +15,7 @@ from rigid.ground_file import GroundFile
 
 from . import beds
 from .amended import read_law
-from .on_law import law_step
+from .on_law import MOST_STEPS_ON_LAW, fastest_speed, law_step
 from .reference import read_reference
 from .rest import made_units
 from .settings import PenetrateSettings, say
@@ -27,8 +27,6 @@ MOST_GRAINS = 2**26
 """More are refused."""
 MOST_STEPS = 1e9
 """Of the grains, in all runs; more are refused."""
-MOST_STEPS_ON_LAW = 2e6
-"""Of the spike on a law, in all runs: some minutes, and 200 MB of rows; more are refused."""
 _HALVINGS = 60  # Of an interval of depths, to the last digit
 
 
@@ -107,7 +105,10 @@ def _check_step_count(settings: PenetrateSettings, step: float) -> None:
 
 
 def _check_steps_on_law(settings: PenetrateSettings, fitted: GroundFile | None) -> None:
-    """Refuse runs on a law that last too long in any case; `fitted` is the law in a file, None for one of a model."""
+    """Refuse runs on a law that last too long in any case; `fitted` is the law in a file, None for one of a model.
+
+    Drops and set-downs are counted by the least that they can last; `StepsOnLaw` ends those that last longer.
+    """
     step = law_step(settings) * settings.substeps
     times = {}
     for unit in plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]})):
@@ -118,8 +119,8 @@ def _check_steps_on_law(settings: PenetrateSettings, fitted: GroundFile | None) 
         else:
             times[unit] = _least_sinkage(settings, fitted) / unit.speed + settings.rest_time
     if sum(times.values()) / step > MOST_STEPS_ON_LAW:
-        how = {"fastest": max(*settings.speeds, *settings.drop_speeds, settings.retreat_speed)}
-        raise ValueError(_too_long(settings, times, step, "steps_on_law", most=MOST_STEPS_ON_LAW, **how))
+        fastest = fastest_speed(settings)
+        raise ValueError(_too_long(settings, times, step, "steps_on_law", most=MOST_STEPS_ON_LAW, fastest=fastest))
 
 
 def _least_sinkage(settings: PenetrateSettings, fitted: GroundFile | None) -> float:

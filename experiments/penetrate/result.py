@@ -8,6 +8,7 @@ from coupling import Penetration, overdamped_below
 from dem.grains.materials import caveat
 from experiments.grains.advice import resolution_advice
 from experiments.grains.graded import grading_warning, unmatched_warning
+from experiments.grains.lammps import cone_note
 from experiments.grains.softening import Softening
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -76,6 +77,7 @@ def conclude(
         *(grading_warning(entry.grading) for entry in facts if entry.grading is not None),
         unmatched_warning(settings.graded, material, packing=settings.packing, stages=beds.stages_of(settings)),
         caveat(material),
+        cone_note(settings),
         *(text for text in doubts if doubts[text]),
     ]
     warnings = [*warnings_of(findings), *filter(None, found)]

@@ -58,7 +58,7 @@ def test_free_fall_is_exact():
 
 
 def test_the_last_rows_of_a_run_are_its_rows_also_after_a_touch_above_the_surface_and_a_restart():
-    """They are kept as an array, so that a long time at rest is not read anew at each step."""
+    """A spike rests by them."""
     options = {"load": 1.0, "lowering_speed": 0.05, "rest_time": 0.01}
     run, steps = SetDown(SPIKE, proud(FakeBed()), **options), 0
     while not run.done:
@@ -71,6 +71,37 @@ def test_the_last_rows_of_a_run_are_its_rows_also_after_a_touch_above_the_surfac
             run = SetDown(SPIKE, proud(FakeBed()), **options)
             run.restore(kept)
     assert steps > 400 and last is not None
+
+
+@pytest.mark.parametrize("shallow", [True, False])
+@pytest.mark.parametrize("rest_time", [0.04, 0.3])
+@pytest.mark.parametrize("kind", [Drop, SetDown])
+def test_a_long_time_at_rest_is_read_as_a_whole_only_where_the_spike_rests(kind, rest_time, shallow, monkeypatch):
+    """Else a step takes as long as the time at rest has rows: hundreds of thousands, pushed some micrometres deep."""
+
+    def made(restarted):
+        ground = SpringDamper(stiffness=400.0 if shallow else 60.0, damping=3.0)
+        options = {"speed": 0.1} if kind is Drop else {"lowering_speed": 0.1}
+        options |= {"load": 1.0, "mass": 0.2, "rest_time": rest_time, "max_time": 2.0, "substeps": 5}
+        run = kind(SPIKE, ground, **options)
+        for _ in range(300 if restarted else 0):
+            run.advance()
+        if restarted:
+            kept, run = run.state(), kind(SPIKE, ground, **options)
+            run.restore(kept)
+        return run
+
+    looked = []
+    of_last = kind._last
+    monkeypatch.setattr(kind, "_last", lambda run, seconds: looked.append(run.count) or of_last(run, seconds))
+    first, again = made(False).run(), made(True).run()
+    assert len(looked) <= 4, looked  # once a run, or once more where another digit decides
+    monkeypatch.setattr(kind, "_may_rest", lambda run: True)
+    plain = made(False).run()
+    assert len(looked) > 100
+    for run in (first, again):
+        assert run.ended == plain.ended and np.array_equal(run.phase, plain.phase)
+        assert np.array_equal(run.force, plain.force)
 
 
 def _drop_error(step):

@@ -251,6 +251,7 @@ def test_settings_of_any_kind_are_computed_or_refused_in_words(part, files, monk
         ("hop", {"body_radius": 1e300}, "body_radius = 1e+300"),
         ("campaign", {"wheel_rate": 1e9}, "wheel_rate = 1e+09 Hz"),
         ("hop", {"damping": 1e300, "spike_length": 0.156}, "no longer finite"),
+        ("hop", {"ground": "spring-damper", "torque": 1e300, "gravity": 0.0025}, "cannot be followed"),
     ],
 )
 def test_what_would_take_without_end_or_overflow_is_refused_by_its_key(command, given, said, files):

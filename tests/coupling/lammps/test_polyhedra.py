@@ -8,13 +8,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from coupling.lammps import LammpsBed, LammpsMissingError, OutOfPlaneError, find_lammps
-from coupling.lammps.polyhedra import Facet, Sheet
+from coupling.lammps.polyhedra import Facet, Sheet, pyramid_corners
 from coupling.lammps.regions import MOST_PIECES, MovingBody, check_count, pieces_of
 from coupling.robot.distances import distances
 from dem import Bed, Material, Mesh, Polyhedron
+from dem.shapes.basic import Cone, Cylinder
 from dem.shapes.solids import Placed
 
 STUFF = Material("mine", 2650.0, 1e7, 0.25, 0.3, 0.8)
@@ -46,6 +48,7 @@ SHAPES = {
     "wedge": WEDGE,
     "tetrahedron": TETRAHEDRON @ SKEW.T,
     "frustum": plate(4, top=0.5) @ SKEW.T,
+    "pointed spike": pyramid_corners(Cone(-0.01, 0.0, 0.0, 0.008), 0.01),
     "leaning block": plate(4) @ np.array([[1.0, 0.3, 0.2], [0.0, 1.2, 0.4], [0.1, 0.0, 1.5]]).T,
 }
 
@@ -194,11 +197,28 @@ def test_a_prism_has_a_piece_for_each_face_and_a_tetrahedron_for_each_face_and_e
     kinds = {name: [type(piece) for piece in pieces_of(Polyhedron(SHAPES[name]))] for name in SHAPES}
     assert {name: (found.count(Facet), found.count(Sheet)) for name, found in kinds.items()} == {
         "octagonal plate": (2, 8), "wedge": (2, 3), "tetrahedron": (4, 6), "frustum": (4, 6),
-        "leaning block": (2, 4),
+        "leaning block": (2, 4), "pointed spike": (10, 18),
     }  # fmt: skip
     assert len(pieces_of(Polyhedron(plate(28)))) == MOST_PIECES
     with pytest.raises(ValueError, match=r"31 pieces, 31 of them faces and edges .* at most 30"):
         check_count(pieces_of(Polyhedron(plate(29))))
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_a_cone_that_ends_in_a_point_is_a_pyramid_with_sections_as_large(upright):
+    radius, height, length = 0.006, 0.01, 0.05
+    cone = Cone(0.0, height, 0.0, radius) if upright else Cone(0.0, height, radius, 0.0)
+    alone = np.concatenate([piece.corners() for piece in pieces_of([cone])])
+    assert np.ptp(alone[:, 2]) == pytest.approx(height)
+    hull = ConvexHull(alone)
+    assert hull.volume == pytest.approx(math.pi * radius**2 * height / 3, rel=1e-12)
+    point = alone[np.argmin(alone[:, 2]) if upright else np.argmax(alone[:, 2])]
+    np.testing.assert_allclose(point, [0.0, 0.0, 0.0 if upright else height], atol=1e-15)
+    if upright:
+        whole = ConvexHull(np.concatenate([p.corners() for p in pieces_of([cone, Cylinder(height, length, radius)])]))
+        assert whole.volume - hull.volume == pytest.approx(math.pi * radius**2 * (length - height), rel=1e-12)
+    moved = pieces_of([Placed(cone, position=(0.0, 0.0, 1.0))])
+    assert len(moved) == 28 and min(piece.corners()[:, 2].min() for piece in moved) == pytest.approx(1.0)
 
 
 def test_a_mesh_of_a_convex_body_in_single_precision_has_the_pieces_of_its_hull_and_another_is_refused():

@@ -104,9 +104,7 @@ def test_a_spike_is_a_ball_below_its_middle_and_a_cylinder_above():
     ("shapes", "named"),
     [
         ([Tube(0.0, 0.01, inner_radius=0.004, outer_radius=0.006)], "Tube has no counterpart"),
-        ([Cone(0.0, 0.01, 0.0, 0.004)], r"bottom_radius=0\.0.* point"),
-        ([Cone(0.0, 0.01, 0.0, 0.004), Cylinder(0.01, 0.06, 0.004)], "point"),
-        ([Placed(Cone(0.0, 0.01, 0.004, 0.0), position=(0.0, 0.0, 0.01))], r"top_radius=0\.0.* point"),
+        ([Cone(0.0, 0.01, 0.0, 0.004), Cylinder(0.01, 0.06, 0.003)], "as thick as"),
         ([Ball(radius=0.006), Cylinder(bottom=0.0, top=0.06, radius=0.004)], "as thick as"),
         ([Ball(radius=0.006), Ball((0, 0, 1), 0.006), Cylinder(0.0, 0.06, 0.006)], "several pieces"),
     ],

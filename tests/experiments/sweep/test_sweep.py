@@ -4,8 +4,11 @@ import ast
 import json
 import math
 import pickle
+import re
 import subprocess
 import sys
+from importlib.metadata import entry_points
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -311,3 +314,14 @@ def test_what_is_not_installed_is_named_before_any_run(monkeypatch, capsys):
     assert "workers = 2" in (said := capsys.readouterr().err) and "hedgebed[sweep]" in said
     assert main(["sweep", "sweep", "--scheduler", "tcp://nowhere:1"]) == 2
     assert "hedgebed[sweep]" in capsys.readouterr().err
+
+
+def test_dask_has_the_commands_of_the_kubernetes_file():
+    """`dask-worker` and `dask-scheduler` are no commands of today's dask."""
+    path = Path(__file__).parents[3] / "examples" / "sweep" / "kubernetes.yaml"
+    given = re.findall(r"args: \[(.*)\]", path.read_text(encoding="utf-8"))
+    known = {entry.name: entry.load() for entry in entry_points(group="dask_cli")}
+    for line in given:
+        program, name, *options = [word.strip(' "') for word in line.split(",")]
+        assert program == "dask" and known[name].make_context(name, options).params
+    assert len(given) == 2

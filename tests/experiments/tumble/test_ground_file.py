@@ -10,9 +10,11 @@ from experiments.platform.ground_file import reached
 from experiments.platform.law_spread import Uncertain, moved, spread_of_law, spread_of_surface, uncertain_of
 from experiments.platform.surfaces import find_surface
 from experiments.runs.folder import read_series
+from experiments.runs.whole_runs import without_reports
 from experiments.spatial.settings import SpatialSettings
 from experiments.spatial.trial import plan_spatial
 from experiments.tumble.trial import plan_tumble
+from rigid.checks.unfit import UnfitSettingsError
 from rigid.ground_file import GroundFile, read_ground
 from rigid.planar.simulate import simulate
 
@@ -118,6 +120,22 @@ def test_a_spike_set_down_on_the_law_of_a_file_rests_at_load_over_stiffness(writ
     assert result["quantities"]["sinkage_law"]["value"] == pytest.approx(0.2 / 62.0, rel=4e-3)
     said = [text for text in result["warnings"] if "speed =" in text]
     assert [float(text.split("speed = ")[1].split(" ")[0]) for text in said] == [0.4, 0.1]
+
+
+def test_a_drop_that_bounces_for_longer_than_a_law_has_steps_is_bad_input_and_the_pushes_are_kept(
+    written, tmp_path, monkeypatch
+):
+    """Found by the fuzzer: nothing bounds a drop but drop_time, which was not counted."""
+    path = written(values=SOFT | {"damping": 0.0})
+    monkeypatch.setattr("experiments.penetrate.on_law.MOST_STEPS_ON_LAW", 3e4)
+    settings = penetrate.Settings(ground=path, load=0.03, depth=1e-3, after_stop=1e9, rest_time=0.01)
+    penetrate.check(settings)
+    with pytest.raises(UnfitSettingsError, match=r"drop at 0.1 m/s: not over after .* s in .* change drop_time or"):
+        penetrate.run(settings, tmp_path / "run")
+    assert len(list((tmp_path / "run" / "series").iterdir())) == 3
+    shorter = settings.model_copy(update={"drop_time": 0.01})
+    with without_reports():
+        assert penetrate.run(shorter, tmp_path / "shorter")["runs"][3]["ended"] == "max_time"
 
 
 def test_what_cannot_stand_beside_a_file_is_refused(written):

@@ -30,13 +30,22 @@ TUMBLE, PENETRATE = {"ground": "lammps", "surface": "sand"}, {"ground": "lammps"
         (TumbleSettings, {"ground": "lamps", "surface": "sand"}, "lammps"),
         (PenetrateSettings, PENETRATE | {"precision": "float32"}, "precision = 'float32'"),
         (PenetrateSettings, PENETRATE | {"shaft_diameter": 0.008}, r"shaft_diameter = 0\.008 m .* 0\.012 m"),
-        (PenetrateSettings, PENETRATE | {"tip": "cone"}, "tip = 'cone' .*'flat'.*ground = 'bed'"),
         (PenetrateSettings, {"ranks": 2}, r"ranks = 2 .*ground = 'bed'"),
     ],
 )
 def test_what_lammps_does_not_take_is_refused_by_name(made, given, named):
     with pytest.raises(ValueError, match=named):
         made(**given)
+
+
+def test_a_conical_tip_in_lammps_is_told_to_be_a_pyramid():
+    given = {"tip": "cone", "tip_diameter": 0.012}
+    said = lammps.cone_note(PenetrateSettings(**PENETRATE, **given))
+    assert "pyramid" in said and "0.12 mm nearer" in said and "0.25 mm farther" in said
+    assert (
+        lammps.cone_note(PenetrateSettings(**given)) is None
+        and lammps.cone_note(PenetrateSettings(**PENETRATE)) is None
+    )
 
 
 def test_grains_in_lammps_are_grains():
