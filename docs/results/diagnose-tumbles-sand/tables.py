@@ -84,7 +84,10 @@ def main() -> None:
     forces(runs)
     beds = [run for run in runs.values() if run["torque_N_m"][0] == 0.22]
     time = min((run["t_s"] for run in beds), key=len)
-    models = {"spring-damper": BASE, "with two effects": {"model": str(HERE / "amended.toml")}}
+    models: dict[str, Mapping[str, object]] = {
+        "spring-damper": BASE,
+        "with two effects": {"model": str(HERE / "amended.toml")},
+    }
     print("| run | model | " + " | ".join(f"{words}: rms, largest" for words in SHOWN.values()) + " | deepest [mm] |")
     for name, run in runs.items():
         for words, options in models.items():
