@@ -9,6 +9,7 @@ import math
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ def grains() -> dict[str, Columns]:
     }
 
 
-def simulated(torque: float, rig: float, time: NDArray[np.float64], **options: object) -> Columns:
+def simulated(torque: float, rig: float, time: NDArray[np.float64], **options: Any) -> Columns:
     """The same tumble on a model, at these times [s]."""
     with tempfile.TemporaryDirectory() as folder:
         duration = float(time[-1]) + 0.01
@@ -84,7 +85,7 @@ def main() -> None:
     forces(runs)
     beds = [run for run in runs.values() if run["torque_N_m"][0] == 0.22]
     time = min((run["t_s"] for run in beds), key=len)
-    models: dict[str, Mapping[str, object]] = {
+    models: dict[str, Mapping[str, Any]] = {
         "spring-damper": BASE,
         "with two effects": {"model": str(HERE / "amended.toml")},
     }
@@ -104,9 +105,8 @@ def main() -> None:
         for axis, (key, words) in zip(panels, SHOWN.items(), strict=True):
             for run in beds:
                 axis.plot(run["t_s"][: len(time)], run[key][: len(time)], color=BED, lw=1.2)
-            for options, style in zip(
-                models.values(), ({"color": MODEL, "ls": DASHED}, {"color": AMENDED}), strict=True
-            ):
+            styles: tuple[dict[str, Any], ...] = ({"color": MODEL, "ls": DASHED}, {"color": AMENDED})
+            for options, style in zip(models.values(), styles, strict=True):
                 axis.plot(time, simulated(0.22, 0.0085, time, **options)[key], lw=1.8, **style)
             axis.set(xlabel="time [s]", title=words)
         marks = [
