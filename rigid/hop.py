@@ -38,6 +38,8 @@ __all__ = [
 ]  # fmt: skip
 
 PHASES = 60  # A launch with more changes between stick and slip than this fails
+_LARGEST = 1e100
+"""Torque from which a launch is not followed [N m]: squares of its rates overflow, and the integrator may never end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,8 +229,11 @@ class _Contact:
         for event in events:
             vars(event).update(terminal=True, direction=1 if event is change else -1)  # as scipy has it
         stop = end if math.isfinite(end) else start + self._long(torque)
-        with np.errstate(over="ignore", invalid="ignore"):  # it fails then
-            solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=events, rtol=1e-10, atol=1e-13)
+        if not abs(torque) < _LARGEST:
+            raise UnfitSettingsError(
+                f"a torque of {torque:g} N m: the motion cannot be followed; expected less than {_LARGEST:g}"
+            )
+        solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=events, rtol=1e-10, atol=1e-13)
         at, y = float(solved.t[-1]), solved.y[:, -1]
         if mode == 0:
             y[2] = self.t.spike_length * math.cos(y[0]) * y[1]
