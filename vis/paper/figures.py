@@ -335,7 +335,7 @@ def figure_signs(paper: PaperRun) -> Block | None:
         handle(f"spring-damper of {' and '.join(surfaces)}", MODEL, marker="o", ls="", ms=6),
         handle("by both ends of its friction band", MODEL, lw=3.0, alpha=0.4),
         *([handle(thin, MODEL, lw=1.0)] if springs else []),
-        handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three beds, 95 %", BED, marker="s", ls="", ms=6),
+        handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three to five beds, 95 %", BED, marker="s", ls="", ms=6),
         handle(f"other materials, {_grains_of(kept['one_bed'], surfaces)}: one bed each", BED, marker="s", mfc="none",
                ls="", ms=6),
         *(denser if packed else []),

@@ -31,7 +31,7 @@ from vis.paper.figures import PaperRun, figure_5, figure_signs
 
 RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
 
-LEGEND = ("grains of sand: mean of three beds, 95 %", "other materials, grains of sand-weak: one bed each")
+LEGEND = ("grains of sand: mean of three to five beds, 95 %", "other materials, grains of sand-weak: one bed each")
 
 
 @pytest.fixture(scope="module")
