@@ -25,7 +25,7 @@ def test_the_script_of_the_readme_prints_what_it_states_and_keeps_its_run(tmp_pa
     """
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     ((script, stated),) = re.findall(r"^```python\n(.*?)^```\n```\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    ((force, work),) = re.findall(r"Another processor rounds differently: ± (\S+) N, ± (\S+) mJ\.", page)
+    ((force, work),) = re.findall(r"Another processor gives ± (\S+) N, ± (\S+) mJ\.", page)
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
         capture_output=True, text=True, timeout=580, check=True,
