@@ -205,17 +205,19 @@ def test_a_push_on_grains_of_a_killed_worker_goes_on_elsewhere_from_its_checkpoi
         tokens = [*HEDGEBED, "sweep", case, "--scheduler", file, "--out", swept]
         client = stack.enter_context(started(*tokens, log=tmp_path / "client.log", **shared))
         victim, run, _ = awaited(lambda: pushing(swept, workers))
+        (other,) = set(workers) - {victim.pid}
+        os.kill(other, signal.SIGSTOP)  # else it may end the run, and remove the checkpoint, while that is read
         victim.send_signal(signal.SIGKILL)
         victim.wait()
         (checkpoint,) = (run / "checkpoint").glob("*-driven-*.npz")
         kept = steps_in(checkpoint)
         assert kept >= MADE and not notes.exists()
+        os.kill(other, signal.SIGCONT)
         assert client.wait(timeout=_PATIENCE) == 0, (tmp_path / "client.log").read_text()
         restored = notes.read_text().split()
         tokens = [*HEDGEBED, "sweep", case, "--workers", "1", "--out", serial]
         alone = stack.enter_context(started(*tokens, log=tmp_path / "serial.log", **shared))
         assert alone.wait(timeout=_PATIENCE) == 0, (tmp_path / "serial.log").read_text()
-    (other,) = set(workers) - {victim.pid}
     assert restored == [str(other), "driven", str(kept)]
     for name in ("table.csv", "table.nc", "result.json"):
         assert (swept / name).read_bytes() == (serial / name).read_bytes(), name
