@@ -133,6 +133,10 @@ def launch(tumbler: Tumbler, torque: float, until: float = math.inf) -> Launch |
     check_above_zero(torque=torque, **({"until": until} if until != math.inf else {}))
     if torque <= tumbler.tipping_torque:
         return None
+    if torque >= _LARGEST:
+        raise UnfitSettingsError(
+            f"a torque of {torque:g} N m: the motion cannot be followed; expected less than {_LARGEST:g}"
+        )
     contact = _Contact(tumbler)
     time, state, driven = 0.0, np.array([tumbler.lean, 0.0, 0.0]), torque
     mode = contact.mode(state, driven)
@@ -229,10 +233,6 @@ class _Contact:
         for event in events:
             vars(event).update(terminal=True, direction=1 if event is change else -1)  # as scipy has it
         stop = end if math.isfinite(end) else start + self._long(torque)
-        if not abs(torque) < _LARGEST:
-            raise UnfitSettingsError(
-                f"a torque of {torque:g} N m: the motion cannot be followed; expected less than {_LARGEST:g}"
-            )
         solved: Any = solve_ivp(slope, (start, stop), state, "DOP853", events=events, rtol=1e-10, atol=1e-13)
         at, y = float(solved.t[-1]), solved.y[:, -1]
         if mode == 0:

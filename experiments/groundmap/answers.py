@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from rigid.intervals import NORMAL
 from vis.page.numbers import foldable, quote
 
 from .settings import say
@@ -24,6 +25,11 @@ class Number:
 
     value: float
     std: float
+
+    @property
+    def half(self) -> float:
+        """Half of the 95 % interval of a normal distribution, in the unit of the number."""
+        return NORMAL * self.std
 
 
 @dataclass(frozen=True)

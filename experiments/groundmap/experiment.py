@@ -8,7 +8,6 @@ from experiments.runs.result import Result, quantity
 from experiments.runs.whole_runs import computed_run
 from rigid.ground.flat_foot import DEPTHS, OVER_BALL
 from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
-from rigid.intervals import NORMAL
 from rigid.platform.files import find_platform
 
 from .answers import Answer, Number, TooDeepError
@@ -83,7 +82,7 @@ def _of_no_platform(settings: GroundSettings, table: Map, answer: Answer) -> lis
         return []
     try:
         _, heavier = _answer(settings.model_copy(update={"load": weight}))
-        then = say("at_weight", mm=1e3 * heavier.sinkage.value, half=1e3 * NORMAL * heavier.sinkage.std)
+        then = say("at_weight", mm=1e3 * heavier.sinkage.value, half=1e3 * heavier.sinkage.half)
     except ValueError:
         then = say("too_heavy", mm=1e3 * table.deepest * settings.tip_diameter)
     where = say("in_rig" if in_rig else "on_its_own")
@@ -113,7 +112,7 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
     words = table.words(answer, gravity=settings.gravity, diameter=settings.tip_diameter)
     unknown = [say("too_deep", load=load, deepest=1e3 * table.deepest * settings.tip_diameter)] if too_deep else []
     warnings = [*unknown, *_of_no_platform(settings, table, answer), *words]
-    low, high = c.value - NORMAL * c.std, c.value + NORMAL * c.std
+    low, high = c.value - c.half, c.value + c.half
     if low <= 0:
         warnings.append(say("unidentified", low=low, high=high))
     if answer.ratio < table.finest:

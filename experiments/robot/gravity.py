@@ -17,7 +17,6 @@ from experiments.groundmap.answers import Answer, Number
 from experiments.groundmap.cohesive import CohesiveMap
 from experiments.groundmap.maps import POWERS, read_map
 from experiments.platform.surfaces import Surface
-from rigid.intervals import NORMAL
 from rigid.platform.rig import STANDARD_GRAVITY
 
 from . import say
@@ -123,7 +122,7 @@ class GravityRule:
 
 def _quoted(symbol: str, number: Number, unit: str) -> str:
     """A number of a map with half of its 95 % interval in two digits: 390, not 3.9e+02."""
-    return f"{symbol} = {number.value:.3g} ± {float(f'{NORMAL * number.std:.2g}'):g} {unit}"
+    return f"{symbol} = {number.value:.3g} ± {float(f'{number.half:.2g}'):g} {unit}"
 
 
 def gravity_rule(
