@@ -26,6 +26,7 @@ _LONGEST_HOP = 2e-2  # [s] in flight
 _SHORTEST = 1e-9  # [s] below which the step no longer adapts
 _STIFF = 2e4  # [1/s]: damper over the mass that a tip offers, above which implicit steps are the quicker ones
 _CROWD, _MOMENT = 40, 1e-6  # events, and within which time [s]
+_TRIES, _SPAN = 2000, 1e-4  # steps tried, and within which time [s]: round-off makes them too short to go on
 
 
 @dataclass
@@ -54,7 +55,7 @@ def integrate(
     """Integrate from `start` (static equilibrium if None) to `duration` [s].
 
     `on_step(t0, t1, z1, interpolant, modes)` is called after every accepted step; `interpolant(t)` is z within it.
-    Raises RuntimeError where numbers stop being finite or the step would have to be absurdly short.
+    Raises UnfitSettingsError where numbers stop being finite or the steps become too short to go on.
     """
     z, modes = standing(system) if start is None else start
     motion = _Motion(system, z, modes, duration=duration, tolerance=tolerance, longest=longest)
@@ -83,6 +84,7 @@ class _Motion:
         self.went.transitions.append((0.0, modes.state, z[THETA]))
         self.h, self.crowd, self.crowd_since = 1e-4, 0, -math.inf
         self.before: Watch = {}
+        self.tries, self.tries_since = 0, 0.0
         self.fresh, self.quiet = True, False
         self.scale = _scale(system)
         carried = 0.0 if system.inner else trial.counterweight
@@ -116,6 +118,7 @@ class _Motion:
     def step(self, on_step: OnStep) -> None:
         """One step, to the first event within it; or none, where it was too long."""
         system, modes, went, h = self.system, self.modes, self.went, self.h
+        self._check_progress()
         ends = self._ends
         room = ends - self.time
         h = min(h, self.longest if modes.touching else _LONGEST_HOP, room)
@@ -150,6 +153,20 @@ class _Motion:
         self.rate, self.fresh = system.derivative(then, self.z, modes), True  # again: `on_step` asked for other moments
         _keep(system, self.z, modes)
         self.h = self._after(event, forced, h, h_next)
+
+    def _check_progress(self) -> None:
+        """Raises UnfitSettingsError where the steps have become so short that the motion would never end."""
+        self.tries += 1
+        if self.time - self.tries_since > _SPAN:
+            self.tries, self.tries_since = 0, self.time
+        elif self.tries > _TRIES:
+            stiffness, damping = stiffness_at_rest(self.system)
+            critical = 2 * math.sqrt(stiffness * self.system.trial.mass)
+            raise UnfitSettingsError(
+                f"the motion cannot be followed beyond t = {self.time:.6g} s: its steps become too short. Under a row "
+                f"C = {damping:g} N s/m, and damping is critical at {critical:.3g} N s/m: expected at most some "
+                f"thousand times that"
+            )
 
     def _after(self, event: list[Monitor], forced: bool, h: float, h_next: float) -> float:
         """The modes that follow the step of length `h`; the length of the next [s]."""

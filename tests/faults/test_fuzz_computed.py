@@ -289,3 +289,11 @@ def test_a_platform_that_only_bounces_where_it_is_set_down_is_bad_input_and_its_
     )  # fmt: skip
     assert status == 2 and "come to rest" in words and in_words(words), words
     assert Path("out/checkpoint/tumble.failed.npz").exists()
+
+
+@pytest.mark.long
+def test_a_motion_whose_steps_become_too_short_to_end_is_refused_by_its_damping(files):
+    """Found by the fuzzer: a damper of 2.5 million times critical, which round-off lets advance by nanoseconds."""
+    (command, given), status, said, faults = computed(864)
+    assert command == "hop" and given["damping"] == 1e9 and not faults
+    assert status == 2 and "cannot be followed beyond" in said and "C = 1e+09" in said
