@@ -15,6 +15,7 @@ from rigid.platform.rig import STANDARD_GRAVITY
 __all__ = [
     "BASE_NOTE",
     "NOTE_WORDS",
+    "OTHERS_NOTE",
     "RANGE_NOTE",
     "SCATTER_NOTE",
     "FORMAT",
@@ -58,6 +59,8 @@ SCATTER_NOTE = "fitted_scatter"
 """A note of model.toml of pushes: by what replicates differ beyond the sensors, standard deviations: `bed` and
 `bed damping` relative, of K and C; channels and zeros in their unit. `trials` and `freedom`: what it was found from. No
 note: the campaign does not show it."""
+OTHERS_NOTE = "not_excluded"
+"""A note of model.toml of pushes: `files` beside it, models of other forms that the trials do not exclude."""
 NOTE_WORDS = {
     BASE_NOTE: "K [N/m] and C [N s/m] of the spring-damper alone, by diameter [m]",
     RANGE_NOTE: "the pushes that the model was fitted to",
@@ -65,6 +68,8 @@ NOTE_WORDS = {
     "these with all, a row for each",
     SCATTER_NOTE: "by what trials of one condition differ beyond the sensors, standard deviations: `bed` relative, of "
     "K and C; others in their unit",
+    OTHERS_NOTE: "models of other forms that the trials do not exclude, beside this file: `penetrate --model` predicts "
+    "with each",
 }
 """What notes of model.toml mean, as comments above them."""
 

@@ -5,43 +5,39 @@ Driven spikes follow the path that they are given; drops are integrated with the
 are those of the model's diameter: on another one forces on a section scale with its square, forces on a shaft with it,
 those of the spring with the K that the model gives.
 
-With a bed, every run of it is made on the law as well. Without one (``--ground spring-damper``), the runs of one seed
-are made on the base model fitted without effects, and on the law.
+With a bed, every run of it is made on the law as well. Without one see `experiments.penetrate.on_law`.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coupling import Penetration
+from coupling import Penetration, Run
 from experiments.campaign import PenetrationModel, read_model
-from experiments.campaign.files import MODEL_COPY, keep_model
+from experiments.campaign.files import MODEL_COPY
 from experiments.campaign.model_errors import ModelErrors, errors_of
 from experiments.campaign.tables import BASE_NOTE, RANGE_NOTE, SCATTER_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, given_way, push, slot_places, slot_table
 from experiments.runs.folder import RunFolder
-from experiments.runs.progress import Progress
-from experiments.runs.result import Result, quantities_of
+from experiments.runs.result import quantities_of
 from experiments.runs.types import Json
-from experiments.runs.version import __version__
-from experiments.runs.whole_runs import publish
 from rigid import SpringDamper
 from rigid.ground.reaction import Reaction
 
 from .findings import force_gap, mean_of, returned_work
-from .on_law import StepsOnLaw, law_step, without_rest
 from .settings import PenetrateSettings, say
-from .sure.peak import peak_error, with_fit_errors
-from .units import Unit, make_run, make_spike, plan_units
+from .units import Unit, make_run
 
-__all__ = ["AmendedGround", "AmendedLaw", "kept_law", "read_law", "run_beside", "run_without_bed"]
+__all__ = [
+    "AmendedGround", "AmendedLaw", "amended_numbers", "kept_law", "read_law", "rest_of", "returned_by", "run_beside",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -282,10 +278,12 @@ class AmendedLaw:
         note = self.model.notes.get(SCATTER_NOTE)
         return note if isinstance(note, Mapping) else None
 
-    def run(self, unit: Unit, like: Penetration, within: StepsOnLaw | None = None) -> Penetration:
+    def run(
+        self, unit: Unit, like: Penetration, within: Callable[[Unit, Run], Penetration] | None = None
+    ) -> Penetration:
         """The run of `unit` on the law, at the times of `like` (the same run on another ground) and from its start.
 
-        `within` counts the steps of a set-down, which has times of its own.
+        `within` makes a set-down, which has times of its own.
         """
         lane, path = np.zeros(1, np.int32), np.array([0, len(like.time)], dtype=np.int32)
         if unit.kind == "driven":
@@ -306,7 +304,7 @@ class AmendedLaw:
             )
         ground = AmendedGround(self, time_step=like.macro_step / self.settings.substeps, speed=unit.speed)
         own = make_run(self.settings, unit, ground, start_depth=like.settings.get("start_depth"))
-        return own.run() if within is None else within.run(unit, own)
+        return own.run() if within is None else within(unit, own)
 
 
 class AmendedGround:
@@ -384,112 +382,22 @@ def run_beside(
     quantities: dict[str, tuple[float | None, str, str]] = {
         "force_gap_spring_damper": (plain, "1", note),
         "force_gap_amended": (amended, "1", f"the same with {law.words}"),
-        "sinkage_amended": (_rest(units, runs), "m", f"depth at rest with {law.words}"),
-        "work_returned_amended": (_returned(units, runs), "1", "work of unloading over work of loading, driven"),
+        "sinkage_amended": (rest_of(units, runs), "m", f"depth at rest with {law.words}"),
+        "work_returned_amended": (returned_by(units, runs), "1", "work of unloading over work of loading, driven"),
     }
     known = plain is not None and amended is not None
     sentences = [say("off_by", law=law, amended=100 * amended, plain=100 * plain)] if known else []  # type: ignore[operator]
-    return quantities_of(quantities, std=None), sentences, {name: _amended(run) for name, run in runs.items()}
+    return quantities_of(quantities, std=None), sentences, {name: amended_numbers(run) for name, run in runs.items()}
 
 
-def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
-    """The runs of the first seed on the base model's spring-damper, and on the law; write and return the result."""
-    with folder.lock():
-        keep_model(settings.model, folder.path)
-        law = kept_law(settings, folder.path)
-        assert law is not None  # the settings see to it
-        units = plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]}))
-        progress.stage("spring-damper", total=float(len(units)))
-        plain, runs = {}, {}
-        step, steps = law_step(settings), StepsOnLaw(settings)
-        for done, unit in enumerate(units, 1):
-            plain[unit.id] = steps.run(unit, make_run(settings, unit, law.plain(step)))
-            runs[unit.id] = law.run(unit, plain[unit.id], steps)
-            folder.write_series(unit.id, plain[unit.id].columns())
-            folder.write_series(f"{unit.id}.amended", runs[unit.id].columns())
-            progress.update(done)
-        (stiffness, damping), (plain_stiffness, plain_damping) = law.pair, law.pair_without_effects
-        under = f"of the set-down: depth at rest under the load of {settings.weight:.3g} N"
-        beside = f"with {law.words}" if law.effects else "without effects"
-        of_plain = "of the spring-damper fitted without effects" if law.has_base else say("no_base_fit")
-        found: dict[str, tuple[float | None, str, str]] = _peaks(settings, units, plain, runs, law) | {
-            "stiffness": (stiffness, "N/m", f"of the model {beside}"),
-            "damping": (damping, "N s/m", f"of the model {beside}"),
-            "stiffness_spring_damper": (plain_stiffness, "N/m", of_plain),
-            "damping_spring_damper": (plain_damping, "N s/m", of_plain),
-            "load": (settings.weight, "N", "on the spike, set down and dropped"),
-            "sinkage_spring_damper": (_rest(units, plain), "m", under),
-            "sinkage_amended": (_rest(units, runs), "m", f"{under}, with {law.words}"),
-            "work_returned_spring_damper": (_returned(units, plain), "1", "work out over work in, driven"),
-            "work_returned_amended": (_returned(units, runs), "1", f"the same with {law.words}"),
-        }
-        if settings.load is None:  # nothing was set down
-            found = {name: own for name, own in found.items() if not name.startswith(("sinkage", "load"))}
-        falls = f"; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N" if settings.drop_speeds else ""
-        spike = say("model_spike", s=settings, tip_mm=1e3 * settings.tip_diameter, falls=falls)
-        fitted = [f"The model was fitted to {law.fitted_to}."] if law.fitted_to else []
-        which = "compared" if law.has_base else "compared_inflated"
-        compared = [say(which, law=law, plain=plain_stiffness)] if law.effects else []
-        errors = {name: peak_error(law, plain[id]) for name, id in _peaked(units).items()}
-        made = Result.make(
-            "penetrate",
-            ground=settings.ground,
-            version=__version__,
-            title=f"A {settings.body_words} on the spring-damper, and with {law.words}",
-            quantities=with_fit_errors(quantities_of(found, std=None), law.own_errors, errors),
-            runs=[
-                {
-                    "id": unit.id,
-                    "kind": unit.kind,
-                    "seed": None,
-                    "speed": unit.speed,
-                    "model_series": f"series/{unit.id}.csv",
-                    "amended_series": f"series/{unit.id}.amended.csv",
-                    "ended": runs[unit.id].ended,
-                    "quantities": {f"model_{name}": value for name, value in plain[unit.id].quantities().items()}
-                    | _amended(runs[unit.id]),
-                }
-                for unit in units
-            ],
-            spike=asdict(make_spike(settings)) | {"load": settings.weight},
-            model={"file": settings.model, "effects": list(law.effects)},
-            departures={"sentences": [spike, *fitted, *compared]},
-            warnings=[
-                *law.warnings(),
-                *without_rest(settings, units, plain, "the spring-damper"),
-                *without_rest(settings, units, runs, f"the law with {law.words}"),
-            ],
-        )
-        return publish(folder, made, progress)
-
-
-def _amended(run: Penetration) -> Json:
+def amended_numbers(run: Penetration) -> Json:
     """The numbers of a run on the law, by their names in result.json."""
     return {f"amended_{name}": value for name, value in run.quantities().items()}
 
 
-def _peaked(units: Sequence[Unit]) -> dict[str, str]:
-    """Name of the peak force on the law -> id of its push; with the speed where there are several."""
-    driven = [unit for unit in units if unit.kind == "driven"]
-    return {f"peak_force_amended{f'@{unit.speed:g}' if len(driven) > 1 else ''}": unit.id for unit in driven}
-
-
-def _peaks(
-    settings: PenetrateSettings, units: Sequence[Unit], plain: Runs, runs: Runs, law: AmendedLaw
-) -> dict[str, tuple[float | None, str, str]]:
-    """Peak forces [N] of the pushes on the spring-damper and on the law, for each speed where there are several."""
-    speeds = {unit.id: unit.speed for unit in units}
-    found: dict[str, tuple[float | None, str, str]] = {}
-    for name, id in _peaked(units).items():
-        path = f"push to {1e3 * settings.depth:.3g} mm at {1e3 * speeds[id]:.3g} mm/s"
-        found[name] = (runs[id].peak_force, "N", f"{path}, with {law.words}")
-        found[name.replace("amended", "spring_damper")] = (plain[id].peak_force, "N", path)
-    return found
-
-
-def _rest(units: Sequence[Unit], runs: Runs) -> float | None:
+def rest_of(units: Sequence[Unit], runs: Runs) -> float | None:
     return mean_of([runs[unit.id].resting_depth for unit in units if unit.kind == "set_down"])
 
 
-def _returned(units: Sequence[Unit], runs: Runs) -> float | None:
+def returned_by(units: Sequence[Unit], runs: Runs) -> float | None:
     return mean_of([returned_work(runs[unit.id]) for unit in units if unit.kind == "driven"])

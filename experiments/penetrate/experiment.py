@@ -33,10 +33,9 @@ from experiments.runs.whole_runs import PictureCosts, draw_report, whole_run
 from rigid.checks.unfit import UnfitSettingsError, failed_as
 
 from . import beds
-from .amended import run_without_bed
 from .beds import fingerprint
 from .findings import BedFacts
-from .on_law import run_on_law
+from .on_law import run_on_law, run_without_bed
 from .recorded import campaign_of, sensors_of
 from .refusals import check
 from .rest import made_units

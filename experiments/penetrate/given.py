@@ -149,10 +149,15 @@ def settings_of_model(given: Json) -> Json:
 
 
 def _asked(given: Json, model: PenetrationModel) -> Json:
-    """Settings without runs that nobody asked for: no drops where pushes are given or the model has none, and a
-    withdrawal at the fastest of the given speeds."""
+    """Settings without runs that nobody asked for: no drops where pushes are given or the model has none; pushes at the
+    slowest, the middle and the fastest speed of the model's own where none are given; and a withdrawal at the fastest.
+    """
     found: Json = {}
     pushes, drops = given.get("speeds"), [trial for trial in model.trial if trial.mode == "drop"]
+    own = sorted({trial.speed for trial in model.trial if trial.mode == "driven" and trial.speed})
+    if pushes is None and own:
+        pushes = tuple(dict.fromkeys((own[0], own[len(own) // 2], own[-1])))
+        found["speeds"] = pushes
     if "drop_speeds" not in given and (pushes or not drops):
         found |= {"drop_speeds": (), "other_drop_speeds": ()}
     with suppress(TypeError, ValueError):  # what is not accepted is refused later

@@ -1,9 +1,14 @@
-"""`hedgebed penetrate --ground ground.toml`: the runs of one seed on the law in a ground file, without a bed."""
+"""`hedgebed penetrate` without a bed: the runs of one seed on the law in a ground file, or on that of a model.toml.
+
+On a model (``--ground spring-damper``) they are made on its base model, fitted without effects, and on the law.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from coupling import Penetration, Run
+from experiments.campaign.files import keep_model
 from experiments.platform.ground_file import fitted_ground, with_kept_ground
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
@@ -13,11 +18,22 @@ from experiments.runs.whole_runs import publish
 from rigid.checks.unfit import UnfitSettingsError
 from rigid.ground_file import GroundFile
 
+from .amended import AmendedLaw, amended_numbers, kept_law, read_law, rest_of, returned_by
 from .findings import mean_of, returned_work
 from .settings import PenetrateSettings, say
+from .sure.other_forms import kept_others
+from .sure.peak import peak_error, with_fit_errors
 from .units import Unit, make_run, make_spike, plan_units
 
-__all__ = ["MOST_STEPS_ON_LAW", "StepsOnLaw", "fastest_speed", "law_step", "run_on_law", "without_rest"]
+__all__ = [
+    "MOST_STEPS_ON_LAW",
+    "StepsOnLaw",
+    "fastest_speed",
+    "law_step",
+    "run_on_law",
+    "run_without_bed",
+    "without_rest",
+]
 
 MOST_STEPS_ON_LAW = 2e6
 """Of the spike on a law, in all runs: some minutes, and 200 MB of rows; no more are made."""
@@ -150,3 +166,95 @@ def _speed(run: Penetration) -> float:
     """Largest speed at which the tip goes in [m/s]; 0 where it never does."""
     inside = run.depth > 0
     return float(run.velocity[inside].max()) if inside.any() else 0.0
+
+
+def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
+    """The runs of the first seed on the base model's spring-damper, and on the law; write and return the result."""
+    with folder.lock():
+        keep_model(settings.model, folder.path)
+        law = kept_law(settings, folder.path)
+        assert law is not None  # the settings see to it
+        source = Path(str(settings.model)).parent
+        others = kept_others(law, source, folder.path, lambda path: read_law(path, settings))
+        units = plan_units(settings.model_copy(update={"seeds": settings.seeds[:1]}))
+        progress.stage("spring-damper", total=float(len(units)))
+        plain, runs = {}, {}
+        step, steps = law_step(settings), StepsOnLaw(settings)
+        for done, unit in enumerate(units, 1):
+            plain[unit.id] = steps.run(unit, make_run(settings, unit, law.plain(step)))
+            runs[unit.id] = law.run(unit, plain[unit.id], steps.run)
+            folder.write_series(unit.id, plain[unit.id].columns())
+            folder.write_series(f"{unit.id}.amended", runs[unit.id].columns())
+            progress.update(done)
+        (stiffness, damping), (plain_stiffness, plain_damping) = law.pair, law.pair_without_effects
+        under = f"of the set-down: depth at rest under the load of {settings.weight:.3g} N"
+        beside = f"with {law.words}" if law.effects else "without effects"
+        of_plain = "of the spring-damper fitted without effects" if law.has_base else say("no_base_fit")
+        found: dict[str, tuple[float | None, str, str]] = _peaks(settings, units, plain, runs, law) | {
+            "stiffness": (stiffness, "N/m", f"of the model {beside}"),
+            "damping": (damping, "N s/m", f"of the model {beside}"),
+            "stiffness_spring_damper": (plain_stiffness, "N/m", of_plain),
+            "damping_spring_damper": (plain_damping, "N s/m", of_plain),
+            "load": (settings.weight, "N", "on the spike, set down and dropped"),
+            "sinkage_spring_damper": (rest_of(units, plain), "m", under),
+            "sinkage_amended": (rest_of(units, runs), "m", f"{under}, with {law.words}"),
+            "work_returned_spring_damper": (returned_by(units, plain), "1", "work out over work in, driven"),
+            "work_returned_amended": (returned_by(units, runs), "1", f"the same with {law.words}"),
+        }
+        if settings.load is None:  # nothing was set down
+            found = {name: own for name, own in found.items() if not name.startswith(("sinkage", "load"))}
+        falls = f"; a drop moves {settings.mass:g} kg under {settings.weight:.4g} N" if settings.drop_speeds else ""
+        spike = say("model_spike", s=settings, tip_mm=1e3 * settings.tip_diameter, falls=falls)
+        fitted = [f"The model was fitted to {law.fitted_to}."] if law.fitted_to else []
+        which = "compared" if law.has_base else "compared_inflated"
+        compared = [say(which, law=law, plain=plain_stiffness)] if law.effects else []
+        peaked = {name: plain[id] for name, id in _peaked(units).items()}
+        errors = {name: peak_error(law, like) for name, like in peaked.items()}
+        made = Result.make(
+            "penetrate",
+            ground=settings.ground,
+            version=__version__,
+            title=f"A {settings.body_words} on the spring-damper, and with {law.words}",
+            quantities=with_fit_errors(quantities_of(found, std=None), law.own_errors, errors),
+            runs=[_amended_entry(unit, plain[unit.id], runs[unit.id]) for unit in units],
+            spike=asdict(make_spike(settings)) | {"load": settings.weight},
+            model={"file": settings.model, "effects": list(law.effects), "other_forms": others.peaks(peaked)},
+            departures={"sentences": [spike, *fitted, *compared]},
+            warnings=[
+                *law.warnings(),
+                *others.warnings,
+                *without_rest(settings, units, plain, "the spring-damper"),
+                *without_rest(settings, units, runs, f"the law with {law.words}"),
+            ],
+        )
+        return publish(folder, made, progress)
+
+
+def _amended_entry(unit: Unit, plain: Penetration, run: Penetration) -> dict[str, object]:
+    return _entry(unit, plain) | {
+        "amended_series": f"series/{unit.id}.amended.csv", "ended": run.ended,
+        "quantities": {f"model_{name}": value for name, value in plain.quantities().items()} | amended_numbers(run),
+    }  # fmt: skip
+
+
+def _peaked(units: Sequence[Unit]) -> dict[str, str]:
+    """Name of the peak force on the law -> id of its push; with the speed where there are several."""
+    driven = [unit for unit in units if unit.kind == "driven"]
+    return {f"peak_force_amended{f'@{unit.speed:g}' if len(driven) > 1 else ''}": unit.id for unit in driven}
+
+
+def _peaks(
+    settings: PenetrateSettings,
+    units: Sequence[Unit],
+    plain: Mapping[str, Penetration],
+    runs: Mapping[str, Penetration],
+    law: AmendedLaw,
+) -> dict[str, tuple[float | None, str, str]]:
+    """Peak forces [N] of the pushes on the spring-damper and on the law, for each speed where there are several."""
+    speeds = {unit.id: unit.speed for unit in units}
+    found: dict[str, tuple[float | None, str, str]] = {}
+    for name, id in _peaked(units).items():
+        path = f"push to {1e3 * settings.depth:.3g} mm at {1e3 * speeds[id]:.3g} mm/s"
+        found[name] = (runs[id].peak_force, "N", f"{path}, with {law.words}")
+        found[name.replace("amended", "spring_damper")] = (plain[id].peak_force, "N", path)
+    return found

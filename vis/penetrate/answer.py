@@ -12,12 +12,14 @@ from rigid.intervals import half_width
 from vis.page.numbers import between, plain, quantity, quote, split_spread, within
 from vis.page.page import Tile
 from vis.penetrate import summary_parts as words
-from vis.penetrate.errors import in_95
+from vis.penetrate.errors import half_of, in_95
 from vis.penetrate.summary_parts import NBSP, say
 
 __all__ = ["answer_tiles", "grains_of", "largest_force", "peaks_of", "rests_at", "words_of_effects"]
 
 Entries = Mapping[str, Any]
+
+_ROWS = 6  # of an answer
 
 
 def answer_tiles(result: Entries) -> list[Tile]:
@@ -235,9 +237,9 @@ def _of_model(result: Entries) -> list[Tile]:
     """What was asked of the law of a model.toml: peaks of pushes, sinkages, K and C, beside the spring-damper's."""
     numbers = in_95(result)
     pushes = [name for name in numbers if name.startswith("peak_force_amended")]
+    pushes = [pushes[0], pushes[-1]] if len(pushes) > 1 else pushes
     rows: list[tuple[str, str, str, str | None]] = [
-        (f"Peak force, {_path(numbers[name])}", name, name.replace("amended", "spring_damper"), None)
-        for name in pushes[:2]
+        (f"Peak force, {_path(numbers[name])}", name, name.replace("amended", "spring_damper"), None) for name in pushes
     ]
     load = f" under {quantity(numbers['load'])}" if "load" in numbers else ""
     rows += [
@@ -247,11 +249,31 @@ def _of_model(result: Entries) -> list[Tile]:
         ("Damping C", "damping", "damping_spring_damper", None),
     ]
     whose = f"with {words_of_effects(result)}"
-    return [
+    tiles = [
         Tile(label, quantity(numbers[name], unit=unit), whose, beside=_on_law(numbers, other, unit))
         for label, name, other, unit in rows
         if words.value_of(numbers, name) is not None
     ]
+    every = [tile for name in pushes for tile in _over_forms(result, numbers, name)]
+    return [*tiles[: len(pushes)], *every, *tiles[len(pushes) :]][:_ROWS]
+
+
+def _over_forms(result: Entries, numbers: Entries, name: str) -> list[Tile]:
+    """The range of a peak force over all forms that the model's trials do not exclude; empty where there is one."""
+    others = [words.mapping_of(one) for one in words.list_of(words.mapping_of(result.get("model")).get("other_forms"))]
+    peaks = [(numbers[name]["value"], numbers[name]["std"]), *(
+        (peak["value"], half_of(peak)) for one in others if (peak := words.mapping_of(one.get("peaks")).get(name))
+    )]  # fmt: skip
+    if len(peaks) < 2:
+        return []
+    ends = [value + sign * (half or 0.0) for value, half in peaks for sign in (-1.0, 1.0)]
+    each = [
+        f"{quote(value, half, 'N')} with {' and '.join(map(str, one.get('effects', [])))}"
+        for (value, half), one in zip(peaks[1:], others, strict=True)
+    ]
+    label = f"The same, all forms not excluded, {_path(numbers[name]).partition(' at ')[2]}"
+    note = say("over_forms", each=words.joined(each))
+    return [Tile(label, between(max(min(ends), 0.0), max(ends), "N"), note)]
 
 
 def _path(entry: Entries) -> str:

@@ -2,7 +2,7 @@
 
 A number over n beds has t s / sqrt(n), that of a fit t times its standard error by the jackknife over runs; t is
 Student's with n - 1 degrees of freedom, n the number of beds or of runs (`rigid.intervals`). Without a bed it is 1.96
-standard errors of the model.
+standard errors of the model; where the scatter of few beds is in it, Student's t with the freedom of both together.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from rigid.intervals import NORMAL, half_width, student
 from vis.page.numbers import quantity, quote
 from vis.penetrate.summary_parts import fit_error, joined, list_of, mapping_of, say, std_of, value_of
 
-__all__ = ["error_words", "fit_part", "fitted", "half_of_fit", "in_95"]
+__all__ = ["error_words", "fit_part", "fitted", "half_of", "half_of_fit", "in_95"]
 
 _UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 
@@ -38,11 +38,18 @@ def in_95(result: Mapping[str, Any]) -> dict[str, Any]:
     found = {name: dict(entry) if isinstance(entry, Mapping) else entry for name, entry in quantities.items()}
     for name in found:
         if std := std_of(quantities, name):
-            found[name]["std"] = half_width(std, counts.get(name, beds)) if beds else NORMAL * std
+            found[name]["std"] = half_width(std, counts.get(name, beds)) if beds else half_of(found[name])
     for key in _UNITS:
         if (error := value_of(quantities, f"{key}_error")) is not None:
             found[f"{key}_error"]["value"] = _of_runs(error, _run_count(result, fits[0] if len(fits) == 1 else {}))
     return found
+
+
+def half_of(entry: Mapping[str, Any]) -> float | None:
+    """Half of the 95 % interval of a model's number: Student's where its `freedom` is known, else that of the normal
+    distribution; None for a number without a standard error."""
+    std, freedom = entry.get("std"), entry.get("freedom")
+    return None if std is None else (NORMAL if freedom is None else student(freedom)) * std
 
 
 def error_words(result: Mapping[str, Any]) -> str:

@@ -269,7 +269,8 @@ class Diagnosis(Known):
         if self.verdict == "named":
             near = self.nearest_answer
             doubted = [name for name in self.effects if near is not None and name not in near.effects]
-            return confirmation((*doubted, *self.choice.best.effects)[0], self.problem.kind) + self._expected
+            general = confirmation((*doubted, *self.choice.best.effects)[0], self.problem.kind)
+            return f"{expected} {say('otherwise')} {general}" if (expected := self._expected) else general
         if self.verdict == "ambiguous":
             told = self.problem.next_experiment(self.forms[0], self.rivals[0], self.best.values)
             if (plan := self.planned) is None:
@@ -296,7 +297,7 @@ class Diagnosis(Known):
         rival, depth_mm = " + ".join(self.ordered(near)), 1e3 * apart["depth_m"]
         beds = say("without_beds" if self.known_scatter is None else "with_beds")
         told = {"first": first, "rival": rival, "depth_mm": depth_mm, "way": way, "beds": beds}
-        return " " + say("confirming", plan=plan, **told, **errors)
+        return say("confirming", plan=plan, **told, **errors)
 
     def base_parameters(self, one: Fit) -> dict[str, Estimated]:
         """The base model's shared numbers in one of the fits: name -> value, std (standard error; None where data and

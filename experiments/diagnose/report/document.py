@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from experiments.campaign import read_model, write_model
+from experiments.campaign.tables import OTHERS_NOTE
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.near import Near, near_models, nearest_each
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
@@ -231,8 +233,9 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     diagnosis = document(found, near)
     if found.verdict == "unknown":
         write_series(folder / "latent.csv", found.latent())
-    diagnosis["errors"] = _write_model(folder / "model.toml", found)
     diagnosis["near_models"] = _write_near_models(folder, found, near)
+    others = [one["file"] for one in diagnosis["near_models"]]
+    diagnosis["errors"] = _write_model(folder / "model.toml", found, others)
     if rows := diagnosis["evidence"]:
         write_series(folder / "evidence.csv", {
             "candidate": [r["candidate"] for r in rows], "effects": [" + ".join(r["effects"]) for r in rows],
@@ -275,10 +278,16 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     return diagnosis
 
 
-def _write_model(path: Path, found: Diagnosis) -> Json:
-    """Write the best model with its equations in comments, and return the errors of its numbers."""
+def _write_model(path: Path, found: Diagnosis, others: Sequence[str] = ()) -> Json:
+    """Write the best model with its equations in comments, and return the errors of its numbers.
+
+    `others`: files beside it with other forms that the trials do not exclude, noted in a model of pushes.
+    """
     errors = found.joint_errors()
     found.problem.write_model(str(path), found.best_values, found.forms, found.base_values, errors, found.known_scatter)
+    if others and found.problem.kind == "penetration":
+        model = read_model(path)
+        write_model(path, model.model_copy(update={"notes": {**model.notes, OTHERS_NOTE: {"files": list(others)}}}))
     text = with_comments(path.read_text(encoding="utf-8"), _equations(found), found.problem.kind)
     write_text(path, text)
     return errors

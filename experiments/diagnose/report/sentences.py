@@ -37,6 +37,7 @@ _STANDING = 2.0  # chi-square per sample of a platform that stands from which on
 _WORSE_OF_ALL, _WORSE_CELL, _WORSE_SHOWN = 1.1, 1.5, 3
 """Factor from which a condition, and a channel in a phase, has got worse; how many of each are reported."""
 _BOUND = 0.95  # confidence of the one-sided bound on a rate (Clopper and Pearson, Biometrika 26 (1934), 404)
+_FEW = 20  # samples of a phase below which their number is stated
 _MAINLY = 0.5  # share of what is beyond the noise from which a phase, a channel or a setting holds most of it
 
 
@@ -177,7 +178,8 @@ def worse_sentences(diagnosis: Row) -> list[str]:
         parts.append(f"{trials}{f' ({settings})' if settings else ''} {_from_to(row)}")
     for row in _worst(diagnosis.get("by_phase", []), _WORSE_CELL):
         held = " of trials held out" if row["held_out"] else ""
-        parts.append(f"{row['channel']} in phase {row['phase']}{held} {_from_to(row)}")
+        few = f" ({row['samples']} samples)" if row.get("samples", _FEW) < _FEW else ""
+        parts.append(f"{row['channel']} in phase {row['phase']}{held}{few} {_from_to(row)}")
     return [f"It makes worse, in chi-square per sample: {'; '.join(parts)}."] if parts else []
 
 
@@ -257,7 +259,8 @@ def _parted(diagnosis: Row) -> list[str]:
             min(row["at_s"] for row in parted if row["trial"] == trial) for trial in {row["trial"] for row in parted}
         ]
         first = min(parted, key=lambda row: row["at_s"])
-        sentences.append(say("parts_at", first_s=min(times), last_s=max(times), first=first))
+        when = " to ".join(dict.fromkeys(f"{end(times):.3g}" for end in (min, max)))
+        sentences.append(say("parts_at", when=when, first=first))
     standing = dict.fromkeys(
         row["channel"] for row in diagnosis.get("by_phase", []) if row["phase"] == "stand" and row["before"] > _STANDING
     )

@@ -15,7 +15,7 @@ from experiments.diagnose.push.law import SLOTS, push, slot_places
 from experiments.runs.types import Json
 from vis.page.sentences import Sentences
 
-__all__ = ["PeakError", "peak_error", "with_fit_errors"]
+__all__ = ["Law", "PeakError", "peak_error", "peak_of", "with_fit_errors"]
 
 Array = NDArray[np.float64]
 say = Sentences(__package__)
@@ -63,6 +63,15 @@ class PeakError:
         return None if self.fit is None else math.hypot(self.fit, self.scatter or 0.0)
 
     @property
+    def freedom(self) -> float | None:
+        """Degrees of freedom of the whole by Welch and Satterthwaite (JCGM 100:2008, G.4.1), those of the fit counted
+        as endless; None where there are no fewer."""
+        found = self.of.get("freedom")
+        if self.fit is None or not self.scatter or not found:
+            return None
+        return float(found) * (1.0 + (self.fit / self.scatter) ** 2) ** 2
+
+    @property
     def words(self) -> str:
         """What is in it, for the note of a quantity."""
         if self.scatter is None:
@@ -73,6 +82,11 @@ class PeakError:
 def peak_error(law: Law, like: Penetration) -> PeakError:
     """The error of the peak force on the law along the path of `like`, a driven run."""
     return PeakError(_fit_std(law, like), _scatter_std(law, like), law.scatter or {})
+
+
+def peak_of(law: Law, like: Penetration) -> float:
+    """Peak force [N] on the law along the path of `like`, a driven run."""
+    return float(_peaks(law, _lanes(law, like, 1), like)[0])
 
 
 def _peaks(law: Law, table: Array, like: Penetration) -> Array:
@@ -133,4 +147,6 @@ def with_fit_errors(
             words = say("fit_error") if error.scatter is None else say("peak_fit_error", fit=error.fit)
             words = f"{words}; {error.words}"
         found[name] = {**found[name], "std": error.whole, "note": f"{found[name]['note']}; {words}"}
+        if error.freedom is not None:
+            found[name]["freedom"] = error.freedom
     return found

@@ -10,13 +10,14 @@ from golden import golden
 
 from dem.grains.materials import Material
 from experiments.campaign import read_campaign
-from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, SCATTER_NOTE
+from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, OTHERS_NOTE, SCATTER_NOTE
 from experiments.cli.main import main
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.amended import AmendedGround, read_law
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import make_run, plan_units
+from rigid.intervals import student
 
 K, C, MASS, LOAD = 120.0, 0.5, 0.3, 0.4
 MODEL = f"""
@@ -237,6 +238,36 @@ def test_the_scatter_of_beds_is_in_the_error_of_a_peak_where_the_model_knows_it(
     assert fit == pytest.approx(2.0 * 0.01 * 1.5, rel=1e-2)
     assert both == pytest.approx(np.hypot(fit, 0.05 * found["known"]["value"]), rel=1e-3)
     assert "not in it" in found["not"]["note"] and "from 9 trials" in found["known"]["note"]
+
+
+def test_other_forms_that_the_trials_do_not_exclude_widen_the_predicted_peak(tmp_path, capsys):
+    """By K (1 + z / D) with D = 10 mm, and by a form whose K is 10 % higher: 95 % of one to 95 % of the other."""
+    note = f'[notes.{ERRORS_NOTE}]\nnames = ["stiffness"]\nstd = [6.0]\ncorrelation = [[1.0]]\nundetermined = []\n'
+    scatter = f"[notes.{SCATTER_NOTE}]\nbed = 0.05\ntrials = 3\nfreedom = 2\n"
+    others = f'[notes.{OTHERS_NOTE}]\nfiles = ["model-b.toml", "gone.toml", "../model-b.toml"]\n'
+    push = "".join(
+        f'[[trial]]\nid = "p{k}"\nmode = "driven"\nspeed = {0.01 * k}\ngravity = 9.81\ndata = "p.csv"\n' for k in (1, 2)
+    )
+    hardening = '[[effect]]\nid = "depth-hardening"\nparameters = {reference = 0.01, hardening_quadratic = 1.0}\n'
+    (tmp_path / "model.toml").write_text(MODEL + note + scatter + others + push + hardening)
+    stiffer = MODEL.replace(f"stiffness = {K}", f"stiffness = {1.1 * K}")
+    (tmp_path / "model-b.toml").write_text(stiffer + note + scatter + push + hardening)
+    tokens = ["penetrate", "--ground", "spring-damper", "--model", str(tmp_path / "model.toml"), "--depth", "10mm"]
+    assert main([*tokens, "--out", str(tmp_path / "run"), "--quiet"]) == 0
+    shown, result = " ".join(capsys.readouterr().out.split()), json.loads((tmp_path / "run/result.json").read_text())
+    assert [run["speed"] for run in result["runs"]] == [0.01, 0.02]  # of the model's own pushes
+    (other,) = result["model"]["other_forms"]
+    own, far = result["quantities"]["peak_force_amended@0.02"], other["peaks"]["peak_force_amended@0.02"]
+    assert far["value"] == pytest.approx(own["value"] + 0.1 * K * 0.01 * 2, rel=1e-3)
+    fit, bed = 6.0 * 0.01 * 2, 0.05 * own["value"]
+    freedom = 2 * (fit**2 + bed**2) ** 2 / bed**4
+    assert own["freedom"] == pytest.approx(freedom, rel=1e-2)
+    low, high = (one["value"] + sign * student(one["freedom"]) * one["std"] for sign, one in ((-1, own), (1, far)))
+    assert f"{low:.2g} to {high:.2g} N" in shown and "gone.toml" in shown
+    (tmp_path / "model-b.toml").unlink()  # the run has copies
+    assert main(["resume", str(tmp_path / "run"), "--quiet"]) == 0 and (tmp_path / "run/model-b.toml").is_file()
+    (tmp_path / "model-b.toml").write_text("nonsense")
+    assert main([*tokens, "--out", str(tmp_path / "bad"), "--quiet"]) == 2 and "model-b.toml" in capsys.readouterr().err
 
 
 def test_a_model_without_a_ground_is_refused_with_what_to_add(tmp_path, capsys):

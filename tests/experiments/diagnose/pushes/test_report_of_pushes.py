@@ -11,7 +11,7 @@ from golden import golden
 from penetration_campaigns import FORCE_STD, campaign_of, saved
 
 from experiments.campaign import Recording, read_campaign, read_model
-from experiments.campaign.tables import ERRORS_NOTE, SCATTER_NOTE
+from experiments.campaign.tables import ERRORS_NOTE, OTHERS_NOTE, SCATTER_NOTE
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose import experiment
@@ -21,7 +21,7 @@ from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.fit.evidence import Hypothesis
 from experiments.diagnose.fit.fitting import fit, settled
 from experiments.diagnose.push.remarks import Push, contradict, highest_damping
-from experiments.diagnose.report.document import COUNTS, _write_near_models, document
+from experiments.diagnose.report.document import COUNTS, _write_model, _write_near_models, document
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
 from experiments.diagnose.report.summary import summary_sentences
@@ -250,6 +250,9 @@ def test_a_near_rival_has_a_model_of_its_own_and_a_far_one_has_none(diagnosed, t
         one = replace(found, choice=replace(found.choice, rivals=(other,)))
         rows = _write_near_models(tmp_path, one, nearest_each(one))
         assert bool(rows) is written
+        files = [row["file"] for row in rows]
+        _write_model(tmp_path / "model.toml", one, files)  # names them, so that `penetrate --model` predicts with each
+        assert read_model(tmp_path / "model.toml").notes.get(OTHERS_NOTE, {}).get("files", []) == files
         for row in rows:
             model = read_model(tmp_path / row["file"])
             assert [effect.id for effect in model.effect] == row["effects"] == list(rival.hypothesis.effects)
