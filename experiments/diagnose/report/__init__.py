@@ -1,5 +1,5 @@
 """What a diagnosis says: diagnosis.json, its summary and sentences.
 
-Imports `experiments.diagnose.core`, `experiments.diagnose.fit`, `experiments.diagnose.noise`, `experiments.runs`,
-`vis.diagnose`, `vis.page`.
+Imports `experiments.campaign`, `experiments.diagnose.core`, `experiments.diagnose.fit`, `experiments.diagnose.noise`,
+`experiments.runs`, `vis.diagnose`, `vis.page`.
 """
