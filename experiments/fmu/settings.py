@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from experiments.platform.settings import NotNegative, PlatformSettings, Positive
+from experiments.platform.settings import Assignments, NotNegative, PlatformSettings, Positive
 from rigid.checks import nearest
 from rigid.ground.laws import GROUNDS
 from rigid.ground_file import is_ground_file
@@ -41,7 +41,7 @@ class FmuSettings(PlatformSettings):
     ground: str = "spring-damper"
     """Law of the force of the ground: spring-damper, hunt-crossley, power, katsuragi-durian, bekker or rft, or the
     file of one (ground.toml, as hedgebed calibrate writes it)."""
-    ground_parameters: tuple[str, ...] = ()
+    ground_parameters: Assignments = ()
     """Parameters of a law other than the spring-damper, for one spike, as name=value in SI units."""
 
     rig: Positive | None = None

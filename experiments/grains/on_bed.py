@@ -166,13 +166,19 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         check_where(arch=self.settings.arch, threads=self.settings.threads)
         self.check_bed()
 
+    @property
+    def depth_expected(self) -> tuple[float, str]:
+        """Depth for which the bed must be deep [m], and on what it is expected, in words."""
+        return self.forecast.deepest, self.forecast.on
+
     def check_bed(self) -> None:
         """Raise ValueError for a bed too small for the forecast, or of too many or too large grains, or too soft."""
         s, spike, forecast = self.settings, self.spike_diameter, self.forecast
         self.check_extent()
-        least = forecast.deepest + 2 * spike
-        if s.bed_size[2] < least:
-            raise ValueError(say("too_shallow", depth=s.bed_size[2], f=forecast, least=math.ceil(1e3 * least) / 1e3))
+        deepest, on = self.depth_expected
+        if s.bed_size[2] < (least := deepest + 2 * spike):
+            words = {"depth": s.bed_size[2], "on": on, "deepest": deepest, "least": math.ceil(1e3 * least) / 1e3}
+            raise ValueError(say("too_shallow", **words))
         self.check_layout()
         if s.grain > spike:
             raise ValueError(say("larger_than_spike", grain=s.grain, spike=spike))

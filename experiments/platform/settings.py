@@ -3,15 +3,25 @@
 Numbers that are not given come from the surface or the platform (`experiments.platform.settled`); a run prints them.
 """
 
+from collections.abc import Mapping
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from experiments.runs.strict import NotNegative, Positive, StrictSettings
 
 from . import say
 
-__all__ = ["NotNegative", "PlatformSettings", "Positive"]
+__all__ = ["Assignments", "NotNegative", "PlatformSettings", "Positive"]
+
+
+def _as_assignments(given: object) -> object:
+    """A table of numbers as name=value texts; anything else as it is."""
+    return tuple(f"{name}={value}" for name, value in given.items()) if isinstance(given, Mapping) else given
+
+
+Assignments = Annotated[tuple[str, ...], BeforeValidator(_as_assignments)]
+"""Parameters as name=value texts; a table of names and numbers is accepted too."""
 
 
 class PlatformSettings(StrictSettings):

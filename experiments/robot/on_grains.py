@@ -96,7 +96,7 @@ class RobotFollowed(Followed[RobotRun]):
         if self._half_way or run.fraction < 0.5:
             return None
         self._half_way = True
-        return f"warning: {say('idle_so_far', time=run.time)}" if idle(self.plan, run) else None
+        return f"note: {say('idle_so_far', time=run.time)}" if idle(self.plan, run) else None
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
         best = _answer(run)
@@ -362,7 +362,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
                 faults.append(say("too_short", s=s, name=name, **words))
                 need += SPARE * way
             sizes[axis] = max(s.bed_size[axis], math.ceil(100 * max(need, wide) - 1e-6) / 100)
-        deepest, on = self._depth
+        deepest, on = self.depth_expected
         least = deepest + 2 * self.spike_diameter
         if s.bed_size[2] < least:
             sizes[2] = math.ceil(1e3 * (least + SPARE * deepest)) / 1e3
@@ -375,7 +375,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             raise ValueError(say("all_sides", s=s, faults=". ".join(faults), sizes=told, spare=SPARE))
 
     @cached_property
-    def _depth(self) -> tuple[float, str]:
+    def depth_expected(self) -> tuple[float, str]:
         """Depth for which the bed must be deep [m], and on what it is expected, in words.
 
         On sand that on the law which is nearest to grains, times `DEEPER`, if that is less than on the spring-damper.

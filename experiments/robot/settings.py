@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from experiments.grains.lammps import ON_GRAINS, RANKS, lammps_fault
 from experiments.grains.settings import HIDDEN, GrainsSettings
-from experiments.platform.settings import NotNegative, Positive
+from experiments.platform.settings import Assignments, NotNegative, Positive
 from experiments.runs.strict import SeedNumber
 from rigid.checks import nearest
 from rigid.ground.laws import GROUNDS
@@ -54,7 +54,7 @@ class RobotSettings(GrainsSettings):
     katsuragi-durian, bekker, rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or
     lammps (a bed whose grains are in LAMMPS; the feet move in the plane of x and z). If not given: rft on sand;
     spring-damper on other surfaces, and with stiffness, damping or scale_with_gravity."""
-    ground_parameters: tuple[str, ...] = ()
+    ground_parameters: Assignments = ()
     """Parameters of a law other than the spring-damper, for one foot, as name=value in SI units (exponent=1.5).
     Defaults are those of a ball tip of 12 mm, scaled to the size of each foot."""
     ignore_foot_size: bool = False

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from experiments.grains.lammps import ON_GRAINS as GRAINS
 from experiments.grains.lammps import lammps_fault
 from experiments.grains.settings import OF_THE_MASTER, TumbleBedSettings
-from experiments.platform.settings import NotNegative, PlatformSettings, Positive
+from experiments.platform.settings import Assignments, NotNegative, PlatformSettings, Positive
 from rigid.checks import nearest
 from rigid.ground.laws import GROUNDS
 from rigid.ground_file import is_ground_file
@@ -40,7 +40,7 @@ class TrialSettings(PlatformSettings):
         f"{' or '.join(', '.join(GROUNDS).rsplit(', ', 1))}, or a ground.toml of one spike; for tumble also bed (of "
         "grains) or lammps (a bed whose grains are in LAMMPS).",
     )
-    ground_parameters: tuple[str, ...] = ()
+    ground_parameters: Assignments = ()
     """Parameters of a law other than the spring-damper, for one spike, as name=value in SI units."""
 
     # The rig

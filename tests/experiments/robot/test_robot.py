@@ -128,7 +128,10 @@ def test_the_depth_of_a_bed_that_a_refusal_names_is_accepted():
 
     with pytest.raises(ValueError, match="too shallow") as refused:
         extent(0.1).check_extent()
-    extent(float(re.findall(r"([0-9.]+) m is accepted", str(refused.value))[0])).check_extent()
+    accepted = extent(float(re.findall(r"([0-9.]+) m is accepted", str(refused.value))[0]))
+    deepest, _ = accepted.depth_expected
+    assert deepest < accepted.forecast.deepest  # on the spring-damper, which asks for a deeper bed
+    accepted.check_bed()
 
 
 def test_k_of_sand_goes_with_gravity_and_c_with_its_root_unless_that_is_refused_and_a_warning_names_it():
