@@ -173,7 +173,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
 
     def check_bed(self) -> None:
         """Raise ValueError for a bed too small for the forecast, or of too many or too large grains, or too soft."""
-        s, spike, forecast = self.settings, self.spike_diameter, self.forecast
+        s, spike = self.settings, self.spike_diameter
         self.check_extent()
         deepest, on = self.depth_expected
         if s.bed_size[2] < (least := deepest + 2 * spike):
