@@ -177,7 +177,8 @@ def _note_of_law(result: Entries, numbers: Entries, sure: Entries) -> str:
         parts.append(say("k_of_real_grains", k=within(sure["low"], sure["high"], "N/m")))
     if words.value_of(numbers, "drag_gap") is not None:
         parts.append(say("error_of_force", gap=quantity(numbers["drag_gap"], unit="%")))
-    return "; ".join(filter(None, (*parts, _own_error(numbers, "stiffness"))))
+    known = bool(sure) and sure["low"] is not None  # the interval of real grains contains the error of the fit
+    return "; ".join(filter(None, (*parts, "" if known else _own_error(numbers, "stiffness"))))
 
 
 def _own_error(numbers: Entries, key: str) -> str:

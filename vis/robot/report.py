@@ -118,9 +118,13 @@ def _draw_ground(motion: Columns, feet: Columns, names: list[str]) -> Figure:
 
 
 def _draw_joints(joints: Columns) -> Figure:
-    drawing, place, force = pair("position [rad, m]", "force [N, N m]")
-    time = joints["t_s"]
     moved, driven = joint_columns(joints)
+    units = sorted({name.rpartition("_")[2] for name in moved}) or ["m"]
+    forces = {"m": "N", "rad": "N m"}
+    drawing, place, force = pair(
+        f"position [{', '.join(units)}]", f"force [{', '.join(forces.get(unit, unit) for unit in units)}]"
+    )
+    time = joints["t_s"]
     for name, style in zip(moved, line_styles(moved, beside_axes=True).values(), strict=True):
         place.plot(time, joints[name], label=name.rpartition("_")[0], **style)
     for name, style in zip(driven, line_styles(driven, beside_axes=True).values(), strict=True):
