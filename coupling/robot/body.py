@@ -390,6 +390,29 @@ class MujocoRobot:
         """Of the MuJoCo bodies that can move, 0 of the others [kg], shape (body,)."""
         return np.where(self.moving, self.model.body_mass, 0.0)
 
+    def onward(self, most_steps: int = 100_000) -> tuple[float, float] | None:
+        """How a flight goes on without the ground: rise of the centre of mass from here [m], 0 where it falls, and time
+        until the lowest foot is at the surface [s].
+
+        MuJoCo steps a copy, with the joints' friction and the controls of now; the controller is not called. None where
+        no foot comes to the surface within `most_steps`.
+        """
+        copied = copy.copy(self)
+        copied.data = copy.copy(self.data)
+        copied.data.xfrc_applied[:] = 0.0
+        start, above, step = float(self.centre[2]), self.clearance, self.model.opt.timestep
+        highest = start
+        for count in range(most_steps):
+            self._mujoco.mj_step(self.model, copied.data)  # leaves the places of bodies as before the step
+            height, low = float(copied.centre[2]), copied.clearance
+            if not math.isfinite(height):
+                return None
+            highest = max(highest, height)
+            if height < highest and low <= 0:
+                return highest - start, step * (count - low / min(low - above, -1e-300))
+            above = low
+        return None
+
     @property
     def momentum(self) -> Vector:
         """[N s], shape (3,), half a lag after the pose."""

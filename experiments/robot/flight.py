@@ -1,7 +1,7 @@
 """How long a robot flies: from the speed of its first launch, and from where it is when a run ends.
 
-In flight the centre of mass has the acceleration of gravity alone, whatever the joints do. A launch with the speed v
-upwards therefore rises by v^2 / 2 g and is back at its height after 2 v / g.
+In flight the centre of mass of a free robot has the acceleration of gravity alone, whatever its joints do. A launch
+with the speed v upwards rises by v^2 / 2 g and is back at its height after 2 v / g. A rail with friction takes from it.
 """
 
 import math
@@ -71,13 +71,13 @@ def to_landing(run: RobotRun, heights: Array) -> str:
     """How much longer a run must be that ends in the air, in a sentence.
 
     ``heights``: of the lowest point of each foot at every row [m], shape (row, foot), as of
-    `experiments.robot.feet.heights_of`. The feet are taken to keep their place below the centre of mass.
+    `experiments.robot.feet.heights_of`.
     """
     gravity, height, speed = run.robot.gravity, max(0.0, float(heights[-1].min())), float(_upwards(run)[-1])
     if run.robot.hangs or (gravity <= 0 and speed >= 0):
         return say("no_landing")
-    end = float(run.columns["time"][-1])
-    fall = _fall(height, speed, gravity) if gravity > 0 else -height / speed
+    end, left = float(run.columns["time"][-1]), at_end(run, heights)
+    fall = -height / speed if left is None else left[2]
     return say("landing", fall=fall, height=1e3 * height, wanted=_above(end + fall))
 
 
@@ -85,12 +85,16 @@ def at_end(run: RobotRun, heights: Array) -> tuple[float, float, float] | None:
     """What is left of a flight at the end of a run: rise of the centre of mass from there [m], its speed upwards [m/s],
     and the time to the landing [s]; None where gravity alone does not bring the robot back.
 
-    ``heights``: as of `to_landing`. The rise is v^2 / 2 g, 0 where the robot already falls.
+    ``heights``: as of `to_landing`. MuJoCo continues the flight; where that takes too long it is a parabola, whose rise
+    is v^2 / 2 g, 0 where the robot already falls.
     """
     gravity = run.robot.gravity
     if run.robot.hangs or not gravity > 0:
         return None
     speed = float(_upwards(run)[-1])
+    if (continued := run.robot.onward()) is not None:
+        rise, fall = continued
+        return rise, speed, fall
     fall = _fall(max(0.0, float(heights[-1].min())), speed, gravity)
     return max(0.0, speed) ** 2 / (2 * gravity), speed, fall
 

@@ -288,7 +288,7 @@ def _highest(run: RobotRun, touched: int | None) -> float:
 def _ballistic(run: RobotRun, heights: Array, flights: Flights, found: Mapping[str, Number]) -> dict[str, Number]:
     """The numbers of `BALLISTIC` of a run that ends in a flight; none of another.
 
-    In flight the centre of mass has the acceleration of gravity alone. The feet are taken to keep their place below it.
+    The lowest points of the feet are taken to rise as the centre of mass does.
     """
     left = at_end(run, heights) if flights.at_end else None
     if left is None:

@@ -22,7 +22,7 @@ BALLISTIC = {
     "highest": "rise_ballistic", "longest_flight": "flight_ballistic", "clearance_largest": "clearance_ballistic",
 }  # fmt: skip
 """Number of the answer -> the quantity in its place where the end of the run cuts off a flight."""
-OF_FLIGHT = "ballistic: v² / 2 g of the speed at the end of the run"
+OF_FLIGHT = "ballistic: the flight at the end of the run, continued without the ground"
 UNKNOWN, ONE_BED = "not known", "one bed"
 
 

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from coupling.robot import MujocoRobot
 from experiments.cli.main import main
 from experiments.robot.flight import fall_warning
 from experiments.robot.on_grains import RobotFollowed
@@ -65,6 +66,26 @@ def test_a_run_that_ends_in_the_air_says_when_it_lands_and_what_a_launch_means(l
         assert short.quantities[ballistic].value == pytest.approx(whole.quantities[own].value, rel=0.02, abs=2e-4)
         assert ballistic not in whole.quantities
     assert short.quantities["highest"].value < whole.quantities["highest"].value - 5e-4
+
+
+def test_a_flight_on_a_rail_with_damping_goes_on_as_mujoco_has_it(tmp_path):
+    """m z'' = -m g - c z': from v it rises m v / c - (m / c)^2 g ln(1 + c v / m g), which is far less than v^2 / 2 g."""
+    m, c, g, v = 2.0, 0.3, 0.1, 0.9
+    (tmp_path / "rail.xml").write_text(
+        f"""<mujoco><option timestep="1e-3" gravity="0 0 -{g}"/><worldbody><body pos="0 0 0.05">
+        <joint name="rail" type="slide" axis="0 0 1" damping="{c}"/>
+        <geom name="foot" type="sphere" size="0.05" mass="{m}"/>
+        </body></worldbody></mujoco>""",
+        encoding="utf-8",
+    )
+    robot = MujocoRobot(str(tmp_path / "rail.xml"), feet=["foot"])
+    robot.data.qvel[0] = v
+    robot.start()
+    rise, fall = robot.onward()
+    assert rise == pytest.approx(m * v / c - (m / c) ** 2 * g * np.log(1 + c * v / (m * g)), rel=2e-3)
+    assert v**2 / (2 * g) > 1.4 * rise
+    assert robot.data.time == 0.0 and robot.data.qvel[0] == v and fall > 0
+    assert robot.onward(most_steps=100) is None
 
 
 def test_a_robot_that_is_still_falling_at_the_end_is_told_of_it_before_and_a_run_of_that_length_touches(
