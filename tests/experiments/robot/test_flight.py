@@ -69,7 +69,7 @@ def test_a_run_that_ends_in_the_air_says_when_it_lands_and_what_a_launch_means(l
 
 
 def test_a_flight_on_a_rail_with_damping_goes_on_as_mujoco_has_it(tmp_path):
-    """m z'' = -m g - c z': from v it rises m v / c - (m / c)^2 g ln(1 + c v / m g), which is far less than v^2 / 2 g."""
+    """m z'' = -m g - c z': from v it rises m v / c - (m / c)^2 g ln(1 + c v / m g), below v^2 / 2 g."""
     m, c, g, v = 2.0, 0.3, 0.1, 0.9
     (tmp_path / "rail.xml").write_text(
         f"""<mujoco><option timestep="1e-3" gravity="0 0 -{g}"/><worldbody><body pos="0 0 0.05">
