@@ -72,11 +72,11 @@ def test_a_bed_must_be_as_deep_as_the_law_nearest_to_grains_asks_for_and_not_as_
     near = bed._answer_of(bed.plan.on_law("rft", MOST_INERTIA))["sinkage_largest"]
     least = DEEPER * near + 0.12
     assert 0 < DEEPER * near < 0.8 * bed.forecast.deepest
-    on_bed(duration=0.15, bed_size=(0.24, 0.24, least + 1e-4)).check_extent()
+    on_bed(duration=0.15, bed_size=(0.24, 0.24, least + 1e-4)).check_bed()
     with pytest.raises(ValueError, match="rft with inertia=10"):
         on_bed(duration=0.15, bed_size=(0.24, 0.24, least - 1e-4)).check_extent()
     spring = on_bed(duration=0.15, stiffness=200.0, damping=1.0)
-    assert spring._depth[0] == spring.forecast.deepest
+    assert spring.depth_expected[0] == spring.forecast.deepest
 
 
 def test_the_modulus_is_stated_and_one_that_is_too_small_is_warned_of_with_the_overlap_to_expect():
