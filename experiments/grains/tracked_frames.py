@@ -1,8 +1,8 @@
 """Frames of a platform for ParaView: the bed and its surface, the platform, contact forces, one file a moment.
 
-A frame has the meshes `spikes` and `hull`; `row_forces`, the force on each row or spike that touches, as points with a
-vector `force` [N]; on a bed the grains, `contact_forces` (of each grain on a spike, that of the normal spring), and
-`surface`, a height map on a grid of half a grain with `height` and `change` [m] since the first frame.
+A frame has the meshes `spikes` and `hull`. `row_forces` is the force on each row or spike that touches, as points with
+a vector `force` [N]. On a bed it has the grains and `contact_forces` (of each grain on a spike, that of the normal
+spring). `surface` is a height map on a grid of half a grain with `height` and `change` [m] since the first frame.
 """
 
 from abc import ABC, abstractmethod

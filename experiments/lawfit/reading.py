@@ -49,8 +49,8 @@ def read_cells(settings: LawFitSettings) -> dict[str, Data]:
     """All runs of `settings`: name of each tip and gravity (`Cell.name`) -> the data of its fits.
 
     Raises ValueError, naming the folder and what was found: for no finished run of penetrate in a bed; for a kept
-    result without series; for runs of different grains; for a run that is there twice; and for a tip and gravity with
-    fewer than two beds, or with runs at one speed, from which C and K cannot be separated.
+    result without series; for runs of different grains or the same run twice. A tip and gravity with fewer than two
+    beds is refused too. So are runs at one speed, from which C and K cannot be separated.
     """
     sources = [_read(name, path) for given in settings.runs for name, path in _folders(given)]
     _refuse_mixed(sources)

@@ -228,7 +228,7 @@ class RunFolder:
         """Make the folder of a new run and write its run.toml.
 
         Raises ValueError, naming the path, if it is in use (a file, or a folder that holds something) or cannot be
-        written; and if the settings would not read back from run.toml as they are.
+        written. Also if the settings would not read back unchanged from run.toml.
         """
         path = Path(path)
         text, where = settings_toml(command, settings, version, code), f"out = {str(path)!r}"

@@ -46,8 +46,8 @@ def option(name: str) -> str:
 def find_case(given: Path, shipped: Path, commands: Iterable[str] = ()) -> Path:
     """The case file that `given` means: a path, or the name of one in the folder `shipped`.
 
-    Raises ValueError naming those that ship and are spelt like it, or where none is, those of the folder itself; first
-    of all the one of `commands`, whose words may stand in the same place, that is spelt like it.
+    Raises ValueError naming those that ship and are spelt like it, or where none is, those of the folder itself. A word
+    of `commands` that is spelt like it is named first, since it may stand in the same place.
     """
     if given.is_file():
         return given
@@ -86,8 +86,8 @@ def read_case(path: Path) -> Layer:
 def settings_from(settings_class: type[Settings], layers: Iterable[Layer]) -> Settings:
     """The settings that the `layers` give, later ones over earlier ones, over the defaults.
 
-    A number may be text with a unit (`experiments.runs.units`). Raises ValueError, one sentence a line, for an unknown
-    name (with the nearest known one) and for a value that is not accepted (with the accepted ones). TOML has no null:
+    A number may be text with a unit (`experiments.runs.units`). Raises ValueError, one sentence a line. An unknown name
+    is answered with the nearest known one, a value that is not accepted with the accepted ones. TOML has no null:
     "none" unsets a setting that need not be set.
     """
     names = list(settings_class.model_fields)

@@ -36,8 +36,8 @@ class SweepRange:
 def parse_sweep(texts: tuple[str, ...]) -> tuple[SweepRange, ...]:
     """The ranges of one key or two, in the units of `unit_of`.
 
-    Raises ValueError for text that is no range; an unknown key; a unit of another kind or at only some of the three
-    numbers; one key twice; more than two keys; and more than 2,500 trials.
+    Raises ValueError for text that is no range, an unknown key, and a unit of another kind or at only some of the three
+    numbers. Also for one key twice, more than two keys, and more than 2,500 trials.
     """
     ranges = tuple(_one(text) for text in texts)
     keys = [each.key for each in ranges]

@@ -119,7 +119,7 @@ class FrameWriter:
     ) -> Path:
         """Write one frame.
 
-        ``time``: Time [s], on the clock of the run's series, not before the last frame; a frame at the last frame's
+        ``time``: Time [s], on the clock of the run's series, not before the last frame. A frame at the last frame's
         time takes its place (a run resumed from a checkpoint may write that frame again). ``grains``: `position` [m],
         shape (n, 3), and any of `GRAIN_FIELDS`; a vector field may be given as its magnitude, shape (n,). ``bodies``:
         Name -> (points [m], shape (n, 3), triangles, shape (m, 3)). ``values``: Scalars of this frame, such as depth
