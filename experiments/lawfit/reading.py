@@ -11,6 +11,7 @@ from experiments.grains.kept_material import MATERIAL_COPY
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.types import Json
+from rigid.checks import alike
 
 from .cells import Cell
 from .data import Data, Drag, Foundation, Placement, Unloading, binned, reached
@@ -123,7 +124,8 @@ def _folders(given: str) -> Iterator[tuple[str, Path]]:
     """The run folders that a setting names: the folder itself, or those within it, in the order of their names."""
     path = Path(given)
     if not path.is_dir():
-        raise ValueError(f"runs = {given!r} is no folder: the folder of a run of penetrate was expected")
+        near = alike(path, folders=True)
+        raise ValueError(f"runs = {given!r} is no folder: the folder of a run of penetrate was expected{near}")
     if (path / "run.toml").is_file():
         yield path.name or given, path
         return

@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails
 from experiments.runs.folder import RUN_FORMATS, settings_in
 from experiments.runs.strict import may_be_empty
 from experiments.runs.units import find_unit, in_both
-from rigid.checks import nearest
+from rigid.checks import nearest, why_unread
 
 __all__ = ["Layer", "find_case", "gravities_told", "option", "read_case", "settings_from"]
 
@@ -57,6 +57,9 @@ def find_case(given: Path, shipped: Path, commands: Iterable[str] = ()) -> Path:
                 return named
     if meant := get_close_matches(str(given), list(commands), n=1):
         raise ValueError(f"{str(given)!r} is neither a command nor a file; did you mean {meant[0]!r}?")
+    own = given if given.suffix else given.with_suffix(".toml")
+    if "did you mean" in (why := why_unread(own, FileNotFoundError())):
+        raise ValueError(f"case = {str(given)!r}: {why}")
     names = sorted(path.stem for path in shipped.glob("*.toml"))
     below = sorted(path.stem for path in shipped.glob("*/*.toml"))
     if close := get_close_matches(given.name.removesuffix(".toml"), [*names, *below], n=_NEAR):

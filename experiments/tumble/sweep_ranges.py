@@ -111,7 +111,7 @@ def _check_key(key: str, text: str) -> None:
     effect, dot, name = key.partition(".")
     if not dot:
         if key not in SWEEPABLE:
-            known = f"{nearest(key, SWEEPABLE)}, or effect.parameter such as pendulum.length"
+            known = f"a parameter of an effect is accepted as pendulum.length is; {nearest(key, SWEEPABLE)}"
             raise ValueError(f"sweep = {text!r}: {key} is no number that can be swept; {known}")
         return
     if effect not in EFFECTS:

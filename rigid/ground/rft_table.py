@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from rigid.checks import why_unread
+
 from .rft import tractions
 
 __all__ = ["RFT_FORMAT", "Pieces", "RftTable", "box_pieces", "mesh_pieces", "read_rft", "round_pieces"]
@@ -225,7 +227,9 @@ def read_rft(path: str | Path) -> RftTable:
     try:
         return RftTable(**json.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+        raise ValueError(
+            f"{path}: cannot be read, rft.json of `hedgebed bed test plates` was expected: {why_unread(path, error)}"
+        ) from None
     except (json.JSONDecodeError, UnicodeDecodeError, TypeError) as error:
         raise ValueError(f"{path}: no JSON table of `hedgebed bed test plates`: {error}") from None
     except ValidationError as error:

@@ -127,8 +127,8 @@ class FrameWriter:
         shape (n, 3), and any of `GRAIN_FIELDS`; a vector field may be given as its magnitude, shape (n,). ``bodies``:
         Name -> (points [m], shape (n, 3), triangles, shape (m, 3)). ``values``: Scalars of this frame, such as depth
         [m] and force [N]. ``clouds``: Name -> (points [m], shape (n, 3), fields), a field of shape (n,) or (n, 3): what
-        glyphs are of. ``maps``: Name -> height map. ``own_moment``: Whether it takes the place of the last such frame: a
-        run has one beside those at even times. Returns the PVD file. Raises ValueError: a time before the last
+        glyphs are of. ``maps``: Name -> height map. ``own_moment``: Whether it takes the place of the last such frame.
+        A run has one beside those at even times. Returns the PVD file. Raises ValueError: a time before the last
         frame's, arrays of unequal length or wrong shape, values that are not finite, an unknown grain field.
         """
         time = float(time)
