@@ -69,7 +69,7 @@ def fault_words(error: Exception) -> str:
 
 def _like(error: UnknownOptionError, option: str) -> bool:
     """Whether an option is spelt so much like the unknown one that it may be meant."""
-    typed = (error.token.keyword if error.token else None) or ""
+    typed = (error.token.keyword or error.token.value) if error.token else ""
     return bool(get_close_matches(typed.strip("-"), [option.strip("-")]))
 
 

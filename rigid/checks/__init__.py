@@ -83,8 +83,9 @@ def alike(path: str | Path, *, folders: bool = False) -> str:
     """``; did you mean 'x'?`` for the file beside `path`, or the folder, that is spelt like it; empty where none is."""
     path = Path(path)
     there = path.parent.iterdir() if path.parent.is_dir() else ()
-    names = get_close_matches(path.name, [one.name for one in there if one.is_dir() == folders], n=1)
-    return f"; did you mean {str(path.with_name(names[0]))!r}?" if names else ""
+    stems = [one.stem for one in there if one.is_dir() == folders and one.suffix == path.suffix]
+    close = get_close_matches(path.stem, stems, n=1)
+    return f"; did you mean {str(path.with_name(close[0] + path.suffix))!r}?" if close else ""
 
 
 def why_unread(path: str | Path, error: OSError) -> str:
